@@ -1,0 +1,309 @@
+"""Modes: the one description of a structure that every later stage works on, whatever computed it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from . import _check
+
+
+class Shapes(Protocol):
+    """Where mode shapes are evaluated: an FE solution, a closed formula or measured points (none inherits this)."""
+
+    @property
+    def dimension(self) -> int:
+        """Coordinates of a point: 2 on a plate, 1 on a beam, 0 for a rigid mass."""
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Mass-normalised shapes (n_points, n_modes) [kg**-0.5] at points (n_points, dimension) [m]."""
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        """Whether each point lies on the body, (n_points,) bool."""
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        """Static compliance (n_points, n_points) [m/N] of the complete body; inertia relief if free."""
+
+    def take(self, n_modes: int) -> "Shapes":
+        """The same body with only its first modes."""
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points (n_points, dimension) [m] and cells (n_cells, dimension + 1) that draw the body."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScaledShapes:
+    """The shapes of a body of the same form but other mass and stiffness (see `Modes.scaled`)."""
+
+    base: Shapes
+    amplitude: float  # [-] new shape over old
+    frequency: float  # [-] new frequency over old
+
+    @property
+    def dimension(self) -> int:
+        return self.base.dimension
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        return self.amplitude * self.base.at(points)
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self.base.contains(points)
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        return (self.amplitude / self.frequency) ** 2 * self.base.compliance(points)
+
+    def take(self, n_modes: int) -> "ScaledShapes":
+        return replace(self, base=self.base.take(n_modes))
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.base.grid()
+
+
+@dataclass(frozen=True, eq=False)
+class RigidShapes:
+    """A rigid mass that can only translate: one mode of frequency zero, the same everywhere."""
+
+    mass: float  # [kg]
+    n_modes: int = 1
+    dimension: int = 0
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        return np.full((len(points), self.n_modes), self.mass**-0.5)
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.ones(len(points), bool)
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros((len(points), len(points)))
+
+    def take(self, n_modes: int) -> "RigidShapes":
+        return replace(self, n_modes=n_modes)
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros((1, 0)), np.zeros((1, 1), int)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledShapes:
+    """Shapes known at points only, as from a modal test; a strike happens at one of the points."""
+
+    points: np.ndarray  # (n_points, dimension) [m]
+    values: np.ndarray  # (n_points, n_modes) [kg**-0.5]
+    static: np.ndarray  # (n_points, n_points) [m/N] static compliance of the complete body
+
+    def __post_init__(self) -> None:
+        _check.lock_arrays(self)
+
+    @property
+    def dimension(self) -> int:
+        return self.points.shape[1]
+
+    def _index(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        distance = np.linalg.norm(points[:, None] - self.points[None], axis=2)  # (n, n_points)
+        index = distance.argmin(axis=1)
+        span = float(np.ptp(self.points, axis=0).max(initial=0.0))
+        return index, distance[np.arange(len(points)), index] <= 1e-6 * (span or 1.0)
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        return self.values[self._index(points)[0]]
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self._index(points)[1]
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        index = self._index(points)[0]
+        return self.static[np.ix_(index, index)]
+
+    def take(self, n_modes: int) -> "SampledShapes":
+        return replace(self, values=self.values[:, :n_modes].copy())
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.points, np.arange(len(self.points))[:, None]
+
+
+Damping = float | np.ndarray | Callable[[np.ndarray], Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Undamped eigenmodes of one body, mass-normalised, in ascending order, each with its damping ratio.
+
+    They stand for the whole body: `shapes.compliance` knows what the modes left out would give statically.
+    Rigid motions are modes of frequency zero.
+    """
+
+    omega: np.ndarray  # (n_modes,) [rad/s]
+    damping_ratio: np.ndarray  # (n_modes,) [-] of critical; 1 and more is overdamped
+    shapes: Shapes
+    mass: float  # [kg] of the whole body
+    frequency_error: np.ndarray | None = None  # (n_modes,) [-] estimated relative error of each frequency
+    bounds: np.ndarray | None = None  # (n_modes, 2) [Hz] guaranteed lower and upper bound of each frequency
+
+    def __post_init__(self) -> None:
+        omega = _check.ascending("omega", self.omega, "rad/s")
+        damping = _check.array("damping_ratio", self.damping_ratio, omega.shape)
+        if (damping < 0.0).any():
+            raise ValueError(f"damping_ratio must not be negative, got {damping.min():g}")
+        object.__setattr__(self, "omega", omega)
+        object.__setattr__(self, "damping_ratio", damping)
+        _check.positive("mass", self.mass, "kg")
+        _check.lock_arrays(self)
+
+    @classmethod
+    def rigid(cls, mass: float) -> "Modes":
+        """A rigid mass [kg] free to translate: one mode of frequency zero."""
+        mass = _check.positive("mass", mass, "kg")
+        return cls(np.zeros(1), np.zeros(1), RigidShapes(mass), mass)
+
+    @classmethod
+    def from_arrays(cls, frequencies, shapes, *, points, mass, damping_ratio=0.0, compliance=None) -> "Modes":
+        """Modes known at points, as from a modal test.
+
+        Parameters
+        ----------
+        frequencies : array_like, shape (n_modes,) [Hz], ascending; 0 for rigid motions
+        shapes : array_like, shape (n_points, n_modes) [kg**-0.5], mass-normalised
+        points : array_like, shape (n_points, dimension) [m]
+        mass : float [kg] of the whole body
+        damping_ratio : float, array (n_modes,) or function of frequency [Hz]
+        compliance : array_like, shape (n_points, n_points) [m/N], optional
+            Static compliance of the complete body; without it the modes given are all there is.
+
+        Raises
+        ------
+        ValueError
+            Where lengths disagree, a number is not finite or frequencies do not ascend.
+        """
+        omega = 2.0 * np.pi * _check.ascending("frequencies", frequencies, "Hz")
+        points = _check.array("points", points, (None, None), "m")
+        values = _check.array("shapes", shapes, (len(points), len(omega)), "kg**-0.5")
+        if compliance is None:
+            flexible = omega > 0.0
+            scaled = values[:, flexible] / omega[flexible]
+            static = scaled @ scaled.T
+        else:
+            static = _check.array("compliance", compliance, (len(points), len(points)), "m/N")
+        damping = damping_ratios(damping_ratio, omega)
+        return cls(omega, damping, SampledShapes(points, values, static), _check.positive("mass", mass, "kg"))
+
+    @property
+    def n_modes(self) -> int:
+        return len(self.omega)
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """Natural frequencies, (n_modes,) [Hz]."""
+        return self.omega / (2.0 * np.pi)
+
+    @property
+    def n_rigid(self) -> int:
+        """Number of rigid motions (modes of frequency zero)."""
+        return int(np.count_nonzero(self.omega == 0.0))
+
+    @property
+    def dimension(self) -> int:
+        """Coordinates of a point on the body: 2 on a plate, 1 on a beam, 0 for a rigid mass."""
+        return self.shapes.dimension
+
+    def points(self, name: str, points: Any) -> np.ndarray:
+        """Return points as (n_points, dimension) [m]; raise ValueError where one is not on the body."""
+        if self.dimension == 0:
+            return np.zeros((1, 0)) if points is None else np.zeros((max(1, np.atleast_2d(points).shape[0]), 0))
+        try:
+            raw = np.array(points, dtype=float)
+        except (TypeError, ValueError):
+            raise ValueError(f"{name} must be coordinates in m, got {points!r:.80}") from None
+        if self.dimension == 1 and (raw.ndim < 2 or raw.shape[-1] != 1):
+            raw = raw.reshape(-1, 1)
+        array = _check.array(name, np.atleast_2d(raw), (None, self.dimension), "m")
+        inside = self.shapes.contains(array)
+        if not inside.all():
+            lost = ", ".join(f"{x:g}" for x in array[~inside][0])
+            corner = self.shapes.grid()[0]
+            low, high = corner.min(axis=0), corner.max(axis=0)
+            extent = " x ".join(f"[{a:g}, {b:g}]" for a, b in zip(low, high))
+            raise ValueError(f"{name} must lie on the body, got ({lost}) m; the body extends over {extent} m")
+        return array
+
+    def shape_at(self, points: Any) -> np.ndarray:
+        """Mass-normalised shapes at points on the body, (n_points, n_modes) [kg**-0.5]."""
+        return self.shapes.at(self.points("points", points))
+
+    def modal_compliance(self, points: Any) -> np.ndarray:
+        """Static compliance carried by the kept modes between points, (n_points, n_points) [m/N]."""
+        flexible = self.omega > 0.0
+        scaled = self.shape_at(points)[:, flexible] / self.omega[flexible]
+        return scaled @ scaled.T
+
+    def residual_compliance(self, points: Any) -> np.ndarray:
+        """Static compliance of everything the kept modes leave out, (n_points, n_points) [m/N]."""
+        return self.shapes.compliance(self.points("points", points)) - self.modal_compliance(points)
+
+    def scaled(self, *, mass: float | None = None, first_frequency: float | None = None) -> "Modes":
+        """The same form with another mass [kg] and lowest flexible frequency [Hz]; points stay where they are."""
+        mass = self.mass if mass is None else _check.positive("mass", mass, "kg")
+        ratio = 1.0
+        if first_frequency is not None:
+            flexible = self.frequencies[self.omega > 0.0]
+            if not flexible.size:
+                raise ValueError("first_frequency needs a flexible mode; these modes are rigid")
+            ratio = _check.positive("first_frequency", first_frequency, "Hz") / flexible[0]
+        shapes = ScaledShapes(self.shapes, float((self.mass / mass) ** 0.5), float(ratio))
+        bounds = None if self.bounds is None else self.bounds * ratio
+        return replace(self, omega=self.omega * ratio, shapes=shapes, mass=mass, bounds=bounds)
+
+    def truncated(self, *, max_frequency: float | None = None, n_modes: int | None = None) -> "Modes":
+        """The lowest modes only, up to a frequency [Hz] or a number; the residual compliance takes over the rest."""
+        keep = self.n_modes
+        if max_frequency is not None:
+            limit = _check.non_negative("max_frequency", max_frequency, "Hz")
+            keep = int(np.searchsorted(self.frequencies, limit, side="right"))
+        if n_modes is not None:
+            keep = min(keep, _check.count("n_modes", n_modes))
+        if keep == 0:
+            raise ValueError(f"max_frequency must reach the first mode at {self.frequencies[0]:g} Hz")
+        return replace(
+            self,
+            omega=self.omega[:keep],
+            damping_ratio=self.damping_ratio[:keep],
+            shapes=self.shapes.take(keep),
+            frequency_error=None if self.frequency_error is None else self.frequency_error[:keep].copy(),
+            bounds=None if self.bounds is None else self.bounds[:keep].copy(),
+        )
+
+    def damped(self, damping_ratio: Damping) -> "Modes":
+        """The same modes with other damping ratios: a number, an array (n_modes,) or a function of frequency [Hz]."""
+        return replace(self, damping_ratio=damping_ratios(damping_ratio, self.omega))
+
+
+def damping_ratios(damping_ratio: Any, omega: np.ndarray) -> np.ndarray:
+    """Return the damping ratio of each mode, (n_modes,) [-]; rigid modes get zero.
+
+    ``damping_ratio`` is a number, an array (n_modes,) or a function of frequency [Hz] (called with flexible ones only).
+    """
+    result = np.zeros(len(omega))
+    flexible = omega > 0.0
+    if callable(damping_ratio):
+        values = np.broadcast_to(damping_ratio(omega[flexible] / (2.0 * np.pi)), (int(flexible.sum()),))
+        result[flexible] = _check.array("damping_ratio", values, (int(flexible.sum()),))
+    elif np.ndim(damping_ratio) == 0:
+        result[flexible] = _check.non_negative("damping_ratio", damping_ratio)
+    else:
+        result = _check.array("damping_ratio", damping_ratio, omega.shape)
+        result[~flexible] = 0.0
+    if (result < 0.0).any():
+        raise ValueError(f"damping_ratio must not be negative, got {result.min():g}")
+    return result
+
+
+def rayleigh(mass_factor: float, stiffness_factor: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Rayleigh damping C = mass_factor M + stiffness_factor K ([1/s], [s]) as a damping ratio over frequency [Hz]."""
+    mass_factor = _check.non_negative("mass_factor", mass_factor, "1/s")
+    stiffness_factor = _check.non_negative("stiffness_factor", stiffness_factor, "s")
+
+    def ratio(frequency: np.ndarray) -> np.ndarray:
+        omega = 2.0 * np.pi * np.asarray(frequency, float)
+        return 0.5 * (mass_factor / omega + stiffness_factor * omega)
+
+    return ratio

@@ -1,0 +1,46 @@
+"""The import order is part of the design: a module may import from lower floors only."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "fem_impact"
+FLOORS = [
+    {"_check", "_kernels"},
+    {"mesh", "section", "contact"},
+    {"assembly"},
+    {"modal"},
+    {"analytic"},
+    {"striker", "response", "spectra"},
+    {"accuracy", "threshold", "export", "figures", "sound"},
+    {"integrator"},
+    {"scene"},
+    {"report", "sweep"},
+    {"cli"},
+]
+FLOOR = {name: level for level, names in enumerate(FLOORS) for name in names}
+OWNERS = {"numba": {"_kernels"}, "skfem": {"mesh", "assembly"}, "matplotlib": {"figures"}}
+
+
+def imports(path):
+    """Return (own modules, outside packages) imported anywhere in a file, as two sets of names."""
+    own, outside = set(), set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            own |= {node.module.split(".")[0]} if node.module else {a.name for a in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            outside.add(node.module.split(".")[0])
+        elif isinstance(node, ast.Import):
+            outside |= {a.name.split(".")[0] for a in node.names}
+    return own, outside
+
+
+@pytest.mark.parametrize("module", sorted(p.stem for p in PACKAGE.glob("*.py") if p.stem != "__init__"))
+def test_module_imports_lower_floors_only(module):
+    own, outside = imports(PACKAGE / f"{module}.py")
+    assert module in FLOOR, f"{module}.py has no floor: add it to FLOORS or fold it into a module"
+    sideways = {name for name in own if FLOOR[name] >= FLOOR[module]}
+    assert not sideways, f"{module}.py imports {sorted(sideways)} from its own floor or above"
+    trespass = {pkg for pkg in outside if module not in OWNERS.get(pkg, {module})}
+    assert not trespass, f"{module}.py imports {sorted(trespass)}, which belongs to other modules"
