@@ -1,0 +1,616 @@
+"""Modes from closed formulas, of the same type as FE modes, so that each checks the other."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy import optimize, special
+
+from . import _check
+from .modal import Damping, Modes, damping_ratios
+
+LEVY_TERMS = 4000  # [-] sum over sines across a hinged plate: with its tail corrected, 1e-11 of the compliance
+DISK_TERMS = 100_000  # [-] cap for points at the very edge of a disk, where terms fall as n**-3 only: 5e-11
+ENDS = ("clamped", "hinged", "free")
+
+
+def _finished(
+    shapes: Any,
+    values: np.ndarray,
+    mass: float | None,
+    first_frequency: float | None,
+    physical: tuple[float, float] | None,
+    damping_ratio: Damping,
+) -> Modes:
+    """Modes of unit mass and rigidity from values = omega**2, brought to a section or to mass and first frequency."""
+    if physical is not None and mass is None and first_frequency is None:
+        mass, factor = physical
+    elif physical is None and mass is not None and first_frequency is not None:
+        mass = _check.positive("mass", mass, "kg")
+        first = _check.positive("first_frequency", first_frequency, "Hz")
+        factor = 2.0 * np.pi * first / np.sqrt(values[values > 0.0][0])
+    else:
+        raise ValueError("give either section, or both mass [kg] and first_frequency [Hz]")
+    omega = np.sqrt(values)
+    unit = Modes(omega, np.zeros(len(omega)), shapes, mass=1.0)
+    scaled = unit.scaled(mass=mass, first_frequency=factor * unit.frequencies[omega > 0.0][0])
+    return scaled.damped(damping_ratios(damping_ratio, scaled.omega))
+
+
+def _enough(n_modes: int | None, max_frequency: float | None, per_unit: Callable[[float], float]) -> tuple[int, float]:
+    """The number of modes wanted (or no limit) and the unit omega they must reach (or no limit)."""
+    if (n_modes is None) == (max_frequency is None):
+        raise ValueError("give either n_modes or max_frequency [Hz]")
+    if n_modes is not None:
+        return _check.count("n_modes", n_modes), np.inf
+    return 10**9, per_unit(_check.positive("max_frequency", max_frequency, "Hz"))
+
+
+def _unit_omega(physical: tuple[float, float] | None, first_frequency: float | None, first: float) -> Callable:
+    """Function from a frequency [Hz] to omega of the body with unit mass and rigidity, its first omega given."""
+
+    def convert(frequency: float) -> float:
+        if physical is not None:
+            return 2.0 * np.pi * frequency / physical[1]
+        return frequency / _check.positive("first_frequency", first_frequency, "Hz") * first
+
+    return convert
+
+
+# ---- hinged rectangle
+
+
+@dataclass(frozen=True, eq=False)
+class RectangleShapes:
+    """Sine shapes of a hinged rectangle of unit mass and rigidity, its corner at the origin."""
+
+    length: float  # [m]
+    width: float  # [m]
+    numbers: np.ndarray  # (n_modes, 2) half waves along length and width
+    dimension: int = 2
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        phase = np.pi * points / (self.length, self.width)  # (n_points, 2)
+        return (
+            2.0 * np.sin(np.outer(phase[:, 0], self.numbers[:, 0])) * np.sin(np.outer(phase[:, 1], self.numbers[:, 1]))
+        )
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        slack = 1e-9 * max(self.length, self.width)
+        return np.all((points >= -slack) & (points <= np.array([self.length, self.width]) + slack), axis=1)
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        """Levy's series: sines along the length, the exact Green's function across."""
+        result = np.empty((len(points), len(points)))
+        for i, load in enumerate(points):
+            for j, place in enumerate(points[: i + 1]):
+                result[i, j] = result[j, i] = self._green(place, load)
+        return result
+
+    def _green(self, place: np.ndarray, load: np.ndarray) -> float:
+        m = np.arange(1, LEVY_TERMS + 1)
+        beta = m * np.pi / self.length
+        low, high = min(place[1], load[1]), self.width - max(place[1], load[1])
+        gap = self.width - low - high
+
+        def cothx(x):  # x coth(x beta) is 1 / beta at x = 0
+            return np.where(x * beta > 1e-8, x / np.tanh(np.maximum(x * beta, 1e-8)), 1.0 / beta)
+
+        decay = np.exp(-beta * gap) * -np.expm1(-2 * beta * low) * -np.expm1(-2 * beta * high)
+        second = decay / (2.0 * beta * -np.expm1(-2 * beta * self.width))  # of -d2/dy2 + beta2
+        fourth = second / (2.0 * beta) * (1.0 / beta + cothx(self.width) - cothx(low) - cothx(high))
+        sines = np.sin(beta * place[0]) * np.sin(beta * load[0])
+        total = float(sines @ fourth)
+        if gap < 1e-12 * self.width and abs(place[0] - load[0]) < 1e-12 * self.length and min(low, high) > 0.0:
+            total += (
+                0.5 * (self.length / np.pi) ** 3 / 4.0 / (2.0 * LEVY_TERMS * (LEVY_TERMS + 1.0))
+            )  # mean sin**2 = 1/2
+        return 2.0 / self.length * total
+
+    def take(self, n_modes: int) -> "RectangleShapes":
+        return replace(self, numbers=self.numbers[:n_modes])
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        n = (48, 32)
+        x, y = np.meshgrid(np.linspace(0, self.length, n[0] + 1), np.linspace(0, self.width, n[1] + 1), indexing="ij")
+        node = np.arange(x.size).reshape(x.shape)
+        a, b, c, d = node[:-1, :-1].ravel(), node[1:, :-1].ravel(), node[1:, 1:].ravel(), node[:-1, 1:].ravel()
+        return np.column_stack([x.ravel(), y.ravel()]), np.vstack([np.c_[a, b, c], np.c_[a, c, d]])
+
+
+def rectangle(
+    length: float,
+    width: float,
+    *,
+    mass: float | None = None,
+    first_frequency: float | None = None,
+    section: Any = None,
+    n_modes: int | None = None,
+    max_frequency: float | None = None,
+    damping_ratio: Damping = 0.0,
+) -> Modes:
+    """Modes of a hinged (simply supported) rectangular Kirchhoff plate with corners (0, 0) and (length, width) [m].
+
+    Parameters
+    ----------
+    length, width : float [m]
+    mass, first_frequency : float [kg], [Hz]; or instead
+    section : Plate, isotropic and of constant thickness
+    n_modes : int, or max_frequency : float [Hz]
+    damping_ratio : float, array (n_modes,) or function of frequency [Hz]
+
+    Returns
+    -------
+    Modes, their frequencies exact to rounding
+
+    Raises
+    ------
+    ValueError
+        Where a size is not positive, or not exactly one of each alternative is given.
+
+    References
+    ----------
+    Leissa (1969), Vibration of plates, NASA SP-160, eq. 4.20; Timoshenko and Woinowsky-Krieger, art. 35 (static sum).
+    """
+    length, width = _check.positive("length", length, "m"), _check.positive("width", width, "m")
+    physical = _plate_scale(section, length * width)
+    # With unit mass and unit D the areal density is 1 / area, so omega = wavenumber**2 * sqrt(area).
+    root_area = np.sqrt(length * width)
+
+    def omega(m, n):
+        return np.pi**2 * ((m / length) ** 2 + (n / width) ** 2) * root_area
+
+    count, reach = _enough(n_modes, max_frequency, _unit_omega(physical, first_frequency, float(omega(1, 1))))
+    if not np.isfinite(reach):  # Weyl's count with its edge term, rounded up until enough are found
+        reach = 4.0 * np.pi * (count + 2.0) / root_area
+        while _lattice(length, width, reach / root_area)[0].size < count:
+            reach *= 1.3
+    m, n = _lattice(length, width, reach / root_area)
+    order = np.lexsort((n, m, omega(m, n)))[:count]
+    if not order.size:
+        raise ValueError(f"max_frequency must reach the first mode, got {max_frequency:g} Hz")
+    numbers = np.column_stack([m[order], n[order]])
+    values = omega(*numbers.T) ** 2
+    return _finished(RectangleShapes(length, width, numbers), values, mass, first_frequency, physical, damping_ratio)
+
+
+def _lattice(length: float, width: float, wavenumber_squared: float) -> tuple[np.ndarray, np.ndarray]:
+    """Half-wave numbers (m, n) with pi**2 (m**2 / length**2 + n**2 / width**2) up to a limit, rounding included."""
+    limit = wavenumber_squared * (1.0 + 1e-12)
+    m = np.arange(1, int(length * np.sqrt(limit) / np.pi) + 2)
+    n = np.arange(1, int(width * np.sqrt(limit) / np.pi) + 2)
+    m, n = (grid.ravel() for grid in np.meshgrid(m, n, indexing="ij"))
+    keep = np.pi**2 * ((m / length) ** 2 + (n / width) ** 2) <= limit
+    return m[keep], n[keep]
+
+
+def _plate_scale(section: Any, area: float) -> tuple[float, float] | None:
+    """Mass [kg] and the factor from omega of unit mass and rigidity to omega of the section."""
+    if section is None:
+        return None
+    material, thickness = section.material, section.thickness
+    if callable(thickness) or getattr(material, "nu", None) is None:
+        raise ValueError("section must be isotropic and of constant thickness for a closed formula")
+    mass = material.rho * thickness * area
+    rigidity = material.E * thickness**3 / (12.0 * (1.0 - material.nu**2))
+    return mass, float(np.sqrt(rigidity / mass))
+
+
+# ---- beams
+
+
+def _beam_roots(ends: tuple[str, str], n: int) -> np.ndarray:
+    """The first n flexible roots kL, from cos kL = +-1/cosh kL, tan kL = tanh kL or sin kL = 0."""
+    i = np.arange(1, n + 1)
+    pair = frozenset(ends)
+    if pair == {"hinged"}:
+        return i * np.pi
+    if pair in ({"clamped", "hinged"}, {"hinged", "free"}):
+        root = (i + 0.25) * np.pi
+        for _ in range(4):  # Newton on sin - cos tanh, whose slope is about sqrt(2)
+            root = root - (np.sin(root) - np.cos(root) * np.tanh(root)) / (np.cos(root) + np.sin(root) * np.tanh(root))
+        return root
+    sign = -1.0 if len(pair) == 2 else 1.0  # clamped-free against clamped-clamped and free-free
+    root = (i + 0.5 * sign) * np.pi
+    for _ in range(6):
+        sech = 1.0 / np.cosh(np.minimum(root, 700.0))
+        root = root - (np.cos(root) - sign * sech) / (-np.sin(root) + sign * sech * np.tanh(root))
+    return root
+
+
+@dataclass(frozen=True, eq=False)
+class BeamShapes:
+    """Shapes of a uniform Euler-Bernoulli beam of unit mass, length and rigidity over x / length in 0 ... 1.
+
+    A flexible shape is A cos kx + B sin kx + C exp(-kx) + D exp(k (x - 1)): bounded terms, so that mode 1000 keeps
+    its digits where cosh and sinh would cancel.
+    """
+
+    length: float  # [m]
+    ends: tuple[str, str]
+    k: np.ndarray  # (n_modes,) wavenumber times length; 0 for rigid motions
+    weights: np.ndarray  # (n_modes, 4)
+    dimension: int = 1
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        x = points[:, :1] / self.length  # (n_points, 1)
+        flexible = self.k > 0.0
+        k, (a, b, c, d) = self.k[flexible], self.weights[flexible].T
+        values = np.empty((len(points), len(self.k)))
+        values[:, flexible] = a * np.cos(k * x) + b * np.sin(k * x) + c * np.exp(-k * x) + d * np.exp(k * (x - 1.0))
+        values[:, ~flexible] = self.weights[~flexible, 0] + x * self.weights[~flexible, 1]
+        return values
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.all((points >= -1e-9 * self.length) & (points <= (1 + 1e-9) * self.length), axis=1)
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        """|x - load|**3 / 12 plus the polynomial that meets the ends; inertia relief where the beam can move."""
+        x = points[:, 0] / self.length
+        rigid = _beam_rigid(self.ends)
+        result = np.column_stack([_beam_green(self.ends, rigid, load)(x) for load in x])
+        return 0.5 * (result + result.T)
+
+    def take(self, n_modes: int) -> "BeamShapes":
+        return replace(self, k=self.k[:n_modes], weights=self.weights[:n_modes])
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        node = np.arange(129)
+        return self.length * node[:, None] / 128.0, np.column_stack([node[:-1], node[1:]])
+
+
+def _beam_rigid(ends: tuple[str, str]) -> np.ndarray:
+    """Rigid shapes c0 + c1 x of a beam of unit mass and length, (n_rigid, 2)."""
+    if ends == ("free", "free"):
+        return np.array([[1.0, 0.0], [-np.sqrt(3.0), np.sqrt(12.0)]])
+    if ends == ("hinged", "free"):
+        return np.array([[0.0, np.sqrt(3.0)]])
+    if ends == ("free", "hinged"):
+        return np.array([[np.sqrt(3.0), -np.sqrt(3.0)]])
+    return np.zeros((0, 2))
+
+
+def _beam_green(ends: tuple[str, str], rigid: np.ndarray, load: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Deflection of the unit beam under a unit force at ``load`` in 0 ... 1, without its rigid motion."""
+    carried = -rigid.T @ (rigid @ [1.0, load])  # distributed inertia force c0 + c1 x that balances the unit force
+    powers = np.array([0.0, 0.0, 0.0, 0.0, carried[0] / 24.0, carried[1] / 120.0])
+    poly = np.polynomial.Polynomial
+    orders = {"clamped": (0, 1), "hinged": (0, 2), "free": (2, 3)}
+    rows, right = [], []
+    for place, end in zip((0.0, 1.0), ends):
+        for order in orders[end]:
+            rows.append(
+                [poly(np.eye(4)[i]).deriv(order)(place) if order else poly(np.eye(4)[i])(place) for i in range(4)]
+            )
+            kink = poly([0, 0, 0, 1 / 12]).deriv(order)(abs(place - load)) if order else abs(place - load) ** 3 / 12
+            sign = np.sign(place - load) if order % 2 else 1.0
+            if order == 3 and place == load:
+                sign = 2.0 * place - 1.0  # the force stands just inside the end
+            smooth = poly(powers).deriv(order)(place) if order else poly(powers)(place)
+            right.append(-(sign * kink + smooth))
+    powers[:4] = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
+
+    def bare(x):
+        return poly(powers)(x) + np.abs(x - load) ** 3 / 12.0
+
+    node, weight = np.polynomial.legendre.leggauss(6)  # exact to degree 11 on either side of the force
+    x = np.concatenate([0.5 * load * (node + 1.0), load + 0.5 * (1.0 - load) * (node + 1.0)])
+    w = np.concatenate([0.5 * load * weight, 0.5 * (1.0 - load) * weight])
+    share = (rigid @ np.vstack([np.ones_like(x), x])) @ (w * bare(x))  # (n_rigid,)
+    return lambda x: bare(x) - (share @ rigid) @ np.vstack([np.ones_like(x), x])
+
+
+def beam(
+    length: float,
+    *,
+    ends: tuple[str, str] = ("hinged", "free"),
+    mass: float | None = None,
+    first_frequency: float | None = None,
+    section: Any = None,
+    n_modes: int | None = None,
+    max_frequency: float | None = None,
+    damping_ratio: Damping = 0.0,
+) -> Modes:
+    """Modes of a uniform Euler-Bernoulli beam from x = 0 to x = length [m], rigid motions included.
+
+    Parameters
+    ----------
+    length : float [m]
+    ends : two of "clamped", "hinged", "free", for x = 0 and x = length
+    mass, first_frequency : float [kg], [Hz] of the lowest bending mode; or instead
+    section : Beam of constant section
+    n_modes : int (rigid motions count), or max_frequency : float [Hz]
+    damping_ratio : float, array (n_modes,) or function of frequency [Hz]
+
+    Returns
+    -------
+    Modes, their frequencies exact to rounding; at a free end the squared shape is 4 / mass for every bending mode
+
+    Raises
+    ------
+    ValueError
+        Where a size is not positive, an end is unknown, or not exactly one of each alternative is given.
+
+    References
+    ----------
+    Bishop and Johnson (1960), The mechanics of vibration, ch. 7.
+    """
+    length = _check.positive("length", length, "m")
+    if isinstance(ends, str) or len(ends) != 2:
+        raise ValueError(f"ends must be two words, one for each end, got {ends!r}")
+    pair = (_check.one_of("ends", ends[0], ENDS), _check.one_of("ends", ends[1], ENDS))
+    rigid = _beam_rigid(pair)
+    physical = _beam_scale(section, length)
+    first = float(_beam_roots(pair, 1)[0] ** 2)
+    count, reach = _enough(n_modes, max_frequency, _unit_omega(physical, first_frequency, first))
+    if np.isfinite(reach):
+        count = len(rigid) + int(np.count_nonzero(_beam_roots(pair, int(np.sqrt(reach) / np.pi) + 2) ** 2 <= reach))
+    if count <= len(rigid):
+        raise ValueError(f"n_modes must exceed the {len(rigid)} rigid motions (max_frequency reach a flexible mode)")
+    k = _beam_roots(pair, count - len(rigid))
+    shapes = BeamShapes(
+        length,
+        pair,
+        np.concatenate([np.zeros(len(rigid)), k]),
+        np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), _beam_weights(pair, k)]),
+    )
+    values = np.concatenate([np.zeros(len(rigid)), k**4])
+    return _finished(shapes, values, mass, first_frequency, physical, damping_ratio)
+
+
+def _beam_weights(ends: tuple[str, str], k: np.ndarray) -> np.ndarray:
+    """Weights of cos, sin and the two exponentials for unit mass, (n, 4): null vectors of the end conditions."""
+    far = np.exp(-k)
+    one, nought = np.ones_like(k), np.zeros_like(k)
+    c, s = np.cos(k), np.sin(k)
+    left = [  # derivatives 0 to 3 over k**order, at x = 0
+        [one, nought, one, far],
+        [nought, one, -one, far],
+        [-one, nought, one, far],
+        [nought, -one, -one, far],
+    ]
+    right = [[c, s, far, one], [-s, c, -far, one], [-c, -s, far, one], [s, -c, -far, one]]
+    orders = {"clamped": (0, 1), "hinged": (0, 2), "free": (2, 3)}
+    rows = [left[i] for i in orders[ends[0]]] + [right[i] for i in orders[ends[1]]]
+    matrix = np.moveaxis(np.array(rows), 2, 0)  # (n, 4, 4)
+    weights = np.linalg.svd(matrix)[2][:, 3, :]
+    value, slope, curve, shear = (np.einsum("in,ni->n", np.array(r), weights) for r in right)
+    norm = 0.25 * (value**2 - 2.0 * slope * shear + curve**2)  # Rayleigh's identity for the integral of the square
+    weights = weights / np.sqrt(norm)[:, None]
+    start = np.einsum("in,ni->n", np.array(left[0]), weights)
+    turn = np.einsum("in,ni->n", np.array(left[1]), weights)
+    clear = np.where(np.abs(start) > 1e-6, start, np.where(np.abs(turn) > 1e-6, turn, weights[:, 0]))
+    return weights * np.where(clear < 0.0, -1.0, 1.0)[:, None]
+
+
+def _beam_scale(section: Any, length: float) -> tuple[float, float] | None:
+    if section is None:
+        return None
+    area, inertia = section.area, section.inertia
+    if callable(area) or callable(inertia):
+        raise ValueError("section must be constant along the beam for a closed formula")
+    mass = section.material.rho * area * length
+    return mass, float(np.sqrt(section.material.E * inertia / (mass * length**3)))
+
+
+# ---- disks
+
+
+def _bessel(n: int, z: Any) -> tuple[Any, ...]:
+    """J, J', I exp(-z), I' exp(-z) of order n at z."""
+    j, dj = special.jv(n, z), special.jvp(n, z)
+    i = special.ive(n, z)
+    di = 0.5 * (special.ive(n - 1, z) + special.ive(n + 1, z))
+    return j, dj, i, di
+
+
+def _disk_rows(edge: str, nu: float, n: int, z: Any) -> tuple[Any, ...]:
+    """The two edge conditions on J and on I exp(-z): (first_j, first_i, second_j, second_i)."""
+    j, dj, i, di = _bessel(n, z)
+    moment_j = -(1 - nu) * z * dj + ((1 - nu) * n**2 - z**2) * j
+    moment_i = -(1 - nu) * z * di + ((1 - nu) * n**2 + z**2) * i
+    if edge == "clamped":
+        return j, i, dj, di
+    if edge == "hinged":
+        return j, i, moment_j / z**2, moment_i / z**2
+    shear_j = -(z**3) * dj - (1 - nu) * n**2 * (z * dj - j)
+    shear_i = z**3 * di - (1 - nu) * n**2 * (z * di - i)
+    return moment_j / z**2, moment_i / z**2, shear_j / z**3, shear_i / z**3
+
+
+def _disk_roots(edge: str, nu: float, reach: float) -> list[tuple[float, int, float]]:
+    """All (z, n, weight of I exp(-z)) with z = k radius up to reach; shape J(z r) + weight I(z r) exp(-z)."""
+    found = []
+    for n in range(int(reach) + 3):
+
+        def determinant(z, n=n):
+            a, b, c, d = _disk_rows(edge, nu, n, z)
+            return a * d - b * c
+
+        # Roots of one order lie about pi apart; below z = n / 2 none exists and J underflows.
+        scan = np.linspace(max(0.3, 0.5 * n), reach, max(16, int(8 * reach)))
+        values = determinant(scan)
+        for i in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0):
+            z = optimize.brentq(determinant, scan[i], scan[i + 1], xtol=1e-14, rtol=8.9e-16)
+            a, b, c, d = _disk_rows(edge, nu, n, z)
+            found.append((z, n, float(-a / b if abs(b) > abs(d) else -c / d)))
+    return sorted(found)
+
+
+@dataclass(frozen=True, eq=False)
+class DiskShapes:
+    """Bessel shapes of a disk of unit mass and rigidity, its centre at the origin; unit radius inside."""
+
+    radius: float  # [m]
+    edge: str
+    nu: float
+    z: np.ndarray  # (n_modes,) wavenumber times radius; 0 for rigid motions
+    order: np.ndarray  # (n_modes,) nodal diameters
+    weight: np.ndarray  # (n_modes,) of I exp(-z) beside J
+    phase: np.ndarray  # (n_modes,) 0 for cos, pi/2 for sin
+    scale: np.ndarray  # (n_modes,)
+    dimension: int = 2
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        r = np.hypot(points[:, 0], points[:, 1])[:, None] / self.radius
+        angle = np.arctan2(points[:, 1], points[:, 0])[:, None]
+        z, n = self.z, self.order
+        growth = np.exp(z * (r - 1.0))
+        radial = special.jv(n, z * r) + self.weight * special.ive(n, z * r) * growth
+        radial = np.where(z == 0.0, np.where(n == 0, 1.0, r), radial)
+        return self.scale * radial * np.cos(n * angle - self.phase)
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.hypot(points[:, 0], points[:, 1]) <= (1 + 1e-9) * self.radius
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        x = points / self.radius
+        result = np.empty((len(x), len(x)))
+        for i, load in enumerate(x):
+            for j, place in enumerate(x[: i + 1]):
+                result[i, j] = result[j, i] = _disk_green(self.edge, self.nu, place, load)
+        return result
+
+    def take(self, n_modes: int) -> "DiskShapes":
+        kept = {name: getattr(self, name)[:n_modes] for name in ("z", "order", "weight", "phase", "scale")}
+        return replace(self, **kept)
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        rings, spokes = 20, 72
+        r = np.repeat(np.arange(1, rings + 1) / rings, spokes) * self.radius
+        angle = np.tile(2 * np.pi * np.arange(spokes) / spokes, rings)
+        points = np.vstack([np.zeros((1, 2)), np.column_stack([r * np.cos(angle), r * np.sin(angle)])])
+        here = np.arange(spokes)
+        there = (here + 1) % spokes
+        cells = [np.column_stack([np.zeros(spokes, int), 1 + here, 1 + there])]
+        for ring in range(rings - 1):
+            a, b = 1 + ring * spokes + here, 1 + ring * spokes + there
+            cells += [np.column_stack([a, a + spokes, b + spokes]), np.column_stack([a, b + spokes, b])]
+        return points, np.vstack(cells)
+
+
+def _disk_green(edge: str, nu: float, place: np.ndarray, load: np.ndarray) -> float:
+    """Deflection of the unit disk (D = 1) at ``place`` under a unit force at ``load``; free: with inertia relief."""
+    r, rho = min(1.0, float(np.hypot(*place))), min(1.0, float(np.hypot(*load)))
+    gamma = float(np.arctan2(place[1], place[0]) - np.arctan2(load[1], load[0]))
+    s = float(np.sum((place - load) ** 2))
+    t = 1.0 + (r * rho) ** 2 - 2.0 * r * rho * np.cos(gamma)
+    q = 1.0 - rho**2
+    clamped = ((1.0 - r**2) * q + (s * np.log(s / t) if s > 0.0 else 0.0)) / (16.0 * np.pi)  # Boggio 1905
+    if edge == "clamped":
+        return clamped
+    decay = r * rho
+    terms = DISK_TERMS if decay > 1.0 - 4e-4 else int(np.log(1e-17) / np.log(max(decay, 1e-3))) + 6
+    n = np.arange(terms)
+    wave = np.where(n == 0, 1.0, 2.0) * rho**n * np.cos(n * gamma)
+    if edge == "hinged":
+        return clamped + q * (1.0 - r**2) / (4.0 * np.pi) * float(np.sum(wave * r**n / (4.0 * n + 2.0 + 2.0 * nu)))
+    # Free: cancel the clamped solution's edge moment and Kirchhoff shear order by order with r**n and r**(n+2).
+    moment = 4.0 * q * wave / (16.0 * np.pi)
+    shear = moment + 4.0 * (n * q + 1.0 + rho**2) * wave / (16.0 * np.pi)
+    cosine = np.cos(gamma)
+    uniform, linear = -1.0 / np.pi, -4.0 * rho / np.pi  # inertia load uniform + linear r cos(gamma)
+    moment[0] += uniform * (12.0 + 4.0 * nu) / 64.0
+    moment[1] += linear * cosine * (20.0 + 4.0 * nu) / 192.0
+    shear[0] += uniform / 2.0
+    shear[1] += linear * cosine * (3.0 / 8.0 - (1.0 - nu) * 4.0 / 192.0)
+    m1, v1 = (1 - nu) * n * (n - 1.0), -(1 - nu) * n**2 * (n - 1.0)
+    m2 = (n + 2.0) * (n + 1.0) + nu * (n + 2.0 - n**2)
+    v2 = (4.0 * n + 4.0) * n - (1 - nu) * n**2 * (n + 1.0)
+    a, b = np.zeros(terms), np.zeros(terms)
+    det = m1[2:] * v2[2:] - m2[2:] * v1[2:]
+    a[2:] = -(moment[2:] * v2[2:] - m2[2:] * shear[2:]) / det
+    b[2:] = -(m1[2:] * shear[2:] - v1[2:] * moment[2:]) / det
+    b[:2] = -moment[:2] / m2[:2]
+    bent = clamped + uniform * r**4 / 64.0 + linear * cosine * r**5 / 192.0 + float(np.sum((a + b * r**2) * r**n))
+    # Take out the rigid motion: projections of `bent` on 1 and on r cos, the clamped parts by reciprocity.
+    mean = q**2 / 64.0 + uniform * 2.0 * np.pi / (64.0 * 6.0) + b[0] * 2.0 * np.pi / 4.0
+    turn = (rho**5 - 2.0 * rho**3 + rho) / 192.0 + linear * np.pi / (192.0 * 8.0)
+    along = b[1] / cosine if abs(cosine) > 1e-3 else _first_order(nu, rho)
+    turn += along * np.pi / 6.0
+    return bent - mean / np.pi - 4.0 * turn * r * cosine / np.pi
+
+
+def _first_order(nu: float, rho: float) -> float:
+    """The weight of r**3 cos(gamma) in the free disk's correction, per cos(gamma)."""
+    moment = 8.0 * (1.0 - rho**2) * rho / (16.0 * np.pi) - 4.0 * rho / np.pi * (20.0 + 4.0 * nu) / 192.0
+    return -moment / (6.0 + 2.0 * nu)
+
+
+def disk(
+    radius: float,
+    *,
+    edge: str = "clamped",
+    nu: float | None = None,
+    mass: float | None = None,
+    first_frequency: float | None = None,
+    section: Any = None,
+    n_modes: int | None = None,
+    max_frequency: float | None = None,
+    damping_ratio: Damping = 0.0,
+) -> Modes:
+    """Modes of a full circular Kirchhoff plate centred at the origin; a free disk's rigid motions are included.
+
+    Parameters
+    ----------
+    radius : float [m]
+    edge : "clamped", "hinged" or "free"
+    nu : float, Poisson's ratio where no section gives it (0.3); a clamped disk's shapes do not depend on it
+    mass, first_frequency : float [kg], [Hz] of the lowest flexible mode; or instead
+    section : Plate, isotropic and of constant thickness
+    n_modes : int (rigid motions count), or max_frequency : float [Hz]
+    damping_ratio : float, array (n_modes,) or function of frequency [Hz]
+
+    Returns
+    -------
+    Modes, pairs of nodal diameters as cos (zero phase along x) then sin
+
+    Raises
+    ------
+    ValueError
+        Where a size is not positive, the edge is unknown, or not exactly one of each alternative is given.
+
+    References
+    ----------
+    Leissa (1969), NASA SP-160, ch. 2; Boggio (1905) for the static deflection of the clamped disk.
+    """
+    radius = _check.positive("radius", radius, "m")
+    _check.one_of("edge", edge, ENDS)
+    if section is not None and nu is not None:
+        raise ValueError("give nu or section, not both: the section's material has its own nu")
+    physical = _plate_scale(section, np.pi * radius**2)
+    ratio = section.material.nu if section is not None else 0.3 if nu is None else _check.between("nu", nu, -0.99, 0.5)
+    n_rigid = 3 if edge == "free" else 0
+    root_area = np.sqrt(np.pi)
+    first = _disk_roots(edge, ratio, 5.0)[0][0] ** 2 * root_area
+    count, reach = _enough(n_modes, max_frequency, _unit_omega(physical, first_frequency, first))
+    if np.isfinite(reach):
+        roots = _disk_roots(edge, ratio, max(5.0, np.sqrt(reach / root_area)))
+        count = n_rigid + sum(1 if n == 0 else 2 for z, n, _ in roots if z**2 * root_area <= reach)
+    else:
+        limit = 2.0 * np.sqrt(count) + 5.0  # Weyl's count z**2 / 4 and its edge term
+        roots = _disk_roots(edge, ratio, limit)
+        while n_rigid + sum(1 if n == 0 else 2 for _, n, _ in roots) < count:
+            limit *= 1.2
+            roots = _disk_roots(edge, ratio, limit)
+    if count <= n_rigid:
+        raise ValueError(f"n_modes must exceed the {n_rigid} rigid motions (max_frequency reach a flexible mode)")
+    rows = [(0.0, 0, 0.0, 0.0), (0.0, 1, 0.0, 0.0), (0.0, 1, 0.0, np.pi / 2)][:n_rigid]
+    for z, n, weight in roots:
+        rows += [(z, n, weight, phase) for phase in ((0.0,) if n == 0 else (0.0, np.pi / 2))]
+    wavenumber, order, weights, phases = np.array(rows[:count]).T
+    bare = DiskShapes(1.0, edge, ratio, wavenumber, order, weights, phases, np.ones(count))
+    shapes = replace(bare, radius=radius, scale=_disk_norm(bare))
+    return _finished(shapes, (wavenumber**2 * root_area) ** 2, mass, first_frequency, physical, damping_ratio)
+
+
+def _disk_norm(bare: DiskShapes) -> np.ndarray:
+    """Factors that make the shapes of unit mass orthonormal, by Gauss quadrature along the radius, (n_modes,)."""
+    node, weight = np.polynomial.legendre.leggauss(48 + int(bare.z.max()))  # two points a half wave and reserve
+    r, w = 0.5 * (node + 1.0), 0.5 * weight
+    z, n = bare.z, bare.order
+    radial = special.jv(n, np.outer(r, z)) + bare.weight * special.ive(n, np.outer(r, z)) * np.exp(np.outer(r - 1, z))
+    radial = np.where(z == 0.0, np.where(n == 0, 1.0, r[:, None]), radial)
+    angular = np.where(n == 0, 2.0, 1.0)  # mean over the circle times 2
+    return 1.0 / np.sqrt(angular * ((w * r) @ radial**2))
