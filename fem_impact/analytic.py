@@ -190,8 +190,8 @@ def _plate_scale(section: Any, area: float) -> tuple[float, float] | None:
     if section is None:
         return None
     material, thickness = section.material, section.thickness
-    if callable(thickness) or getattr(material, "nu", None) is None:
-        raise ValueError("section must be isotropic and of constant thickness for a closed formula")
+    if callable(thickness) or material.E_across is not None or section.tension:
+        raise ValueError("section must be isotropic, of constant thickness and without tension for a closed formula")
     mass = material.rho * thickness * area
     rigidity = material.E * thickness**3 / (12.0 * (1.0 - material.nu**2))
     return mass, float(np.sqrt(rigidity / mass))
@@ -387,11 +387,11 @@ def _beam_weights(ends: tuple[str, str], k: np.ndarray) -> np.ndarray:
 def _beam_scale(section: Any, length: float) -> tuple[float, float] | None:
     if section is None:
         return None
-    area, inertia = section.area, section.inertia
-    if callable(area) or callable(inertia):
+    if callable(section.width) or callable(section.height):
         raise ValueError("section must be constant along the beam for a closed formula")
-    mass = section.material.rho * area * length
-    return mass, float(np.sqrt(section.material.E * inertia / (mass * length**3)))
+    middle = np.array([[0.5 * length]])
+    mass = float(section.inertia(middle)[0]) * length
+    return mass, float(np.sqrt(section.stiffness(middle)[0] / (mass * length**3)))
 
 
 # ---- disks
