@@ -7,6 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from . import _check
+from .assembly import System, assemble
+from .eigen import Flexibility, count_below, lowest
 
 
 class Shapes(Protocol):
@@ -307,3 +309,117 @@ def rayleigh(mass_factor: float, stiffness_factor: float) -> Callable[[np.ndarra
         return 0.5 * (mass_factor / omega + stiffness_factor * omega)
 
     return ratio
+
+
+@dataclass(frozen=True, eq=False)
+class FieldShapes:
+    """Shapes of an FE solution: evaluated exactly as the elements define them, anywhere on the body."""
+
+    system: System
+    vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
+    flexibility: Flexibility
+
+    def __post_init__(self) -> None:
+        _check.lock_arrays(self)
+
+    @property
+    def dimension(self) -> int:
+        return self.system.mesh.dimension
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        return self.system.interpolate(points) @ self.vectors * self.system.frame.mass**-0.5
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self.system.contains(points)
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        rows = self.system.interpolate(points)
+        static = rows @ self.flexibility.solve(rows.toarray().T)
+        return 0.5 * (static + static.T) / (self.system.frame.mass * self.system.frame.rate**2)
+
+    def take(self, n_modes: int) -> "FieldShapes":
+        return replace(self, vectors=self.vectors[:, :n_modes].copy())
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.system.mesh.points, self.system.mesh.cells
+
+
+WAVE_PER_ELEMENT = {"argyris": 1.5, "hermite": 0.3}  # [rad] error 1e-7 (kh)**8 and 7e-4 (kh)**4: below 1e-5 either way
+
+
+def _fine_enough(system: System, n_modes: int | None, max_frequency: float | None) -> System:
+    """The system on a mesh that resolves the shortest wave asked for, where the user left the size open."""
+    mesh, frame = system.mesh, system.frame
+    softest = float(system.softness) * frame.inertia / frame.stiffness
+    if max_frequency is not None:
+        wave = (softest * (2.0 * np.pi * max_frequency) ** 2) ** 0.25  # [rad/m]
+    elif n_modes is None:
+        return system
+    elif mesh.dimension == 1:
+        wave = np.pi * (n_modes + 1) / float(np.ptp(mesh.points))
+    else:  # Weyl's law: modes grow with the area, and fewer fit along the edge
+        area, rim = mesh.area, mesh.perimeter
+        wave = np.sqrt(4.0 * np.pi * n_modes / area) + 0.5 * rim / area
+    size = WAVE_PER_ELEMENT[system.element] / wave
+    if size >= mesh.size:
+        return system
+    finer = mesh.refined(mesh.size / size)
+    return assemble(finer, system.section, system.supports, system.element)
+
+
+def find_modes(
+    system: System,
+    *,
+    n_modes: int | None = None,
+    max_frequency: float | None = None,
+    damping_ratio: Damping = 0.0,
+    tolerance: float | None = None,
+) -> Modes:
+    """The lowest modes of a body, none missed; rigid motions first, with frequency exactly zero.
+
+    Parameters
+    ----------
+    system : System
+    n_modes : int, optional
+        How many modes, rigid motions included. Give either this or ``max_frequency``.
+    max_frequency : float [Hz], optional
+        All modes up to this frequency.
+    damping_ratio : float, array (n_modes,) or function of frequency [Hz] returning [-]
+    tolerance : float [-], optional
+        Largest relative error accepted in any frequency: the mesh is refined until the estimate meets it.
+
+    Returns
+    -------
+    Modes
+
+    Raises
+    ------
+    ValueError
+        Where neither or both of n_modes and max_frequency are given, or the mesh has too few unknowns.
+    SimulationError
+        Where the number of modes found disagrees with the inertia of the factorised matrix.
+    """
+    if not isinstance(system, System):
+        raise ValueError(f"system must come from fi.assemble, got {type(system).__name__}")
+    if (n_modes is None) == (max_frequency is None):
+        raise ValueError("find_modes needs either n_modes or max_frequency")
+    if not system.mesh.size_stated:
+        system = _fine_enough(system, n_modes, max_frequency)
+    flexibility = Flexibility(system.K, system.M, system.rigid)
+    n_rigid = system.rigid.shape[1]
+    if max_frequency is not None:
+        limit = _check.positive("max_frequency", max_frequency, "Hz")
+        wanted = count_below(system.K, system.M, (2.0 * np.pi * limit / system.frame.rate) ** 2) - n_rigid
+    else:
+        wanted = _check.count("n_modes", n_modes) - n_rigid
+    if wanted > 0:
+        values, vectors = lowest(flexibility, wanted)
+    else:
+        values, vectors = np.zeros(0), np.zeros((system.n_dofs, 0))
+        if n_modes is None and n_rigid == 0:
+            raise ValueError(f"max_frequency must reach the first mode; there is none below {max_frequency:g} Hz")
+    omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * system.frame.rate])
+    vectors = np.column_stack([system.rigid, vectors])
+    keep = len(omega) if n_modes is None else n_modes
+    shapes = FieldShapes(system, vectors[:, :keep].copy(), flexibility)
+    return Modes(omega[:keep], damping_ratios(damping_ratio, omega[:keep]), shapes, system.mass)

@@ -1,0 +1,247 @@
+"""Finite elements whose shape functions stay accurate at any size, shape and place of a triangle or line element."""
+
+from itertools import product
+
+import numpy as np
+from scipy.spatial import cKDTree
+from skfem import CellBasis, ElementLineHermite, ElementTriArgyris, MeshLine, MeshTri, MeshTri2
+from skfem.element import DiscreteField
+
+ORDERS = np.array([0, 1, 1, 2, 2, 2] * 3 + [1] * 3)  # derivative that each Argyris unknown stands for
+EXPONENTS = np.array([(i, j) for i in range(6) for j in range(6 - i)])  # the 21 monomials of degree 5
+SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in scikit-fem's order
+ON_BODY = 1e-9  # [-] of a triangle: how far outside a point may lie by rounding
+NEAR_CURVE = 1e-3  # [-] of a triangle on a curved edge: the parabola differs from the curve by less
+CANDIDATES = 8  # [-] nearest triangles looked at before all of them are
+CURVE_STEPS = 12  # [-] fixed-point steps from a point to its place in a curved triangle
+DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+
+
+def _powers(x: np.ndarray, highest: int, order: int) -> np.ndarray:
+    """The ``order``-th derivative of x**0 ... x**highest, (..., highest + 1)."""
+    result = np.zeros((*x.shape, highest + 1))
+    factor = 1.0
+    for k in range(order, highest + 1):
+        factor = float(np.prod(np.arange(k - order + 1, k + 1))) if order else 1.0
+        result[..., k] = factor * x ** (k - order)
+    return result
+
+
+def monomials(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
+    """Derivative of the 21 monomials at local coordinates (..., 2), shape (..., 21)."""
+    x, y = _powers(local[..., 0], 5, dx), _powers(local[..., 1], 5, dy)
+    return x[..., EXPONENTS[:, 0]] * y[..., EXPONENTS[:, 1]]
+
+
+class ArgyrisSpace:
+    """Quintic shape functions of every triangle of one mesh, in coordinates of the triangle itself.
+
+    scikit-fem inverts a Vandermonde matrix of raw monomials in physical coordinates, which is singular once elements
+    are a thousandth of the coordinates. Here each triangle is mapped to the reference one first, and its unknowns are
+    turned into the reference directions before the inversion.
+    """
+
+    def __init__(self, mesh: MeshTri) -> None:
+        corners = mesh.p[:, mesh.t[:3]].transpose(2, 1, 0)  # (n_cells, 3, 2)
+        self.origin = corners.mean(axis=1)
+        self.jacobian = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+        self.inverse = np.linalg.inv(self.jacobian)
+        middles = np.stack([0.5 * (corners[:, a] + corners[:, b]) for a, b in SIDES], axis=1)
+        self.bulge = np.zeros_like(middles)  # (n_cells, 3, 2) of the curved sides, off the chord
+        if isinstance(mesh, MeshTri2):
+            self.bulge = mesh.doflocs[:, mesh.dofs.element_dofs[3:6]].transpose(2, 1, 0) - middles
+        self.curved = (np.abs(self.bulge) > 0.0).any(axis=(1, 2))
+        self.vertices = mesh.t[:3].T
+        along = np.stack([corners[:, q] - corners[:, p] for p, q in SIDES], axis=1)
+        up = np.stack([self.vertices[:, p] < self.vertices[:, q] for p, q in SIDES], axis=1)
+        along = along * np.where(up, 1.0, -1.0)[..., None]  # the same for both triangles of a side
+        self.normals = np.stack([along[..., 1], -along[..., 0]], axis=-1) / np.linalg.norm(along, axis=2)[..., None]
+        self.coefficients = self._invert(corners, middles + self.bulge)
+        self.tree = cKDTree(self.origin)
+
+    def _invert(self, corners: np.ndarray, middles: np.ndarray) -> np.ndarray:
+        n = len(corners)
+        functionals = np.zeros((n, 21, 21))
+        turn = np.zeros((n, 21, 21))  # physical unknowns -> unknowns along the reference directions
+        J = self.jacobian
+        for k in range(3):
+            at = self.local(np.arange(n), corners[:, k])
+            for row, (dx, dy) in enumerate(DERIVATIVES):
+                functionals[:, 6 * k + row] = monomials(at, dx, dy)
+            a, b, c, d = J[:, 0, 0], J[:, 0, 1], J[:, 1, 0], J[:, 1, 1]
+            block = turn[:, 6 * k : 6 * k + 6, 6 * k : 6 * k + 6]
+            block[:, 0, 0] = 1.0
+            block[:, 1:3, 1:3] = np.stack([np.stack([a, c], -1), np.stack([b, d], -1)], axis=1)
+            hessian = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
+            block[:, 3:, 3:] = np.stack([np.stack(row, axis=-1) for row in hessian], axis=1)
+        for side in range(3):
+            weight = np.einsum("eij,ej->ei", self.inverse, self.normals[:, side])  # reference derivative along it
+            size = np.linalg.norm(weight, axis=1)
+            at = self.local(np.arange(n), middles[:, side])
+            row = weight[:, :1] * monomials(at, 1, 0) + weight[:, 1:] * monomials(at, 0, 1)
+            functionals[:, 18 + side] = row / size[:, None]
+            turn[:, 18 + side, 18 + side] = 1.0 / size
+        return np.linalg.solve(functionals, turn)
+
+    def local(self, cells: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Coordinates (n, ..., 2) in the triangle, zero at its centre, of points (n, ..., 2)."""
+        shape = (len(cells),) + (1,) * (points.ndim - 2)
+        offset = points - self.origin[cells].reshape(*shape, 2)
+        return np.einsum("eij,e...j->e...i", self.inverse[cells], offset)
+
+    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+        """Shape functions of cells (n,) at points (n, n_q, 2) for each derivative order asked for.
+
+        Returns arrays (n, n_q, 21) for order 0, (n, 2, n_q, 21) for order 1, (n, 3, n_q, 21) for order 2 (xx, xy, yy).
+        """
+        local = self.local(cells, points)
+        inverse, coefficients = self.inverse[cells], self.coefficients[cells]
+        result = []
+        for order in orders:
+            raw = [monomials(local, order - k, k) @ coefficients for k in range(order + 1)]
+            if order == 0:
+                result.append(raw[0])
+                continue
+            stacked = np.stack(raw, axis=1)  # (n, order + 1, n_q, 21)
+            a, b, c, d = (inverse[:, i, j] for i, j in product(range(2), repeat=2))
+            if order == 1:
+                chain = [[a, c], [b, d]]
+            else:
+                chain = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
+            matrix = np.stack([np.stack(row, axis=-1) for row in chain], axis=1)
+            result.append(np.einsum("eij,ejqk->eiqk", matrix, stacked))
+        return result
+
+    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cell that holds each point (n, 2), or the nearest one, and whether the point lies in it."""
+        near = self.tree.query(points, k=min(CANDIDATES, len(self.origin)))[1].reshape(len(points), -1)
+        cell, depth = self._deepest(points, near)
+        lost = depth < 0.0
+        if lost.any():
+            every = np.broadcast_to(np.arange(len(self.origin)), (1, len(self.origin)))
+            for i in np.flatnonzero(lost):
+                cell[i], depth[i] = (a[0] for a in self._deepest(points[i : i + 1], every))
+        return cell, depth >= np.where(self.curved[cell], -NEAR_CURVE, -ON_BODY)
+
+    def _deepest(self, points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of candidate cells (n, k), the one in which the point lies deepest, and how deep (in area coordinates)."""
+        offset = points[:, None] - self.origin[cells]
+        local = np.einsum("nkij,nkj->nki", self.inverse[cells], offset) + 1.0 / 3.0
+        for _ in range(CURVE_STEPS if self.curved[cells].any() else 0):
+            area = np.stack([1.0 - local.sum(axis=2), local[..., 0], local[..., 1]], axis=2)
+            product4 = np.stack([4.0 * area[..., p] * area[..., q] for p, q in SIDES], axis=2)
+            bulged = offset - np.einsum("nks,nksi->nki", product4, self.bulge[cells])
+            local = np.einsum("nkij,nkj->nki", self.inverse[cells], bulged) + 1.0 / 3.0
+        depth = np.minimum(local.min(axis=2), 1.0 - local.sum(axis=2))
+        best = depth.argmax(axis=1)
+        row = np.arange(len(points))
+        return cells[np.zeros_like(row) if len(cells) == 1 else row, best], depth[row, best]
+
+    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+        """Unknowns (n_all, 3) of the deflections 1, x and y: the rigid motions of a plate."""
+        result = np.zeros((n_all, 3))
+        corner = self.origin[:, None] + (np.array([[0, 0], [1, 0], [0, 1]]) - 1.0 / 3.0) @ self.jacobian.transpose(
+            0, 2, 1
+        )
+        for k in range(3):
+            result[element_dofs[6 * k], 0] = 1.0
+            result[element_dofs[6 * k], 1:] = corner[:, k]
+            result[element_dofs[6 * k + 1], 1] = 1.0
+            result[element_dofs[6 * k + 2], 2] = 1.0
+            result[element_dofs[18 + k], 1:] = self.normals[:, k]
+        return result
+
+
+class Argyris(ElementTriArgyris):
+    """scikit-fem's Argyris element on the shape functions of `ArgyrisSpace`; make a new one for each mesh."""
+
+    def __init__(self, space: ArgyrisSpace) -> None:
+        self.space = space
+        self.fields: list[np.ndarray] = []
+        self.asked: object = None
+
+    def gbasis(self, mapping, X, i, tind=None):
+        cells = np.arange(len(self.space.origin)) if tind is None else tind
+        if X is not self.asked:
+            points = mapping.F(X, tind=tind).transpose(1, 2, 0)  # (n_cells, n_q, 2)
+            self.fields, self.asked = self.space.functions(cells, points, (0, 1, 2)), X
+        value, gradient, hessian = self.fields
+        xx, xy, yy = hessian[:, 0, :, i], hessian[:, 1, :, i], hessian[:, 2, :, i]
+        grad = gradient[..., i].transpose(1, 0, 2)
+        return (DiscreteField(value=value[..., i], grad=grad, hess=np.array([[xx, xy], [xy, yy]])),)
+
+
+class HermiteSpace:
+    """Cubic shape functions of every element on one line (unknowns: deflection and slope at both ends)."""
+
+    def __init__(self, mesh: MeshLine) -> None:
+        ends = mesh.p[0, mesh.t]  # (2, n_cells)
+        self.start, self.length = ends[0], ends[1] - ends[0]
+
+    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+        """Derivatives (n, n_q, 4) of the shape functions of cells (n,) at points (n, n_q, 1), one array per order."""
+        h = self.length[cells][:, None]
+        s = (points[..., 0] - self.start[cells][:, None]) / h
+        cubic = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], float)
+        result = []
+        for order in orders:
+            basis = _powers(s, 3, order) @ cubic.T
+            basis[..., 1::2] *= h[..., None]
+            result.append(basis / h[..., None] ** order)
+        return result
+
+    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cell that holds each point (n, 1), or the nearest one, and whether the point lies in it."""
+        low = np.minimum(self.start, self.start + self.length)
+        order = np.argsort(low)
+        cell = order[np.clip(np.searchsorted(low[order], points[:, 0], side="right") - 1, 0, len(low) - 1)]
+        s = (points[:, 0] - self.start[cell]) / self.length[cell]
+        return cell, (s >= -ON_BODY) & (s <= 1.0 + ON_BODY)
+
+    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+        """Unknowns (n_all, 2) of the deflections 1 and x: the rigid motions of a beam."""
+        result = np.zeros((n_all, 2))
+        for k in range(2):
+            result[element_dofs[2 * k], 0] = 1.0
+            result[element_dofs[2 * k], 1] = self.start + k * self.length
+            result[element_dofs[2 * k + 1], 1] = 1.0
+        return result
+
+
+class Hermite(ElementLineHermite):
+    """scikit-fem's Hermite element on the shape functions of `HermiteSpace`; make a new one for each mesh."""
+
+    def __init__(self, space: HermiteSpace) -> None:
+        self.space = space
+
+    def gbasis(self, mapping, X, i, tind=None):
+        cells = np.arange(len(self.space.start)) if tind is None else tind
+        points = mapping.F(X, tind=tind).transpose(1, 2, 0)
+        value, slope, bend = (f[..., i] for f in self.space.functions(cells, points, (0, 1, 2)))
+        return (DiscreteField(value=value, grad=slope[None], hess=bend[None, None]),)
+
+
+def triangles(points: np.ndarray, cells: np.ndarray, facets: np.ndarray, middles: np.ndarray, curved: np.ndarray):
+    """scikit-fem's mesh of triangles; with quadratic edges where any facet is curved."""
+    mesh = MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
+    if not curved.any():
+        return mesh
+    mesh = MeshTri2.from_mesh(mesh)
+    ends = np.sort(facets[curved], axis=1)
+    n = len(points)
+    keys = np.sort(mesh.facets.T, axis=1) @ np.array([n, 1])
+    order = np.argsort(keys)
+    number = order[np.searchsorted(keys, ends @ np.array([n, 1]), sorter=order)]
+    nodes = mesh.doflocs.copy()
+    nodes[:, n + number] = middles[curved].T
+    return MeshTri2(nodes, mesh.t)
+
+
+def segments(points: np.ndarray, cells: np.ndarray) -> MeshLine:
+    """scikit-fem's mesh of line elements."""
+    return MeshLine(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
+
+
+def basis_of(mesh, element, order: int) -> CellBasis:
+    """scikit-fem's basis: quadrature exact to ``order`` on straight elements, and the numbering of unknowns."""
+    return CellBasis(mesh, element, intorder=order)

@@ -1,0 +1,143 @@
+"""Where a body is: triangles or line elements, named edges on the true curve, and how to make a finer mesh of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from . import _check
+
+DEFAULT_DIVISIONS = 8  # [-] elements across the shorter side where no size is stated; find_modes refines on its own
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles in the plane or elements on a line, with named edges.
+
+    Boundary facets run with the body on their left; normals point outward. Where an edge is curved, the facet is the
+    parabola through its ends and its middle, and tangent and curvature are those of the true curve.
+    """
+
+    points: np.ndarray  # (n_points, dimension) [m]
+    cells: np.ndarray  # (n_cells, dimension + 1) vertex numbers
+    facets: np.ndarray  # (n_facets, dimension) vertex numbers of the boundary facets
+    edges: dict[str, np.ndarray]  # name -> numbers of its facets; "boundary" is all of them
+    middles: np.ndarray  # (n_facets, dimension) [m] middle of each facet on the true curve
+    tangents: np.ndarray  # (n_facets, 2, 2) unit tangent at both ends of each facet; zero on a line
+    curvatures: np.ndarray  # (n_facets, 2) [1/m] at both ends, positive where convex
+    recipe: Callable[..., "Mesh"] | None = field(default=None, repr=False)  # recipe(size=...) makes a finer one
+    size: float = 0.0  # [m] element size asked for
+    size_stated: bool = True  # whether the user asked for it; otherwise find_modes may choose
+    notes: tuple[str, ...] = ()  # what was repaired or assumed
+
+    def __post_init__(self) -> None:
+        _check.lock_arrays(self)
+
+    @property
+    def dimension(self) -> int:
+        """2 for a plate, 1 for a beam."""
+        return self.points.shape[1]
+
+    @property
+    def curved(self) -> np.ndarray:
+        """Which facets are curved, (n_facets,) bool."""
+        if self.dimension == 1:
+            return np.zeros(len(self.facets), bool)
+        ends = self.points[self.facets]  # (n_facets, 2, 2)
+        chord = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        return np.linalg.norm(self.middles - ends.mean(axis=1), axis=1) > 1e-9 * chord
+
+    @property
+    def perimeter(self) -> float:
+        """Length of the boundary [m], along the chords of curved edges."""
+        return float(np.linalg.norm(np.diff(self.points[self.facets], axis=1), axis=2).sum())
+
+    @property
+    def area(self) -> float:
+        """Area of a plate [m^2] (within the chords of curved edges), length of a beam [m]."""
+        corner = self.points[self.cells]
+        sides = corner[:, 1:] - corner[:, :1]
+        return float(np.abs(np.linalg.det(sides)).sum()) / self.dimension
+
+    def refined(self, factor: float = 2.0) -> "Mesh":
+        """The same body with elements smaller by a factor, on the true curve where the outline is known."""
+        if self.recipe is None:
+            raise ValueError("this mesh has no outline to refine on; make it with fi.mesh, or load a finer file")
+        return self.recipe(size=self.size / _check.positive("factor", factor))
+
+
+def straight(points: np.ndarray, cells: np.ndarray, facets: np.ndarray, edges: dict, **rest) -> Mesh:
+    """A plane mesh whose edges are all straight."""
+    ends = points[facets]
+    along = ends[:, 1] - ends[:, 0]
+    unit = along / np.linalg.norm(along, axis=1, keepdims=True)
+    return Mesh(
+        points,
+        cells,
+        facets,
+        edges,
+        ends.mean(axis=1),
+        np.stack([unit, unit], axis=1),
+        np.zeros((len(facets), 2)),
+        **rest,
+    )
+
+
+def _element_size(size: float | None, default: float) -> tuple[float, bool]:
+    return (default, False) if size is None else (_check.positive("size", size, "m"), True)
+
+
+def rectangle(length: float, width: float, *, size: float | None = None) -> Mesh:
+    """Rectangle [0, length] x [0, width] [m]; edges left, right (x = 0, length), bottom, top (y = 0, width).
+
+    Without a size, `find_modes` chooses one fine enough for the modes it is asked for.
+    """
+    length = _check.positive("length", length, "m")
+    width = _check.positive("width", width, "m")
+    size, stated = _element_size(size, min(length, width) / DEFAULT_DIVISIONS)
+    nx, ny = max(1, round(length / size)), max(1, round(width / size))
+    x, y = np.meshgrid(np.linspace(0.0, length, nx + 1), np.linspace(0.0, width, ny + 1), indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel()])
+    number = np.arange((nx + 1) * (ny + 1)).reshape(nx + 1, ny + 1)
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    odd = (np.add.outer(np.arange(nx), np.arange(ny)) % 2).astype(bool)[..., None]
+    # alternating diagonals, so that the mesh has the symmetries of the plate
+    first = np.where(odd, np.stack([a, b, d], axis=-1), np.stack([a, b, c], axis=-1))
+    second = np.where(odd, np.stack([b, c, d], axis=-1), np.stack([a, c, d], axis=-1))
+    cells = np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)])
+    sides = {
+        "left": number[0, ::-1],
+        "right": number[-1, :],
+        "bottom": number[:, 0],
+        "top": number[::-1, -1],
+    }
+    facets, edges, start = [], {}, 0
+    for name, line in sides.items():
+        facets.append(np.column_stack([line[:-1], line[1:]]))
+        edges[name] = np.arange(start, start + len(line) - 1)
+        start += len(line) - 1
+    edges["boundary"] = np.arange(start)
+    recipe = partial(rectangle, length, width)
+    return straight(points, cells, np.concatenate(facets), edges, recipe=recipe, size=size, size_stated=stated)
+
+
+def line(length: float, *, size: float | None = None) -> Mesh:
+    """Line [0, length] [m] for a beam; edges left (x = 0) and right (x = length)."""
+    length = _check.positive("length", length, "m")
+    size, stated = _element_size(size, length / (4 * DEFAULT_DIVISIONS))
+    n = max(1, round(length / size))
+    cells = np.column_stack([np.arange(n), np.arange(1, n + 1)])
+    edges = {"left": np.array([0]), "right": np.array([1]), "boundary": np.array([0, 1])}
+    return Mesh(
+        np.linspace(0.0, length, n + 1)[:, None],
+        cells,
+        np.array([[0], [n]]),
+        edges,
+        np.array([[0.0], [length]]),
+        np.zeros((2, 2, 2)),
+        np.zeros((2, 2)),
+        recipe=partial(line, length),
+        size=size,
+        size_stated=stated,
+    )

@@ -1,0 +1,154 @@
+"""What supports leave of a plate's unknowns: one rule for straight and curved edges, corners and mixed supports."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import null_space
+from scipy.sparse import csr_matrix
+
+SMOOTH = 1e-6  # [-] tangents [rad], and curvatures times facet length, closer than this meet smoothly
+RANK = 1e-9  # [-] singular values below count as zero in conditions whose rows are of order one
+SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in scikit-fem's order
+
+
+@dataclass(frozen=True, eq=False)
+class Rim:
+    """The boundary of a plate and how it is held."""
+
+    facets: np.ndarray  # (n_facets, 2) vertices, body on the left
+    tangents: np.ndarray  # (n_facets, 2, 2) at both ends
+    curvatures: np.ndarray  # (n_facets, 2) at both ends, positive where convex
+    points: np.ndarray  # (n_points, 2)
+    kinds: list[str]  # (n_facets,) clamped, hinged or free
+
+    def is_special(self, at: list[tuple[int, int]]) -> bool:
+        """Whether the curvature of the plate may jump at a vertex, given its facets and which of their ends it is."""
+        if len(at) != 2:
+            return True
+        (f, i), (g, j) = at
+        if self.kinds[f] != self.kinds[g]:
+            return True
+        a, b = self.tangents[f, i], self.tangents[g, j]
+        corner = a @ b < 0.0 or abs(a[0] * b[1] - a[1] * b[0]) > SMOOTH
+        ends = self.points[self.facets[[f, g]]]
+        length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
+        jump = abs(self.curvatures[f, i] - self.curvatures[g, j]) * length > SMOOTH
+        return corner or (jump and self.kinds[f] == "hinged")
+
+
+def _conditions(kind: str, tangent: np.ndarray, curvature: float) -> np.ndarray:
+    """Conditions (n, 6) of one facet's end on w, w_x, w_y, w_xx, w_xy, w_yy there."""
+    (tx, ty), (nx, ny) = tangent, (tangent[1], -tangent[0])
+    along = [0.0, 0.0, 0.0, tx * tx, 2.0 * tx * ty, ty * ty]
+    deflection, slope = [1.0, 0, 0, 0, 0, 0], [0, tx, ty, 0, 0, 0]
+    if kind == "free":
+        return np.zeros((0, 6))
+    if kind == "hinged":
+        # the deflection stays zero along the curve: its second derivative by arc length is w_tt - curvature w_n
+        return np.array([deflection, slope, np.subtract(along, [0, curvature * nx, curvature * ny, 0, 0, 0])])
+    across = [0, 0, 0, tx * nx, tx * ny + ty * nx, ty * ny]
+    return np.array([deflection, slope, [0, nx, ny, 0, 0, 0], along, across])
+
+
+def _smooth(kind: str, tangent: np.ndarray, curvature: float) -> np.ndarray:
+    """What the conditions leave at a smooth vertex: orthonormal columns (6, n)."""
+    return null_space(_conditions(kind, tangent, curvature), rcond=RANK)
+
+
+def _split(
+    vertex: int, at: list, around: np.ndarray, rim: Rim, cells: np.ndarray, facet_cell: np.ndarray
+) -> np.ndarray:
+    """What is left at a vertex whose triangles (n,) have second derivatives of their own: (3 + 3 n, n_left)."""
+    slot = {int(cell): 3 + 3 * i for i, cell in enumerate(around)}
+    rows = []
+    shared: dict[int, list[int]] = {}
+    for cell in around.tolist():
+        for other in cells[cell].tolist():
+            if other != vertex:
+                shared.setdefault(other, []).append(cell)
+    for other, pair in shared.items():
+        if len(pair) != 2:
+            continue
+        x, y = rim.points[other] - rim.points[vertex]
+        x, y = np.array([x, y]) / np.hypot(x, y)
+        for row in ([x, y, 0.0], [0.0, x, y]):  # the second derivatives along the shared edge agree
+            line = np.zeros(3 + 3 * len(around))
+            line[slot[pair[0]] : slot[pair[0]] + 3] = row
+            line[slot[pair[1]] : slot[pair[1]] + 3] = np.negative(row)
+            rows.append(line)
+    for facet, end in at:
+        for condition in _conditions(rim.kinds[facet], rim.tangents[facet, end], rim.curvatures[facet, end]):
+            line = np.zeros(3 + 3 * len(around))
+            start = slot[int(facet_cell[facet])]
+            line[:3], line[start : start + 3] = condition[:3], condition[3:]
+            rows.append(line)
+    return null_space(np.array(rows), rcond=RANK) if rows else np.eye(3 + 3 * len(around))
+
+
+def cells_of_facets(facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The triangle of each boundary facet and which of its sides that is, both (n_facets,)."""
+    n = int(cells.max()) + 1
+    pairs = np.stack([np.sort(cells[:, side], axis=1) for side in SIDES], axis=1).reshape(-1, 2)
+    keys = pairs[:, 0] * n + pairs[:, 1]
+    order = np.argsort(keys)
+    wanted = np.sort(facets, axis=1)
+    found = order[np.searchsorted(keys, wanted[:, 0] * n + wanted[:, 1], sorter=order)]
+    return found // 3, found % 3
+
+
+def constrain(rim: Rim, cells: np.ndarray, dofs: np.ndarray, n_all: int) -> tuple[csr_matrix, np.ndarray]:
+    """What the supports leave of the Argyris unknowns.
+
+    Each boundary vertex gets the null space of the conditions of its two facets. At a corner, where the support
+    changes or where the curvature of a hinged edge jumps, the curvature of the plate jumps too: second derivatives are
+    then one set per triangle, tied so that deflection and slope stay continuous across the edges between them.
+
+    Parameters
+    ----------
+    rim : Rim
+    cells : ndarray, shape (n_cells, 3), vertices of the triangles
+    dofs : ndarray, shape (21, n_cells), numbers of their unknowns
+    n_all : int, how many unknowns there are
+
+    Returns
+    -------
+    expand : csr_matrix, shape (n_all + new, n_left), orthonormal columns
+    dofs : ndarray, shape (21, n_cells), with the new unknowns of split vertices
+    """
+    dofs = dofs.copy()
+    cell, side = cells_of_facets(rim.facets, cells)
+    ends: dict[int, list[tuple[int, int]]] = {}
+    for facet, pair in enumerate(rim.facets.tolist()):
+        for end, vertex in enumerate(pair):
+            ends.setdefault(vertex, []).append((facet, end))
+    blocks: list[tuple[np.ndarray, np.ndarray]] = []
+    for vertex, at in ends.items():
+        if not rim.is_special(at) and rim.kinds[at[0][0]] == "free":
+            continue
+        around, corner = np.nonzero(cells == vertex)
+        first = dofs[6 * corner[0] : 6 * corner[0] + 6, around[0]].copy()
+        if not rim.is_special(at):
+            facet, end = at[0]
+            blocks.append((first, _smooth(rim.kinds[facet], rim.tangents[facet, end], rim.curvatures[facet, end])))
+            continue
+        numbers = [first[:3]]
+        for i, (c, k) in enumerate(zip(around, corner)):
+            own = first[3:] if i == 0 else n_all + np.arange(3)
+            n_all += 0 if i == 0 else 3
+            dofs[6 * k + 3 : 6 * k + 6, c] = own
+            numbers.append(own)
+        blocks.append((np.concatenate(numbers), _split(vertex, at, around, rim, cells, cell)))
+    clamped = np.array([kind == "clamped" for kind in rim.kinds])
+    blocks.append((dofs[18 + side[clamped], cell[clamped]], np.zeros((int(clamped.sum()), 0))))
+    free = np.setdiff1d(np.arange(n_all), np.concatenate([block[0] for block in blocks]))
+    rows, columns, entries, width = [free], [np.arange(len(free))], [np.ones(len(free))], len(free)
+    for unknowns, kept in blocks:
+        n_left = kept.shape[1]
+        rows.append(np.repeat(unknowns, n_left))
+        columns.append(np.tile(np.arange(width, width + n_left), len(unknowns)))
+        entries.append(kept.ravel())
+        width += n_left
+    if width == 0:
+        raise ValueError("supports leave this mesh nothing to move; refine it")
+    where = np.concatenate(rows).astype(int), np.concatenate(columns).astype(int)
+    return csr_matrix((np.concatenate(entries), where), shape=(n_all, width)), dofs

@@ -1,0 +1,175 @@
+"""FE modes against exact values, their order of convergence, and the static solution they add up to."""
+
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from fem_impact import mesh
+from fem_impact.assembly import assemble
+from fem_impact.modal import find_modes
+from fem_impact.section import Beam, Material, Plate
+
+STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
+PLATE = Plate(STEEL, 2e-3)
+BAR = Beam.rectangular(STEEL, width=0.02, height=0.01)
+PER_RATE = np.sqrt(7850 * 2e-3 / (210e9 * 2e-3**3 / (12 * (1 - 0.3**2))))  # sqrt(rho h / D) of PLATE
+SQUARE_CLAMPED = [35.9851911, 73.3938455, 73.3938455, 108.2165017, 131.5807726, 132.2047902]
+SQUARE_FREE = [13.468197, 19.596137, 24.270201, 34.800891, 34.800891, 61.093234, 61.093234]
+SQUARE_CANTILEVER = [3.47100, 8.5062, 21.2839, 27.1987, 30.9543]
+
+
+def parameters(shape, supports, n_modes, **options):
+    """Dimensionless frequencies omega sqrt(rho h / D) of the flexible modes of a steel plate in metres."""
+    modes = find_modes(assemble(shape, PLATE, supports), n_modes=n_modes, **options)
+    return modes.omega[modes.n_rigid :] * PER_RATE
+
+
+def hinged(length, width, n_modes):
+    """Exact parameters of a hinged rectangle, ascending."""
+    m = np.arange(1, n_modes + 1)
+    return np.sort(np.pi**2 * ((m[:, None] / length) ** 2 + (m / width) ** 2), axis=None)[:n_modes]
+
+
+def test_hinged_rectangle_is_exact_to_eight_digits():
+    found = parameters(mesh.rectangle(1.55, 1.0, size=1 / 12), {"boundary": "hinged"}, 6)
+    assert_allclose(found, hinged(1.55, 1.0, 6), rtol=1e-8)  # 1e-7 (kh)**8 = 8e-9 for the sixth
+
+
+@pytest.mark.parametrize(
+    ("supports", "wanted", "rtol"),
+    [
+        ({"boundary": "clamped"}, SQUARE_CLAMPED, 1e-6),  # clamped corners are smooth to second derivatives
+        ({}, SQUARE_FREE, 1e-6),
+        ({"left": "clamped"}, SQUARE_CANTILEVER, 5e-5),  # five digits printed; the corner is singular
+    ],
+)
+def test_squares_meet_their_tables(supports, wanted, rtol):
+    n_rigid = 3 if not supports else 0
+    found = parameters(mesh.rectangle(1.0, 1.0, size=1 / 14), supports, len(wanted) + n_rigid)
+    assert_allclose(found, wanted, rtol=rtol)
+
+
+def test_order_on_smooth_straight_cases():
+    errors = []
+    for n in (3, 6):
+        found = parameters(mesh.rectangle(1.0, 1.0, size=1 / n), {"boundary": "hinged"}, 4)
+        errors.append(np.abs(found / hinged(1.0, 1.0, 4) - 1.0))
+    assert (np.log2(errors[0] / errors[1]) > 6.0).all()  # theory 8 once a wave has a few elements
+
+
+@pytest.mark.parametrize(
+    ("supports", "wanted"),
+    [
+        ({"left": "clamped"}, [1.875104068712, 4.694091132974]),
+        ({}, [0.0, 0.0, 4.730040744863, 7.853204624096]),
+        ({"left": "hinged"}, [0.0, 3.926602312048, 7.068582745629]),
+        ({"boundary": "hinged"}, [np.pi, 2 * np.pi]),
+    ],
+)
+def test_beams_meet_their_closed_forms(supports, wanted):
+    modes = find_modes(assemble(mesh.line(0.5, size=0.5 / 80), BAR, supports), n_modes=len(wanted))
+    found = np.sqrt(modes.omega * np.sqrt(7850 * 12 / (210e9 * 0.01**2))) * 0.5
+    assert_allclose(found, wanted, rtol=1e-7)  # 3.5e-4 (kh)**4 = 3e-8
+    if "right" not in supports and "boundary" not in supports:
+        bending = modes.shape_at([0.5])[0, modes.n_rigid :] ** 2 * modes.mass
+        assert_allclose(bending, 4.0, rtol=1e-5)  # u**2 = 4 at a free end
+
+
+def test_order_of_hermite_beams():
+    exact = (np.pi * np.arange(1, 5)) ** 2
+    errors = []
+    for n in (16, 32):
+        modes = find_modes(assemble(mesh.line(1.0, size=1 / n), BAR, {"boundary": "hinged"}), n_modes=4)
+        errors.append(modes.omega * np.sqrt(7850 * 12 / (210e9 * 0.01**2)) / exact - 1.0)
+    assert_allclose(np.log2(errors[0] / errors[1]), 4.0, atol=0.1)  # theory 4
+
+
+def test_modes_are_mass_normalised_and_orthogonal():
+    modes = find_modes(assemble(mesh.rectangle(1.0, 1.0, size=1 / 6), PLATE), n_modes=20)
+    M, vectors = modes.shapes.system.M, modes.shapes.vectors
+    assert_allclose(vectors.T @ (M @ vectors), np.eye(20), atol=1e-10)  # rounding
+
+
+def test_shape_at_a_point_is_the_sine_of_the_hinged_plate():
+    modes = find_modes(assemble(mesh.rectangle(1.55, 1.0, size=1 / 10), PLATE, {"boundary": "hinged"}), n_modes=1)
+    x, y = 0.4, 0.3
+    wanted = 2.0 / np.sqrt(modes.mass) * np.sin(np.pi * x / 1.55) * np.sin(np.pi * y)
+    assert_allclose(abs(modes.shape_at([(x, y)])[0, 0]), wanted, rtol=1e-7)  # the shape errs as h**6
+
+
+def test_degenerate_pair_spans_the_right_space():
+    modes = find_modes(assemble(mesh.rectangle(1.0, 1.0, size=1 / 8), PLATE, {"boundary": "hinged"}), n_modes=3)
+    points = np.array([[0.2, 0.3], [0.6, 0.1], [0.7, 0.8]])
+    x, y = np.pi * points.T
+    exact = 2.0 / np.sqrt(modes.mass) * np.column_stack([np.sin(2 * x) * np.sin(y), np.sin(x) * np.sin(2 * y)])
+    pair = modes.shape_at(points)[:, 1:]
+    assert_allclose(pair @ pair.T, exact @ exact.T, atol=1e-5 * np.abs(exact).max() ** 2)  # the shape errs as h**6
+
+
+@pytest.mark.parametrize("supports", [{"boundary": "hinged"}, {}, {"left": "hinged"}])
+def test_all_modes_add_up_to_the_static_solution(supports):
+    system = assemble(mesh.rectangle(1.0, 1.0, size=0.5), PLATE, supports)
+    modes = find_modes(system, n_modes=system.n_dofs)
+    points = [(0.3, 0.4), (0.7, 0.7)]
+    static = modes.shapes.compliance(np.array(points))
+    assert_allclose(modes.modal_compliance(points), static, atol=1e-9 * static.max())  # rounding
+    few = modes.truncated(n_modes=10)
+    assert_allclose(few.modal_compliance(points) + few.residual_compliance(points), static, rtol=1e-12)
+
+
+def test_static_deflection_of_a_hinged_square_under_its_middle():
+    system = assemble(mesh.rectangle(1.0, 1.0, size=1 / 8), PLATE, {"boundary": "hinged"})
+    found = find_modes(system, n_modes=1).shapes.compliance(np.array([[0.5, 0.5]]))[0, 0]
+    D = 210e9 * 2e-3**3 / (12 * (1 - 0.3**2))
+    assert_allclose(found * D, 0.0116008, rtol=2e-3)  # Timoshenko's 0.01160; r**2 log r at the load slows it to h**2
+
+
+def test_inertia_relief_of_a_free_beam():
+    modes = find_modes(assemble(mesh.line(1.0, size=1 / 200), BAR), n_modes=60)
+    residual = modes.residual_compliance([0.0])[0, 0]
+    total = modes.shapes.compliance(np.array([[0.0]]))[0, 0]
+    # a free-free beam loaded at its end: L^3 / (105 E I), from its fourth-order deflection under inertia relief
+    assert_allclose(total, 1.0 / (105 * 210e9 * 0.02 * 0.01**3 / 12), rtol=1e-6)
+    assert 0.0 < residual < 1e-4 * total
+
+
+def test_a_size_left_open_is_chosen_for_the_modes_asked_for():
+    found = parameters(mesh.rectangle(1.55, 1.0), {"boundary": "hinged"}, 150)
+    assert_allclose(found, hinged(1.55, 1.0, 150), rtol=1e-5)  # WAVE_PER_ELEMENT promises it
+
+
+def test_max_frequency_keeps_every_mode_below_it():
+    exact = hinged(1.55, 1.0, 30) / (2 * np.pi * PER_RATE)
+    limit = 0.5 * (exact[20] + exact[21])
+    modes = find_modes(assemble(mesh.rectangle(1.55, 1.0), PLATE, {"boundary": "hinged"}), max_frequency=limit)
+    assert modes.n_modes == 21
+
+
+def test_modes_survive_a_pickle():
+    modes = find_modes(assemble(mesh.rectangle(1.0, 1.0, size=0.25), PLATE), n_modes=6)
+    again = pickle.loads(pickle.dumps(modes))
+    assert_allclose(again.residual_compliance([(0.3, 0.3)]), modes.residual_compliance([(0.3, 0.3)]), rtol=1e-12)
+
+
+def test_strike_point_off_the_body_is_refused():
+    modes = find_modes(assemble(mesh.rectangle(1.0, 1.0, size=0.5), PLATE), n_modes=4)
+    with pytest.raises(ValueError, match=r"at must lie on the body, got \(1.2, 0.5\) m"):
+        modes.points("at", (1.2, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({}, "either n_modes or max_frequency"),
+        ({"n_modes": 3, "max_frequency": 10.0}, "either n_modes or max_frequency"),
+        ({"n_modes": 0}, "n_modes must be at least 1"),
+        ({"max_frequency": 1e-3}, "max_frequency must reach the first mode"),
+        ({"n_modes": 10**6}, "n_modes must not exceed"),
+    ],
+)
+def test_refuses_requests_that_make_no_sense(options, text):
+    system = assemble(mesh.rectangle(1.0, 1.0, size=0.5), PLATE, {"boundary": "hinged"})
+    with pytest.raises(ValueError, match=text):
+        find_modes(system, **options)
