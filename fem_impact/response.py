@@ -1,0 +1,443 @@
+"""What a blow leaves behind: the force history, every scalar read from it, and the motion of everything, any time."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from . import _check, _kernels
+from .contact import Contact
+from .modal import Modes
+from .striker import Striker
+
+PEAK_LOOKS = 17  # [-] looks per step for the peak force before a parabola refines it: (pi/11/16)**2/8 of it at worst
+
+
+@dataclass(frozen=True)
+class Impact:
+    """One unbroken contact."""
+
+    start: float  # [s]
+    end: float  # [s]
+    peak_force: float  # [N]
+    impulse: float  # [N s]
+    contact: int = 0  # which contact, where there are several
+
+    @property
+    def duration(self) -> float:
+        """Time in contact [s]."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True)
+class Error:
+    """Estimated errors: absolute in the restitution, relative in impulse, contact time and peak force."""
+
+    step: float  # [-] of the time integration
+    truncation: float  # [-] of the modes left out
+    mesh: float  # [-] of the finite elements
+    resolvable: bool = True  # False: the modes left out are the contact's own dynamics; no estimate holds
+
+    @property
+    def total(self) -> float:
+        """The sum [-]; infinite where the modes cannot resolve the contact."""
+        return self.step + self.truncation + self.mesh if self.resolvable else float("inf")
+
+    def __float__(self) -> float:
+        return self.total
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """The modal system of a run, where it began and every step it took."""
+
+    omega: np.ndarray  # (n_modes,) [rad/s] of all bodies
+    zeta: np.ndarray  # (n_modes,) [-]
+    shape: np.ndarray  # (n_contacts, n_modes) [kg**-0.5] signed: the approach is offset + shape @ q
+    offset: np.ndarray  # (n_contacts,) [m]
+    bias: np.ndarray  # (n_modes,) [N kg**-0.5] constant modal forces
+    law: np.ndarray  # (n_contacts, 4) stiffness, exponent, loss, compliance in series
+    start_q: np.ndarray  # (n_modes,) [m kg**0.5]
+    start_p: np.ndarray  # (n_modes,) [m kg**0.5/s]
+    steps: np.ndarray  # (n_steps, 3 + 4 n_contacts) see `_kernels.run_energy`
+    end_q: np.ndarray  # (n_modes,)
+    end_p: np.ndarray  # (n_modes,)
+    now: np.ndarray  # (5, n_contacts) last approach and, in row 4, rate
+    work: np.ndarray  # (n_contacts,) [J] integral of force times rate of approach
+    end_time: float  # [s]
+    status: int  # see `_kernels`
+    n_fallback: int  # [-] steps scheme A4 left to A
+    n_blind: int  # [-] steps whose contact events were passed, not located
+
+    def __post_init__(self) -> None:
+        _check.lock_arrays(self)
+
+    @property
+    def n_contacts(self) -> int:
+        return len(self.offset)
+
+    @cached_property
+    def ends(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Approach and rate at the beginning and end of every step, four arrays (n_steps, n_contacts)."""
+        d0, v0 = self.steps[:, 3::4], self.steps[:, 4::4]
+        d1 = np.vstack([d0[1:], self.now[:1]])
+        v1 = np.vstack([v0[1:], self.now[4:5]])
+        return d0, v0, d1, v1
+
+    @cached_property
+    def pressed(self) -> np.ndarray:
+        """Whether a contact carries force in a step, (n_steps, n_contacts)."""
+        return self.steps[:, 5::4] > 0.0
+
+    def approach(self, steps: np.ndarray, contact: int, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Approach and rate within steps at fractions of them, (n_steps, n_parts): cubics through both ends."""
+        d0, v0, d1, v1 = (end[steps, contact][:, None] for end in self.ends)
+        h = self.steps[steps, 1][:, None]
+        a = 2.0 * (d0 - d1) + h * (v0 + v1)
+        b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
+        return d0 + part * (h * v0 + part * (b + part * a)), v0 + part * (2.0 * b + 3.0 * a * part) / h
+
+    def force(self, steps: np.ndarray, contact: int, part: np.ndarray) -> np.ndarray:
+        """Contact force [N] within steps at fractions of them, (n_steps, n_parts)."""
+        approach, rate = self.approach(steps, contact, part)
+        k, exponent, loss, c = self.law[contact]
+        pressed = np.maximum(approach, 0.0)
+        if c:
+            pressed = _kernels.compressions(pressed.ravel(), k, exponent, c).reshape(pressed.shape)
+        return np.maximum(k * pressed**exponent * (1.0 + loss * rate), 0.0)
+
+    @cached_property
+    def impacts(self) -> tuple[Impact, ...]:
+        """Every unbroken contact, in order of its beginning."""
+        found = []
+        for i in range(self.n_contacts):
+            edges = np.flatnonzero(np.diff(np.concatenate([[False], self.pressed[:, i], [False]])))
+            found += [self._impact(i, first, last) for first, last in zip(edges[::2], edges[1::2] - 1)]
+        return tuple(sorted(found, key=lambda impact: (impact.start, impact.contact)))
+
+    def _impact(self, i: int, first: int, last: int) -> Impact:
+        d0, v0, d1, v1 = (end[:, i] for end in self.ends)
+        start, end = self.steps[first, 0], self.steps[last, 0] + self.steps[last, 1]
+        if d0[first] < 0.0 < d1[first]:
+            start += _kernels.hermite_root(d0[first], v0[first], d1[first], v1[first], self.steps[first, 1])
+        if d0[last] > 0.0 > d1[last]:
+            end = self.steps[last, 0]
+            end += _kernels.hermite_root(d0[last], v0[last], d1[last], v1[last], self.steps[last, 1])
+        rows = np.arange(first, last + 1)
+        force = self.force(rows, i, np.linspace(0.0, 1.0, PEAK_LOOKS)[None])
+        row, column = np.unravel_index(int(force.argmax()), force.shape)
+        step = 1.0 / (PEAK_LOOKS - 1)
+        middle = min(max(column * step, step), 1.0 - step)
+        low, top, high = self.force(rows[row : row + 1], i, np.array([[middle - step, middle, middle + step]]))[0]
+        bend = low - 2.0 * top + high
+        peak = float(force.max())
+        if bend < 0.0:
+            shift = min(max(0.5 * (low - high) / bend, -1.0), 1.0)
+            peak = max(peak, float(self.force(rows[row : row + 1], i, np.array([[middle + shift * step]]))[0, 0]))
+        impulse = float(self.steps[rows, 1] @ self.steps[rows, 5 + 4 * i])
+        return Impact(float(start), float(end), peak, impulse, i)
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Everything about a blow; `strike` and `collide` make it. Histories are exact between steps and after the end."""
+
+    bodies: tuple[Modes, ...]
+    contacts: tuple[Contact, ...]
+    history: History
+    speed: float  # [m/s] of the striker's contact point at the start; the fastest body's in `collide`
+    tolerance: float  # [-] asked for
+    scheme: str  # that ran
+    error: Error
+    striker: Striker | None = None
+    at: np.ndarray | None = None  # (dimension,) [m] where the target was struck
+
+    def __post_init__(self) -> None:
+        _check.lock_arrays(self)
+
+    @property
+    def target(self) -> Modes:
+        """The struck body; in `collide` the last one."""
+        return self.bodies[-1]
+
+    @property
+    def contact(self) -> Contact:
+        """The contact law; in `collide` the first one."""
+        return self.contacts[0]
+
+    @property
+    def impacts(self) -> tuple[Impact, ...]:
+        """Every unbroken contact, in order of its beginning."""
+        return self.history.impacts
+
+    @property
+    def n_impacts(self) -> int:
+        """Number of unbroken contacts."""
+        return len(self.impacts)
+
+    @property
+    def contact_time(self) -> float:
+        """Total time in contact [s]."""
+        return float(sum(impact.duration for impact in self.impacts))
+
+    @property
+    def impulse(self) -> float:
+        """Total impulse of the contact forces [N s]."""
+        return float(sum(impact.impulse for impact in self.impacts))
+
+    @property
+    def peak_force(self) -> float:
+        """Largest contact force [N]."""
+        return max((impact.peak_force for impact in self.impacts), default=0.0)
+
+    @cached_property
+    def _samples(self) -> tuple[np.ndarray, np.ndarray]:
+        steps = self.history.steps
+        if not len(steps):
+            return np.zeros(1), np.zeros((1, self.history.n_contacts))
+        busy = np.asarray(self.history.pressed.any(axis=1))
+        per_step = 4.0
+        if busy.any():
+            per_impact = busy.sum() / max(1, len({impact.start for impact in self.impacts}))
+            per_step = np.clip(np.ceil((3.0 / max(self.tolerance, 1e-10)) ** 0.5 / per_impact), 4, 4096)
+        part = np.arange(int(per_step)) / per_step
+        times, forces = [], []
+        edges = np.flatnonzero(np.diff(np.concatenate([[-1], busy.astype(int)])))
+        for first, last in zip(edges, np.append(edges[1:], len(steps))):
+            rows = np.arange(first, last)
+            if busy[first]:
+                times.append((steps[rows, :1] + part * steps[rows, 1:2]).ravel())
+                forces.append(np.stack([self._within(rows, i, part) for i in range(self.history.n_contacts)], axis=1))
+            else:
+                times.append(steps[rows, 0])
+                forces.append(np.zeros((len(rows), self.history.n_contacts)))
+        times.append(np.array([self.history.end_time]))
+        last_row = np.array([len(steps) - 1])
+        forces.append(np.array([[self._within(last_row, i, np.ones(1))[0] for i in range(self.history.n_contacts)]]))
+        return np.concatenate(times), np.concatenate(forces)
+
+    def _within(self, rows: np.ndarray, i: int, part: np.ndarray) -> np.ndarray:
+        return np.where(self.history.pressed[rows, i][:, None], self.history.force(rows, i, part[None]), 0.0).ravel()
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times [s] of `force`, (n_times,)."""
+        return self._samples[0]
+
+    @property
+    def force(self) -> np.ndarray:
+        """Contact force [N] at `time`, (n_times,); one column per contact where there are several."""
+        force = self._samples[1]
+        return force[:, 0] if force.shape[1] == 1 else force
+
+    def spectrum(self, frequencies: Any) -> np.ndarray:
+        """Fourier transform of the force, integral of F exp(-i omega t) [N s], (n_frequencies,), complex.
+
+        Exact for the sampled force taken as straight between its samples.
+        """
+        omega = 2.0 * np.pi * _check.array("frequencies", np.atleast_1d(frequencies), (None,), "Hz")
+        time, force = self._samples
+        total = np.zeros(len(omega), complex)
+        force = force.sum(axis=1)
+        keep = (force[1:] != 0.0) | (force[:-1] != 0.0)
+        h, t = np.diff(time)[keep], time[:-1][keep]
+        f0, f1 = force[:-1][keep], force[1:][keep]
+        for block in np.array_split(np.arange(len(omega)), max(1, len(omega) * len(h) // 2**20)):
+            x = omega[block, None] * h  # (n_block, n_pieces)
+            small = np.abs(x) < 1e-2
+            safe = np.where(small, 1.0, x)
+            edge = np.exp(-1j * safe)
+            mean = np.where(small, 1.0 - 0.5j * x - x**2 / 6.0 + 1j * x**3 / 24.0, (1.0 - edge) / (1j * safe))
+            ramp = np.where(
+                small, 0.5 - 1j * x / 3.0 - x**2 / 8.0 + 1j * x**3 / 30.0, (edge * (1.0 + 1j * safe) - 1.0) / safe**2
+            )
+            start = np.exp(-1j * omega[block, None] * t)
+            total[block] = (start * h * (f0 * mean + (f1 - f0) * ramp)).sum(axis=1)
+        return total
+
+    def spectral_centroid(self, max_frequency: float) -> float:
+        """Mean frequency [Hz] of the force spectrum's magnitude from zero to ``max_frequency`` [Hz]."""
+        limit = _check.positive("max_frequency", max_frequency, "Hz")
+        span = max((impact.end for impact in self.impacts), default=0.0)
+        if span == 0.0:
+            raise ValueError("spectral_centroid needs a contact; nothing touched")
+        frequencies = np.linspace(0.0, limit, int(np.clip(32.0 * limit * span, 512, 65536)))
+        size = np.abs(self.spectrum(frequencies))
+        return float(np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies))
+
+    def body_slice(self, body: int) -> slice:
+        """Where the modes of a body stand in the history's arrays."""
+        start = sum(modes.n_modes for modes in self.bodies[:body])
+        return slice(start, start + self.bodies[body].n_modes)
+
+    def modal_state(self, times: Any, *, body: int = -1) -> tuple[np.ndarray, np.ndarray]:
+        """Modal displacements and velocities of the target at times of any order.
+
+        Parameters
+        ----------
+        times : array_like, shape (n_times,) [s], from the start on; after the end the bodies fly free
+        body : int
+            Which body; the target is the last.
+
+        Returns
+        -------
+        q, p : ndarray, shape (n_times, n_modes) [m kg**0.5], [m kg**0.5/s]
+        """
+        times = _check.array("times", np.atleast_1d(times), (None,), "s")
+        if times.size and times.min() < 0.0:
+            raise ValueError(f"times must not lie before the blow at 0 s, got {times.min():g} s")
+        order = np.argsort(times, kind="stable")
+        h = self.history
+        q = np.empty((len(times), len(h.omega)))
+        p = np.empty_like(q)
+        _kernels.replay_ramps(h.omega, h.zeta, h.shape, h.bias, h.start_q, h.start_p, h.steps, times[order], q, p)
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        part = self.body_slice(body % len(self.bodies))
+        n_modes = self.bodies[body].n_modes
+        return q[back, part][:, :n_modes], p[back, part][:, :n_modes]
+
+    def displacement(self, points: Any, times: Any, *, body: int = -1) -> np.ndarray:
+        """Displacement [m] of the target at points and times, (n_times, n_points); positive along the blow."""
+        q, _ = self.modal_state(times, body=body)
+        return q @ self.bodies[body].shape_at(points).T  # (n_times, n_modes) @ (n_modes, n_points)
+
+    def velocity(self, points: Any, times: Any, *, body: int = -1) -> np.ndarray:
+        """Velocity [m/s] of the target at points and times, (n_times, n_points)."""
+        _, p = self.modal_state(times, body=body)
+        return p @ self.bodies[body].shape_at(points).T
+
+    @property
+    def speeds(self) -> tuple[float, ...]:
+        """Speed [m/s] at the end of each body's rigid motion at its contact point (its first, if several)."""
+        h = self.history
+        result = []
+        for body, modes in enumerate(self.bodies):
+            part = slice(self.body_slice(body).start, self.body_slice(body).start + modes.n_rigid)
+            rows = [i for i in range(h.n_contacts) if (h.shape[i, self.body_slice(body)] != 0.0).any()]
+            sign = self._sign(body, rows[0]) if rows else 1.0
+            result.append(sign * float(h.shape[rows[0], part] @ h.end_p[part]) if rows else 0.0)
+        return tuple(result)
+
+    def _sign(self, body: int, contact: int) -> float:
+        later = any((self.history.shape[contact, self.body_slice(other)] != 0.0).any() for other in range(body))
+        return -1.0 if later else 1.0
+
+    @property
+    def restitution(self) -> float:
+        """Minus the striker's speed at the end over its speed before, at its contact point, its vibration left out."""
+        return -self.speeds[0] / self.speed if self.speed else 0.0
+
+    @cached_property
+    def _balance(self) -> dict[str, float]:
+        h = self.history
+
+        def modal(q: np.ndarray, p: np.ndarray, part: slice) -> float:
+            kinetic = 0.5 * (p[part] @ p[part]) + 0.5 * ((h.omega[part] * q[part]) @ (h.omega[part] * q[part]))
+            return float(kinetic - h.bias[part] @ q[part])
+
+        def stored(d: np.ndarray) -> float:
+            return sum(_kernels.law_at(float(x), h.law, i)[2] for i, x in enumerate(d))
+
+        everything = slice(0, len(h.omega))
+        start_contact = stored(h.offset + h.shape @ h.start_q)
+        end_contact = stored(np.atleast_1d(h.now[0]))
+        start = modal(h.start_q, h.start_p, everything)
+        end = modal(h.end_q, h.end_p, everything)
+        work = float(h.work.sum())
+        return {
+            "start": start + start_contact,
+            "end": end + end_contact,
+            "contact": end_contact,
+            "contact_loss": work - (end_contact - start_contact),
+            "modal_loss": -(end - start) - work,
+        }
+
+    @property
+    def energies(self) -> dict[str, float]:
+        """Energies [J] at the end: striker, target (or body 0, 1, ...), contact, and what was dissipated.
+
+        They add up to the energy at the start to within `energy_error`.
+        """
+        h = self.history
+        names = ["striker", "target"] if len(self.bodies) == 2 else [f"body {i}" for i in range(len(self.bodies))]
+        result = {}
+        for body, name in enumerate(names):
+            part = self.body_slice(body)
+            q, p = h.end_q[part], h.end_p[part]
+            result[name] = float(0.5 * (p @ p + (h.omega[part] * q) @ (h.omega[part] * q)) - h.bias[part] @ q)
+        result["contact"] = self._balance["contact"]
+        result["dissipated"] = sum(self.dissipated.values())
+        return result
+
+    @property
+    def dissipated(self) -> dict[str, float]:
+        """Energy lost [J] to the damping of the modes and to the contacts; zero where nothing can lose any."""
+        lossy = bool((self.history.law[:, 2] > 0.0).any())
+        damped = bool(((self.history.zeta > 0.0) & (self.history.omega > 0.0)).any())
+        return {
+            "modes": self._balance["modal_loss"] if damped else 0.0,
+            "contact": self._balance["contact_loss"] if lossy else 0.0,
+        }
+
+    @property
+    def energy_error(self) -> float:
+        """Energy that appeared or vanished without a reason, over the energy at the start [-]."""
+        balance, lost = self._balance, self.dissipated
+        unexplained = [balance["modal_loss"] - lost["modes"], balance["contact_loss"] - lost["contact"]]
+        unexplained += [min(0.0, value) for value in lost.values()]
+        scale = max(abs(balance["start"]), abs(balance["end"]))
+        return float(sum(abs(value) for value in unexplained) / scale) if scale else 0.0
+
+    @property
+    def momentum_error(self) -> float:
+        """Largest change of a rigid motion's momentum not explained by the forces, over the largest momentum [-]."""
+        h = self.history
+        rigid = h.omega == 0.0
+        if not rigid.any():
+            return 0.0
+        impulses = h.steps[:, 1] @ h.steps[:, 5::4]  # (n_contacts,)
+        wanted = h.start_p + h.bias * h.end_time - impulses @ h.shape
+        scale = max(np.abs(h.start_p[rigid]).max(), np.abs(impulses @ np.abs(h.shape[:, rigid])).max())
+        return float(np.abs(h.end_p - wanted)[rigid].max() / scale) if scale else 0.0
+
+    @property
+    def finished(self) -> bool:
+        """Whether the bodies are proved to have separated for good."""
+        return self.history.status == _kernels.FINISHED
+
+    def summary(self) -> str:
+        """The blow in a few lines a person can read."""
+        lines = [f"{self.n_impacts} impact{'s' if self.n_impacts != 1 else ''}, {self._outcome}"]
+        lines += [
+            f"  {impact.start * 1e3:9.4f} to {impact.end * 1e3:9.4f} ms: peak {impact.peak_force:.5g} N, "
+            f"impulse {impact.impulse:.5g} N s"
+            for impact in self.impacts[:20]
+        ]
+        if self.n_impacts > 20:
+            lines.append(f"  ... and {self.n_impacts - 20} more")
+        total = self._balance["start"]
+        shares = ", ".join(f"{name} {value / total:.2%}" for name, value in self.energies.items()) if total else "none"
+        error = self.error
+        lines += [
+            f"contact time {self.contact_time * 1e3:.5g} ms, peak force {self.peak_force:.5g} N, "
+            f"impulse {self.impulse:.5g} N s",
+            f"restitution {self.restitution:.5f} at {self.speed:g} m/s",
+            f"energy {total:.5g} J: {shares}",
+            f"estimated error {error.total:.1e} (step {error.step:.1e}, truncation {error.truncation:.1e}, "
+            f"mesh {error.mesh:.1e}); energy kept to {self.energy_error:.1e}",
+        ]
+        if not error.resolvable:
+            lines.append("not resolvable: the modes left out matter to this contact; keep more modes")
+        return "\n".join(lines)
+
+    @property
+    def _outcome(self) -> str:
+        words = {
+            _kernels.FINISHED: "then separation for good (proved)",
+            _kernels.HORIZON: "stopped at the duration asked for",
+            _kernels.IMPACTS: "stopped after the impacts asked for",
+            _kernels.SETTLED: "then rest",
+        }
+        return words[self.history.status]

@@ -1,0 +1,94 @@
+"""What strikes: a rigid mass, a sphere, a stick or any body with modes, and the point it strikes with."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import _check, mesh
+from .assembly import assemble
+from .modal import Modes, find_modes
+from .section import Beam, Material
+
+
+@dataclass(frozen=True, eq=False)
+class Striker:
+    """A body and the point it strikes with; it arrives moving rigidly, undeformed.
+
+    Its speed is that of its contact point: a body hinged at its far end turns about the hinge, a free one moves
+    straight.
+    """
+
+    modes: Modes
+    at: np.ndarray  # (dimension,) [m] the contact point
+    material: Material | None = None  # of a sphere, for `Contact.between`
+    radius: float | None = None  # [m] of a sphere
+
+    def __post_init__(self) -> None:
+        if self.modes.n_rigid == 0:
+            raise ValueError(
+                f"striker must be able to move rigidly, but its lowest mode is at {self.modes.frequencies[0]:g} Hz; "
+                "support it by at most a hinge"
+            )
+        at = self.modes.points("at", self.at)[0]
+        object.__setattr__(self, "at", at)
+        shape = self.modes.shape_at(at[None] if self.modes.dimension else None)[0]
+        if not (shape[: self.modes.n_rigid] != 0.0).any():
+            raise ValueError("at must be a point that moves when the striker moves rigidly, got one at rest")
+        _check.lock_arrays(self)
+
+    @classmethod
+    def rigid(cls, mass: float) -> "Striker":
+        """A rigid mass [kg]."""
+        return cls(Modes.rigid(mass), np.zeros(0))
+
+    @classmethod
+    def sphere(cls, material: Material, radius: float) -> "Striker":
+        """A rigid solid sphere of a material, radius in m; `Contact.between` gives its Hertz stiffness."""
+        radius = _check.positive("radius", radius, "m")
+        rho = material.rho
+        if not isinstance(rho, (int, float)):
+            raise ValueError(f"material must have one density, got {rho!r:.60}")
+        return cls(Modes.rigid(4.0 / 3.0 * np.pi * radius**3 * rho), np.zeros(0), material, radius)
+
+    @classmethod
+    def stick(cls, mass: float, first_frequency: float, *, n_modes: int = 8) -> "Striker":
+        """A uniform stick hinged at its far end that strikes with its free end, as a drumstick.
+
+        Parameters
+        ----------
+        mass : float [kg]
+            While the stick is rigid, its tip feels as a third of this.
+        first_frequency : float [Hz]
+            Of its first bending mode.
+        n_modes : int
+            Bending modes kept, one turning mode besides; the rest act by their residual compliance.
+        """
+        mass = _check.positive("mass", mass, "kg")
+        first_frequency = _check.positive("first_frequency", first_frequency, "Hz")
+        beam = Beam.rectangular(Material(E=1.0, nu=0.0, rho=1.0), width=1.0, height=1.0)
+        line = mesh.line(1.0, size=0.2 / (1 + _check.count("n_modes", n_modes)))  # five elements per half wave
+        system = assemble(line, beam, supports={"left": "hinged"})
+        modes = find_modes(system, n_modes=1 + n_modes)
+        return cls(modes.scaled(mass=mass, first_frequency=first_frequency), np.ones(1))
+
+    @classmethod
+    def flexible(cls, modes: Modes, *, at: Any) -> "Striker":
+        """Any body that can move rigidly, striking with its point ``at`` [m]."""
+        return cls(modes, at)
+
+    @property
+    def mass(self) -> float:
+        """Mass of the body [kg]."""
+        return self.modes.mass
+
+    @property
+    def shape(self) -> np.ndarray:
+        """Mass-normalised shapes at the contact point, (n_modes,) [kg**-0.5]."""
+        return self.modes.shape_at(self.at[None] if self.modes.dimension else None)[0]
+
+    @property
+    def felt_mass(self) -> float:
+        """Mass felt at the contact point while the striker stays rigid [kg]."""
+        rigid = self.shape[: self.modes.n_rigid]
+        return 1.0 / float(rigid @ rigid)
