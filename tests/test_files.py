@@ -48,7 +48,7 @@ def test_staged_leaves_nothing_when_the_block_fails(tmp_path, failure):
 
 def test_staged_moves_nothing_where_a_folder_is_in_the_way(tmp_path):
     (tmp_path / "b.txt").mkdir()
-    with pytest.raises(IsADirectoryError, match="b.txt"), staged(tmp_path) as staging:
+    with pytest.raises(IsADirectoryError, match=r"b\.txt"), staged(tmp_path) as staging:
         (staging / "a.txt").write_text("a")
         (staging / "b.txt").write_text("b")
     assert names(tmp_path) == ["b.txt"]

@@ -1,0 +1,166 @@
+"""The same verbs at the prompt: parses, calls, prints; no physics."""
+
+import argparse
+import json
+import os
+import shutil
+import signal
+import sys
+import textwrap
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+import fem_impact as fi
+
+BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses
+WIDEST = 88  # [-] columns of text at most; a narrow terminal has fewer
+SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` writes any number
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one command; the exit status is 0, 2 for bad input, 1 for a run that failed, 130 after Ctrl-C."""
+    options = _parser().parse_args(arguments)
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that temporary files go away
+    try:
+        options.run(options)
+        sys.stdout.flush()
+    except ValueError as error:
+        return _complain(error, BAD_INPUT)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else Python complains again at its exit
+        return FAILED
+    except OSError as error:
+        return _complain(f"{error.filename}: {error.strerror}" if error.filename else error, FAILED)
+    except MemoryError:
+        return _complain("not enough memory; allow a larger tolerance", FAILED)
+    except RuntimeError as error:
+        if not isinstance(error, fi.SimulationError):
+            raise
+        return _complain(error, FAILED)
+    except KeyboardInterrupt:
+        return _complain("interrupted; nothing was written", INTERRUPTED)
+    return 0
+
+
+def _complain(error: object, status: int) -> int:
+    print(f"fem-impact: {' '.join(str(error).split())}", file=sys.stderr)
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="fem-impact", description="Strike anything thin with anything, and know how far to trust the answer."
+    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
+    verbs = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    strike = verbs.add_parser("strike", help="strike a scene; write force, spectrum, modes and sound")
+    strike.set_defaults(run=_strike)
+    strike.add_argument("scene", metavar="SCENE", type=Path, help="a TOML file, such as studies/scenes/drumstick.toml")
+    strike.add_argument("--out", metavar="DIR", type=Path, help="where the files go (default: out/NAME-OF-SCENE)")
+    strike.add_argument("--tolerance", metavar="T", type=float, help="largest error accepted, instead of the scene's")
+    strike.add_argument("--json", action="store_true", help="print what response.json holds instead of the summary")
+
+    modes = verbs.add_parser("modes", help="list the modes of the struck body; write their shapes")
+    modes.set_defaults(run=_modes)
+    modes.add_argument("scene", metavar="SCENE", type=Path, help="a TOML file")
+    modes.add_argument("--count", metavar="N", type=int, default=12, help="how many modes (default: 12)")
+    modes.add_argument("--vtk", metavar="FILE", type=Path, help="write the shapes to a .pvd or .vtu file")
+    modes.add_argument("--json", action="store_true", help="print the numbers as JSON")
+    return parser
+
+
+class _Version(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        print(f"fem-impact {fi.__version__}")
+        parser.exit()
+
+
+def _strike(options: argparse.Namespace) -> None:
+    began = time.perf_counter()
+    scene = fi.load_scene(options.scene)
+    folder = options.out if options.out is not None else Path("out") / options.scene.stem
+    changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
+    with fi.export.staged(folder) as staging:
+        run = scene.run(_progress, **changes)
+        start = time.perf_counter()
+        with _progress("files"):
+            data = _write(staging, scene, run, changes)
+    seconds = {**run.seconds, "files": time.perf_counter() - start, "total": time.perf_counter() - began}
+    if options.json:
+        print(json.dumps(data, indent=2, allow_nan=False))
+        return
+    print(_wrapped(scene.title or str(scene.path)))
+    print(_wrapped(run.response.summary()))
+    print(_wrapped("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())))
+    print(_wrapped(f"Files in {folder}{os.sep}: {', '.join(data['files'])}"))
+
+
+def _write(folder: Path, scene: Any, run: Any, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Write every file of a strike; return what response.json holds."""
+    response = run.response
+    fi.export.write_force(folder / "force.csv", response)
+    fi.figures.save(folder / "force.png", fi.figures.force(response))
+    fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=SHAPES_WRITTEN))
+    heard = fi.export.write_wav(folder / "strike.wav", response, scene.points[0])
+    data = fi.export.plain(
+        {
+            **fi.export.numbers(response),
+            "sound": {"at": scene.points[0], "full_scale": heard.full_scale, "peak_level": heard.peak_level},
+            "scene": scene.data(**changes),
+            "seconds": dict(run.seconds),
+            "versions": fi.export.versions(),
+            "files": ["response.json", "force.csv", "force.png", "modes.pvd", "strike.wav"],
+        }
+    )
+    fi.export.write_json(folder / "response.json", data)
+    return data
+
+
+def _modes(options: argparse.Namespace) -> None:
+    scene = fi.load_scene(options.scene)
+    modes = scene.modes(options.count)
+    if options.vtk is not None:
+        fi.export.write_vtk(options.vtk, modes)
+    if options.json:
+        data = {"frequencies": modes.frequencies, "damping_ratios": modes.damping_ratio, "mass": modes.mass}
+        print(json.dumps(fi.export.plain({**data, "versions": fi.export.versions()}), indent=2, allow_nan=False))
+        return
+    print(_wrapped(scene.title or str(scene.path)))
+    print(f"{'mode':>5} {'frequency':>14} {'damping ratio':>14}")
+    for i, (frequency, ratio) in enumerate(zip(modes.frequencies, modes.damping_ratio), 1):
+        print(f"{i:5d} {frequency:11.5g} Hz {ratio:14.3g}")
+    if options.vtk is not None:
+        print(_wrapped(f"Files: {options.vtk}"))
+
+
+def _wrapped(text: str) -> str:
+    """Text broken to the width of the terminal, continued lines indented."""
+    width = max(20, min(WIDEST, shutil.get_terminal_size().columns))
+    lines = (textwrap.wrap(line, width, subsequent_indent="    ") or [""] for line in text.splitlines())
+    return "\n".join(line for wrapped in lines for line in wrapped)
+
+
+@contextmanager
+def _progress(stage: str) -> Iterator[None]:
+    """Show on a terminal that a stage is at work, and for how long."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield
+        return
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        progress.add_task(stage, total=None)
+        yield
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,178 @@
+"""Pictures of a blow, all in one style: safe for the colour-blind, SI units on every axis, no screen needed."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from cycler import cycler
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter
+
+from . import _check
+from ._files import replacing
+from .modal import Modes
+from .response import Response
+
+# Okabe and Ito's palette: told apart with every common colour vision, and in print.
+BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
+STYLE: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.titlesize": 10.0,
+    "axes.titlelocation": "left",
+    "axes.prop_cycle": cycler(color=[BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY]),
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.5,
+    "legend.frameon": False,
+    "savefig.dpi": 150.0,
+}
+SPECTRUM_BAND = (10.0, 20e3)  # [Hz] shown unless another is asked for: about what is heard
+SPECTRUM_POINTS = 1200  # [-] enough for a line of one pixel each
+SPECTRUM_DEPTH = 1e-4  # [-] 80 dB below the largest value the axis ends
+FLAT = 1e-9  # [-] of the largest deflection: below, a shape is zero to rounding
+MARGIN = 0.1  # [-] time shown before and after the blow over its length
+
+
+@contextmanager
+def _styled(width: float, height: float) -> Iterator[Figure]:
+    with matplotlib.rc_context(STYLE):
+        yield Figure(figsize=(width, height), layout="constrained")
+
+
+def save(path: str | Path, figure: Figure) -> None:
+    """Write a figure; the ending of the path says how (.png, .pdf, .svg)."""
+    endings = [f".{name}" for name in figure.canvas.get_supported_filetypes()]
+    _check.one_of("path ending", Path(path).suffix.lower(), endings)
+    with matplotlib.rc_context(STYLE), replacing(path) as temporary:
+        figure.savefig(temporary)
+
+
+def force(response: Response, *, band: tuple[float, float] = SPECTRUM_BAND) -> Figure:
+    """Contact force over time, and the size of its spectrum over frequency.
+
+    Parameters
+    ----------
+    response : Response
+    band : (low, high) [Hz] of the spectrum shown
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Contacts are shaded and numbered; ticks along the spectrum's foot are the struck body's modes.
+    """
+    low, high = _check.positive("band[0]", band[0], "Hz"), _check.positive("band[1]", band[1], "Hz")
+    with _styled(7.0, 6.0) as figure:
+        above, below = figure.subplots(2, 1)
+        _draw_force(above, response)
+        frequencies = np.geomspace(low, high, SPECTRUM_POINTS)
+        size = np.abs(response.spectrum(frequencies))
+        top = float(size.max(initial=0.0)) or 1.0
+        below.loglog(frequencies, np.maximum(size, 0.1 * SPECTRUM_DEPTH * top))
+        below.set(xlim=(low, high), ylim=(SPECTRUM_DEPTH * top, 2.0 * top))
+        below.set(xlabel="frequency", ylabel="force spectrum [N s]", title="Spectrum of the force")
+        below.xaxis.set_major_formatter(EngFormatter(unit="Hz", sep=" "))
+        below.plot(
+            response.target.frequencies,
+            np.zeros(response.target.n_modes),
+            "|",
+            color=GREEN,
+            ms=9.0,
+            transform=below.get_xaxis_transform(),
+            label="modes of the struck body",
+            clip_on=True,
+        )
+        below.legend(loc="lower left")
+    return figure
+
+
+def _draw_force(axes: Any, response: Response) -> None:
+    start, end = response.time[0], response.time[-1]
+    if response.impacts:
+        start, end = response.impacts[0].start, response.impacts[-1].end
+    room = MARGIN * (end - start)
+    axes.plot(response.time, response.force)
+    for number, impact in enumerate(response.impacts, 1):
+        axes.axvspan(impact.start, impact.end, color=SKY, alpha=0.2, lw=0)
+        axes.annotate(
+            str(number),
+            (0.5 * (impact.start + impact.end), 1.0),
+            xycoords=axes.get_xaxis_transform(),
+            ha="center",
+            va="bottom",
+            color="#555555",
+        )
+    axes.set(xlim=(start - room, end + room), xlabel="time", ylabel="contact force", title="Contact force")
+    axes.set_ylim(bottom=0.0)
+    axes.xaxis.set_major_formatter(EngFormatter(unit="s", sep=" "))
+    axes.yaxis.set_major_formatter(EngFormatter(unit="N", sep=" "))
+
+
+def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
+    """The first shapes as a grid of small pictures, nodal lines drawn, frequencies above.
+
+    Parameters
+    ----------
+    modes : Modes of a plate or a beam
+    count : int
+        How many at most.
+    columns : int
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    count = min(_check.count("count", count), modes.n_modes)
+    columns = min(_check.count("columns", columns), count)
+    rows = -(-count // columns)
+    _check.between("dimension of modes", modes.dimension, 1, 2)
+    points, cells = modes.shapes.grid()
+    shapes = modes.shapes.at(points)[:, :count]
+    shapes = shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300)
+    rim = _rim(cells) if modes.dimension == 2 else None
+    with _styled(2.2 * columns, 1.9 * rows) as figure:
+        grid = figure.subplots(rows, columns, squeeze=False)
+        for i, axes in enumerate(grid.flat):
+            if i >= count:
+                axes.set_axis_off()
+                continue
+            if modes.dimension == 1:
+                order = np.argsort(points[:, 0])
+                axes.plot(points[order, 0], shapes[order, i])
+                axes.axhline(0.0, color="#888888", lw=0.6)
+                axes.set(ylim=(-1.1, 1.1), yticks=[], xlabel="x [m]" if i >= count - columns else "")
+            else:
+                axes.tripcolor(*points.T, cells, shapes[:, i], cmap="PuOr", vmin=-1, vmax=1, shading="gouraud")
+                nodal = _unflattened(shapes[:, i], cells)
+                axes.tricontour(*points.T, cells, nodal, levels=[0.0], colors="black", linewidths=0.8)
+                axes.add_collection(LineCollection(list(points[rim]), colors="#888888", linewidths=0.8))
+                axes.set_aspect("equal")
+                axes.set_axis_off()
+            axes.set_title(f"{i + 1}   {modes.frequencies[i]:.4g} Hz")
+    return figure
+
+
+def _rim(cells: np.ndarray) -> np.ndarray:
+    """Sides (n_sides, 2) that belong to one triangle only: the edge of the plate."""
+    sides, counts = np.unique(np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0, return_counts=True)
+    return sides[counts == 1]
+
+
+def _unflattened(shape: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """The shape (n_points,) with a trace of its neighbours where it is zero.
+
+    A supported edge is zero all along, to rounding; drawn as it is, it would pass for a nodal line here and there.
+    """
+    total, count = np.zeros(len(shape)), np.zeros(len(shape))
+    for i in range(3):
+        np.add.at(total, cells[:, i], shape[cells].sum(axis=1))
+        np.add.at(count, cells[:, i], 3.0)
+    return np.where(np.abs(shape) < FLAT, FLAT * total / np.maximum(count, 1.0), shape)

@@ -1,0 +1,194 @@
+"""The command line: what it prints, what it writes, and how it fails."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import pyvista
+
+import fem_impact as fi
+from fem_impact import cli
+
+SCENES = Path(__file__).parents[1] / "studies" / "scenes"
+TEXT = """
+title = "A small test"
+[mesh]
+shape = "rectangle"
+length = 0.465
+width = 0.3
+[target]
+mass = 0.2
+first_frequency = 100.0
+damping_ratio = 0.01
+source = "analytic"
+[supports]
+boundary = "hinged"
+[striker]
+kind = "rigid"
+mass = 0.03
+[contact]
+kind = "hertz"
+stiffness = 695e3
+[strike]
+at = [0.1395, 0.09]
+speed = 2.0
+tolerance = 1e-2
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(TEXT)
+    return path
+
+
+def test_strike_writes_every_file_and_prints_a_summary(scene, tmp_path, capsys):
+    assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out")]) == 0
+    written = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert written == ["force.csv", "force.png", "modes", "modes.pvd", "response.json", "strike.wav"]
+    printed = capsys.readouterr().out
+    data = json.loads((tmp_path / "out" / "response.json").read_text())
+    for word in ("A small test", "Time: mesh", "strike", "files", "total", "response.json", str(tmp_path / "out")):
+        assert word in printed
+    assert data["scene"]["contact"] == {"kind": "hertz", "stiffness": 695e3}
+    assert data["versions"]["fem-impact"] == fi.__version__
+    assert data["response"]["n_impacts"] == len(data["impacts"]) > 0
+    reader = pyvista.get_reader(tmp_path / "out" / "modes.pvd")
+    assert reader.time_values[0] == pytest.approx(100.0, rel=1e-9)
+
+
+def test_json_is_printed_as_it_is_written(scene, tmp_path, capsys):
+    assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads((tmp_path / "out" / "response.json").read_text())
+
+
+def test_tolerance_of_the_command_replaces_that_of_the_scene(scene, tmp_path, capsys):
+    cli.main(["strike", str(scene), "--out", str(tmp_path / "out"), "--json"])
+    loose = json.loads(capsys.readouterr().out)
+    cli.main(["strike", str(scene), "--out", str(tmp_path / "out"), "--json", "--tolerance", "1e-4"])
+    tight = json.loads(capsys.readouterr().out)
+    assert tight["scene"]["strike"]["tolerance"] == 1e-4
+    assert tight["response"]["n_modes"] > loose["response"]["n_modes"]
+
+
+def test_files_go_to_a_folder_named_after_the_scene(scene, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["strike", str(scene)]) == 0
+    assert (tmp_path / "out" / "small" / "response.json").is_file()
+    assert f"Files in {Path('out/small')}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ("speed = 2.0", "sped = 2.0", "[strike] sped is not a key of this table; did you mean 'speed'?"),
+        ("mass = 0.03", "mass = -0.03", "[striker] mass must be positive, got -0.03 kg"),
+        ("stiffness = 695e3", "stiffness = nan", "[contact] stiffness must be finite, got nan"),
+        ("at = [0.1395, 0.09]", "at = [0.1395, 0.9]", "[strike] at must lie on the body, got (0.1395, 0.9) m"),
+    ],
+)
+def test_bad_scene_is_one_line_status_2_and_no_file(scene, tmp_path, capsys, old, new, text):
+    scene.write_text(TEXT.replace(old, new))
+    assert cli.main(["strike", str(scene), "--out", str(tmp_path / "deep" / "out")]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == "" and captured.err.startswith(f"fem-impact: {scene}: {text}")
+    assert captured.err.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
+
+
+def test_bad_tolerance_of_the_command_is_told(scene, tmp_path, capsys):
+    assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out"), "--tolerance", "-1"]) == 2
+    assert "tolerance must be positive, got -1" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_missing_scene_is_a_sentence(tmp_path, capsys):
+    assert cli.main(["strike", str(tmp_path / "none.toml")]) == 1
+    assert capsys.readouterr().err == f"fem-impact: {tmp_path / 'none.toml'}: No such file or directory\n"
+
+
+def test_place_that_cannot_be_written_to_is_a_sentence(scene, tmp_path, capsys):
+    (tmp_path / "file").write_text("in the way")
+    assert cli.main(["strike", str(scene), "--out", str(tmp_path / "file" / "out")]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_failed_run_is_a_sentence_and_leaves_nothing(scene, tmp_path, capsys, monkeypatch):
+    def fail(*_, **__):
+        raise fi.SimulationError("energy drifted")
+
+    monkeypatch.setattr(fi.figures, "save", fail)
+    assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out")]) == 1
+    assert capsys.readouterr().err == "fem-impact: energy drifted\n"
+    assert not (tmp_path / "out").exists()
+
+
+def test_interrupted_run_leaves_nothing(scene, tmp_path, capsys, monkeypatch):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(fi.export, "write_json", interrupt)
+    assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out")]) == 130
+    assert "interrupted; nothing was written" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_modes_are_listed_and_written(scene, tmp_path, capsys):
+    assert cli.main(["modes", str(scene), "--count", "5", "--vtk", str(tmp_path / "m.pvd")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "A small test" and len(lines) == 2 + 5 + 1
+    assert lines[2].split() == ["1", "100", "Hz", "0.01"]
+    assert len(list((tmp_path / "m").glob("*.vtu"))) == 5
+
+
+def test_modes_as_json(scene, capsys):
+    assert cli.main(["modes", str(scene), "--count", "3", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["frequencies"][0] == pytest.approx(100.0) and len(data["frequencies"]) == 3
+
+
+@pytest.mark.parametrize("count", ["0", "-3"])
+def test_count_of_modes_must_be_positive(scene, capsys, count):
+    assert cli.main(["modes", str(scene), "--count", count]) == 2
+    assert "count must be at least 1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("columns", [20, 40, 200])
+def test_summary_keeps_to_the_width_of_the_terminal(scene, tmp_path, capsys, monkeypatch, columns):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["strike", str(scene), "--out", "o"]) == 0
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= min(columns, 88)
+
+
+def test_help_and_version_load_nothing_heavy():
+    code = (
+        "import sys; from fem_impact import cli\n"
+        "try: cli.main(sys.argv[1:])\nexcept SystemExit as end: assert not end.code\n"
+        "heavy = {'numpy', 'scipy', 'skfem', 'numba', 'matplotlib', 'vtk', 'pyvista', 'meshio', 'netgen', 'shapely'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)"
+    )
+    for option, word in (("--help", "strike"), ("--version", fi.__version__)):
+        run = subprocess.run([sys.executable, "-c", code, option], capture_output=True, text=True)
+        assert run.returncode == 0, run.stderr
+        assert word in run.stdout
+
+
+def test_closed_pipe_is_no_error(scene, tmp_path):
+    command = f"{sys.executable} -m fem_impact.cli modes {scene} --count 20 | head -n 1"
+    environment = {**os.environ, "PYTHONPATH": str(Path(cli.__file__).parents[1])}
+    run = subprocess.run(["bash", "-c", command], capture_output=True, text=True, env=environment)
+    assert run.stdout == "A small test\n" and run.stderr == ""
+
+
+@pytest.mark.slow  # compiles, and finds some hundred modes
+def test_default_scene_runs_end_to_end(tmp_path, capsys):
+    assert cli.main(["strike", str(SCENES / "drumstick.toml"), "--out", str(tmp_path / "out"), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    # the estimate must keep the promise the scene asks for
+    assert data["response"]["error"]["total"] < 1e-4
+    assert -1.0 < data["response"]["restitution"] < 1.0

@@ -1,0 +1,61 @@
+"""What the README shows must run as it stands there."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+import fem_impact as fi
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language):
+    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.MULTILINE | re.DOTALL)
+
+
+def test_python_example_runs_and_writes_its_files(tmp_path, monkeypatch, capsys):
+    (example,) = blocks("python")
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(compile(example, "README.md", "exec"), names)
+    # The stick weighs m/3 at its tip and the plate 200 g: it must rebound or follow, never gain speed.
+    assert -1.0 < names["hit"].restitution < 1.0
+    assert names["hit"].n_impacts >= 1
+    assert f"{names['hit'].n_impacts}" in capsys.readouterr().out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["force.png", "strike.wav"]
+
+
+def test_first_two_commands_are_single_lines_that_install_then_run_and_test():
+    run, test = (block.strip() for block in blocks("sh")[:2])
+    assert "\n" not in run and "\n" not in test
+    assert run.split(" && ")[2].startswith(".venv/bin/fem-impact strike studies/scenes/drumstick.toml")
+    assert test.endswith(".venv/bin/python -m pytest") and ".[test]" in test
+
+
+def test_commands_shown_name_scenes_that_exist_and_load():
+    shown = set(re.findall(r"studies/scenes/\w+\.toml", README))
+    assert shown
+    for name in shown:
+        assert fi.load_scene(ROOT / name).title
+
+
+@pytest.mark.parametrize(
+    "line", [line for block in blocks("sh") for line in block.splitlines() if "fem-impact" in line]
+)
+def test_shown_commands_are_ones_the_parser_takes(line):
+    from fem_impact import cli
+
+    words = shlex.split(line)
+    start = next(i for i, word in enumerate(words) if word.endswith("fem-impact"))
+    options = cli._parser().parse_args(words[start + 1 :])  # exits with status 2 where an option does not exist
+    assert options.scene.suffix == ".toml"
+
+
+def test_licence_is_the_one_the_package_declares():
+    import tomllib
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["license"] == "BSD-3-Clause" and project["license"] in README
