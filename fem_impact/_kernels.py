@@ -15,83 +15,118 @@ FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = 0, 1, 2, 3, 4, 5  # why
 
 
 @njit(cache=True, error_model="numpy")
-def exponential_sums(z):
-    """phi_1, phi_2, phi_3 of -z for z >= 0, where phi_k(-z) = integral of (1-r)^(k-1)/(k-1)! exp(-z r) over [0, 1]."""
-    if z < 1.0:
-        term = 1.0 / 6.0
-        third = 0.0
-        for j in range(1, 24):
-            third += term
-            term *= -z / (j + 3.0)
-        second = 0.5 - z * third
-        return 1.0 - z * second, second, third
-    first = -np.expm1(-z) / z
-    second = (1.0 - first) / z
-    return first, second, (0.5 - second) / z
+def mode_matrix(w, z, h):
+    """Exact free motion of one flexible mode: a11, a12, a22 of the state's step, then slow and fast rate and half gap.
 
-
-@njit(cache=True, error_model="numpy")
-def mode_step(w, z, h):
-    """Exact step of one mode: (a11, a12, a21, a22) and the moments I1, I2, I3 of its impulse response."""
-    if w == 0.0:
-        return 1.0, h, 0.0, 1.0, 0.5 * h * h, h**3 / 6.0, h**4 / 24.0
-    th = w * h
-    x = z * th
-    fast = 0.0
-    root = 0.0
+    The rates are those of an overdamped mode, zero below; a21 is -w**2 a12.
+    """
+    x = z * w * h
     if z < 1.0:
         damped = w * np.sqrt((1.0 - z) * (1.0 + z))
         decay = np.exp(-x)
         s = decay * np.sin(damped * h) / damped
         c = decay * np.cos(damped * h)
-        a11 = c + z * w * s
-        a22 = c - z * w * s
-    elif z == 1.0:
+        return c + z * w * s, s, c - z * w * s, 0.0, 0.0, 0.0
+    if z == 1.0:
         decay = np.exp(-x)
-        s = decay * h
-        a11 = decay * (1.0 + x)
-        a22 = decay * (1.0 - x)
-    else:
-        root = w * np.sqrt((z - 1.0) * (z + 1.0))
-        fast = z * w + root
-        slow = w * w / fast
-        e1 = np.exp(-slow * h)
-        e2 = np.exp(-fast * h)
-        s = e1 * (-np.expm1(-2.0 * root * h)) / (2.0 * root)
-        a11 = e1 + slow * s
-        a22 = e2 - slow * s
-    rate = w if z < OVERDAMPED else fast
-    if rate * h < SERIES_LIMIT:
-        before = 0.0
-        now = 1.0
-        second = 0.0
-        third = 0.0
-        factor = 1.0 / 6.0
-        for j in range(1, 30):
-            second += now * factor
-            factor /= j + 3.0
-            third += now * factor
-            before, now = now, -2.0 * x * now - th * th * before
-            if abs(now) * factor < 1e-19 and abs(before) * factor < 1e-19:
+        return decay * (1.0 + x), decay * h, decay * (1.0 - x), w, w, 0.0
+    root = w * np.sqrt((z - 1.0) * (z + 1.0))
+    fast = z * w + root
+    slow = w * (w / fast)
+    e1 = np.exp(-slow * h)
+    s = e1 * (-np.expm1(-2.0 * root * h)) / (2.0 * root)
+    return e1 + slow * s, s, np.exp(-fast * h) - slow * s, slow, fast, root
+
+
+@njit(cache=True, error_model="numpy")
+def exponential_sums(z, count, out_sums):
+    """phi_k of -z, k = 1 .. count, z >= 0: the integrals of (1-r)**(k-1)/(k-1)! exp(-z r) over [0, 1].
+
+    Upwards by recursion while that keeps digits (k <= z), downwards from a power series at the top.
+    """
+    upward = min(count, int(min(z, 1e6)))
+    inverse = 1.0
+    if upward > 0:
+        out_sums[0] = -np.expm1(-z) / z
+        for k in range(1, upward):
+            out_sums[k] = (inverse - out_sums[k - 1]) / z
+            inverse /= k + 1.0
+    if upward < count:
+        term = 1.0
+        for k in range(2, count + 1):
+            term /= k
+        inverse = term * count
+        total = 0.0
+        for j in range(1, 60):
+            total += term
+            term *= -z / (count + j)
+            if abs(term) < 1e-18 * total:
                 break
-        i2 = h**3 * second
-        i3 = h**4 * third
-        i1 = h * h * (0.5 - 2.0 * x * second - th * th * third)
-    elif z < OVERDAMPED:
-        if z == 0.0:
-            half = np.sin(0.5 * th) / w
-            i1 = 2.0 * half * half
+        out_sums[count - 1] = total
+        for k in range(count - 1, upward, -1):
+            out_sums[k - 1] = inverse - z * out_sums[k]
+            inverse *= k
+
+
+@njit(cache=True, error_model="numpy")
+def mode_moments(w, z, h, count, out_moments, work):
+    """Exact step of one mode: a11, a12, a22, and in out_moments the moments of its impulse response g.
+
+    Moment k = 0 .. count is ``h**(-k-1)`` times the integral over [0, h] of ``(h-t)**(k-1)/(k-1)! g(t)``, k = 0 being
+    g(h)/h. They obey ``th**2 m[k+1] = 1/k! - 2 x m[k] - m[k-1]`` with ``th = w h``, ``x = z th``: upwards while
+    k < th, downwards from a power series above; heavily damped modes take partial fractions.
+    """
+    if w == 0.0:
+        value = 1.0
+        for k in range(count + 1):
+            out_moments[k] = value
+            value /= k + 2.0
+        return 1.0, h, 1.0
+    th = w * h
+    x = z * th
+    a11, a12, a22, slow, fast, root = mode_matrix(w, z, h)
+    out_moments[0] = a12 / h
+    heavy = z >= OVERDAMPED and fast * h >= SERIES_LIMIT
+    if heavy:
+        exponential_sums(slow * h, count, work[0])
+        exponential_sums(fast * h, count, work[1])
+        for k in range(1, count + 1):
+            out_moments[k] = (work[0, k - 1] - work[1, k - 1]) / (2.0 * root * h)
+        return a11, a12, a22
+    upward = min(count, int(min(th, 1e6)))
+    inverse = 1.0
+    before = a22
+    for k in range(upward):
+        if k == 0 and z == 0.0:
+            half = np.sin(0.5 * th) / th
+            new = 2.0 * half * half
         else:
-            i1 = (1.0 - a11) / (w * w)
-        i2 = (h - 2.0 * z * w * i1 - s) / (w * w)
-        i3 = (0.5 * h * h - 2.0 * z * w * i2 - i1) / (w * w)
-    else:
-        f1, f2, f3 = exponential_sums(slow * h)
-        g1, g2, g3 = exponential_sums(fast * h)
-        i1 = h * (f1 - g1) / (2.0 * root)
-        i2 = h * h * (f2 - g2) / (2.0 * root)
-        i3 = h**3 * (f3 - g3) / (2.0 * root)
-    return a11, s, -w * w * s, a22, i1, i2, i3
+            new = (inverse - 2.0 * x * out_moments[k] - before) / (th * th)
+        before = out_moments[k]
+        out_moments[k + 1] = new
+        inverse /= k + 1.0
+    if upward < count:
+        factor = 1.0
+        for k in range(2, count + 2):
+            factor /= k
+        inverse = factor * (count + 1.0)
+        last = 0.0
+        now = 1.0
+        top = 0.0
+        above = 0.0
+        for j in range(1, 80):
+            top += now * factor
+            factor /= count + j + 1.0
+            above += now * factor
+            last, now = now, -2.0 * x * now - th * th * last
+            if (abs(now) + abs(last)) * factor < 1e-19 * abs(top):
+                break
+        out_moments[count] = top
+        for k in range(count, upward + 1, -1):
+            out_moments[k - 1] = inverse - 2.0 * x * out_moments[k] - th * th * above
+            above = out_moments[k]
+            inverse *= k
+    return a11, a12, a22
 
 
 @njit(cache=True, error_model="numpy")
@@ -101,21 +136,22 @@ def step_table(omega, zeta, h, out_table):
     Rows: a11, a12, a21, a22; b1, b2 (constant force); c1, c2 (ramp t/h - 1/2); the step averages of the free motion
     A1, A2 and of the two forces B0, B1.
     """
+    moments = np.empty(4)
+    work = np.empty((2, 3))
     for n in range(omega.size):
-        w = omega[n]
-        a11, a12, a21, a22, i1, i2, i3 = mode_step(w, zeta[n], h)
+        a11, a12, a22 = mode_moments(omega[n], zeta[n], h, 3, moments, work)
         out_table[0, n] = a11
         out_table[1, n] = a12
-        out_table[2, n] = a21
+        out_table[2, n] = -omega[n] * omega[n] * a12
         out_table[3, n] = a22
-        out_table[4, n] = i1
+        out_table[4, n] = h * h * moments[1]
         out_table[5, n] = a12
-        out_table[6, n] = i2 / h - 0.5 * i1
-        out_table[7, n] = i1 / h - 0.5 * a12
-        out_table[8, n] = (a12 + 2.0 * zeta[n] * w * i1) / h
-        out_table[9, n] = i1 / h
-        out_table[10, n] = i2 / h
-        out_table[11, n] = (i3 / h - 0.5 * i2) / h
+        out_table[6, n] = h * h * (moments[2] - 0.5 * moments[1])
+        out_table[7, n] = h * (moments[1] - 0.5 * moments[0])
+        out_table[8, n] = moments[0] + 2.0 * zeta[n] * omega[n] * h * moments[1]
+        out_table[9, n] = h * moments[1]
+        out_table[10, n] = h * h * moments[2]
+        out_table[11, n] = h * h * (moments[3] - 0.5 * moments[2])
 
 
 @njit(cache=True, error_model="numpy", fastmath=LOOSE)
@@ -335,9 +371,9 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
             now[0, 0], now[1, 0], now[2, 0], now[3, 0], e[0], sums[0, 0, 0], law[0, 2] / h, law, 0
         )
         return
-    matrix = work[:m, :m]
-    step = work[m, :m]
-    trial = work[m + 1, :m]
+    matrix = work[0]
+    step = work[2, 0]
+    trial = work[2, 1]
     for i in range(m):
         out_y[i] = e[i]
         out_f[i] = 0.0
@@ -397,7 +433,7 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
 @njit(cache=True, error_model="numpy")
 def ramp_forces(h, y, now, law, e, ea, vf, sums, work, out_f, out_s, out_r):
     """Mean and slope of the forces of scheme A4 if the step ended at approaches y, and the residual in y."""
-    m = y.size
+    m = law.shape[0]
     if m == 1:
         d0 = now[0, 0]
         x1, f1, v1 = law_at(y[0], law, 0)
@@ -420,8 +456,8 @@ def ramp_forces(h, y, now, law, e, ea, vf, sums, work, out_f, out_s, out_r):
         out_s[0] = s
         out_r[0] = y[0] - e[0] + sums[0, 0, 0] * f + sums[1, 0, 0] * s
         return True
-    matrix = work[: 2 * m, : 2 * m]
-    vector = work[2 * m, : 2 * m]
+    matrix = work[0]
+    vector = work[2, 2]
     for i in range(m):
         d0 = now[0, i]
         x1, f1, v1 = law_at(y[i], law, i)
@@ -456,22 +492,19 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
     Returns False where the iteration does not settle or a force would pull; the step then belongs to scheme A.
     """
     m = e.size
-    width = work.shape[1]
-    base = work.shape[0] - 6
-    r = work[base, :m]
-    r2 = work[base + 1, :m]
-    f2 = work[base + 2, :m]
-    s2 = work[base + 3, :m]
-    y2 = work[base + 4, :m]
-    inner = work[: base - 2 * m - 1]
-    jacobian = work[base - 2 * m - 1 : base - 1, :width]
+    r = work[3, 0]
+    r2 = work[3, 1]
+    f2 = work[3, 2]
+    s2 = work[3, 3]
+    y2 = work[4, 0]
+    jacobian = work[1]
     settled = False
     if m == 1:
         slope = 0.0
         before = 0.0
         scale = max(abs(e[0]), abs(now[0, 0]))
         for iteration in range(25):
-            ramp_forces(h, out_y, now, law, e, ea, vf, sums, inner, out_f, out_s, r)
+            ramp_forces(h, out_y, now, law, e, ea, vf, sums, work, out_f, out_s, r)
             if settled or r[0] == 0.0:
                 settled = True
                 break
@@ -496,7 +529,7 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
                 settled = True
     else:
         for _ in range(20):
-            if not ramp_forces(h, out_y, now, law, e, ea, vf, sums, inner, out_f, out_s, r):
+            if not ramp_forces(h, out_y, now, law, e, ea, vf, sums, work, out_f, out_s, r):
                 return False
             if settled:
                 break
@@ -509,7 +542,7 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
                 shift = 1e-7 * max(abs(out_y[j]), 1e-3 * scale)
                 y2[j] += shift
                 shift = y2[j] - out_y[j]
-                if not ramp_forces(h, y2, now, law, e, ea, vf, sums, inner, f2, s2, r2):
+                if not ramp_forces(h, y2, now, law, e, ea, vf, sums, work, f2, s2, r2):
                     return False
                 for i in range(m):
                     jacobian[i, j] = (r2[i] - r[i]) / shift
@@ -585,11 +618,18 @@ def commit(shape, table, force, slope, free_q, free_p, out_q, out_p):
 @njit(cache=True, error_model="numpy")
 def free_flight(omega, zeta, bias, time, q, p):
     """Advance a state in place by the exact motion without contact."""
+    moments = np.empty(2)
+    work = np.empty((2, 1))
     for n in range(omega.size):
-        a11, a12, a21, a22, i1, _, _ = mode_step(omega[n], zeta[n], time)
         q0 = q[n]
-        q[n] = a11 * q0 + a12 * p[n] + i1 * bias[n]
-        p[n] = a21 * q0 + a22 * p[n] + a12 * bias[n]
+        if bias[n] != 0.0 or omega[n] == 0.0:
+            a11, a12, a22 = mode_moments(omega[n], zeta[n], time, 1, moments, work)
+            push = bias[n] * time * time * moments[1]
+        else:
+            a11, a12, a22, _, _, _ = mode_matrix(omega[n], zeta[n], time)
+            push = 0.0
+        q[n] = a11 * q0 + a12 * p[n] + push
+        p[n] = -omega[n] * omega[n] * a12 * q0 + a22 * p[n] + a12 * bias[n]
 
 
 @njit(cache=True, error_model="numpy", fastmath=LOOSE)
@@ -749,7 +789,7 @@ def try_step(ramp, h, table, sums, shape, offset, bias, law, q, p, now, free_q, 
         if f[i] > 0.0:
             pressed = True
     if ramp and pressed:
-        keep = work[work.shape[0] - 1]
+        keep = work[4, 1]
         for i in range(m):
             keep[i] = y[i]
             keep[m + i] = f[i]
@@ -769,10 +809,12 @@ def try_step(ramp, h, table, sums, shape, offset, bias, law, q, p, now, free_q, 
 
 
 @njit(cache=True, error_model="numpy")
-def longer(array, n):
-    """The same rows in an array twice as long."""
-    result = np.empty((2 * array.shape[0], array.shape[1]))
-    result[:n] = array[:n]
+def resized(array, n, length):
+    """The first n rows of an array in a new one of another length."""
+    result = np.empty((length, array.shape[1]))
+    for i in range(n):
+        for j in range(array.shape[1]):
+            result[i, j] = array[i, j]
     return result
 
 
@@ -799,10 +841,10 @@ def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, ba
     contacts; offset (n_contacts,) approach at zero state; law (n_contacts, 4): stiffness, exponent, loss, compliance;
     base: the longest step in contact; horizon: where to stop at the latest; max_impacts: stop after so many releases.
 
-    Returns (steps, q, p, now, work, time, status, n_fallback, n_blind); steps has one row per step or flight: start,
-    length, blind, then per contact the start approach and rate and the force's mean and slope (mean + slope
-    (t/h - 1/2)); now (5, n_contacts) ends with the last approach, .., rate; work (n_contacts,) is the integral of
-    force times rate [J].
+    Returns (steps, q, p, now, done, time, status, n_fallback, n_blind). Each row of steps is a step or a flight:
+    start, length, blind; then per contact start approach, start rate, whether it pushes, and the force as powers of
+    the fraction of the step. now (5, n_contacts) ends with the last approach, .., rate; done (n_contacts,) is the
+    integral of force times rate [J].
     """
     m, n_modes = shape.shape
     q = start_q.copy()
@@ -816,14 +858,14 @@ def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, ba
     odd_sums = np.empty((6, m, m))
     now = np.zeros((5, m))
     end = np.empty((3, m))
-    work = np.zeros((4 * m + 10, max(4, 2 * m)))
+    work = np.zeros((5, max(4, 2 * m), max(4, 2 * m)))
     y = np.empty(m)
     f = np.empty(m)
     s = np.empty(m)
     rate = np.empty(m)
     pressed = np.zeros(m, np.bool_)
     done = np.zeros(m)
-    steps = np.zeros((64, 3 + 4 * m))
+    steps = np.zeros((64, 3 + 5 * m))
     n_steps = 0
     n_fallback = 0
     n_blind = 0
@@ -854,17 +896,18 @@ def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, ba
             status = IMPACTS
             break
         if n_steps + 1 >= steps.shape[0]:
-            steps = longer(steps, n_steps)
+            steps = resized(steps, n_steps, 2 * steps.shape[0])
         idle = True
         for i in range(m):
             if pressed[i]:
                 idle = False
         if idle and not stalled:
             for i in range(m):
-                steps[n_steps, 3 + 4 * i] = now[0, i]
-                steps[n_steps, 4 + 4 * i] = now[4, i]
-                steps[n_steps, 5 + 4 * i] = 0.0
-                steps[n_steps, 6 + 4 * i] = 0.0
+                steps[n_steps, 3 + 5 * i] = now[0, i]
+                steps[n_steps, 4 + 5 * i] = now[4, i]
+                steps[n_steps, 5 + 5 * i] = 0.0
+                steps[n_steps, 6 + 5 * i] = 0.0
+                steps[n_steps, 7 + 5 * i] = 0.0
             elapsed, first, found = find_onset(omega, zeta, shape, offset, bias, horizon - time, 1e-3 * base, q, p)
             if found == 1:
                 time += elapsed
@@ -990,10 +1033,11 @@ def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, ba
         steps[n_steps, 1] = h
         steps[n_steps, 2] = 1.0 if blind else 0.0
         for i in range(m):
-            steps[n_steps, 3 + 4 * i] = now[0, i]
-            steps[n_steps, 4 + 4 * i] = now[4, i]
-            steps[n_steps, 5 + 4 * i] = f[i]
-            steps[n_steps, 6 + 4 * i] = s[i]
+            steps[n_steps, 3 + 5 * i] = now[0, i]
+            steps[n_steps, 4 + 5 * i] = now[4, i]
+            steps[n_steps, 5 + 5 * i] = 1.0 if f[i] > 0.0 else 0.0
+            steps[n_steps, 6 + 5 * i] = f[i] - 0.5 * s[i]
+            steps[n_steps, 7 + 5 * i] = s[i]
             mean = end[1, i]
             for j in range(m):
                 mean -= sums[2, i, j] * f[j] + sums[3, i, j] * s[j]
@@ -1035,58 +1079,59 @@ def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, ba
             if energy <= 1e-24 * start_energy:
                 status = SETTLED
                 break
-    return steps[:n_steps].copy(), q, p, now, done, time, status, n_fallback, n_blind
+    return resized(steps, n_steps, n_steps), q, p, now, done, time, status, n_fallback, n_blind
 
 
 @njit(cache=True, error_model="numpy")
-def replay_ramps(omega, zeta, shape, bias, start_q, start_p, steps, times, out_q, out_p):
+def push(omega, zeta, shape, bias, row, n_coefficients, length, q, p, out_q, out_p):
+    """State after a part of a step, (n_modes,), from the step's start; exact for its polynomial forces."""
+    m = shape.shape[0]
+    stride = 3 + n_coefficients
+    moments = np.empty(n_coefficients + 1)
+    work = np.empty((2, n_coefficients))
+    weights = np.zeros((n_coefficients, m))
+    active = False
+    for i in range(m):
+        scale = 1.0
+        for k in range(n_coefficients):
+            weights[k, i] = row[6 + stride * i + k] * scale
+            scale *= (k + 1.0) * length / row[1]
+            if weights[k, i] != 0.0:
+                active = True
+    for n in range(q.size):
+        q0 = q[n]
+        a11, a12, a22 = mode_moments(omega[n], zeta[n], length, n_coefficients if active else 1, moments, work)
+        x = bias[n] * moments[1]
+        v = bias[n] * moments[0]
+        if active:
+            for i in range(m):
+                for k in range(n_coefficients):
+                    x -= shape[i, n] * weights[k, i] * moments[k + 1]
+                    v -= shape[i, n] * weights[k, i] * moments[k]
+        out_q[n] = a11 * q0 + a12 * p[n] + length * length * x
+        out_p[n] = -omega[n] * omega[n] * a12 * q0 + a22 * p[n] + length * v
+
+
+@njit(cache=True, error_model="numpy")
+def replay(omega, zeta, shape, bias, start_q, start_p, steps, n_coefficients, times, out_q, out_p):
     """States (n_times, n_modes) at ascending times, from the start state and the recorded forces; exact in between."""
-    m, n_modes = shape.shape
+    n_steps = steps.shape[0]
     q = start_q.copy()
     p = start_p.copy()
-    table = np.empty((N_TABLE, n_modes))
-    part = np.empty((N_TABLE, n_modes))
-    force = np.empty(m)
-    slope = np.empty(m)
-    last = -1.0
+    flight = np.zeros(steps.shape[1])
+    flight[1] = 1.0
+    begin = 0.0
     k = 0
-    for j in range(steps.shape[0] + 1):
-        ends = np.inf if j == steps.shape[0] else steps[j, 0] + steps[j, 1]
-        begin = (
-            0.0 if steps.shape[0] == 0 else (steps[j, 0] if j < steps.shape[0] else steps[j - 1, 0] + steps[j - 1, 1])
-        )
+    for j in range(n_steps + 1):
+        row = flight if j == n_steps else steps[j]
+        ends = np.inf if j == n_steps else begin + row[1]
         while k < times.size and times[k] < ends:
-            t = max(0.0, times[k] - begin)
-            for i in range(m):
-                force[i] = 0.0
-                slope[i] = 0.0
-                if j < steps.shape[0]:
-                    slope[i] = steps[j, 6 + 4 * i] * t / steps[j, 1]
-                    force[i] = steps[j, 5 + 4 * i] + 0.5 * (slope[i] - steps[j, 6 + 4 * i])
-            if t > 0.0:
-                step_table(omega, zeta, t, part)
-                for n in range(n_modes):
-                    out_q[k, n] = part[0, n] * q[n] + part[1, n] * p[n] + part[4, n] * bias[n]
-                    out_p[k, n] = part[2, n] * q[n] + part[3, n] * p[n] + part[5, n] * bias[n]
-                commit(shape, part, force, slope, out_q[k], out_p[k], out_q[k], out_p[k])
-            else:
-                out_q[k] = q
-                out_p[k] = p
+            push(omega, zeta, shape, bias, row, n_coefficients, times[k] - begin, q, p, out_q[k], out_p[k])
             k += 1
-        if k >= times.size or j == steps.shape[0]:
+        if k >= times.size or j == n_steps:
             return
-        h = steps[j, 1]
-        if h != last:
-            step_table(omega, zeta, h, table)
-            last = h
-        for i in range(m):
-            force[i] = steps[j, 5 + 4 * i]
-            slope[i] = steps[j, 6 + 4 * i]
-        for n in range(n_modes):
-            q0 = q[n]
-            q[n] = table[0, n] * q0 + table[1, n] * p[n] + table[4, n] * bias[n]
-            p[n] = table[2, n] * q0 + table[3, n] * p[n] + table[5, n] * bias[n]
-        commit(shape, table, force, slope, q, p, q, p)
+        push(omega, zeta, shape, bias, row, n_coefficients, row[1], q, p, q, p)
+        begin = steps[j + 1, 0] if j + 1 < n_steps else begin + row[1]
 
 
 @njit(cache=True, error_model="numpy")

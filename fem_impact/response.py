@@ -60,7 +60,7 @@ class History:
     law: np.ndarray  # (n_contacts, 4) stiffness, exponent, loss, compliance in series
     start_q: np.ndarray  # (n_modes,) [m kg**0.5]
     start_p: np.ndarray  # (n_modes,) [m kg**0.5/s]
-    steps: np.ndarray  # (n_steps, 3 + 4 n_contacts) see `_kernels.run_energy`
+    steps: np.ndarray  # (n_steps, 3 + (3 + n_coefficients) n_contacts) see `_kernels.run_energy`
     end_q: np.ndarray  # (n_modes,)
     end_p: np.ndarray  # (n_modes,)
     now: np.ndarray  # (5, n_contacts) last approach and, in row 4, rate
@@ -74,13 +74,27 @@ class History:
         _check.lock_arrays(self)
 
     @property
+    def n_coefficients(self) -> int:
+        """Coefficients of the force polynomial of a step and contact."""
+        return (self.steps.shape[1] - 3) // self.n_contacts - 3
+
+    def _column(self, first: int) -> np.ndarray:
+        return self.steps[:, 3 + first :: 3 + self.n_coefficients]
+
+    @cached_property
+    def impulses(self) -> np.ndarray:
+        """Impulse of every step and contact [N s], (n_steps, n_contacts)."""
+        mean = sum(self._column(3 + k) / (k + 1.0) for k in range(self.n_coefficients))
+        return self.steps[:, 1:2] * mean
+
+    @property
     def n_contacts(self) -> int:
         return len(self.offset)
 
     @cached_property
     def ends(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Approach and rate at the beginning and end of every step, four arrays (n_steps, n_contacts)."""
-        d0, v0 = self.steps[:, 3::4], self.steps[:, 4::4]
+        d0, v0 = self._column(0), self._column(1)
         d1 = np.vstack([d0[1:], self.now[:1]])
         v1 = np.vstack([v0[1:], self.now[4:5]])
         return d0, v0, d1, v1
@@ -88,7 +102,7 @@ class History:
     @cached_property
     def pressed(self) -> np.ndarray:
         """Whether a contact carries force in a step, (n_steps, n_contacts)."""
-        return self.steps[:, 5::4] > 0.0
+        return self._column(2) > 0.0
 
     def approach(self, steps: np.ndarray, contact: int, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Approach and rate within steps at fractions of them, (n_steps, n_parts): cubics through both ends."""
@@ -100,6 +114,10 @@ class History:
 
     def force(self, steps: np.ndarray, contact: int, part: np.ndarray) -> np.ndarray:
         """Contact force [N] within steps at fractions of them, (n_steps, n_parts)."""
+        if self.n_coefficients > 2:
+            first = 6 + contact * (3 + self.n_coefficients)
+            terms = self.steps[steps, first : first + self.n_coefficients]
+            return np.maximum(np.polynomial.polynomial.polyval(part[0], terms.T), 0.0)
         approach, rate = self.approach(steps, contact, part)
         k, exponent, loss, c = self.law[contact]
         pressed = np.maximum(approach, 0.0)
@@ -135,7 +153,7 @@ class History:
         if bend < 0.0:
             shift = min(max(0.5 * (low - high) / bend, -1.0), 1.0)
             peak = max(peak, float(self.force(rows[row : row + 1], i, np.array([[middle + shift * step]]))[0, 0]))
-        impulse = float(self.steps[rows, 1] @ self.steps[rows, 5 + 4 * i])
+        impulse = float(self.impulses[rows, i].sum())
         return Impact(float(start), float(end), peak, impulse, i)
 
 
@@ -291,7 +309,9 @@ class Response:
         h = self.history
         q = np.empty((len(times), len(h.omega)))
         p = np.empty_like(q)
-        _kernels.replay_ramps(h.omega, h.zeta, h.shape, h.bias, h.start_q, h.start_p, h.steps, times[order], q, p)
+        _kernels.replay(
+            h.omega, h.zeta, h.shape, h.bias, h.start_q, h.start_p, h.steps, h.n_coefficients, times[order], q, p
+        )  # fmt: skip
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
         part = self.body_slice(body % len(self.bodies))
@@ -397,7 +417,7 @@ class Response:
         rigid = h.omega == 0.0
         if not rigid.any():
             return 0.0
-        impulses = h.steps[:, 1] @ h.steps[:, 5::4]  # (n_contacts,)
+        impulses = h.impulses.sum(axis=0)  # (n_contacts,)
         wanted = h.start_p + h.bias * h.end_time - impulses @ h.shape
         scale = max(np.abs(h.start_p[rigid]).max(), np.abs(impulses @ np.abs(h.shape[:, rigid])).max())
         return float(np.abs(h.end_p - wanted)[rigid].max() / scale) if scale else 0.0

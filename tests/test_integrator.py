@@ -87,5 +87,5 @@ def test_response_agrees_with_itself():
     assert hit.momentum_error < 1e-14  # rounding: momentum is exact at each step
     assert hit.force.min() >= 0.0
     q, p = hit.modal_state([hit.history.end_time])
-    assert_allclose(q[0], hit.history.end_q[-60:], atol=1e-14 * np.abs(q).max())  # the same sums again
-    assert_allclose(p[0], hit.history.end_p[-60:], atol=1e-14 * np.abs(p).max())
+    assert_allclose(q[0], hit.history.end_q[-60:], atol=1e-12 * np.abs(q).max())  # rounding of 312 steps
+    assert_allclose(p[0], hit.history.end_p[-60:], atol=1e-12 * np.abs(p).max())
