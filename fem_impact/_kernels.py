@@ -1085,6 +1085,11 @@ def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, ba
 @njit(cache=True, error_model="numpy")
 def push(omega, zeta, shape, bias, row, n_coefficients, length, q, p, out_q, out_p):
     """State after a part of a step, (n_modes,), from the step's start; exact for its polynomial forces."""
+    if length <= 0.0:
+        for n in range(q.size):
+            out_q[n] = q[n]
+            out_p[n] = p[n]
+        return
     m = shape.shape[0]
     stride = 3 + n_coefficients
     moments = np.empty(n_coefficients + 1)
