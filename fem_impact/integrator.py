@@ -188,6 +188,7 @@ def _assemble(bodies, contacts, speeds, states, forces, residual) -> tuple[_Syst
     shape = np.zeros((len(contacts), len(omega)))
     law = np.zeros((len(contacts), 4))
     first_row: dict[int, np.ndarray] = {}
+    first_point: dict[int, Any] = {}
     for i, touch in enumerate(contacts):
         compliance = 0.0
         for body, at, sign in ((touch.first, touch.first_at, 1.0), (touch.second, touch.second_at, -1.0)):
@@ -200,6 +201,7 @@ def _assemble(bodies, contacts, speeds, states, forces, residual) -> tuple[_Syst
             row = modes.shape_at(point if modes.dimension else None)[0]
             shape[i, starts[body] : starts[body + 1]] += sign * row
             first_row.setdefault(body, row)
+            first_point.setdefault(body, point if modes.dimension else None)
             if residual and modes.dimension:
                 compliance += max(0.0, float(modes.residual_compliance(point)[0, 0]))
         law[i] = touch.law.stiffness, touch.law.exponent, touch.law.loss, compliance
@@ -213,10 +215,9 @@ def _assemble(bodies, contacts, speeds, states, forces, residual) -> tuple[_Syst
         if row is None:
             row = np.zeros(modes.n_modes)
         if speeds[body] != 0.0:
-            rigid = np.where(modes.omega == 0.0, row, 0.0)
-            if not rigid.any():
+            if not np.where(modes.omega == 0.0, row, 0.0).any():
                 raise ValueError(f"speeds must be zero for a body that cannot move rigidly, got {speeds[body]:g} m/s")
-            p[part] += speeds[body] * rigid / (rigid @ rigid)
+            p[part] += speeds[body] * modes.rigid_motion(first_point[body])
             arriving = arriving or float(speeds[body])
         bias[part] = forces[body] * row
         if states is not None:

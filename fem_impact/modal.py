@@ -232,6 +232,25 @@ class Modes:
         """Mass-normalised shapes at points on the body, (n_points, n_modes) [kg**-0.5]."""
         return self.shapes.at(self.points("points", points))
 
+    def rigid_motion(self, at: Any) -> np.ndarray:
+        """Modal velocities (n_modes,) [kg**0.5] of a rigid motion that carries the point ``at`` [m] at unit speed.
+
+        Straight where the body is free to move so; else turning about its hinge.
+        """
+        point = self.points("at", at)[:1]
+        result = np.zeros(self.n_modes)
+        rigid = self.shapes.take(self.n_rigid) if self.n_rigid else None
+        if rigid is None or not rigid.at(point).any():
+            raise ValueError("at must be a point that moves when the body moves rigidly, got one at rest")
+        corners = self.shapes.grid()[0]
+        everywhere = rigid.at(corners)  # (n_points, n_rigid)
+        straight = np.linalg.lstsq(everywhere, np.ones(len(corners)), rcond=None)[0]
+        if np.abs(everywhere @ straight - 1.0).max() > 1e-6:
+            row = rigid.at(point)[0]
+            straight = row / (row @ row)
+        result[: self.n_rigid] = straight / (rigid.at(point)[0] @ straight)
+        return result
+
     def modal_compliance(self, points: Any) -> np.ndarray:
         """Static compliance carried by the kept modes between points, (n_points, n_points) [m/N]."""
         flexible = self.omega > 0.0
