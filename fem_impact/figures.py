@@ -12,7 +12,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from . import _check
+from . import _check, spectra
 from ._files import replacing
 from .modal import Modes
 from .response import Response
@@ -38,6 +38,8 @@ STYLE: Any = {
 SPECTRUM_BAND = (10.0, 20e3)  # [Hz] shown unless another is asked for: about what is heard
 SPECTRUM_POINTS = 1200  # [-] enough for a line of one pixel each
 SPECTRUM_DEPTH = 1e-4  # [-] 80 dB below the largest value the axis ends
+TIMES = 800  # [-] instants shown of the energies
+MODE_DEPTH = 1e-8  # [-] 80 dB below the most energetic mode the axis ends
 FLAT = 1e-9  # [-] of the largest deflection: below, a shape is zero to rounding
 MARGIN = 0.1  # [-] time shown before and after the blow over its length
 
@@ -114,6 +116,76 @@ def _draw_force(axes: Any, response: Response) -> None:
     axes.set_ylim(bottom=0.0)
     axes.xaxis.set_major_formatter(EngFormatter(unit="s", sep=" "))
     axes.yaxis.set_major_formatter(EngFormatter(unit="N", sep=" "))
+
+
+def energies(response: Response) -> Figure:
+    """Where the energy is during the blow: in the striker, in the struck body, and between them or lost."""
+    end = (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
+    times = np.linspace(0.0, (1.0 + MARGIN) * end, TIMES)
+    parts = []
+    for body in (0, -1):
+        q, p = response.modal_state(times, body=body)
+        parts.append(0.5 * (p**2 + (response.bodies[body].omega * q) ** 2).sum(axis=1))
+    with _styled(7.0, 3.6) as figure:
+        axes = figure.subplots()
+        axes.plot(times, parts[0], label="striker")
+        axes.plot(times, parts[1], label="struck body")
+        axes.plot(times, parts[0][0] - parts[0] - parts[1], label="contact and losses")
+        axes.set(xlim=(0.0, times[-1]), xlabel="time", ylabel="energy", title="Energy during the blow")
+        axes.xaxis.set_major_formatter(EngFormatter(unit="s", sep=" "))
+        axes.yaxis.set_major_formatter(EngFormatter(unit="J", sep=" "))
+        axes.legend(loc="best")
+    return figure
+
+
+def mode_energies(response: Response) -> Figure:
+    """Energy each mode of the struck body holds when the striker leaves it, over its frequency."""
+    end = response.impacts[-1].end if response.impacts else 0.0
+    q, p = response.modal_state([end])
+    energy = 0.5 * (p**2 + (response.target.omega * q) ** 2)[0]
+    shown = (response.target.omega > 0.0) & (energy > 0.0)
+    top = float(energy[shown].max(initial=0.0)) or 1.0
+    with _styled(7.0, 3.6) as figure:
+        axes = figure.subplots()
+        axes.vlines(response.target.frequencies[shown], MODE_DEPTH * top, energy[shown], lw=2.0, color=BLUE)
+        axes.set(xscale="log", yscale="log", ylim=(MODE_DEPTH * top, 3.0 * top))
+        axes.set(xlabel="natural frequency", ylabel="energy", title="Energy of each mode after the blow")
+        axes.xaxis.set_major_formatter(EngFormatter(unit="Hz", sep=" "))
+        axes.yaxis.set_major_formatter(EngFormatter(unit="J", sep=" "))
+    return figure
+
+
+def mobility(modes: Modes, at: Any, to: Any = None, *, band: tuple[float, float] | None = None) -> Figure:
+    """Size and phase of the velocity at ``to`` per force at ``at``, over frequency.
+
+    Parameters
+    ----------
+    modes : Modes
+    at, to : point of the force and of the velocity, (dimension,) [m]; the same point by default
+    band : (low, high) [Hz], optional
+        Default: from half the first flexible mode to the last kept one.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    flexible = modes.frequencies[modes.omega > 0.0]
+    if band is None:
+        if not flexible.size:
+            raise ValueError("band must be given for a body without flexible modes, in Hz")
+        band = (0.5 * float(flexible[0]), float(flexible[-1]))
+    low, high = _check.positive("band[0]", band[0], "Hz"), _check.positive("band[1]", band[1], "Hz")
+    grid = np.geomspace(low, high, SPECTRUM_POINTS)
+    frequencies = np.union1d(grid, flexible[(flexible > low) & (flexible < high)] * (1.0 + 1e-6))  # no peak is missed
+    value = spectra.mobility(modes, at, at if to is None else to, frequencies)
+    with _styled(7.0, 5.0) as figure:
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+        above.loglog(frequencies, np.abs(value))
+        above.set(ylabel="mobility [m/(N s)]", title="Mobility", xlim=(low, high))
+        below.semilogx(frequencies, np.angle(value, deg=True))
+        below.set(ylabel="phase [degrees]", xlabel="frequency", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
+        below.xaxis.set_major_formatter(EngFormatter(unit="Hz", sep=" "))
+    return figure
 
 
 def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:

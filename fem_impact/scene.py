@@ -6,7 +6,7 @@ import time
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -19,6 +19,7 @@ from .section import Beam, Material, Plate
 from .striker import Striker
 
 LARGEST_FILE = 1_000_000  # [byte] a scene is written by hand; more is a mistake, refused before it is read
+SHARE = 0.45  # [-] of the tolerance each for the modes left out and for the time steps; the rest is the mesh's
 FIRST_LOOK = 20  # [-] modes found first: enough to set the scale and to tell how densely the others follow
 
 Watch = Callable[[str], AbstractContextManager[Any]]
@@ -160,7 +161,10 @@ class Scene:
             for point in self.points:
                 modes.points("points", [point])
         with stages("strike"), self._blame("strike"):
+            tolerance = _check.positive("tolerance", blow.get("tolerance", integrator.TOLERANCE))
+            blow = {**blow, "tolerance": SHARE * tolerance}
             response = integrator.strike(modes, self._striker(), self._contact(), **blow)
+            response = replace(response, tolerance=tolerance)
         return Run(response, MappingProxyType(stages.seconds))
 
     @property
@@ -191,7 +195,7 @@ class Scene:
                 scaled.points("at", blow["at"])
                 if count is None:
                     limit = self._cutoff(scaled, blow) * first.frequencies[-1] / scaled.frequencies[-1]
-            if count is None:
+            if count is None and limit > first.frequencies[-1]:
                 first = find(max_frequency=limit)
             return first.scaled(**target["scale"]).damped(target["damping_ratio"])
 
@@ -204,7 +208,7 @@ class Scene:
             contact=self._contact(),
             mass=self._striker().felt_mass,
             speed=_check.positive("speed", blow["speed"], "m/s"),
-            tolerance=0.5 * tolerance,
+            tolerance=SHARE * tolerance,
         )
 
     def _finite_elements(self, stages: "_Stages", blow: Mapping[str, Any]) -> Callable[..., Modes]:

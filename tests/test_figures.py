@@ -7,6 +7,7 @@ import pytest
 from fem_impact import analytic, figures
 from fem_impact.contact import Contact
 from fem_impact.integrator import strike
+from fem_impact.modal import Modes
 from fem_impact.striker import Striker
 
 
@@ -61,3 +62,37 @@ def test_saved_picture_is_an_image_with_ink(tmp_path, hit):
 def test_unknown_picture_format_is_refused(tmp_path, hit):
     with pytest.raises(ValueError, match=r"path ending must be one of .*'\.pgn'; did you mean '\.png'"):
         figures.save(tmp_path / "force.pgn", figures.force(hit))
+
+
+def test_energies_add_up_at_every_instant(hit):
+    lines = figures.energies(hit).axes[0].lines
+    assert [line.get_label() for line in lines] == ["striker", "struck body", "contact and losses"]
+    total = sum(line.get_ydata() for line in lines)
+    np.testing.assert_allclose(total, 0.5 * 0.03 * 2.0**2, rtol=1e-12)  # what the striker brought
+    # a contact stores and never lends; between the ends of steps the energy holds to their tolerance of 1e-3
+    assert lines[2].get_ydata().min() > -1e-3 * 0.06
+
+
+def test_mode_energies_are_those_at_the_last_release(hit):
+    (bars,) = figures.mode_energies(hit).axes[0].collections
+    tops = np.array([segment[1] for segment in bars.get_segments()])
+    q, p = hit.modal_state([hit.impacts[-1].end])
+    np.testing.assert_allclose(tops[:, 0], hit.target.frequencies, rtol=1e-12)
+    np.testing.assert_allclose(tops[:, 1], 0.5 * (p**2 + (hit.target.omega * q) ** 2)[0], rtol=1e-12)
+
+
+def test_mobility_shows_every_peak(modes):
+    above, below = figures.mobility(modes, (0.1395, 0.09)).axes
+    frequency, size = above.lines[0].get_data()
+    for i in (0, 1, 10, 20):  # at resonance one mode dominates: u**2 / (2 zeta omega); its neighbours add some percent
+        alone = modes.shape_at([(0.1395, 0.09)])[0, i] ** 2 / (2 * 0.005 * modes.omega[i])
+        if alone > 0.1:
+            at_peak = size[np.argmin(np.abs(frequency - modes.frequencies[i]))]
+            np.testing.assert_allclose(at_peak, alone, rtol=0.1)
+    phase = below.lines[0].get_ydata()
+    assert np.abs(phase).max() <= 90.0 + 1e-9  # power flows in only: the real part of a point mobility is positive
+
+
+def test_mobility_of_a_rigid_mass_needs_a_band():
+    with pytest.raises(ValueError, match="band must be given"):
+        figures.mobility(Modes.rigid(1.0), None)
