@@ -4,15 +4,30 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import qr
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags
 
 from . import _check
-from .elements import Argyris, ArgyrisSpace, Hermite, HermiteSpace, basis_of, segments, triangles
+from .corners import around_corners
+from .elements import (
+    Argyris,
+    ArgyrisSpace,
+    Bent,
+    BentMapping,
+    Curves,
+    Hermite,
+    HermiteSpace,
+    basis_of,
+    segments,
+    triangles,
+)
 from .mesh import Mesh
 from .section import Beam, Plate
-from .supports import Rim, constrain
+from .supports import Rim, cells_of_facets, constrain
 
 KINDS = ("clamped", "hinged", "free")
+STIFFNESS_ORDER = 10  # [-] of the quadrature where thickness varies or triangles are bent; 6 is exact otherwise
+MASS_ORDER = 10  # [-] exact for products of quintics
 RIGID = 1e-9  # [-] share of a rigid motion that supports may suppress by rounding alone
 
 
@@ -56,6 +71,8 @@ class System:
     element_dofs: np.ndarray = field(repr=False)  # (n_local, n_cells) numbers among all unknowns
     space: ArgyrisSpace | HermiteSpace = field(repr=False)  # shape functions
     rigid: np.ndarray = field(repr=False)  # (n_dofs, n_rigid) [-] rigid motions left, mass-normalised
+    held: np.ndarray = field(repr=False)  # (n_rigid,) unknowns that hold the rigid motions, statically determinate
+    graded: bool = True  # whether rings of ever smaller triangles surround singular corners
     softness: float = 1.0  # [-] largest inertia over stiffness on the body, in the frame: its shortest waves
 
     @property
@@ -78,7 +95,14 @@ class System:
         return full @ self.expand
 
 
-def assemble(mesh: Mesh, section: Plate | Beam, supports: dict | None = None, element: str = "argyris") -> System:
+def assemble(
+    mesh: Mesh,
+    section: Plate | Beam,
+    supports: dict | None = None,
+    element: str = "argyris",
+    *,
+    graded: bool = True,
+) -> System:
     """Stiffness and mass of a body, held at its named edges.
 
     Parameters
@@ -89,6 +113,8 @@ def assemble(mesh: Mesh, section: Plate | Beam, supports: dict | None = None, el
         Edges not named are free; "boundary" stands for all edges, and an edge named itself goes before it.
     element : str
         "argyris" on a plate; beams always take Hermite elements.
+    graded : bool
+        Whether rings of ever smaller triangles are put at corners where the supports make the solution singular.
 
     Returns
     -------
@@ -102,13 +128,15 @@ def assemble(mesh: Mesh, section: Plate | Beam, supports: dict | None = None, el
     if not isinstance(mesh, Mesh):
         raise ValueError(f"mesh must be made by fi.mesh, got {type(mesh).__name__}")
     kinds = _support_of_facets(mesh, supports or {})
-    _check.one_of("element", element, ("argyris",))
+    _check.one_of("element", element, ("argyris", "hermite"))
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     centre, length = 0.5 * (low + high), float((high - low).max())
     if mesh.dimension == 1 and isinstance(section, Beam):
         return _assemble_beam(mesh, section, supports or {}, kinds, centre, length)
     if mesh.dimension == 2 and isinstance(section, Plate):
-        return _assemble_plate(mesh, section, supports or {}, kinds, centre, length)
+        fine = around_corners(mesh, kinds, section.material.nu) if graded else mesh
+        kinds = _support_of_facets(fine, supports or {})
+        return replace(_assemble_plate(fine, section, supports or {}, kinds, centre, length), mesh=mesh, graded=graded)
     wanted = "Plate" if mesh.dimension == 2 else "Beam"
     raise ValueError(f"section must be a {wanted} on a mesh of dimension {mesh.dimension}, got {section!r:.80}")
 
@@ -143,11 +171,11 @@ def _scatter(local: np.ndarray, element_dofs: np.ndarray, n_all: int) -> csc_mat
     return coo_matrix((local.ravel(), (rows.ravel(), columns.ravel())), shape=(n_all, n_all)).tocsc()
 
 
-def _finish(mesh, section, supports, element, mass, frame, K, M, expand, element_dofs, space) -> System:
+def _finish(mesh, section, supports, element, mass, frame, K, M, expand, project, element_dofs, space) -> System:
     """Put the supports on the matrices and find the rigid motions they leave."""
     n_all = expand.shape[0]
     rigid_all = space.linear(element_dofs, n_all)
-    left = expand.T @ rigid_all  # expand has orthonormal columns
+    left = project @ rigid_all
     lost = rigid_all - expand @ left
     scale = np.abs(rigid_all).max()
     _, lengths, turn = np.linalg.svd(lost.T @ lost / scale**2)
@@ -156,12 +184,14 @@ def _finish(mesh, section, supports, element, mass, frame, K, M, expand, element
     size = 1.0 / np.sqrt(K.diagonal())
     even = diags(size)
     K, M, expand = (even @ K @ even).tocsc(), (even @ M @ even).tocsc(), (expand @ even).tocsr()
-    rigid = (left @ kept) / size[:, None]
+    rigid = left @ kept
+    held = qr(rigid.T, pivoting=True, mode="economic")[2][: rigid.shape[1]]
+    rigid = rigid / size[:, None]
     if kept.shape[1]:
         factor = np.linalg.cholesky(rigid.T @ (M @ rigid))
         rigid = np.linalg.solve(factor, rigid.T).T
     K, M = 0.5 * (K + K.T).tocsc(), 0.5 * (M + M.T).tocsc()
-    return System(mesh, section, supports, element, mass, frame, K, M, expand, element_dofs, space, rigid)
+    return System(mesh, section, supports, element, mass, frame, K, M, expand, element_dofs, space, rigid, held)
 
 
 def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, kinds: list, centre: np.ndarray, length: float) -> System:
@@ -185,10 +215,11 @@ def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, kinds: list, centr
     if not free.size:
         raise ValueError("supports leave this mesh nothing to move; refine it")
     expand = csr_matrix((np.ones(len(free)), (free, np.arange(len(free)))), shape=(n_all, len(free)))
+    project = expand.T.tocsr()
     mass = float((inertia * basis.dx).sum() * length)
     dofs = basis.element_dofs
     matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all)
-    system = _finish(mesh, section, supports, "hermite", mass, frame, *matrices, expand, dofs, space)
+    system = _finish(mesh, section, supports, "hermite", mass, frame, *matrices, expand, project, dofs, space)
     return replace(system, softness=float((inertia / stiffness).max()) * frame.stiffness / frame.inertia)
 
 
@@ -199,18 +230,30 @@ def _fields(section, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return stiffness.reshape(*points.shape[:2], *stiffness.shape[1:]), inertia.reshape(points.shape[:2])
 
 
+def _bent(mesh: Mesh, centre: np.ndarray, length: float, points: np.ndarray, plane: Any) -> Bent | None:
+    """How the triangles at curved facets are bent; None where every edge is straight."""
+    curved = mesh.curved
+    if not curved.any():
+        return None
+    facets = mesh.facets[curved]
+    middles = (mesh.middles[curved] - centre) / length
+    curves = Curves(points[facets], middles, mesh.tangents[curved], mesh.curvatures[curved] * length)
+    return Bent(curves, facets, *cells_of_facets(facets, plane.t.T), plane.t.T)
+
+
 def _assemble_plate(
     mesh: Mesh, section: Plate, supports: dict, kinds: list, centre: np.ndarray, length: float
 ) -> System:
     points = (mesh.points - centre) / length
-    middles = (mesh.middles - centre) / length
-    plane = triangles(points, mesh.cells, mesh.facets, middles, mesh.curved)
-    space = ArgyrisSpace(plane)
+    plane = triangles(points, mesh.cells)
+    bent = _bent(mesh, centre, length, points, plane)
+    mapping = None if bent is None else BentMapping(plane, bent)
+    space = ArgyrisSpace(plane, bent)
     constant = not callable(section.thickness)
     local = []
-    for order, derivative in ((6 if constant and not mesh.curved.any() else 10, 2), (10, 0)):
+    for order, derivative in ((6 if constant and bent is None else STIFFNESS_ORDER, 2), (MASS_ORDER, 0)):
         element = Argyris(space)
-        basis = basis_of(plane, element, order)
+        basis = basis_of(plane, element, order, mapping)
         x = basis.mapping.F(basis.X).transpose(1, 2, 0)
         stiffness, inertia = _fields(section, centre + length * x)
         if derivative:
@@ -228,8 +271,8 @@ def _assemble_plate(
             mass = float((inertia * basis.dx).sum() * length**2)
     frame = Frame(centre, length, reference, heaviest)
     rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, kinds)
-    expand, dofs = constrain(rim, space.vertices, basis.element_dofs, basis.N)
+    expand, project, dofs = constrain(rim, space.vertices, basis.element_dofs, basis.N)
     n_all = expand.shape[0]
     matrices = _scatter(local[0], dofs, n_all), _scatter(local[1], dofs, n_all)
-    system = _finish(mesh, section, supports, "argyris", mass, frame, *matrices, expand, dofs, space)
+    system = _finish(mesh, section, supports, "argyris", mass, frame, *matrices, expand, project, dofs, space)
     return replace(system, softness=softness / heaviest)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh, qr
+from scipy.linalg import eigh
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
@@ -37,19 +37,16 @@ class Flexibility:
     K: csc_matrix
     M: csc_matrix
     rigid: np.ndarray  # (n_dofs, n_rigid) mass-normalised
+    held: np.ndarray  # (n_rigid,) unknowns that hold the rigid motions and nothing else
     _lu: list = field(default_factory=list)
 
     def __reduce__(self):
-        return Flexibility, (self.K, self.M, self.rigid)
-
-    def _held(self) -> np.ndarray:
-        """Unknowns that hold the rigid motions and nothing else, so that the held body is statically determinate."""
-        return qr(self.rigid.T, pivoting=True, mode="economic")[2][: self.rigid.shape[1]]
+        return Flexibility, (self.K, self.M, self.rigid, self.held)
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Static deflection under loads (n_dofs, n): balanced by inertia and free of rigid motion where not held."""
         if not self._lu:
-            keep = np.setdiff1d(np.arange(self.K.shape[0]), self._held()) if self.rigid.shape[1] else slice(None)
+            keep = np.setdiff1d(np.arange(self.K.shape[0]), self.held) if self.rigid.shape[1] else slice(None)
             self._lu.extend([keep, factorise(self.K[keep][:, keep] if self.rigid.shape[1] else self.K)])
         keep, lu = self._lu
         if not self.rigid.shape[1]:
@@ -68,8 +65,10 @@ def lowest(flexibility: Flexibility, n: int) -> tuple[np.ndarray, np.ndarray]:
     if n > size - n_rigid:
         raise ValueError(f"n_modes must not exceed the {size} unknowns of this mesh; refine it")
     if size <= DENSE or n + SPARE + n_rigid >= size // 2:
-        values, vectors = eigh(K.toarray(), M.toarray(), subset_by_index=[0, n + n_rigid - 1])
-        vectors = vectors[:, n_rigid:]
+        # the reciprocal problem: K stays definite where the smallest triangles leave M none of its digits
+        moving = M @ flexibility.rigid
+        rest = moving @ moving.T
+        vectors = eigh(M.toarray() - rest, K.toarray() + rest, subset_by_index=[size - n, size - 1])[1][:, ::-1]
     else:
         start = np.cos(np.arange(size) * 1.7 + 0.3)  # fixed, so that every run gives the same
         start = flexibility.solve(M @ start)

@@ -4,14 +4,14 @@ from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
-from skfem import CellBasis, ElementLineHermite, ElementTriArgyris, MeshLine, MeshTri, MeshTri2
+from skfem import CellBasis, ElementLineHermite, ElementTriArgyris, MappingAffine, MeshLine, MeshTri
 from skfem.element import DiscreteField
 
 ORDERS = np.array([0, 1, 1, 2, 2, 2] * 3 + [1] * 3)  # derivative that each Argyris unknown stands for
 EXPONENTS = np.array([(i, j) for i in range(6) for j in range(6 - i)])  # the 21 monomials of degree 5
 SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in scikit-fem's order
 ON_BODY = 1e-9  # [-] of a triangle: how far outside a point may lie by rounding
-NEAR_CURVE = 1e-3  # [-] of a triangle on a curved edge: the parabola differs from the curve by less
+NEAR_CURVE = 1e-5  # [-] of a triangle on a curved edge: it leaves the true curve by less
 CANDIDATES = 8  # [-] nearest triangles looked at before all of them are
 CURVE_STEPS = 12  # [-] fixed-point steps from a point to its place in a curved triangle
 DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
@@ -33,6 +33,111 @@ def monomials(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
     return x[..., EXPONENTS[:, 0]] * y[..., EXPONENTS[:, 1]]
 
 
+class Curves:
+    """The curved facets of a mesh, each a graph over its chord, and the triangles bent to follow them.
+
+    A facet leaves its chord by s (1 - s) p(s), s from 0 to 1 along it; p, of degree four, meets tangent and curvature
+    at both ends and the true middle. Inside the triangle the bend is p times the product of the two area coordinates.
+    """
+
+    def __init__(self, ends, middles, tangents, curvatures) -> None:
+        chord = ends[:, 1] - ends[:, 0]  # (n, 2)
+        self.length = np.linalg.norm(chord, axis=1)
+        self.along = chord / self.length[:, None]
+        self.out = np.column_stack([self.along[:, 1], -self.along[:, 0]])
+        self.centre = ends.mean(axis=1)
+        lean = np.einsum("nei,ni->ne", tangents, self.out) / np.einsum("nei,ni->ne", tangents, self.along)
+        slope = lean * self.length[:, None]
+        bend = -curvatures * (1.0 + lean**2) ** 1.5 * self.length[:, None] ** 2
+        height = ((middles - self.centre) * self.out).sum(axis=1)
+        start, stop = slope[:, 0], -slope[:, 1]  # p(0), p(1)
+        values = np.column_stack([start, stop, 0.5 * bend[:, 0] + start, -0.5 * bend[:, 1] - stop, 4.0 * height])
+        k = np.arange(5.0)
+        conditions = np.array([k == 0, np.ones(5), k == 1, k, 0.5**k], float)
+        self.p = np.linalg.solve(conditions, values.T).T  # (n, 5) ascending powers of s
+
+    def graph(self, rows: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """p and its derivative for curves (n,) at s (n, n_q)."""
+        p = self.p[rows][:, None]
+        return (p * _powers(s, 4, 0)).sum(axis=2), (p * _powers(s, 4, 1)).sum(axis=2)
+
+    def middle(self) -> tuple[np.ndarray, np.ndarray]:
+        """Middle (n, 2) and outward unit normal (n, 2) there."""
+        p, dp = (a[:, 0] for a in self.graph(np.arange(len(self.p)), np.full((len(self.p), 1), 0.5)))
+        normal = self.out - (0.25 * dp / self.length)[:, None] * self.along
+        return self.centre + (0.25 * p)[:, None] * self.out, normal / np.linalg.norm(normal, axis=1)[:, None]
+
+    def along_it(self, share: float) -> tuple[np.ndarray, np.ndarray, float]:
+        """Point, unit tangent (2,) and curvature [1/length] of the first curve above a share of its chord."""
+        s, one = np.array([[share]]), np.zeros(1, int)
+        p, dp = (float(a[0, 0]) for a in self.graph(one, s))
+        d2p = float((self.p[0] * _powers(np.array(share), 4, 2)).sum())
+        bump, slope = share * (1.0 - share), 1.0 - 2.0 * share
+        start = self.centre[0] - 0.5 * self.length[0] * self.along[0]
+        point = start + share * self.length[0] * self.along[0] + bump * p * self.out[0]
+        lean = (slope * p + bump * dp) / self.length[0]
+        second = (-2.0 * p + 2.0 * slope * dp + bump * d2p) / self.length[0] ** 2
+        tangent = self.along[0] + lean * self.out[0]
+        return point, tangent / np.hypot(1.0, lean), -second / np.hypot(1.0, lean) ** 3
+
+    def halfway(self, low: float, high: float) -> np.ndarray:
+        """Point (2,) of the first curve on the perpendicular bisector of the chord between two shares of its chord."""
+        a, b = self.along_it(low)[0], self.along_it(high)[0]
+        for _ in range(60):
+            share = 0.5 * (low + high)
+            point = self.along_it(share)[0]
+            low, high = (share, high) if (point - 0.5 * (a + b)) @ (b - a) < 0.0 else (low, share)
+        return point
+
+
+class Bent:
+    """How the triangles at curved facets are bent; the others stay as they are."""
+
+    def __init__(self, curves: Curves, facets: np.ndarray, cells: np.ndarray, sides: np.ndarray, vertices) -> None:
+        self.curves, self.cells, self.sides = curves, cells, sides
+        corner = vertices[cells]  # (n, 3)
+        self.start = (corner == facets[:, :1]).argmax(axis=1)
+        self.stop = (corner == facets[:, 1:]).argmax(axis=1)
+        self.of_side = np.full(vertices.shape, -1)
+        self.of_side[cells, sides] = np.arange(len(cells))
+
+    def shift(self, cells: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement (n, n_q, 2) of cells (n,) at area coordinates (n, n_q, 3), and its gradient (n, n_q, 2, 3)."""
+        moved, gradient = np.zeros((*area.shape[:2], 2)), np.zeros((*area.shape[:2], 2, 3))
+        for side in range(3):
+            here = np.flatnonzero(self.of_side[cells, side] >= 0)
+            rows = self.of_side[cells[here], side]
+            first, last, out = self.start[rows], self.stop[rows], self.curves.out[rows]
+            a, b = area[here, :, first], area[here, :, last]
+            p, dp = self.curves.graph(rows, 0.5 * (1.0 + b - a))
+            moved[here] += (a * b * p)[..., None] * out[:, None]
+            gradient[here, :, :, first] += (b * (p - 0.5 * a * dp))[..., None] * out[:, None]
+            gradient[here, :, :, last] += (a * (p + 0.5 * b * dp))[..., None] * out[:, None]
+        return moved, gradient
+
+
+class BentMapping(MappingAffine):
+    """scikit-fem's mapping from the reference triangle, onto the true curve."""
+
+    def __init__(self, mesh: MeshTri, bent: Bent) -> None:
+        super().__init__(mesh)
+        self.bent = bent
+
+    def _shift(self, X, tind):
+        cells = np.arange(self.mesh.t.shape[1]) if tind is None else tind
+        X = np.broadcast_to(X, (2, X.shape[-1]))
+        area = np.broadcast_to(np.stack([1.0 - X[0] - X[1], X[0], X[1]], axis=1), (len(cells), X.shape[1], 3))
+        return cells, *self.bent.shift(cells, area)
+
+    def F(self, X, tind=None):
+        return super().F(X, tind) + self._shift(X, tind)[1].transpose(2, 0, 1)
+
+    def detDF(self, X, tind=None):
+        cells, _, gradient = self._shift(X, tind)
+        J = self.A[:, :, cells].transpose(2, 0, 1)[:, None] + gradient[..., 1:] - gradient[..., :1]
+        return J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
+
+
 class ArgyrisSpace:
     """Quintic shape functions of every triangle of one mesh, in coordinates of the triangle itself.
 
@@ -41,22 +146,24 @@ class ArgyrisSpace:
     turned into the reference directions before the inversion.
     """
 
-    def __init__(self, mesh: MeshTri) -> None:
-        corners = mesh.p[:, mesh.t[:3]].transpose(2, 1, 0)  # (n_cells, 3, 2)
+    def __init__(self, mesh: MeshTri, bent: Bent | None = None) -> None:
+        corners = mesh.p[:, mesh.t].transpose(2, 1, 0)  # (n_cells, 3, 2)
+        self.vertices = mesh.t.T
         self.origin = corners.mean(axis=1)
         self.jacobian = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
         self.inverse = np.linalg.inv(self.jacobian)
-        middles = np.stack([0.5 * (corners[:, a] + corners[:, b]) for a, b in SIDES], axis=1)
-        self.bulge = np.zeros_like(middles)  # (n_cells, 3, 2) of the curved sides, off the chord
-        if isinstance(mesh, MeshTri2):
-            self.bulge = mesh.doflocs[:, mesh.dofs.element_dofs[3:6]].transpose(2, 1, 0) - middles
-        self.curved = (np.abs(self.bulge) > 0.0).any(axis=(1, 2))
-        self.vertices = mesh.t[:3].T
         along = np.stack([corners[:, q] - corners[:, p] for p, q in SIDES], axis=1)
         up = np.stack([self.vertices[:, p] < self.vertices[:, q] for p, q in SIDES], axis=1)
         along = along * np.where(up, 1.0, -1.0)[..., None]  # the same for both triangles of a side
         self.normals = np.stack([along[..., 1], -along[..., 0]], axis=-1) / np.linalg.norm(along, axis=2)[..., None]
-        self.coefficients = self._invert(corners, middles + self.bulge)
+        self.middles = np.stack([0.5 * (corners[:, p] + corners[:, q]) for p, q in SIDES], axis=1)
+        self.bent = bent
+        self.curved = np.zeros(len(corners), bool)
+        if bent is not None:
+            self.curved[bent.cells] = True
+            at = bent.cells, bent.sides
+            self.middles[at], self.normals[at] = bent.curves.middle()
+        self.coefficients = self._invert(corners, self.middles)
         self.tree = cKDTree(self.origin)
 
     def _invert(self, corners: np.ndarray, middles: np.ndarray) -> np.ndarray:
@@ -125,17 +232,23 @@ class ArgyrisSpace:
 
     def _deepest(self, points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of candidate cells (n, k), the one in which the point lies deepest, and how deep (in area coordinates)."""
+        cells = np.broadcast_to(cells, (len(points), cells.shape[1]))
         offset = points[:, None] - self.origin[cells]
         local = np.einsum("nkij,nkj->nki", self.inverse[cells], offset) + 1.0 / 3.0
-        for _ in range(CURVE_STEPS if self.curved[cells].any() else 0):
-            area = np.stack([1.0 - local.sum(axis=2), local[..., 0], local[..., 1]], axis=2)
-            product4 = np.stack([4.0 * area[..., p] * area[..., q] for p, q in SIDES], axis=2)
-            bulged = offset - np.einsum("nks,nksi->nki", product4, self.bulge[cells])
-            local = np.einsum("nkij,nkj->nki", self.inverse[cells], bulged) + 1.0 / 3.0
+        bent = self.curved[cells]
+        if self.bent is not None and bent.any():
+            which, away = cells[bent], offset[bent]
+            place = local[bent]
+            for _ in range(CURVE_STEPS):
+                area = np.column_stack([1.0 - place.sum(axis=1), place])
+                moved = self.bent.shift(which, area[:, None])[0][:, 0]
+                place = np.einsum("nij,nj->ni", self.inverse[which], away - moved) + 1.0 / 3.0
+                place = np.clip(place, -1.0, 2.0)  # far away points are outside whatever the bend there
+            local[bent] = place
         depth = np.minimum(local.min(axis=2), 1.0 - local.sum(axis=2))
         best = depth.argmax(axis=1)
         row = np.arange(len(points))
-        return cells[np.zeros_like(row) if len(cells) == 1 else row, best], depth[row, best]
+        return cells[row, best], depth[row, best]
 
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 3) of the deflections 1, x and y: the rigid motions of a plate."""
@@ -221,20 +334,9 @@ class Hermite(ElementLineHermite):
         return (DiscreteField(value=value, grad=slope[None], hess=bend[None, None]),)
 
 
-def triangles(points: np.ndarray, cells: np.ndarray, facets: np.ndarray, middles: np.ndarray, curved: np.ndarray):
-    """scikit-fem's mesh of triangles; with quadratic edges where any facet is curved."""
-    mesh = MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
-    if not curved.any():
-        return mesh
-    mesh = MeshTri2.from_mesh(mesh)
-    ends = np.sort(facets[curved], axis=1)
-    n = len(points)
-    keys = np.sort(mesh.facets.T, axis=1) @ np.array([n, 1])
-    order = np.argsort(keys)
-    number = order[np.searchsorted(keys, ends @ np.array([n, 1]), sorter=order)]
-    nodes = mesh.doflocs.copy()
-    nodes[:, n + number] = middles[curved].T
-    return MeshTri2(nodes, mesh.t)
+def triangles(points: np.ndarray, cells: np.ndarray) -> MeshTri:
+    """scikit-fem's mesh of triangles."""
+    return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
 
 
 def segments(points: np.ndarray, cells: np.ndarray) -> MeshLine:
@@ -242,6 +344,6 @@ def segments(points: np.ndarray, cells: np.ndarray) -> MeshLine:
     return MeshLine(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
 
 
-def basis_of(mesh, element, order: int) -> CellBasis:
+def basis_of(mesh, element, order: int, mapping=None) -> CellBasis:
     """scikit-fem's basis: quadrature exact to ``order`` on straight elements, and the numbering of unknowns."""
-    return CellBasis(mesh, element, intorder=order)
+    return CellBasis(mesh, element, intorder=order, mapping=mapping)

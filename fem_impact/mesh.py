@@ -1,12 +1,15 @@
 """Where a body is: triangles or line elements, named edges on the true curve, and how to make a finer mesh of it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from . import _check
+from .outline import Outline, circle, extent, straight_loop
+from .triangulation import check_simple, triangulate
 
 DEFAULT_DIVISIONS = 8  # [-] elements across the shorter side where no size is stated; find_modes refines on its own
 
@@ -15,8 +18,8 @@ DEFAULT_DIVISIONS = 8  # [-] elements across the shorter side where no size is s
 class Mesh:
     """Triangles in the plane or elements on a line, with named edges.
 
-    Boundary facets run with the body on their left; normals point outward. Where an edge is curved, the facet is the
-    parabola through its ends and its middle, and tangent and curvature are those of the true curve.
+    Boundary facets run with the body on their left; normals point outward. A facet is the curve through its ends and
+    its middle with the tangents and curvatures given at its ends: off the true curve by the sixth power of its length.
     """
 
     points: np.ndarray  # (n_points, dimension) [m]
@@ -141,3 +144,44 @@ def line(length: float, *, size: float | None = None) -> Mesh:
         size=size,
         size_stated=stated,
     )
+
+
+def fill(outline: Outline, *, size: float | None = None) -> Mesh:
+    """Mesh within any outline; without a size, `find_modes` chooses one."""
+    check_simple(outline)
+    size, stated = _element_size(size, extent(outline.outer) / DEFAULT_DIVISIONS)
+    arrays = triangulate(outline, size)
+    return Mesh(**arrays, recipe=partial(fill, outline), size=size, size_stated=stated)
+
+
+def disk(radius: float, hole: float = 0.0, *, size: float | None = None) -> Mesh:
+    """Disk about the origin, or annulus with a hole of the given radius [m]; edges outer, inner and boundary (both)."""
+    radius = _check.positive("radius", radius, "m")
+    hole = _check.non_negative("hole", hole, "m")
+    if hole >= radius:
+        raise ValueError(f"hole must be smaller than radius = {radius:g} m, got {hole:g} m")
+    inner = (circle((0.0, 0.0), hole, "inner"),) if hole else ()
+    return fill(Outline.around(circle((0.0, 0.0), radius, "outer"), inner), size=size)
+
+
+def polygon(corners: Any, holes: Sequence[Any] = (), *, size: float | None = None) -> Mesh:
+    """Polygon with holes.
+
+    Parameters
+    ----------
+    corners : array_like, shape (n, 2) [m]
+        In order, either way round.
+    holes : sequence of array_like, shape (n, 2) [m]
+        Corners of each hole.
+    size : float [m], optional
+        Element size; without it `find_modes` chooses one fine enough for the modes it is asked for.
+
+    Returns
+    -------
+    Mesh
+        Edge "edge0" runs from the first corner to the second, and so on; "hole0" is all of the first hole, "outer" the
+        whole outer rim, "boundary" everything.
+    """
+    outer = straight_loop("corners", corners, "edge{}")
+    inner = [straight_loop(f"holes[{i}]", hole, f"hole{i}") for i, hole in enumerate(holes)]
+    return fill(Outline.around(outer, tuple(inner)), size=size)

@@ -383,7 +383,7 @@ def _fine_enough(system: System, n_modes: int | None, max_frequency: float | Non
     if size >= mesh.size:
         return system
     finer = mesh.refined(mesh.size / size)
-    return assemble(finer, system.section, system.supports, system.element)
+    return assemble(finer, system.section, system.supports, graded=system.graded)
 
 
 def find_modes(
@@ -424,7 +424,7 @@ def find_modes(
         raise ValueError("find_modes needs either n_modes or max_frequency")
     if not system.mesh.size_stated:
         system = _fine_enough(system, n_modes, max_frequency)
-    flexibility = Flexibility(system.K, system.M, system.rigid)
+    flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
     n_rigid = system.rigid.shape[1]
     if max_frequency is not None:
         limit = _check.positive("max_frequency", max_frequency, "Hz")

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.sparse import csr_matrix
 
-SMOOTH = 1e-6  # [-] tangents [rad], and curvatures times facet length, closer than this meet smoothly
-RANK = 1e-9  # [-] singular values below count as zero in conditions whose rows are of order one
+SMOOTH = 1e-5  # [-] tangents [rad], and curvatures times facet length, closer than this meet smoothly
+RANK = 1e-5  # [-] singular values below count as zero: directions in the smallest triangles are that rough
 SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in scikit-fem's order
 
 
@@ -50,15 +50,24 @@ def _conditions(kind: str, tangent: np.ndarray, curvature: float) -> np.ndarray:
     return np.array([deflection, slope, [0, nx, ny, 0, 0, 0], along, across])
 
 
-def _smooth(kind: str, tangent: np.ndarray, curvature: float) -> np.ndarray:
-    """What the conditions leave at a smooth vertex: orthonormal columns (6, n)."""
-    return null_space(_conditions(kind, tangent, curvature), rcond=RANK)
+def _left(conditions: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """What conditions (n, n_unknowns) leave: columns (n_unknowns, n_left) and their left inverse (n_left, n_unknowns).
+
+    Unknowns are weighed by the length of the triangles there, or slopes and curvatures would mix in one column, which
+    costs as many digits as the triangles are small.
+    """
+    n = conditions.shape[1]
+    weight = length ** -np.concatenate([[0.0, 1.0, 1.0], np.full(n - 3, 2.0)])  # unknown = weight * scaled unknown
+    rows = conditions * weight
+    rows = rows / np.abs(rows).max(axis=1, keepdims=True)
+    kept = null_space(rows, rcond=RANK) if len(rows) else np.eye(n)
+    return weight[:, None] * kept, kept.T / weight
 
 
 def _split(
     vertex: int, at: list, around: np.ndarray, rim: Rim, cells: np.ndarray, facet_cell: np.ndarray
 ) -> np.ndarray:
-    """What is left at a vertex whose triangles (n,) have second derivatives of their own: (3 + 3 n, n_left)."""
+    """Conditions (n_rows, 3 + 3 n) at a vertex whose triangles (n,) have second derivatives of their own."""
     slot = {int(cell): 3 + 3 * i for i, cell in enumerate(around)}
     rows = []
     shared: dict[int, list[int]] = {}
@@ -82,7 +91,7 @@ def _split(
             start = slot[int(facet_cell[facet])]
             line[:3], line[start : start + 3] = condition[:3], condition[3:]
             rows.append(line)
-    return null_space(np.array(rows), rcond=RANK) if rows else np.eye(3 + 3 * len(around))
+    return np.array(rows).reshape(-1, 3 + 3 * len(around))
 
 
 def cells_of_facets(facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -96,7 +105,7 @@ def cells_of_facets(facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, 
     return found // 3, found % 3
 
 
-def constrain(rim: Rim, cells: np.ndarray, dofs: np.ndarray, n_all: int) -> tuple[csr_matrix, np.ndarray]:
+def constrain(rim: Rim, cells: np.ndarray, dofs: np.ndarray, n_all: int) -> tuple[csr_matrix, csr_matrix, np.ndarray]:
     """What the supports leave of the Argyris unknowns.
 
     Each boundary vertex gets the null space of the conditions of its two facets. At a corner, where the support
@@ -112,7 +121,8 @@ def constrain(rim: Rim, cells: np.ndarray, dofs: np.ndarray, n_all: int) -> tupl
 
     Returns
     -------
-    expand : csr_matrix, shape (n_all + new, n_left), orthonormal columns
+    expand : csr_matrix, shape (n_all + new, n_left)
+    project : csr_matrix, shape (n_left, n_all + new), left inverse of expand
     dofs : ndarray, shape (21, n_cells), with the new unknowns of split vertices
     """
     dofs = dofs.copy()
@@ -121,15 +131,17 @@ def constrain(rim: Rim, cells: np.ndarray, dofs: np.ndarray, n_all: int) -> tupl
     for facet, pair in enumerate(rim.facets.tolist()):
         for end, vertex in enumerate(pair):
             ends.setdefault(vertex, []).append((facet, end))
-    blocks: list[tuple[np.ndarray, np.ndarray]] = []
+    blocks: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for vertex, at in ends.items():
         if not rim.is_special(at) and rim.kinds[at[0][0]] == "free":
             continue
         around, corner = np.nonzero(cells == vertex)
+        length = float(np.linalg.norm(rim.points[cells[around]] - rim.points[vertex], axis=2).max())
         first = dofs[6 * corner[0] : 6 * corner[0] + 6, around[0]].copy()
         if not rim.is_special(at):
             facet, end = at[0]
-            blocks.append((first, _smooth(rim.kinds[facet], rim.tangents[facet, end], rim.curvatures[facet, end])))
+            conditions = _conditions(rim.kinds[facet], rim.tangents[facet, end], rim.curvatures[facet, end])
+            blocks.append((first, *_left(conditions, length)))
             continue
         numbers = [first[:3]]
         for i, (c, k) in enumerate(zip(around, corner)):
@@ -137,18 +149,22 @@ def constrain(rim: Rim, cells: np.ndarray, dofs: np.ndarray, n_all: int) -> tupl
             n_all += 0 if i == 0 else 3
             dofs[6 * k + 3 : 6 * k + 6, c] = own
             numbers.append(own)
-        blocks.append((np.concatenate(numbers), _split(vertex, at, around, rim, cells, cell)))
+        blocks.append((np.concatenate(numbers), *_left(_split(vertex, at, around, rim, cells, cell), length)))
     clamped = np.array([kind == "clamped" for kind in rim.kinds])
-    blocks.append((dofs[18 + side[clamped], cell[clamped]], np.zeros((int(clamped.sum()), 0))))
+    none = np.zeros((int(clamped.sum()), 0))
+    blocks.append((dofs[18 + side[clamped], cell[clamped]], none, none.T))
     free = np.setdiff1d(np.arange(n_all), np.concatenate([block[0] for block in blocks]))
-    rows, columns, entries, width = [free], [np.arange(len(free))], [np.ones(len(free))], len(free)
-    for unknowns, kept in blocks:
+    rows, columns, width = [free], [np.arange(len(free))], len(free)
+    entries, inverse = [np.ones(len(free))], [np.ones(len(free))]
+    for unknowns, kept, back in blocks:
         n_left = kept.shape[1]
         rows.append(np.repeat(unknowns, n_left))
         columns.append(np.tile(np.arange(width, width + n_left), len(unknowns)))
         entries.append(kept.ravel())
+        inverse.append(back.T.ravel())
         width += n_left
     if width == 0:
         raise ValueError("supports leave this mesh nothing to move; refine it")
-    where = np.concatenate(rows).astype(int), np.concatenate(columns).astype(int)
-    return csr_matrix((np.concatenate(entries), where), shape=(n_all, width)), dofs
+    row, column = np.concatenate(rows).astype(int), np.concatenate(columns).astype(int)
+    expand = csr_matrix((np.concatenate(entries), (row, column)), shape=(n_all, width))
+    return expand, csr_matrix((np.concatenate(inverse), (column, row)), shape=(width, n_all)), dofs

@@ -11,6 +11,7 @@ FLOORS = [
     {"outline"},
     {"triangulation"},
     {"mesh", "section", "contact", "elements", "supports", "eigen"},
+    {"corners"},
     {"assembly"},
     {"modal"},
     {"analytic"},
@@ -20,7 +21,7 @@ FLOORS = [
     {"export"},
     {"integrator"},
     {"scene"},
-    {"report", "sweep"},
+    {"doctor", "report", "sweep"},
     {"cli"},
 ]
 FLOOR = {name: level for level, names in enumerate(FLOORS) for name in names}

@@ -30,11 +30,40 @@ def test_refined_mesh_keeps_shape_and_edge_names():
     assert set(fine.edges) == set(coarse.edges)
 
 
+def test_points_of_a_disk_lie_on_the_circle_with_its_curvature():
+    plate = mesh.disk(2.0, 0.5, size=0.4)
+    for name, radius, bend in (("outer", 2.0, 0.5), ("inner", 0.5, -2.0)):
+        mine = plate.edges[name]
+        assert_allclose(np.hypot(*plate.points[plate.facets[mine]].transpose(2, 0, 1)), radius, rtol=1e-12)
+        assert_allclose(np.hypot(*plate.middles[mine].T), radius, rtol=1e-12)
+        assert_allclose(plate.curvatures[mine], bend, rtol=1e-9)  # an edge of the hole is concave
+    assert plate.curved.all()
+
+
+def test_polygon_names_its_sides_and_holes():
+    plate = mesh.polygon([(0, 0), (0, 1), (2, 1), (2, 0)], [[(0.5, 0.4), (0.8, 0.4), (0.8, 0.7)]], size=0.3)
+    assert_allclose(plate.area, 2.0 - 0.045, rtol=1e-12)
+    assert_allclose(plate.points[plate.facets[plate.edges["edge0"]]][..., 0], 0.0, atol=1e-15)
+    assert_allclose(plate.points[plate.facets[plate.edges["edge1"]]][..., 1], 1.0)
+    assert len(plate.edges["outer"]) + len(plate.edges["hole0"]) == len(plate.edges["boundary"])
+
+
+def test_mesh_far_from_the_origin_is_the_same_one_moved():
+    here = mesh.polygon([(0, 0), (1, 0), (0, 1)], size=0.2)
+    there = mesh.polygon([(1e4, 0), (1e4 + 1, 0), (1e4, 1)], size=0.2)
+    assert_allclose(there.points - [1e4, 0], here.points, atol=1e-10)  # 1e4 in floats leaves 2e-12
+
+
 @pytest.mark.parametrize(
     ("make", "text"),
     [
         (lambda: mesh.rectangle(-1.0, 1.0), "length must be positive, got -1 m"),
         (lambda: mesh.rectangle(1.0, 1.0, size=0.0), "size must be positive, got 0 m"),
+        (lambda: mesh.disk(1.0, 1.0), "hole must be smaller than radius = 1 m, got 1 m"),
+        (lambda: mesh.polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), "must not cross or touch itself.*Self-intersection"),
+        (lambda: mesh.polygon([(0, 0), (1, 1)]), "corners must have at least three corners, got 2"),
+        (lambda: mesh.polygon([(0, 0), (1, 0), (1, 0), (0, 1)]), "corners 1 and 2 at the same place"),
+        (lambda: mesh.polygon([(0, 0), (1, 0), (0, 1)], [[(2, 2), (3, 2), (3, 3)]]), "must lie inside the outline"),
         (lambda: mesh.line(float("nan")), "length must be finite"),
     ],
 )

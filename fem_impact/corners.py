@@ -1,0 +1,220 @@
+"""How singular a plate is at a corner, and triangles that shrink geometrically towards it."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from .elements import Curves
+from .mesh import Mesh
+
+SHRINK = 0.35  # [-] of the distance to the corner from one ring of triangles to the next
+WIDE = 0.7  # [rad] triangles at a singular corner are bisected until they are narrower
+CORNER_ERROR = 1e-8  # [-] share of the energy that the innermost ring may miss, about twice that in frequency
+SMALLEST = 1e-10  # [-] of the facet: rings stop here, before the rounding of coordinates shows
+SMALLEST_FREE = 3e-3  # [-] likewise at a free corner: it moves, and rounding grows as (deflection / size)**2
+MILD = 2.5  # [-] exponents above this cost quintic triangles less than the rings would
+
+
+def _rows(kind: str, z: np.ndarray, angle: float, nu: float) -> list[np.ndarray]:
+    """Conditions (2 of shape (n, 4)) of a straight edge at an angle on r**z times the four biharmonic functions."""
+    c, s = np.cos(z * angle), np.sin(z * angle)
+    y = z - 2.0
+    c2, s2 = np.cos(y * angle), np.sin(y * angle)
+    f = np.stack([c, s, c2, s2], axis=1)
+    df = np.stack([-z * s, z * c, -y * s2, y * c2], axis=1)
+    d2f = np.stack([-(z**2) * c, -(z**2) * s, -(y**2) * c2, -(y**2) * s2], axis=1)
+    d3f = np.stack([z**3 * s, -(z**3) * c, y**3 * s2, -(y**3) * c2], axis=1)
+    if kind == "clamped":
+        return [f, df]
+    if kind == "hinged":
+        return [f, d2f]
+    moment = d2f + (z + nu * z * (z - 1.0))[:, None] * f
+    shear = d3f + (z**2 + (1.0 - nu) * (z - 1.0) * (z - 2.0))[:, None] * df
+    return [moment, shear]
+
+
+def _determinant(z: np.ndarray, angle: float, kinds: tuple[str, str], nu: float) -> np.ndarray:
+    matrix = np.stack(_rows(kinds[0], z, 0.0, nu) + _rows(kinds[1], z, angle, nu), axis=1)
+    matrix = matrix / np.abs(matrix).max(axis=2, keepdims=True)
+    return np.linalg.det(matrix) / ((z - 1.0) * (z - 2.0))  # both zeros belong to the basis, not to the plate
+
+
+@lru_cache(maxsize=256)
+def exponent(angle: float, kinds: tuple[str, str], nu: float) -> float:
+    """Smallest real part above 1 of the exponents z for which r**z solves the plate equation in a corner.
+
+    Parameters
+    ----------
+    angle : float [rad], inside the body
+    kinds : supports of the two edges: clamped, hinged or free
+    nu : float [-]
+
+    References
+    ----------
+    Williams (1952), Proc. 1st US National Congress of Applied Mechanics, 325-329.
+    """
+    real, imaginary = np.meshgrid(np.arange(1.02, MILD + 0.1, 0.06), [0.0, 0.15, 0.4, 0.8])
+    z = (real + 1j * imaginary).ravel()
+    before = z + 1e-3
+    value_before = _determinant(before, angle, kinds, nu)
+    for _ in range(40):  # secant steps from every start together
+        value = _determinant(z, angle, kinds, nu)
+        change = value - value_before
+        step = np.where(change == 0.0, 0.0, value * (z - before) / np.where(change == 0.0, 1.0, change))
+        step = step * np.minimum(1.0, 0.3 / np.maximum(np.abs(step), 1e-300))
+        before, value_before, z = z, value, z - step
+        z = np.clip(z.real, 1.0 + 1e-6, MILD + 1.0) + 1j * np.clip(z.imag, -3.0, 3.0)
+        z = np.where(np.abs(z - 2.0) < 1e-12, 2.0 + 1e-7, z)
+    settled = (np.abs(z - before) < 1e-9) & (z.real > 1.0 + 1e-4) & (np.abs(z - 2.0) > 1e-4) & (z.real < MILD)
+    return float(z.real[settled].min()) if settled.any() else MILD
+
+
+def rings(angle: float, kinds: tuple[str, str], nu: float) -> int:
+    """Number of rings of triangles towards a corner that leave less than CORNER_ERROR of the energy unresolved."""
+    z = exponent(round(angle, 9), kinds, nu)
+    if z >= MILD - 1e-3:
+        return 0
+    wanted = np.log(CORNER_ERROR) / (2.0 * (z - 1.0) * np.log(SHRINK))
+    smallest = SMALLEST_FREE if kinds == ("free", "free") else SMALLEST
+    return int(np.ceil(min(wanted, np.log(smallest) / np.log(SHRINK))))
+
+
+def around_corners(mesh: Mesh, kinds: list[str], nu: float) -> Mesh:
+    """The mesh with rings of shrinking triangles at every corner that is singular under its supports (n_facets,)."""
+    into: dict[int, int] = {}
+    out_of: dict[int, int] = {}
+    for facet, (a, b) in enumerate(mesh.facets.tolist()):
+        out_of[a], into[b] = facet, facet
+    wanted = {}
+    for vertex, facet in out_of.items():
+        before = into[vertex]
+        if kinds[before] == kinds[facet] and (mesh.tangents[before, 1] @ mesh.tangents[facet, 0]) > 1.0 - 1e-12:
+            continue
+        (x, y), (u, v) = mesh.tangents[before, 1], mesh.tangents[facet, 0]
+        n = rings(float(np.pi - np.arctan2(x * v - y * u, x * u + y * v)), (kinds[facet], kinds[before]), nu)
+        if n:
+            wanted[vertex] = n
+    return towards(mesh, wanted)
+
+
+def towards(mesh: Mesh, wanted: dict[int, int]) -> Mesh:
+    """The mesh with rings of triangles that shrink towards some of its vertices (vertex -> number of rings)."""
+    if not wanted:
+        return mesh
+    points, cells = list(mesh.points), mesh.cells.tolist()
+    touching: dict[int, list[int]] = {vertex: [] for vertex in wanted}
+    for c, cell in enumerate(cells):
+        for vertex in cell:
+            if vertex in touching:
+                touching[vertex].append(c)
+    rim = _Rim(mesh)
+    _narrow(points, cells, touching, rim)
+    for vertex, n in wanted.items():
+        for _ in range(n):
+            nearer: dict[int, int] = {}
+            for c in touching[vertex]:
+                a, b = (p for p in cells[c] if p != vertex)
+                for p in (a, b):
+                    if p not in nearer:
+                        nearer[p] = len(points)
+                        points.append(rim.split(vertex, p, len(points), points, SHRINK))
+                cells[c] = [vertex, nearer[a], nearer[b]]
+                for new in ([nearer[a], a, b], [nearer[a], b, nearer[b]]):
+                    for p in new:
+                        if p in touching and p != vertex:
+                            touching[p].append(len(cells))
+                    cells.append(new)
+            for p in nearer:  # the cells that held the split side at its far end hold it no more
+                if p in touching:
+                    touching[p] = [c for c in touching[p] if p in cells[c]]
+    return rim.finish(mesh, np.array(points), np.array(cells))
+
+
+def _narrow(points: list[np.ndarray], cells: list[list[int]], touching: dict[int, list[int]], rim: "_Rim") -> None:
+    """Bisect wide triangles at the vertices of ``touching``: the rings cannot mend a coarse division of the angle."""
+    sides: dict[tuple[int, int], list[int]] = {}
+    for c, cell in enumerate(cells):
+        for i in range(3):
+            a, b = sorted((cell[i], cell[i - 1]))
+            sides.setdefault((a, b), []).append(c)
+    for vertex, mine in touching.items():
+        for c in list(mine):
+            a, b = (p for p in cells[c] if p != vertex)
+            u, v = points[a] - points[vertex], points[b] - points[vertex]
+            if np.arccos(np.clip(u @ v / np.linalg.norm(u) / np.linalg.norm(v), -1.0, 1.0)) < WIDE:
+                continue
+            new = len(points)
+            points.append(rim.split(a, b, new, points, 0.5))
+            for other in list(sides.pop((min(a, b), max(a, b)))):
+                top = next(p for p in cells[other] if p not in (a, b))
+                fresh = len(cells)
+                cells.append([top, new, b])
+                cells[other] = [top, a, new]
+                sides.setdefault((min(new, a), max(new, a)), []).append(other)
+                sides.setdefault((min(new, b), max(new, b)), []).append(fresh)
+                sides[min(new, top), max(new, top)] = [other, fresh]
+                far = sides[min(b, top), max(b, top)]
+                far[far.index(other)] = fresh
+                for p, holders in touching.items():
+                    if p == top:
+                        holders.append(fresh)
+                    elif p == b:
+                        holders[holders.index(other)] = fresh
+
+
+class _Rim:
+    """The boundary facets while they are being split."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.facets = mesh.facets.tolist()
+        self.number = {(a, b): i for i, (a, b) in enumerate(self.facets)}
+        self.middles, self.tangents, self.curvatures = list(mesh.middles), list(mesh.tangents), list(mesh.curvatures)
+        self.curved = mesh.curved.tolist()
+        self.parent = list(range(len(self.facets)))
+
+    def split(self, vertex: int, far: int, new: int, points: list[np.ndarray], ratio: float) -> np.ndarray:
+        """The point that divides the side from a vertex to its neighbour; a boundary facet there becomes two."""
+        plain = points[vertex] + ratio * (points[far] - points[vertex])
+        forward = (vertex, far) in self.number
+        if not forward and (far, vertex) not in self.number:
+            return plain
+        pair = (vertex, far) if forward else (far, vertex)
+        facet = self.number.pop(pair)
+        ends = np.array([[points[pair[0]], points[pair[1]]]])
+        share = ratio if forward else 1.0 - ratio
+        place, tangent, curvature = plain, self.tangents[facet][0], 0.0
+        pieces = [0.5 * share, 0.5 * (1.0 + share)]
+        halves = [ends[0, 0] + s * (ends[0, 1] - ends[0, 0]) for s in pieces]
+        if self.curved[facet]:
+            curve = Curves(ends, *(np.array([a[facet]]) for a in (self.middles, self.tangents, self.curvatures)))
+            place, tangent, curvature = curve.along_it(share)
+            halves = [curve.halfway(0.0, share), curve.halfway(share, 1.0)]
+        first, last = self.tangents[facet], self.curvatures[facet]
+        self.facets[facet], self.number[pair[0], new] = [pair[0], new], facet
+        self.middles[facet] = halves[0]
+        self.tangents[facet], self.curvatures[facet] = np.array([first[0], tangent]), np.array([last[0], curvature])
+        self.number[new, pair[1]] = len(self.facets)
+        self.facets.append([new, pair[1]])
+        self.middles.append(halves[1])
+        self.tangents.append(np.array([tangent, first[1]]))
+        self.curvatures.append(np.array([curvature, last[1]]))
+        self.curved.append(self.curved[facet])
+        self.parent.append(self.parent[facet])
+        return place
+
+    def finish(self, mesh: Mesh, points: np.ndarray, cells: np.ndarray) -> Mesh:
+        parent = np.array(self.parent)
+        edges = {name: np.flatnonzero(np.isin(parent, numbers)) for name, numbers in mesh.edges.items()}
+        arrays = (np.array(a) for a in (self.middles, self.tangents, self.curvatures))
+        middles, tangents, curvatures = arrays
+        return replace(
+            mesh,
+            points=points,
+            cells=cells,
+            facets=np.array(self.facets),
+            edges=edges,
+            middles=middles,
+            tangents=tangents,
+            curvatures=curvatures,
+        )

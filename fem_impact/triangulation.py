@@ -1,0 +1,115 @@
+"""From an outline to triangles whose boundary follows it."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import shapely
+from netgen.geom2d import SplineGeometry
+
+from . import _check
+from .outline import Outline, Piece, crossing, curvature, divide, extent, is_straight, polyline, tangent
+
+SPREAD = 1.3  # [-] how much longer than asked for a side inside may get before the mesher divides it
+GRADING = 0.35  # [-] how fast the mesher lets elements grow away from small ones
+
+
+def check_simple(outline: Outline) -> None:
+    """Raise ValueError where the outline crosses itself or a hole leaves the body; the mesher would not return."""
+    size = extent(outline.outer) / 30.0
+    outer = shapely.Polygon(polyline(outline.outer, size))
+    if not outer.is_valid:
+        raise ValueError(f"outline must not cross or touch itself: {shapely.is_valid_reason(outer)}")
+    holes: list[shapely.Polygon] = []
+    for i, loop in enumerate(outline.holes):
+        hole = shapely.Polygon(polyline(loop, size))
+        if not hole.is_valid:
+            raise ValueError(f"holes[{i}] must not cross or touch itself: {shapely.is_valid_reason(hole)}")
+        if not outer.contains_properly(hole):
+            raise ValueError(f"holes[{i}] must lie inside the outline and not touch it")
+        for j, other in enumerate(holes):
+            if hole.intersects(other):
+                raise ValueError(f"holes[{i}] must not overlap or touch holes[{j}]")
+        holes.append(hole)
+
+
+def triangulate(outline: Outline, size: float) -> dict[str, Any]:
+    """Triangles within an outline.
+
+    Parameters
+    ----------
+    outline : Outline
+        Already known to be simple (`check_simple`).
+    size : float [m]
+        Longest side of a triangle, about; where the outline turns quickly they are smaller.
+
+    Returns
+    -------
+    dict
+        The fields of a `Mesh`: points, cells, facets, edges, middles, tangents, curvatures.
+    """
+    span = extent(outline.outer)
+    centre = outline.outer[0].at(np.zeros(1))[0]
+    geometry = SplineGeometry()
+    chords: list[tuple[Piece, float, float]] = []
+    for loop in outline.loops:
+        first, start = len(chords), len(chords)
+        for piece in loop:
+            t = divide(piece, size)
+            chords += [(piece, a, b) for a, b in pairwise(t)]
+        places = np.array([piece.at(np.array([a]))[0] for piece, a, _ in chords[first:]])
+        numbers = [geometry.AppendPoint(*point) for point in (places - centre) / span]
+        for i, number in enumerate(numbers):
+            line = ["line", number, numbers[(i + 1) % len(numbers)]]
+            geometry.Append(line, leftdomain=1, rightdomain=0, bc=start + i + 1)
+    made = geometry.GenerateMesh(maxh=SPREAD * size / span, grading=GRADING, quad_dominated=False)
+    points = np.array([p.p for p in made.Points()])[:, :2] * span + centre
+    cells = made.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
+    facets = np.array([[e.points[0].nr - 1, e.points[1].nr - 1] for e in made.Elements1D()])
+    owner = np.array([e.index - 1 for e in made.Elements1D()])
+    if not len(cells) or set(owner.tolist()) != set(range(len(chords))):
+        raise _check.SimulationError("the mesher could not fill the outline; check it for very thin necks")
+    return _follow(points, cells, facets, owner, chords, outline.outer)
+
+
+def _follow(
+    points: np.ndarray, cells: np.ndarray, facets: np.ndarray, owner: np.ndarray, chords: list, outer: tuple
+) -> dict:
+    """Put the boundary points on the true curve and read off tangents and curvatures there."""
+    middles, tangents, curvatures = (
+        np.zeros((len(facets), 2)),
+        np.zeros((len(facets), 2, 2)),
+        np.zeros((len(facets), 2)),
+    )
+    place = points.copy()
+    edges: dict[str, list[int]] = {}
+    for piece in dict.fromkeys(chord[0] for chord in chords):
+        mine = np.flatnonzero([chords[j][0] is piece for j in owner])
+        low, high = np.array([chords[j][1:] for j in owner[mine]]).T
+        ends = points[facets[mine]]  # (n, 2, 2)
+        a, b = piece.at(low), piece.at(high)
+        along = ((ends - a[:, None]) * (b - a)[:, None]).sum(axis=2) / ((b - a) ** 2).sum(axis=1)[:, None]
+        t = np.stack([crossing(piece, low, high, along[:, 0]), crossing(piece, low, high, along[:, 1])], axis=1)
+        for end, exact in ((0, low), (1, high)):
+            t[:, end] = np.where(np.abs(along[:, end] - end) < 1e-9, exact, t[:, end])
+            place[facets[mine, end]] = piece.at(t[:, end])
+        middles[mine] = piece.at(crossing(piece, t[:, 0], t[:, 1], np.full(len(mine), 0.5)))
+        if is_straight(piece):
+            middles[mine] = place[facets[mine]].mean(axis=1)
+        for end in (0, 1):
+            tangents[mine, end] = tangent(piece, t[:, end])
+            curvatures[mine, end] = curvature(piece, t[:, end])
+        edges.setdefault(piece.name, []).extend(mine.tolist())
+    named = {name: np.array(sorted(numbers)) for name, numbers in edges.items() if name}
+    if "outer" not in named:
+        named["outer"] = np.flatnonzero([any(chords[j][0] is piece for piece in outer) for j in owner])
+    named["boundary"] = np.arange(len(facets))
+    return {
+        "points": place,
+        "cells": cells,
+        "facets": facets,
+        "edges": named,
+        "middles": middles,
+        "tangents": tangents,
+        "curvatures": curvatures,
+    }
