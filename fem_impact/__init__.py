@@ -24,7 +24,7 @@ _HOME = {
     "Scene": "scene",
     "load_scene": "scene",
 }
-_MODULES = ("mesh", "analytic", "spectra", "threshold", "accuracy", "export", "figures", "sound", "section", "contact")
+_MODULES = ("mesh", "analytic", "spectra", "threshold", "accuracy", "export", "figures", "sound", "section", "contact", "doctor")
 
 __all__ = [*_HOME, *_MODULES, "__version__"]
 

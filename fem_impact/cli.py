@@ -75,6 +75,12 @@ def _parser() -> argparse.ArgumentParser:
     modes.add_argument("--count", metavar="N", type=int, default=12, help="how many modes (default: 12)")
     modes.add_argument("--vtk", metavar="FILE", type=Path, help="write the shapes to a .pvd or .vtu file")
     modes.add_argument("--json", action="store_true", help="print the numbers as JSON")
+
+    doctor = verbs.add_parser("doctor", help="check this installation; say what to do about what fails")
+    doctor.set_defaults(run=_doctor)
+
+    completion = verbs.add_parser("completion", help="print a completion script for bash: eval it in ~/.bashrc")
+    completion.set_defaults(run=lambda options: print(_completion(parser)))
     return parser
 
 
@@ -140,6 +146,40 @@ def _modes(options: argparse.Namespace) -> None:
         print(f"{i:5d} {frequency:11.5g} Hz {ratio:14.3g}")
     if options.vtk is not None:
         print(_wrapped(f"Files: {options.vtk}"))
+
+
+def _doctor(options: argparse.Namespace) -> None:
+    for name, version in fi.export.versions().items():
+        print(f"{name:<22} {version}")
+    findings = fi.doctor.examine()
+    for finding in findings:
+        state = "works" if finding.works else "fails" if finding.vital else "missing"
+        print(_wrapped(f"{finding.name:<22} {state:<8} {finding.seconds:5.2f} s  {finding.remedy}".rstrip()))
+    failed = [finding.name for finding in findings if finding.vital and not finding.works]
+    if failed:
+        raise fi.SimulationError(f"{', '.join(failed)}: not working; see above")
+
+
+def _completion(parser: argparse.ArgumentParser) -> str:
+    """A bash script that completes verbs, then the options of the verb and file names."""
+    (verbs,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    cases = [
+        f"        {name}) words='{' '.join(word for action in verb._actions for word in action.option_strings)}' ;;"
+        for name, verb in verbs.choices.items()
+    ]
+    return "\n".join(
+        [
+            "_fem_impact() {",
+            f"    local words='{' '.join(verbs.choices)} --help --version'",
+            '    case "${COMP_WORDS[1]}" in',
+            *cases,
+            "    esac",
+            '    [ "$COMP_CWORD" = 1 ] && words="$words ' + " ".join(verbs.choices) + '"',
+            '    COMPREPLY=($(compgen -W "$words" -- "${COMP_WORDS[COMP_CWORD]}"))',
+            "}",
+            "complete -o default -F _fem_impact fem-impact",
+        ]
+    )
 
 
 def _wrapped(text: str) -> str:

@@ -192,3 +192,17 @@ def test_default_scene_runs_end_to_end(tmp_path, capsys):
     # the estimate must keep the promise the scene asks for
     assert data["response"]["error"]["total"] < 1e-4
     assert -1.0 < data["response"]["restitution"] < 1.0
+
+
+def test_completion_offers_verbs_and_their_options():
+    script = cli._completion(cli._parser())
+
+    def offered(*words):
+        line = " ".join(f"'{word}'" for word in words)
+        code = f"{script}\nCOMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _fem_impact; echo ${{COMPREPLY[@]}}"
+        run = subprocess.run(["bash", "-c", code], capture_output=True, text=True, check=True)
+        return sorted(set(run.stdout.split()))
+
+    assert offered("fem-impact", "st") == ["strike"]
+    assert offered("fem-impact", "strike", "--t") == ["--tolerance"]
+    assert offered("fem-impact", "modes", "a.toml", "--") == ["--count", "--help", "--json", "--vtk"]

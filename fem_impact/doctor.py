@@ -1,0 +1,95 @@
+"""Is this installation sound? Small checks with a known answer, and a sentence of help for each that fails."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from . import export, figures, mesh
+from .assembly import assemble
+from .contact import Contact
+from .integrator import strike
+from .modal import Modes, find_modes
+from .section import Material, Plate
+from .striker import Striker
+
+SQUARE = 2.0 * np.pi**2  # [-] omega of a hinged unit square of unit stiffness and mass
+PATIENCE = 60.0  # [s] a rendering probe that takes longer has failed
+# Without a driver this ends the process by a signal no `try` catches, hence another process.
+RENDER = (
+    "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=(16, 16)); p.add_mesh(pyvista.Sphere()); "
+    "assert p.screenshot(None).std() > 0"
+)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was tried."""
+
+    name: str
+    works: bool
+    seconds: float  # [s]
+    remedy: str  # empty where it works
+    vital: bool = True  # whether the command line needs it
+
+
+def examine() -> list[Finding]:
+    """Try everything a strike needs, and 3-D rendering, which it does not need; takes some seconds."""
+    return [
+        _tried("finite elements", _finite_elements, "install scikit-fem again: its numbers are wrong or it fails"),
+        _tried("compiled kernels", _kernels, "install numba again; NUMBA_DISABLE_JIT=1 runs without, slowly"),
+        _tried("pictures", _picture, "install matplotlib again"),
+        _tried("mode shapes as files", _vtk, "check that the folder for temporary files can be written to"),
+        _tried("3-D rendering", _render, "for pictures in 3-D install libegl1 and libgl1-mesa-dri", vital=False),
+    ]
+
+
+def _tried(name: str, check: Callable[[], bool], remedy: str, vital: bool = True) -> Finding:
+    start = time.perf_counter()
+    reason = ""
+    try:
+        works = check()
+    except (ArithmeticError, ImportError, LookupError, OSError, RuntimeError, TypeError, ValueError) as error:
+        works, reason = False, f" ({type(error).__name__}: {error})"
+    return Finding(name, works, time.perf_counter() - start, "" if works else remedy + reason, vital)
+
+
+def _finite_elements() -> bool:
+    plate = Plate(Material(E=12.0 * (1.0 - 0.09), nu=0.3, rho=1.0), 1.0)
+    modes = find_modes(assemble(mesh.rectangle(1.0, 1.0), plate, supports={"boundary": "hinged"}), n_modes=1)
+    return bool(abs(modes.omega[0] / SQUARE - 1.0) < 1e-4)
+
+
+def _kernels() -> bool:
+    hit = strike(Modes.rigid(1.0), Striker.rigid(1.0), Contact.linear(1e5), at=None, speed=1.0)
+    return abs(hit.restitution) < 1e-9 and hit.n_impacts == 1  # equal masses exchange their speeds
+
+
+def _picture() -> bool:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "picture.png"
+        hit = strike(Modes.rigid(1.0), Striker.rigid(1.0), Contact.linear(1e5), at=None, speed=1.0)
+        figures.save(path, figures.force(hit))
+        return path.stat().st_size > 1000
+
+
+def _vtk() -> bool:
+    with tempfile.TemporaryDirectory() as folder:
+        export.write_vtk(Path(folder) / "rigid.vtu", Modes.rigid(1.0))
+        return bool(list(Path(folder).iterdir()))
+
+
+def _render() -> bool:
+    environment = {**os.environ, "VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
+    command = [sys.executable, "-c", RENDER]
+    try:
+        run = subprocess.run(command, env=environment, capture_output=True, timeout=PATIENCE, check=False)
+    except subprocess.TimeoutExpired:
+        return False
+    return run.returncode == 0
