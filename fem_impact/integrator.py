@@ -5,22 +5,24 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.special import gamma
 
 from . import _check, _kernels
 from ._check import SimulationError
-from .accuracy import contact_duration
 from .contact import Contact
 from .modal import Modes
 from .response import Error, History, Response
 from .striker import Striker
 
 TOLERANCE = 1e-4  # [-] the default promise
-ENERGY_SCHEMES = ("A", "A4")
+SCHEMES = ("A", "A4", "collocation")
 MAX_STEPS = 2_000_000  # [-] of one run, about a second for a few modes
 FIRST_STEPS = 12.0  # [-] steps per contact at which A4 errs by about FIRST_ERROR: measured 9e-6 linear, 1e-4 Hertz
 FIRST_ERROR = 1e-4  # [-]
 DOUBLINGS = 7  # [-] how often the step is halved before the run gives up
-RICHARDSON = {"A": 3.0, "A4": 7.0}  # [-] difference of two runs over the error of the finer: 2**order - 1, order 3 kept
+RICHARDSON = {"A": 3.0, "A4": 7.0, "collocation": 1.0}  # [-] difference of two runs over the error of the finer one
+COLLOCATION_BELOW = 1e-7  # [-] tolerance from which collocation needs less work than A4
+NODES = 5  # [-] of collocation; more gain nothing where onset and release limit the smoothness
 RESOLVABLE = 0.3  # [-] contact stiffness times residual compliance up to which the estimate of its error holds
 STATIC_ERROR = 0.5  # [-] force error over k C omega_0/omega_c with residual compliance, see accuracy.py
 ROUNDING = 1e-13  # [-] below this two runs cannot be told apart
@@ -86,7 +88,7 @@ def strike(
         Where to stop at the latest.
     max_impacts : int, optional
         Stop when so many impacts have ended.
-    scheme : {"A", "A4"}, optional
+    scheme : {"A", "A4", "collocation"}, optional
         Fixes the scheme instead of leaving it to the tolerance.
     dt : float [s], optional
         Fixes the step in contact; the step error is then estimated, not held to the tolerance.
@@ -161,7 +163,7 @@ def collide(
     horizon = np.inf if duration is None else _check.positive("duration", duration, "s")
     n_max = 0 if max_impacts is None else _check.count("max_impacts", max_impacts)
     if scheme is not None:
-        scheme = _check.one_of("scheme", scheme, ENERGY_SCHEMES)
+        scheme = _check.one_of("scheme", scheme, SCHEMES)
     if dt is not None:
         dt = _check.positive("dt", dt, "s")
     bodies, contacts = tuple(bodies), tuple(contacts)
@@ -170,9 +172,9 @@ def collide(
         raise ValueError(
             "duration or max_impacts must be given where a constant force keeps pressing the bodies together"
         )
-    shortest = _contact_times(system)
-    history, step_error, ran = _controlled(system, scheme, dt, tolerance, shortest, horizon, n_max)
-    truncation, resolvable = _truncation(bodies, contacts, system, shortest, residual)
+    pace = _pace(system)
+    history, step_error, ran = _controlled(system, scheme, dt, tolerance, pace, horizon, n_max)
+    truncation, resolvable = _truncation(bodies, contacts, system, pace[0], residual)
     error = Error(step_error, truncation, _mesh_error(bodies, history), resolvable)
     laws = tuple(touch.law for touch in contacts)
     return Response(bodies, laws, history, arriving, tolerance, ran, error)
@@ -227,50 +229,69 @@ def _assemble(bodies, contacts, speeds, states, forces, residual) -> tuple[_Syst
     return _System(omega, zeta, shape, offset, bias, law, q, p), arriving
 
 
-def _contact_times(system: _System) -> float:
-    """Shortest duration [s] to expect of an undisturbed contact, from the masses that can move within it."""
+def _pace(system: _System) -> tuple[float, float]:
+    """Shortest duration [s] to expect of an undisturbed contact, and the speed [m/s] that goes with it."""
     order = np.argsort(system.omega, kind="stable")
     omega = system.omega[order]
-    closing = np.abs(system.shape) @ np.abs(system.start_p)  # bounds the rate of approach at any time
-    best = np.inf
+    last = np.append(omega[1:] > omega[:-1], True)  # of several modes with one frequency
+    shortest, fastest = np.inf, 0.0
     for i, (k, exponent, _, compliance) in enumerate(system.law):
         mobile = np.cumsum(system.shape[i, order] ** 2)  # [1/kg] of the modes up to each
-        if not mobile[-1] > 0.0:
+        mobile, above = mobile[last], np.append(omega[last][1:], np.inf)
+        above, mobile = above[mobile > 0.0], mobile[mobile > 0.0]
+        if not mobile.size:
             continue
-        speed = max(closing[i], 1e-300)
-        pressed = max(0.0, system.offset[i] + float(system.shape[i] @ system.start_q))
-        if pressed:
-            speed = max(speed, pressed * np.sqrt(k * pressed ** (exponent - 1.0) * mobile[-1]))
-        for count in np.flatnonzero(np.append(np.diff(omega) > 0.0, True)):
-            if not mobile[count] > 0.0:
-                continue
-            free = contact_duration(Contact(k, exponent), 1.0 / mobile[count], speed)
-            if compliance and exponent == 1.0:
-                free *= np.sqrt(1.0 + k * compliance)
-            if count + 1 == len(omega) or np.pi / free < omega[count + 1]:
-                break
-        best = min(best, free)
-    if not np.isfinite(best):
-        raise ValueError("contacts must join points that can move, got only points at rest")
-    return float(best)
+        approach = system.offset[i] + float(system.shape[i] @ system.start_q)
+        pull = max(0.0, float(system.shape[i] @ system.bias))  # [m/s**2]
+        speed = float(np.abs(system.shape[i]) @ np.abs(system.start_p))
+        speed = max(speed, np.sqrt(2.0 * pull * max(0.0, -approach)))
+        speed = max(speed, np.sqrt(pull * (pull / (k * mobile[-1])) ** (1.0 / exponent)))
+        if approach > 0.0:
+            speed = max(speed, approach * np.sqrt(k * approach ** (exponent - 1.0) * mobile[-1]))
+        if speed == 0.0:
+            continue
+        free = _wall_duration(k, exponent, mobile, speed)
+        if exponent == 1.0:
+            free = free * np.sqrt(1.0 + k * compliance)
+        shortest = min(shortest, float(free[np.argmax(np.pi / free < above)]))
+        fastest = max(fastest, float(speed))
+    if not np.isfinite(shortest):
+        k, exponent = system.law[0, :2]
+        return float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0
+    return shortest, fastest
 
 
-def _controlled(system, scheme, dt, tolerance, shortest, horizon, n_max) -> tuple[History, float, str]:
-    """Run with a step that meets the tolerance, judged by halving it; return the history and its estimated error."""
-    name = scheme or "A4"
+def _wall_duration(k: float, exponent: float, mobility: np.ndarray, speed: float) -> np.ndarray:
+    """Contact times [s] on a rigid wall of masses 1/mobility; in logarithms, as extremes overflow the direct form."""
+    q = 1.0 / (exponent + 1.0)
+    deepest = np.exp(q * (2.0 * np.log(speed) - np.log(2.0 * q * k) - np.log(mobility)))
+    return 2.0 * np.sqrt(np.pi) * gamma(1.0 + q) / gamma(0.5 + q) * deepest / speed
+
+
+def _controlled(system, scheme, dt, tolerance, pace, horizon, n_max) -> tuple[History, float, str]:
+    """Run so that the tolerance is met, judged by a second, finer run; return the history and its estimated error."""
+    if scheme is None:
+        smooth = bool((system.law[:, 1] >= 1.0).all())
+        scheme = "collocation" if tolerance < COLLOCATION_BELOW and smooth else "A4"
+    if scheme == "collocation" and (system.law[:, 1] < 1.0).any():
+        raise ValueError(f"scheme collocation needs exponents of at least 1, got {system.law[:, 1].min():g}; take A4")
+    shortest = pace[0]
     if dt is not None:
-        fine = _run(system, name, dt, horizon, n_max)
-        coarse = _run(system, name, 2.0 * dt, horizon, n_max)
-        return fine, _difference(coarse, fine, system) / RICHARDSON[name], name
-    order = 2.0 if name == "A" else 4.0
-    count = max(6.0, FIRST_STEPS * (FIRST_ERROR / tolerance) ** (1.0 / order))
-    coarse = _run(system, name, 2.0 * shortest / count, horizon, n_max)
+        fine = _run(system, scheme, dt, pace, horizon, n_max)
+        coarse = _run(system, scheme, 2.0 * dt, pace, horizon, n_max)
+        return fine, _difference(coarse, fine, system) / RICHARDSON[scheme], scheme
+    if scheme == "collocation":
+        sizes = [max(1e-15, tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)]
+    else:
+        count = max(6.0, FIRST_STEPS * (FIRST_ERROR / tolerance) ** (0.5 if scheme == "A" else 0.25))
+        sizes = [shortest / count * 2.0 ** (1 - n) for n in range(DOUBLINGS + 1)]
+    coarse = _run(system, scheme, sizes[0], pace, horizon, n_max)
     best = np.inf
-    for doubling in range(DOUBLINGS):
-        fine = _run(system, name, shortest / count / 2.0**doubling, horizon, n_max)
-        estimate = _difference(coarse, fine, system) / RICHARDSON[name]
+    for size in sizes[1:]:
+        fine = _run(system, scheme, size, pace, horizon, n_max)
+        estimate = _difference(coarse, fine, system) / RICHARDSON[scheme]
         if estimate <= tolerance:
-            return fine, estimate, name
+            return fine, estimate, scheme
         best = min(best, estimate)
         coarse = fine
     raise SimulationError(
@@ -279,22 +300,35 @@ def _controlled(system, scheme, dt, tolerance, shortest, horizon, n_max) -> tupl
     )
 
 
-def _run(system: _System, scheme: str, base: float, horizon: float, n_max: int) -> History:
-    """One run at one step; SimulationError where it cannot end."""
-    steps, q, p, now, work, time, status, n_fallback, n_blind = _kernels.run_energy(
-        system.omega, system.zeta, system.shape, system.offset, system.bias, system.law,
-        system.start_q, system.start_p, int(scheme == "A4"), float(base), float(horizon), n_max, MAX_STEPS,
+def _run(system: _System, scheme: str, size: float, pace: tuple[float, float], horizon: float, n_max: int) -> History:
+    """One run; ``size`` is the step in contact, or the misfit allowed to collocation."""
+    parts = (
+        system.omega, system.zeta, system.shape, system.offset, system.bias, system.law, system.start_q, system.start_p
     )  # fmt: skip
+    if scheme == "collocation":
+        nodes, powers = _gauss(NODES)
+        result = _kernels.run_collocation(
+            *parts, nodes, powers, pace[0] / 2.0, pace[1], float(size), float(horizon), n_max, MAX_STEPS
+        )
+    else:
+        result = _kernels.run_energy(*parts, int(scheme == "A4"), float(size), float(horizon), n_max, MAX_STEPS)
+    time, status = result[5], result[6]
     if status == _kernels.EXHAUSTED:
         raise SimulationError(
             f"no final separation was reached in {MAX_STEPS} steps, up to {time:.4g} s; give duration or max_impacts"
         )
     if status == _kernels.FAILED:
-        raise SimulationError(f"numbers left the range of floating point at {time:.4g} s; check the units of the scene")
-    return History(
-        system.omega, system.zeta, system.shape, system.offset, system.bias, system.law, system.start_q, system.start_p,
-        steps, q, p, now, work, time, status, n_fallback, n_blind,
-    )  # fmt: skip
+        raise SimulationError(
+            f"scheme {scheme} found no next step at {time:.4g} s; take scheme A4, or check the units of the scene"
+        )
+    return History(*parts, *result)
+
+
+def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss nodes on [0, 1] with 1 appended, (count + 1,), and Lagrange polynomials as powers, (count, count)."""
+    nodes = 0.5 * (np.polynomial.legendre.leggauss(count)[0] + 1.0)
+    powers = np.linalg.inv(np.vander(nodes, increasing=True)).T
+    return np.append(nodes, 1.0), np.ascontiguousarray(powers)
 
 
 def _scalars(history: History, system: _System) -> np.ndarray:
