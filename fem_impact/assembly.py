@@ -9,12 +9,12 @@ from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags
 
 from . import _check
 from .corners import around_corners
+from .curves import Curves
 from .elements import (
     Argyris,
     ArgyrisSpace,
     Bent,
     BentMapping,
-    Curves,
     Hermite,
     HermiteSpace,
     basis_of,
@@ -73,6 +73,7 @@ class System:
     rigid: np.ndarray = field(repr=False)  # (n_dofs, n_rigid) [-] rigid motions left, mass-normalised
     held: np.ndarray = field(repr=False)  # (n_rigid,) unknowns that hold the rigid motions, statically determinate
     graded: bool = True  # whether rings of ever smaller triangles surround singular corners
+    rim: Rim | None = field(default=None, repr=False)  # of the triangles solved on, in the frame; None on a beam
     softness: float = 1.0  # [-] largest inertia over stiffness on the body, in the frame: its shortest waves
 
     @property
@@ -275,4 +276,4 @@ def _assemble_plate(
     n_all = expand.shape[0]
     matrices = _scatter(local[0], dofs, n_all), _scatter(local[1], dofs, n_all)
     system = _finish(mesh, section, supports, "argyris", mass, frame, *matrices, expand, project, dofs, space)
-    return replace(system, softness=softness / heaviest)
+    return replace(system, softness=softness / heaviest, rim=rim)

@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from .elements import Curves
+from .curves import divided
 from .mesh import Mesh
 
 SHRINK = 0.35  # [-] of the distance to the corner from one ring of triangles to the next
@@ -170,7 +170,6 @@ class _Rim:
         self.facets = mesh.facets.tolist()
         self.number = {(a, b): i for i, (a, b) in enumerate(self.facets)}
         self.middles, self.tangents, self.curvatures = list(mesh.middles), list(mesh.tangents), list(mesh.curvatures)
-        self.curved = mesh.curved.tolist()
         self.parent = list(range(len(self.facets)))
 
     def split(self, vertex: int, far: int, new: int, points: list[np.ndarray], ratio: float) -> np.ndarray:
@@ -183,13 +182,8 @@ class _Rim:
         facet = self.number.pop(pair)
         ends = np.array([[points[pair[0]], points[pair[1]]]])
         share = ratio if forward else 1.0 - ratio
-        place, tangent, curvature = plain, self.tangents[facet][0], 0.0
-        pieces = [0.5 * share, 0.5 * (1.0 + share)]
-        halves = [ends[0, 0] + s * (ends[0, 1] - ends[0, 0]) for s in pieces]
-        if self.curved[facet]:
-            curve = Curves(ends, *(np.array([a[facet]]) for a in (self.middles, self.tangents, self.curvatures)))
-            place, tangent, curvature = curve.along_it(share)
-            halves = [curve.halfway(0.0, share), curve.halfway(share, 1.0)]
+        middle, tangent, bend = (np.array([a[facet]]) for a in (self.middles, self.tangents, self.curvatures))
+        place, tangent, curvature, *halves = (a[0] for a in divided(ends, middle, tangent, bend, share))
         first, last = self.tangents[facet], self.curvatures[facet]
         self.facets[facet], self.number[pair[0], new] = [pair[0], new], facet
         self.middles[facet] = halves[0]
@@ -199,7 +193,6 @@ class _Rim:
         self.middles.append(halves[1])
         self.tangents.append(np.array([tangent, first[1]]))
         self.curvatures.append(np.array([curvature, last[1]]))
-        self.curved.append(self.curved[facet])
         self.parent.append(self.parent[facet])
         return place
 

@@ -7,7 +7,8 @@ from scipy.spatial import cKDTree
 from skfem import CellBasis, ElementLineHermite, ElementTriArgyris, MappingAffine, MeshLine, MeshTri
 from skfem.element import DiscreteField
 
-ORDERS = np.array([0, 1, 1, 2, 2, 2] * 3 + [1] * 3)  # derivative that each Argyris unknown stands for
+from .curves import Curves, powers
+
 EXPONENTS = np.array([(i, j) for i in range(6) for j in range(6 - i)])  # the 21 monomials of degree 5
 SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in scikit-fem's order
 ON_BODY = 1e-9  # [-] of a triangle: how far outside a point may lie by rounding
@@ -17,77 +18,10 @@ CURVE_STEPS = 12  # [-] fixed-point steps from a point to its place in a curved 
 DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 
 
-def _powers(x: np.ndarray, highest: int, order: int) -> np.ndarray:
-    """The ``order``-th derivative of x**0 ... x**highest, (..., highest + 1)."""
-    result = np.zeros((*x.shape, highest + 1))
-    factor = 1.0
-    for k in range(order, highest + 1):
-        factor = float(np.prod(np.arange(k - order + 1, k + 1))) if order else 1.0
-        result[..., k] = factor * x ** (k - order)
-    return result
-
-
 def monomials(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
     """Derivative of the 21 monomials at local coordinates (..., 2), shape (..., 21)."""
-    x, y = _powers(local[..., 0], 5, dx), _powers(local[..., 1], 5, dy)
+    x, y = powers(local[..., 0], 5, dx), powers(local[..., 1], 5, dy)
     return x[..., EXPONENTS[:, 0]] * y[..., EXPONENTS[:, 1]]
-
-
-class Curves:
-    """The curved facets of a mesh, each a graph over its chord, and the triangles bent to follow them.
-
-    A facet leaves its chord by s (1 - s) p(s), s from 0 to 1 along it; p, of degree four, meets tangent and curvature
-    at both ends and the true middle. Inside the triangle the bend is p times the product of the two area coordinates.
-    """
-
-    def __init__(self, ends, middles, tangents, curvatures) -> None:
-        chord = ends[:, 1] - ends[:, 0]  # (n, 2)
-        self.length = np.linalg.norm(chord, axis=1)
-        self.along = chord / self.length[:, None]
-        self.out = np.column_stack([self.along[:, 1], -self.along[:, 0]])
-        self.centre = ends.mean(axis=1)
-        lean = np.einsum("nei,ni->ne", tangents, self.out) / np.einsum("nei,ni->ne", tangents, self.along)
-        slope = lean * self.length[:, None]
-        bend = -curvatures * (1.0 + lean**2) ** 1.5 * self.length[:, None] ** 2
-        height = ((middles - self.centre) * self.out).sum(axis=1)
-        start, stop = slope[:, 0], -slope[:, 1]  # p(0), p(1)
-        values = np.column_stack([start, stop, 0.5 * bend[:, 0] + start, -0.5 * bend[:, 1] - stop, 4.0 * height])
-        k = np.arange(5.0)
-        conditions = np.array([k == 0, np.ones(5), k == 1, k, 0.5**k], float)
-        self.p = np.linalg.solve(conditions, values.T).T  # (n, 5) ascending powers of s
-
-    def graph(self, rows: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """p and its derivative for curves (n,) at s (n, n_q)."""
-        p = self.p[rows][:, None]
-        return (p * _powers(s, 4, 0)).sum(axis=2), (p * _powers(s, 4, 1)).sum(axis=2)
-
-    def middle(self) -> tuple[np.ndarray, np.ndarray]:
-        """Middle (n, 2) and outward unit normal (n, 2) there."""
-        p, dp = (a[:, 0] for a in self.graph(np.arange(len(self.p)), np.full((len(self.p), 1), 0.5)))
-        normal = self.out - (0.25 * dp / self.length)[:, None] * self.along
-        return self.centre + (0.25 * p)[:, None] * self.out, normal / np.linalg.norm(normal, axis=1)[:, None]
-
-    def along_it(self, share: float) -> tuple[np.ndarray, np.ndarray, float]:
-        """Point, unit tangent (2,) and curvature [1/length] of the first curve above a share of its chord."""
-        s, one = np.array([[share]]), np.zeros(1, int)
-        p, dp = (float(a[0, 0]) for a in self.graph(one, s))
-        d2p = float((self.p[0] * _powers(np.array(share), 4, 2)).sum())
-        bump, slope = share * (1.0 - share), 1.0 - 2.0 * share
-        start = self.centre[0] - 0.5 * self.length[0] * self.along[0]
-        point = start + share * self.length[0] * self.along[0] + bump * p * self.out[0]
-        lean = (slope * p + bump * dp) / self.length[0]
-        second = (-2.0 * p + 2.0 * slope * dp + bump * d2p) / self.length[0] ** 2
-        tangent = self.along[0] + lean * self.out[0]
-        return point, tangent / np.hypot(1.0, lean), -second / np.hypot(1.0, lean) ** 3
-
-    def halfway(self, low: float, high: float) -> np.ndarray:
-        """Point (2,) of the first curve on the perpendicular bisector of the chord between two shares of its chord."""
-        a, b = self.along_it(low)[0], self.along_it(high)[0]
-        for _ in range(60):
-            share = 0.5 * (low + high)
-            point = self.along_it(share)[0]
-            low, high = (share, high) if (point - 0.5 * (a + b)) @ (b - a) < 0.0 else (low, share)
-        return point
 
 
 class Bent:
@@ -298,7 +232,7 @@ class HermiteSpace:
         cubic = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], float)
         result = []
         for order in orders:
-            basis = _powers(s, 3, order) @ cubic.T
+            basis = powers(s, 3, order) @ cubic.T
             basis[..., 1::2] *= h[..., None]
             result.append(basis / h[..., None] ** order)
         return result

@@ -1,13 +1,15 @@
 """Where a body is: triangles or line elements, named edges on the true curve, and how to make a finer mesh of it."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from . import _check
+from . import _check, boundary, meshfile
+from .curves import divided
 from .outline import Outline, circle, extent, straight_loop
 from .triangulation import check_simple, triangulate
 
@@ -185,3 +187,106 @@ def polygon(corners: Any, holes: Sequence[Any] = (), *, size: float | None = Non
     outer = straight_loop("corners", corners, "edge{}")
     inner = [straight_loop(f"holes[{i}]", hole, f"hole{i}") for i, hole in enumerate(holes)]
     return fill(Outline.around(outer, tuple(inner)), size=size)
+
+
+def load(path: Any, *, unit: str | None = None) -> Mesh:
+    """Plate from a mesh file: Gmsh .msh, .vtu, .vtk and whatever else meshio reads.
+
+    Parameters
+    ----------
+    path : str or Path
+    unit : str, optional
+        What the numbers in the file are: "m" (as where left out), "cm", "mm", "um", "in" or "km".
+
+    Returns
+    -------
+    Mesh
+        Physical groups of lines, cell sets and numbered line cells become named edges ("edge7" for number 7 without a
+        name); "outer", "hole0" ... are the loops of the rim and "boundary" all of it. `Mesh.notes` says what was mended
+        or assumed: where a rim turns by little at each vertex it is taken as the smooth curve through them.
+
+    Raises
+    ------
+    ValueError
+        Where the file cannot be read, holds no flat connected set of triangles, or looks like millimetres.
+    """
+    points, cells, given, pairs, notes = meshfile.read(path, unit)
+    rim = meshfile.boundary(cells)
+    follower = {int(a): int(b) for a, b in rim}
+    loops = [np.array([(a, follower[a]) for a in loop]) for loop in meshfile.loops_of(rim)]
+    loops.sort(key=lambda loop: -float(np.ptp(points[loop[:, 0]], axis=0).max()))
+    facets = np.concatenate(loops)
+    number = {(min(a, b), max(a, b)): i for i, (a, b) in enumerate(facets.tolist())}
+    curve = boundary.follow(points, loops, {number[pair]: at for pair, at in given.items() if pair in number})
+    if curve.n_curved and not given:
+        notes.append(f"{curve.n_curved} sides of the rim were taken as parts of smooth curves through their ends")
+    edges = {name: np.array(sorted(number[p] for p in found if p in number), int) for name, found in pairs.items()}
+    edges = {name: found for name, found in edges.items() if len(found)}
+    inside = sorted(set(pairs) - set(edges))
+    if inside:
+        notes.append(f"{', '.join(inside)}: not on the rim, so no support can hold there")
+    start = 0
+    for i, loop in enumerate(loops):
+        edges.setdefault("outer" if i == 0 else f"hole{i - 1}", np.arange(start, start + len(loop)))
+        start += len(loop)
+    edges["boundary"] = np.arange(len(facets))
+    longest = np.linalg.norm(points[cells] - points[np.roll(cells, 1, axis=1)], axis=2).max(axis=1)
+    made = Mesh(
+        points,
+        cells,
+        facets,
+        edges,
+        curve.middles,
+        curve.tangents,
+        curve.curvatures,
+        size=float(longest.max()),
+        size_stated=False,
+        notes=tuple(f"{Path(path).name}: {note}" for note in notes),
+    )
+    return replace(made, recipe=partial(_divided, made))
+
+
+def save(path: Any, mesh: Mesh) -> None:
+    """Write a plate's mesh with its named edges to a Gmsh file (.msh) that `load` and other programs read."""
+    if not isinstance(mesh, Mesh) or mesh.dimension != 2:
+        raise ValueError("mesh must be that of a plate; a beam is made by fi.mesh.line")
+    meshfile.write(path, mesh.points, mesh.cells, mesh.facets, mesh.middles, mesh.curved, mesh.edges)
+
+
+def _divided(mesh: Mesh, *, size: float) -> Mesh:
+    """The mesh with its triangles divided in four until they are no larger than a size [m]."""
+    fine = mesh
+    for _ in range(max(0, int(np.ceil(np.log2(mesh.size / size) - 1e-9)))):
+        fine = _quartered(fine)
+    return replace(fine, size=size, size_stated=True, recipe=partial(_divided, mesh))
+
+
+def _quartered(mesh: Mesh) -> Mesh:
+    """Each triangle divided in four, new boundary points on the curve of their facet."""
+    cells, n = mesh.cells, len(mesh.points)
+    sides = np.sort(np.stack([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]], axis=1).reshape(-1, 2), axis=1)
+    unique, inverse = np.unique(sides, axis=0, return_inverse=True)
+    m = n + inverse.reshape(-1, 3)
+    a, b, c = cells.T
+    new = [[a, m[:, 0], m[:, 2]], [m[:, 0], b, m[:, 1]], [m[:, 2], m[:, 1], c], [m[:, 0], m[:, 1], m[:, 2]]]
+    points = np.concatenate([mesh.points, mesh.points[unique].mean(axis=1)])
+    keys = unique[:, 0] * n + unique[:, 1]
+    ends = np.sort(mesh.facets, axis=1)
+    middle = n + np.searchsorted(keys, ends[:, 0] * n + ends[:, 1])
+    known = mesh.points[mesh.facets], mesh.middles, mesh.tangents, mesh.curvatures
+    points[middle], tangent, bend, first, second = divided(*known, 0.5)
+    both = np.arange(2 * len(mesh.facets)).reshape(-1, 2)
+    rim = np.stack([mesh.facets[:, 0], middle, middle, mesh.facets[:, 1]], axis=1).reshape(-1, 2)
+    tangents = np.stack([mesh.tangents[:, 0], tangent, tangent, mesh.tangents[:, 1]], axis=1).reshape(-1, 2, 2)
+    curvatures = np.stack([mesh.curvatures[:, 0], bend, bend, mesh.curvatures[:, 1]], axis=1).reshape(-1, 2)
+    return replace(
+        mesh,
+        points=points,
+        cells=np.concatenate([np.stack(part, axis=1) for part in new]),
+        facets=rim,
+        edges={name: both[numbers].ravel() for name, numbers in mesh.edges.items()},
+        middles=np.stack([first, second], axis=1).reshape(-1, 2),
+        tangents=tangents,
+        curvatures=curvatures,
+        size=0.5 * mesh.size,
+    )

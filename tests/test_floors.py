@@ -8,11 +8,12 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "fem_impact"
 FLOORS = [
     {"_check", "_files", "_kernels"},
-    {"outline"},
+    {"outline", "curves", "boundary", "meshfile"},
     {"triangulation"},
     {"mesh", "section", "contact", "elements", "supports", "eigen"},
     {"corners"},
     {"assembly"},
+    {"pointload"},
     {"modal"},
     {"analytic"},
     {"striker", "spectra"},
@@ -20,12 +21,12 @@ FLOORS = [
     {"accuracy", "threshold", "figures", "sound"},
     {"export"},
     {"integrator"},
-    {"scene"},
-    {"doctor", "report", "sweep"},
+    {"scene", "charts"},
+    {"doctor", "report", "maps"},
     {"cli"},
 ]
 FLOOR = {name: level for level, names in enumerate(FLOORS) for name in names}
-OWNERS = {"numba": {"_kernels"}, "skfem": {"elements"}, "matplotlib": {"figures"}}
+OWNERS = {"numba": {"_kernels"}, "skfem": {"elements"}, "matplotlib": {"figures", "charts"}}
 
 
 def imports(path):

@@ -1,0 +1,332 @@
+"""Triangles and named edges from a file, mended where that is safe and refused with a reason where it is not."""
+
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+import shapely
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from . import _check
+
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "km": 1e3}
+LARGEST = 20.0  # [m] a plate larger than this was most likely drawn in millimetres
+SAME = 1e-9  # [-] of the extent: nodes nearer than this are one
+THIN = 1e-9  # [-] height over length below which a triangle is a line
+PLANE = ("triangle", "triangle6", "quad")
+
+
+def read(path: Any, unit: str | None) -> tuple[np.ndarray, np.ndarray, dict, dict, list[str]]:
+    """Read and mend a mesh file.
+
+    Returns
+    -------
+    points : ndarray, shape (n_points, 2) [m]
+    cells : ndarray, shape (n_cells, 3)
+    middles : dict, sorted pair of vertices -> middle of their side (2,) [m]; empty on straight-sided files
+    names : dict, edge name -> set of sorted pairs of vertices
+    notes : list of str, what was mended
+    """
+    data = _open(Path(path))
+    raw, notes = _plane_points(path, data, unit)
+    cells, nodes = _triangles(path, data)
+    names = _named_pairs(data)
+    points, cells, number = _mend(path, raw, cells, notes)
+    middles = {_pair(number[a], number[b]): raw[node] for (a, b), node in nodes.items()}
+    pairs = {name: {_pair(number[a], number[b]) for a, b in found} for name, found in names.items()}
+    cells = _hanging(points, cells, pairs, notes)
+    _refuse_overlap(path, points, cells)
+    return points, cells, middles, pairs, notes
+
+
+def _pair(a: int, b: int) -> tuple[int, int]:
+    return (int(a), int(b)) if a < b else (int(b), int(a))
+
+
+def _open(path: Path) -> meshio.Mesh:
+    if not path.is_file():
+        raise ValueError(f"path must name a mesh file, got {str(path)!r}; there is no such file")
+    said = StringIO()
+    try:
+        with redirect_stdout(said), redirect_stderr(said), np.errstate(all="ignore"):
+            return meshio.read(path)
+    except (meshio.ReadError, SystemExit, ValueError, LookupError, AssertionError, OSError, TypeError) as error:
+        known = ", ".join(sorted(meshio.extension_to_filetypes))
+        reason = " ".join(said.getvalue().split()) or str(error) or type(error).__name__
+        raise ValueError(f"{path.name} cannot be read as a mesh ({reason}); meshio reads {known}") from None
+
+
+def _plane_points(path: Any, data: meshio.Mesh, unit: str | None) -> tuple[np.ndarray, list[str]]:
+    """Coordinates in the plane [m]."""
+    name, notes = Path(path).name, []
+    points = np.asarray(data.points, float)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise ValueError(f"{name} must hold points of two or three coordinates, got shape {points.shape}")
+    used = np.unique(np.concatenate([block.data.ravel() for block in data.cells])) if data.cells else np.zeros(0, int)
+    if used.size and (used.min() < 0 or used.max() >= len(points)):
+        raise ValueError(
+            f"{name} names node {used.max()} in a cell but holds {len(points)} nodes; write the file again"
+        )
+    bad = used[~np.isfinite(points[used]).all(axis=1)]
+    if bad.size:
+        raise ValueError(
+            f"{name} has a coordinate that is not a number at node {bad[0]}: {points[bad[0]]}; mend that node"
+        )
+    if points.shape[1] == 3:
+        spread = np.ptp(points[used], axis=0) if used.size else np.zeros(3)
+        flat = int(spread.argmin())
+        if spread[flat] > 1e-6 * spread.max():
+            raise ValueError(
+                f"{name} is not flat: it extends over {spread[0]:g} x {spread[1]:g} x {spread[2]:g}; "
+                "a plate needs triangles in one plane z = constant"
+            )
+        if flat != 2:
+            notes.append(f"the mesh lies in the plane {'xyz'[flat]} = constant; the other two coordinates were taken")
+        points = np.delete(points, flat, axis=1)
+    if unit is not None:
+        points = points * UNITS[_check.one_of("unit", unit, UNITS)]
+    elif used.size and np.ptp(points[used], axis=0).max() > LARGEST:
+        x, y = np.ptp(points[used], axis=0)
+        raise ValueError(
+            f"{name} extends over {x:g} x {y:g} m, which looks like millimetres taken for metres; "
+            "pass unit='mm' to load it, or unit='m' if it is that large"
+        )
+    return points, notes
+
+
+def _triangles(path: Any, data: meshio.Mesh) -> tuple[np.ndarray, dict]:
+    """Triangles (n_cells, 3) and the middle nodes of quadratic ones (pair -> node)."""
+    name = Path(path).name
+    kinds = sorted({block.type for block in data.cells})
+    solid = [kind for kind in kinds if kind.startswith(("tetra", "hexahedron", "wedge", "pyramid"))]
+    if not set(kinds) & set(PLANE):
+        found = ", ".join(kinds) or "no cells"
+        hint = (
+            "a beam is made by fi.mesh.line" if any(k.startswith("line") for k in kinds) else "a plate needs triangles"
+        )
+        raise ValueError(f"{name} holds {found} and no triangles; mesh its surface with triangles ({hint})")
+    if solid:
+        raise ValueError(f"{name} holds volume cells ({', '.join(solid)}); export the flat surface alone")
+    cells, middles = [], {}
+    for block in data.cells:
+        if block.type == "triangle":
+            cells.append(block.data)
+        elif block.type == "quad":
+            cells += [block.data[:, [0, 1, 2]], block.data[:, [0, 2, 3]]]
+        elif block.type == "triangle6":
+            cells.append(block.data[:, :3])
+            for row in block.data.tolist():
+                for k, (a, b) in enumerate(((0, 1), (1, 2), (2, 0))):
+                    middles[row[a], row[b]] = row[3 + k]
+    return np.concatenate(cells).astype(int), middles
+
+
+def _named_pairs(data: meshio.Mesh) -> dict[str, set[tuple[int, int]]]:
+    """Sides named in the file: physical groups, cell sets, or numbers on line cells."""
+    label = {int(v[0]): name for name, v in data.field_data.items() if len(v) == 2 and int(v[1]) == 1}
+    names: dict[str, set[tuple[int, int]]] = {}
+
+    def add(name: str, row: np.ndarray) -> None:
+        names.setdefault(name, set()).add((int(row[0]), int(row[1])))
+
+    tags = next((key for key in ("gmsh:physical", "medit:ref", "edge", "cell_tags") if key in data.cell_data), None)
+    for i, block in enumerate(data.cells):
+        if not block.type.startswith("line"):
+            continue
+        if tags is not None:
+            for row, tag in zip(block.data, np.asarray(data.cell_data[tags][i]).ravel()):
+                if int(tag) in label or int(tag) != 0:
+                    add(label.get(int(tag), f"edge{int(tag)}"), row)
+        for name, members in data.cell_sets.items():
+            if name.startswith("gmsh:") or members[i] is None:
+                continue
+            for number in np.asarray(members[i]).ravel():
+                add(name, block.data[int(number)])
+    return names
+
+
+def _mend(path: Any, points: np.ndarray, cells: np.ndarray, notes: list[str]):
+    """Join duplicate nodes, drop triangles that are none, turn the inverted; and number the nodes in use anew."""
+    name = Path(path).name
+    used = np.unique(cells)
+    span = float(np.ptp(points[used], axis=0).max())
+    if span == 0.0:
+        raise ValueError(f"{name} has all its nodes at one place; export it again")
+    leader = np.arange(len(points))
+    for a, b in sorted(map(tuple, cKDTree(points[used]).query_pairs(SAME * span))):
+        leader[used[b]] = min(leader[used[b]], leader[used[a]])
+    doubles = int((leader != np.arange(len(points))).sum())
+    if doubles:
+        notes.append(f"{doubles} duplicate nodes were joined with those at the same place")
+    cells = leader[cells]
+    collapsed = (cells[:, 0] == cells[:, 1]) | (cells[:, 1] == cells[:, 2]) | (cells[:, 0] == cells[:, 2])
+    if collapsed.any():
+        notes.append(f"{int(collapsed.sum())} triangles with two corners at one place were left out")
+        cells = cells[~collapsed]
+    _, first = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)
+    if len(first) < len(cells):
+        notes.append(f"{len(cells) - len(first)} triangles were there twice and were left out once")
+        cells = cells[np.sort(first)]
+    corner = points[cells]
+    u, v = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    area = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    longest = np.maximum(np.maximum((u**2).sum(1), (v**2).sum(1)), ((u - v) ** 2).sum(1))
+    flat = np.flatnonzero(2.0 * np.abs(area) <= THIN * longest)
+    if flat.size:
+        x, y = corner[flat[0]].mean(axis=0)
+        raise ValueError(
+            f"{name} has {flat.size} triangles without area, the first near ({x:g}, {y:g}) m between nodes "
+            f"{cells[flat[0]].tolist()}; take them out or mesh the outline again"
+        )
+    turned = area < 0.0
+    if turned.any() and not turned.all():
+        notes.append(f"{int(turned.sum())} inverted triangles were turned")
+    cells = np.where(turned[:, None], cells[:, [0, 2, 1]], cells)
+    used = np.unique(cells)
+    number = np.full(len(points), -1)
+    number[used] = np.arange(len(used))
+    return points[used], number[cells], number[leader]
+
+
+def boundary(cells: np.ndarray) -> np.ndarray:
+    """Sides that belong to one triangle only, (n_facets, 2), with the body on their left (cells anticlockwise)."""
+    sides = np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])
+    _, index, counts = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
+    return sides[index[counts == 1]]
+
+
+def _hanging(points: np.ndarray, cells: np.ndarray, names: dict, notes: list[str]) -> np.ndarray:
+    """Divide triangles on whose sides a node of their neighbours lies, until none is left."""
+    count = 0
+    for _ in range(64):
+        rim = boundary(cells)
+        corners = np.unique(rim)
+        tree = cKDTree(points[corners])
+        a, b = points[rim[:, 0]], points[rim[:, 1]]
+        length = np.linalg.norm(b - a, axis=1)
+        near = tree.query_ball_point(0.5 * (a + b), 0.5 * length)
+        split: dict[tuple[int, int], int] = {}
+        for i, candidates in enumerate(near):
+            others = [corners[c] for c in candidates if corners[c] not in rim[i]]
+            for node in others:
+                along = (points[node] - a[i]) @ (b[i] - a[i]) / length[i] ** 2
+                off = abs(np.linalg.det(np.array([b[i] - a[i], points[node] - a[i]]))) / length[i]
+                if 1e-9 < along < 1.0 - 1e-9 and off <= 1e-8 * length[i]:
+                    split[_pair(*rim[i])] = int(node)
+                    break
+        if not split:
+            break
+        fresh = []
+        for c, cell in enumerate(cells.tolist()):
+            for k in range(3):
+                p, q, r = cell[k], cell[(k + 1) % 3], cell[(k + 2) % 3]
+                node = split.pop(_pair(p, q), None)
+                if node is not None:
+                    cells[c] = [p, node, r]
+                    fresh.append([node, q, r])
+                    for found in names.values():
+                        if _pair(p, q) in found:
+                            found |= {_pair(p, node), _pair(node, q)}
+                    count += 1
+                    break
+        cells = np.concatenate([cells, np.array(fresh, int).reshape(-1, 3)])
+    if count:
+        notes.append(f"{count} triangles with a node of their neighbours on a side were divided there")
+    return cells
+
+
+def _refuse_overlap(path: Any, points: np.ndarray, cells: np.ndarray) -> None:
+    """Raise ValueError where triangles overlap, branch, or make several pieces."""
+    name = Path(path).name
+    sides = np.sort(np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]]), axis=1)
+    unique, inverse, counts = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    if (counts > 2).any():
+        x, y = points[unique[counts > 2][0]].mean(axis=0)
+        raise ValueError(f"{name} has a side with three triangles near ({x:g}, {y:g}) m; take the surplus one out")
+    owner = np.tile(np.arange(len(cells)), 3)[np.argsort(inverse.ravel(), kind="stable")]
+    starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
+    inner = starts[counts == 2]
+    links = coo_matrix((np.ones(len(inner)), (owner[inner], owner[inner + 1])), shape=(len(cells), len(cells)))
+    n_pieces, piece = connected_components(links, directed=False)
+    if n_pieces > 1:
+        where = [points[cells[piece == i]].mean(axis=(0, 1)) for i in range(min(n_pieces, 4))]
+        text = ", ".join(f"({x:g}, {y:g})" for x, y in where)
+        raise ValueError(
+            f"{name} falls into {n_pieces} pieces that share no side (around {text} m); "
+            "join them, or save the piece you want alone"
+        )
+    rim = boundary(cells)
+    if not np.array_equal(np.sort(rim[:, 0]), np.sort(rim[:, 1])):
+        raise ValueError(
+            f"{name} has triangles that overlap: some side has both its triangles on one side; mesh it again"
+        )
+    vertex, visits = np.unique(rim, return_counts=True)
+    if (visits > 2).any():
+        x, y = points[vertex[visits > 2][0]]
+        raise ValueError(f"{name} hangs together by a single node at ({x:g}, {y:g}) m; join it there along a side")
+    # triangles all turn the same way, so they cover the plane once just where their rim does not cross itself
+    loops = [shapely.LinearRing(points[loop]) for loop in loops_of(rim)]
+    crossed = [a for i, a in enumerate(loops) if not a.is_simple or any(a.intersects(b) for b in loops[:i])]
+    if crossed:
+        x, y = crossed[0].coords[0]
+        raise ValueError(f"{name} has triangles that overlap at the rim through ({x:g}, {y:g}) m; mesh it again")
+
+
+def loops_of(rim: np.ndarray) -> list[list[int]]:
+    """Closed loops of vertices from boundary facets (n_facets, 2), the largest set of vertices first seen first."""
+    after = dict(rim.tolist())
+    loops = []
+    while after:
+        start, node = next(iter(after.items()))
+        loop = [start]
+        del after[start]
+        while node != start:
+            loop.append(node)
+            node = after.pop(node)
+        loops.append(loop)
+    return loops
+
+
+def write(path: Any, points, cells, facets, middles, curved, edges: dict[str, np.ndarray]) -> None:
+    """Write triangles and named edges as binary Gmsh 2.2, the rim quadratic where it is curved.
+
+    Parameters
+    ----------
+    path : str or Path ending in .msh
+    points, cells, facets, middles, edges : as in a `Mesh`
+    curved : ndarray, shape (n_facets,), bool
+    """
+    path = Path(path)
+    if path.suffix != ".msh":
+        raise ValueError(f"path must end in .msh, got {path.name!r}")
+    own = [name for name in edges if name not in ("boundary", "outer")] or ["boundary"]
+    tag = np.zeros(len(facets), int)
+    for i, name in enumerate(own):
+        tag[edges[name]] = i + 1
+    names = {name: np.array([i + 1, 1]) for i, name in enumerate(own)} | {"plate": np.array([len(own) + 1, 2])}
+    place = [points]
+    blocks: list[tuple[str, np.ndarray]] = [("line", facets), ("triangle", cells)]
+    if curved.any():
+        sides = np.sort(np.stack([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]], axis=1).reshape(-1, 2), axis=1)
+        unique, inverse = np.unique(sides, axis=0, return_inverse=True)
+        halfway = points[unique].mean(axis=1)
+        key = unique[:, 0] * len(points) + unique[:, 1]
+        ends = np.sort(facets, axis=1)
+        on_rim = np.searchsorted(key, ends[:, 0] * len(points) + ends[:, 1])
+        halfway[on_rim] = middles
+        place.append(halfway)
+        blocks = [
+            ("line3", np.column_stack([facets, len(points) + on_rim])),
+            ("triangle6", np.column_stack([cells, len(points) + inverse.reshape(-1, 3)])),
+        ]
+    flat = np.concatenate(place)
+    number = [tag, np.full(len(cells), len(own) + 1)]
+    data = {"gmsh:physical": number, "gmsh:geometrical": number}
+    made = meshio.Mesh(np.column_stack([flat, np.zeros(len(flat))]), blocks, cell_data=data, field_data=names)
+    with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+        made.write(path, file_format="gmsh22", binary=True)
