@@ -13,7 +13,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from scipy.io import wavfile
 
-from . import _check, sound
+from . import _check, drawing, sound
 from ._files import replacing, staged
 from .modal import Modes
 from .response import Response
@@ -50,7 +50,7 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
     """
     path = Path(path)
     suffix = _check.one_of("path ending", path.suffix, (".vtu", ".pvd"))
-    points, cells = modes.shapes.grid()
+    points, cells = drawing.grid(modes)
     if response is None:
         parts = _mode_parts(modes, points)
         stamps = _distinct(modes.frequencies)

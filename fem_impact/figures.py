@@ -12,7 +12,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from . import _check, spectra
+from . import _check, drawing, spectra
 from ._files import replacing
 from .modal import Modes
 from .response import Response
@@ -206,7 +206,7 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
     columns = min(_check.count("columns", columns), count)
     rows = -(-count // columns)
     _check.between("dimension of modes", modes.dimension, 1, 2)
-    points, cells = modes.shapes.grid()
+    points, cells = drawing.grid(modes)
     shapes = modes.shapes.at(points)[:, :count]
     shapes = shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300)
     rim = _rim(cells) if modes.dimension == 2 else None
@@ -228,8 +228,12 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
                 axes.add_collection(LineCollection(list(points[rim]), colors="#888888", linewidths=0.8))
                 axes.set_aspect("equal")
                 axes.set_axis_off()
-            axes.set_title(f"{i + 1}   {modes.frequencies[i]:.4g} Hz")
+            axes.set_title(f"{i + 1}   {_frequency(modes.frequencies[i])}")
     return figure
+
+
+def _frequency(value: float) -> str:
+    return f"{value:.4g} Hz" if value < 1e4 else f"{value * 1e-3:.4g} kHz"
 
 
 def _rim(cells: np.ndarray) -> np.ndarray:

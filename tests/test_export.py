@@ -10,7 +10,7 @@ import pyvista
 from numpy.testing import assert_allclose
 from scipy.io import wavfile
 
-from fem_impact import analytic, export, sound
+from fem_impact import analytic, drawing, export, sound
 from fem_impact.contact import Contact
 from fem_impact.integrator import strike
 from fem_impact.modal import Modes
@@ -53,7 +53,7 @@ def test_equal_frequencies_stay_apart_as_times(tmp_path):
 
 def test_single_file_opens_in_meshio_and_pyvista(tmp_path, modes):
     export.write_vtk(tmp_path / "modes.vtu", modes)
-    grid, points = pyvista.read(tmp_path / "modes.vtu"), modes.shapes.grid()[0]
+    grid, points = pyvista.read(tmp_path / "modes.vtu"), drawing.grid(modes)[0]
     assert_allclose(grid.field_data["frequency"], modes.frequencies, rtol=0, atol=0)
     other = meshio.read(tmp_path / "modes.vtu")
     for data in (grid.point_data, other.point_data):
@@ -73,7 +73,7 @@ def test_motion_has_displacement_and_velocity_at_each_time(tmp_path, modes, hit)
     export.write_vtk(tmp_path / "wave.pvd", modes, hit, times)
     reader = pyvista.get_reader(tmp_path / "wave.pvd")
     assert_allclose(reader.time_values, times, rtol=0, atol=0)
-    points = modes.shapes.grid()[0]
+    points = drawing.grid(modes)[0]
     for i, instant in enumerate(times):
         reader.set_active_time_point(i)
         grid = reader.read()[0]
