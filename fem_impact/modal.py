@@ -1,12 +1,12 @@
 """Modes: the one description of a structure that every later stage works on, whatever computed it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 
-from . import _check
+from . import _check, pointload
 from .assembly import System, assemble
 from .eigen import Flexibility, count_below, lowest
 
@@ -337,6 +337,7 @@ class FieldShapes:
     system: System
     vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
     flexibility: Flexibility
+    _static: dict[bytes, np.ndarray] = field(default_factory=dict, repr=False)  # compliance by point, found once
 
     def __post_init__(self) -> None:
         _check.lock_arrays(self)
@@ -352,8 +353,17 @@ class FieldShapes:
         return self.system.contains(points)
 
     def compliance(self, points: np.ndarray) -> np.ndarray:
-        rows = self.system.interpolate(points)
-        static = rows @ self.flexibility.solve(rows.toarray().T)
+        key = points.tobytes()
+        if key not in self._static:
+            self._static[key] = self._compliance(points)
+        return self._static[key]
+
+    def _compliance(self, points: np.ndarray) -> np.ndarray:
+        if pointload.applies(self.system):
+            static = pointload.compliance(self.system, self.flexibility, points)
+        else:
+            rows = self.system.interpolate(points)
+            static = rows @ self.flexibility.solve(rows.toarray().T)
         return 0.5 * (static + static.T) / (self.system.frame.mass * self.system.frame.rate**2)
 
     def take(self, n_modes: int) -> "FieldShapes":
