@@ -8,6 +8,7 @@ SERIES_LIMIT = 1.0  # [-] below this omega*h the moment recursion cancels and a 
 OVERDAMPED = 1.2  # [-] damping ratio from which the two decay rates are far enough apart for partial fractions
 LEVELS = 40  # [-] halvings of the step that may be cached
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
+LOOK_LIMIT = 300_000  # [-] looks ahead in one free flight before the run gives up
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
 EVENT_LIMIT = 64  # [-] events without one full step between them: chatter, passed with unlocated steps
 CONTACT, FLIGHT = 0, 1  # what the run does next
@@ -685,16 +686,18 @@ def quadratic_wait(d, v, a):
 
 
 @njit(cache=True, error_model="numpy")
-def find_onset(omega, zeta, shape, offset, bias, limit, shortest, q, p):
+def find_onset(omega, zeta, shape, offset, bias, limit, shortest, depth, still, q, p):
     """Advance a state without contact in place to the next onset, never passing one (conservative advancement).
 
     Returns (elapsed, contact, status): status 0 an onset at `contact`, 1 no contact ever again (proved),
-    2 the limit reached, 3 too slow an advance (shorter than `shortest` per look): hand over to a stepping scheme.
+    2 the limit reached, 3 too slow an advance (shorter than `shortest` per look): hand over to a stepping scheme,
+    4 neither contact nor proof in LOOK_LIMIT looks. Rigid approaches no faster than `still` [m/s] and
+    overlaps no deeper than `depth` [m] are rounding.
     """
     n_contacts = shape.shape[0]
     elapsed = 0.0
     slow = 0
-    while True:
+    for _ in range(LOOK_LIMIT):
         wait = np.inf
         first = -1
         final = True
@@ -704,10 +707,12 @@ def find_onset(omega, zeta, shape, offset, bias, limit, shortest, q, p):
             r0 += offset[i]
             scale = abs(r0) + reach + abs(offset[i])
             d = min(d, 0.0)
-            if -d <= 4e-16 * scale and (v > 0.0 or (v == 0.0 and elapsed > 0.0)):
+            if r1 <= still and r2 <= 0.0 and r0 + reach <= depth:
+                continue
+            final = False
+            driven = hardest > 0.0 or r2 > 0.0
+            if -d <= 4e-16 * scale and (v > still or (driven and (v > 0.0 or (v == 0.0 and elapsed + r2 > 0.0)))):
                 return elapsed, i, 0
-            if not (r1 <= 0.0 and r2 <= 0.0 and r0 + reach <= 0.0):
-                final = False
             bound = quadratic_wait(d, v, hardest + max(r2, 0.0))
             bound = max(bound, quadratic_wait(d, max(0.0, r1 + fastest), max(r2, 0.0)))
             if r2 <= 0.0 and r0 + reach <= 0.0:
@@ -732,6 +737,7 @@ def find_onset(omega, zeta, shape, offset, bias, limit, shortest, q, p):
                 return elapsed, first, 3
         free_flight(omega, zeta, bias, wait, q, p)
         elapsed += wait
+    return elapsed, -1, 4
 
 
 @njit(cache=True, error_model="numpy")
@@ -828,18 +834,23 @@ def modal_energy(omega, bias, q, p):
 
 
 @njit(cache=True, error_model="numpy")
-def crossed(pressed, d0, y):
+def crossed(pressed, d0, v0, y, depth, still):
     """Whether a contact opened (was pressed and ends apart) or closed (was apart and ends pressed) within a step."""
-    return (pressed and y <= 0.0) or (not pressed and d0 < 0.0 and y > 0.0)
+    if pressed:
+        return y < -depth
+    return y > depth and (d0 < 0.0 or v0 < -still)
 
 
 @njit(cache=True, error_model="numpy")
-def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, base, horizon, max_impacts, max_steps):
+def run_energy(
+    omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, base, depth, still, horizon, max_impacts, max_steps
+):
     """Follow bodies in contact with the energy-exact schemes A (ramp 0) or A4 (ramp 1).
 
     Parameters: omega, zeta, bias, start_q, start_p (n_modes,); shape (n_contacts, n_modes), the signed shapes at the
     contacts; offset (n_contacts,) approach at zero state; law (n_contacts, 4): stiffness, exponent, loss, compliance;
-    base: the longest step in contact; horizon: where to stop at the latest; max_impacts: stop after so many releases.
+    base: the longest step in contact; depth [m] and still [m/s]: approaches and speeds that are rounding;
+    horizon: where to stop at the latest; max_impacts: stop after so many releases.
 
     Returns (steps, q, p, now, done, time, status, n_fallback, n_blind). Each row of steps is a step or a flight:
     start, length, blind; then per contact start approach, start rate, whether it pushes, and the force as powers of
@@ -908,7 +919,9 @@ def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, ba
                 steps[n_steps, 5 + 5 * i] = 0.0
                 steps[n_steps, 6 + 5 * i] = 0.0
                 steps[n_steps, 7 + 5 * i] = 0.0
-            elapsed, first, found = find_onset(omega, zeta, shape, offset, bias, horizon - time, 1e-3 * base, q, p)
+            elapsed, first, found = find_onset(
+                omega, zeta, shape, offset, bias, horizon - time, 1e-3 * base, depth, still, q, p
+            )
             if found == 1:
                 time += elapsed
                 if elapsed > 0.0:
@@ -917,6 +930,8 @@ def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, ba
                     steps[n_steps, 2] = 0.0
                     n_steps += 1
                 status = FINISHED
+                break
+            if found == 4:
                 break
             if elapsed > 0.0:
                 steps[n_steps, 0] = time
@@ -963,12 +978,13 @@ def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, ba
                 low, high = hermite_extreme(d0, now[4, i], y[i], rate[i], h)
                 if pressed[i]:
                     if y[i] <= 0.0 and d0 == 0.0:
-                        shorter = max(shorter, 3 if level == 0 else 1)
-                    elif y[i] > 0.0 and low < -1e-9 * max(d0, y[i]):
+                        if now[4, i] > still:
+                            shorter = max(shorter, 3 if level == 0 else 1)
+                    elif y[i] > 0.0 and now[4, i] < 0.0 < rate[i] and low < -1e-9 * max(d0, y[i]):
                         shorter = max(shorter, 1)
-                elif y[i] <= 0.0 and high > 1e-9 * max(-d0, -y[i]):
+                elif y[i] <= 0.0 and now[4, i] > 0.0 > rate[i] and high > 1e-9 * max(-d0, -y[i]):
                     shorter = max(shorter, 1)
-                if crossed(pressed[i], d0, y[i]):
+                if crossed(pressed[i], d0, now[4, i], y[i], depth, still):
                     target = i
             if shorter > 0 and level + shorter < LEVELS:
                 level += shorter
@@ -981,7 +997,7 @@ def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, ba
             high = h
             guess = h
             for i in range(m):
-                if crossed(pressed[i], now[0, i], y[i]):
+                if crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
                     root = hermite_root(now[0, i], now[4, i], y[i], rate[i], h)
                     if root <= guess:
                         guess = root
@@ -998,7 +1014,7 @@ def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, ba
                 )
                 early = -1
                 for i in range(m):
-                    if i != target and crossed(pressed[i], now[0, i], y[i]):
+                    if i != target and crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
                         early = i
                 if early >= 0:
                     target = early
@@ -1011,7 +1027,7 @@ def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, ba
                     continue
                 if abs(y[target]) <= 2e-15 * scale or high - low <= 4e-16 * high:
                     break
-                if crossed(pressed[target], now[0, target], y[target]):
+                if (y[target] > 0.0) != pressed[target]:
                     high = h
                 else:
                     low = h
@@ -1060,6 +1076,9 @@ def run_energy(omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, ba
                 now[0, i] = 0.0
                 pressed[i] = not was
                 events += 1
+            elif abs(y[i]) <= depth:
+                now[0, i] = 0.0
+                pressed[i] = rate[i] > still or (was and rate[i] >= -still)
             else:
                 pressed[i] = y[i] > 0.0
             if was and not pressed[i]:
@@ -1280,8 +1299,8 @@ def collocate(
 
 @njit(cache=True, error_model="numpy")
 def run_collocation(
-    omega, zeta, shape, offset, bias, law, start_q, start_p, nodes, powers, base, speed, tolerance, horizon,
-    max_impacts, max_steps,
+    omega, zeta, shape, offset, bias, law, start_q, start_p, nodes, powers, base, speed, tolerance, depth, still,
+    horizon, max_impacts, max_steps,
 ):  # fmt: skip
     """Follow bodies in contact with exponential Gauss collocation of the contact forces; the reference scheme.
 
@@ -1366,7 +1385,9 @@ def run_collocation(
             if pressed[i]:
                 idle = False
         if idle:
-            elapsed, first, found = find_onset(omega, zeta, shape, offset, bias, horizon - time, 1e-6 * base, q, p)
+            elapsed, first, found = find_onset(
+                omega, zeta, shape, offset, bias, horizon - time, 1e-6 * base, depth, still, q, p
+            )
             if elapsed > 0.0:
                 steps[n_steps, 0] = time
                 steps[n_steps, 1] = elapsed
@@ -1375,8 +1396,8 @@ def run_collocation(
             if found == 1:
                 status = FINISHED
                 break
-            if found == 3:
-                status = FAILED
+            if found >= 3:
+                status = FAILED if found == 3 else EXHAUSTED
                 break
             for i in range(m):
                 now[0, i], now[4, i] = approach(shape, offset, i, q, p)
@@ -1424,19 +1445,19 @@ def run_collocation(
                 low, high = hermite_extreme(d0, now[4, i], y[i], rate[i], h)
                 if pressed[i]:
                     if y[i] <= 0.0 and d0 == 0.0:
-                        if now[4, i] > 0.0 and level < LEVELS - 2:
+                        if now[4, i] > still and level < LEVELS - 2:
                             shorter = max(shorter, 1)
                         else:
                             pressed[i] = False
                             again = True
-                    elif y[i] > 0.0 and low < -1e-9 * max(d0, y[i]):
+                    elif y[i] > 0.0 and now[4, i] < 0.0 < rate[i] and low < -1e-9 * max(d0, y[i]):
                         shorter = max(shorter, 1)
-                elif d0 == 0.0 and now[4, i] >= 0.0 and y[i] > 0.0:
+                elif d0 == 0.0 and now[4, i] >= -still and y[i] > depth:
                     pressed[i] = True
                     again = True
-                elif y[i] <= 0.0 and high > 1e-9 * max(-d0, -y[i]) and level < LEVELS - 2:
+                elif y[i] <= 0.0 and now[4, i] > 0.0 > rate[i] and high > 1e-9 * max(-d0, -y[i]) and level < LEVELS - 2:
                     shorter = max(shorter, 1)
-                if crossed(pressed[i], d0, y[i]) or (not pressed[i] and d0 == 0.0 and y[i] > 0.0):
+                if crossed(pressed[i], d0, now[4, i], y[i], depth, still):
                     target = i
         if again:
             continue
@@ -1454,7 +1475,7 @@ def run_collocation(
             high = h
             root = h
             for i in range(m):
-                if crossed(pressed[i], now[0, i], y[i]) or (not pressed[i] and now[0, i] == 0.0 and y[i] > 0.0):
+                if crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
                     at = hermite_root(now[0, i], now[4, i], y[i], rate[i], h)
                     if at <= root:
                         root = at
@@ -1484,7 +1505,7 @@ def run_collocation(
                     break
                 early = -1
                 for i in range(m):
-                    if i != target and crossed(pressed[i], now[0, i], y[i]):
+                    if i != target and crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
                         early = i
                 if early >= 0:
                     target = early
@@ -1558,6 +1579,9 @@ def run_collocation(
                 now[0, i] = 0.0
                 pressed[i] = not was
                 events += 1
+            elif abs(y[i]) <= depth:
+                now[0, i] = 0.0
+                pressed[i] = rate[i] > still or (was and rate[i] >= -still)
             elif was and y[i] <= 0.0:
                 pressed[i] = False
             if was and not pressed[i]:

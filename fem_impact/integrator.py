@@ -25,6 +25,8 @@ COLLOCATION_BELOW = 1e-7  # [-] tolerance from which collocation needs less work
 NODES = 5  # [-] of collocation; more gain nothing where onset and release limit the smoothness
 RESOLVABLE = 0.3  # [-] contact stiffness times residual compliance up to which the estimate of its error holds
 STATIC_ERROR = 0.5  # [-] force error over k C omega_0/omega_c with residual compliance, see accuracy.py
+NOISE = 1e-16  # [-] approaches below this times duration and speed are rounding: contacts that merely touch
+STILL = 1e-12  # [-] rigid approaches slower than this times the speed are rounding, not a contact to come
 ROUNDING = 1e-13  # [-] below this two runs cannot be told apart
 
 
@@ -305,13 +307,14 @@ def _run(system: _System, scheme: str, size: float, pace: tuple[float, float], h
     parts = (
         system.omega, system.zeta, system.shape, system.offset, system.bias, system.law, system.start_q, system.start_p
     )  # fmt: skip
+    noise = NOISE * pace[0] * pace[1], STILL * pace[1]
     if scheme == "collocation":
         nodes, powers = _gauss(NODES)
         result = _kernels.run_collocation(
-            *parts, nodes, powers, pace[0] / 2.0, pace[1], float(size), float(horizon), n_max, MAX_STEPS
+            *parts, nodes, powers, pace[0] / 2.0, pace[1], float(size), *noise, float(horizon), n_max, MAX_STEPS
         )
     else:
-        result = _kernels.run_energy(*parts, int(scheme == "A4"), float(size), float(horizon), n_max, MAX_STEPS)
+        result = _kernels.run_energy(*parts, int(scheme == "A4"), float(size), *noise, float(horizon), n_max, MAX_STEPS)
     time, status = result[5], result[6]
     if status == _kernels.EXHAUSTED:
         raise SimulationError(

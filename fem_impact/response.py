@@ -11,6 +11,7 @@ from .contact import Contact
 from .modal import Modes
 from .striker import Striker
 
+TOUCH = 1e-12  # [-] of the fastest approach: bodies that touch and hardly move press from the first push on
 PEAK_LOOKS = 17  # [-] looks per step for the peak force before a parabola refines it: (pi/11/16)**2/8 of it at worst
 
 
@@ -142,6 +143,10 @@ class History:
         if d0[last] > 0.0 > d1[last]:
             end = self.steps[last, 0]
             end += _kernels.hermite_root(d0[last], v0[last], d1[last], v1[last], self.steps[last, 1])
+        began = first
+        while began and d0[began] == 0.0 == d0[began - 1] and abs(v0[began - 1]) <= TOUCH * np.abs(v0).max():
+            began -= 1
+        start = min(start, self.steps[began, 0])
         rows = np.arange(first, last + 1)
         force = self.force(rows, i, np.linspace(0.0, 1.0, PEAK_LOOKS)[None])
         row, column = np.unravel_index(int(force.argmax()), force.shape)
