@@ -5,6 +5,9 @@ from numba import njit
 
 LOOSE = {"reassoc", "contract"}  # sums may be reordered to run in parallel lanes; NaN and infinity keep their meaning
 SERIES_LIMIT = 1.0  # [-] below this omega*h the moment recursion cancels and a power series takes over
+LIGHT = 0.9  # [-] damping ratio up to which a mode takes the fast lanes
+SERIES_END = 3.0  # [-] omega*h below which the fast lanes sum a power series: 13 terms leave 3e-17
+ANGLE_LIMIT = 1e6  # [-] angle up to which the reduction in `waves` is exact
 OVERDAMPED = 1.2  # [-] damping ratio from which the two decay rates are far enough apart for partial fractions
 LEVELS = 40  # [-] halvings of the step that may be cached
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
@@ -130,29 +133,210 @@ def mode_moments(w, z, h, count, out_moments, work):
     return a11, a12, a22
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def waves(angle, out_sin, out_cos):
+    """Sine and cosine of many angles from 0 to ANGLE_LIMIT, within 1.5 units in the last place, in parallel lanes.
+
+    Cody and Waite's reduction by multiples of pi/2 in three parts, then the polynomials of Sun's fdlibm.
+    """
+    for n in range(angle.size):
+        turns = np.floor(angle[n] * 0.6366197723675814 + 0.5)
+        r = angle[n] - turns * 1.57079632673412561417e00
+        r -= turns * 6.07710050630396597660e-11
+        r -= turns * 2.02226624879595063154e-21
+        z = r * r
+        sine = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10
+        sine = 2.75573137070700676789e-06 + z * sine
+        sine = -1.98412698298579493134e-04 + z * sine
+        sine = 8.33333333332248946124e-03 + z * sine
+        sine = r + r * z * (-1.66666666666666324348e-01 + z * sine)
+        cosine = 2.08757232129817482790e-09 + z * -1.13596475577881948265e-11
+        cosine = -2.75573143513906633035e-07 + z * cosine
+        cosine = 2.48015872894767294178e-05 + z * cosine
+        cosine = -1.38888888888741095749e-03 + z * cosine
+        cosine = 4.16666666666666019037e-02 + z * cosine
+        cosine = 1.0 - (0.5 * z - z * z * cosine)
+        quarter = turns - 4.0 * np.floor(0.25 * turns)
+        odd = (quarter == 1.0) or (quarter == 3.0)
+        s = cosine if odd else sine
+        c = sine if odd else cosine
+        out_sin[n] = -s if quarter >= 2.0 else s
+        out_cos[n] = -c if (quarter == 1.0) or (quarter == 2.0) else c
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def decays(exponent, out_decay):
+    """exp(-x) of many x >= 0 within two units in the last place, in parallel lanes; zero beyond 700."""
+    bits = np.empty(exponent.size, np.int64)
+    for n in range(exponent.size):
+        x = min(exponent[n], 700.0)
+        turns = np.floor(0.5 - x * 1.4426950408889634)
+        r = -x - turns * 6.93147180369123816490e-01
+        r -= turns * 1.90821492927058770002e-10
+        e = 1.0 + r * (1.0 / 13.0)
+        e = 1.0 + r * (1.0 / 12.0) * e
+        e = 1.0 + r * (1.0 / 11.0) * e
+        e = 1.0 + r * (1.0 / 10.0) * e
+        e = 1.0 + r * (1.0 / 9.0) * e
+        e = 1.0 + r * (1.0 / 8.0) * e
+        e = 1.0 + r * (1.0 / 7.0) * e
+        e = 1.0 + r * (1.0 / 6.0) * e
+        e = 1.0 + r * (1.0 / 5.0) * e
+        e = 1.0 + r * (1.0 / 4.0) * e
+        e = 1.0 + r * (1.0 / 3.0) * e
+        e = 1.0 + r * (1.0 / 2.0) * e
+        out_decay[n] = 1.0 + r * e
+        bits[n] = (np.int64(turns) + 1023) << 52
+    scale = bits.view(np.float64)
+    for n in range(exponent.size):
+        out_decay[n] = out_decay[n] * scale[n] if exponent[n] < 700.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def free_table(omega, zeta, h, out_free, out_decayed):
+    """Exact free motion of every mode over h: rows a11, a12, a22 of out_free (3, n_modes); a21 is -omega**2 a12.
+
+    out_decayed (n_modes,) receives twice the damping exponent x = zeta omega h.
+    """
+    n_modes = omega.size
+    angle = np.empty(n_modes)
+    for n in range(n_modes):
+        z = zeta[n] if zeta[n] <= LIGHT else 0.0
+        y = omega[n] * h * np.sqrt((1.0 - z) * (1.0 + z))
+        angle[n] = y if y < ANGLE_LIMIT else 0.0
+        out_decayed[n] = z * omega[n] * h
+    waves(angle, out_free[1], out_free[0])
+    damped = False
+    for n in range(n_modes):
+        if zeta[n] != 0.0:
+            damped = True
+    if damped:
+        decays(out_decayed, out_free[2])
+    for n in range(n_modes):
+        decay = out_free[2, n] if damped else 1.0
+        s = decay * (out_free[1, n] / angle[n] if angle[n] > 0.0 else 1.0)
+        c = decay * out_free[0, n]
+        x = out_decayed[n]
+        out_free[0, n] = c + x * s
+        out_free[1, n] = h * s
+        out_free[2, n] = c - x * s
+        out_decayed[n] = 2.0 * x
+    for n in range(n_modes):
+        if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT:
+            a11, a12, a22, _, _, _ = mode_matrix(omega[n], zeta[n], h)
+            out_free[0, n] = a11
+            out_free[1, n] = a12
+            out_free[2, n] = a22
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def near_moments(omega, h, double, out_moments):
+    """Moments 2 and 3 (rows of out_moments) by power series, for every mode with omega h < SERIES_END."""
+    n_modes = omega.size
+    square = np.empty(n_modes)
+    damped = False
+    for n in range(n_modes):
+        th = min(omega[n] * h, SERIES_END)
+        square[n] = th * th
+        if double[n] != 0.0:
+            damped = True
+    if not damped:
+        for n in range(n_modes):
+            t2 = square[n]
+            odd = 1.0 - t2 * (1.0 / 812.0)
+            odd = 1.0 - t2 * (1.0 / 702.0) * odd
+            odd = 1.0 - t2 * (1.0 / 600.0) * odd
+            odd = 1.0 - t2 * (1.0 / 506.0) * odd
+            odd = 1.0 - t2 * (1.0 / 420.0) * odd
+            odd = 1.0 - t2 * (1.0 / 342.0) * odd
+            odd = 1.0 - t2 * (1.0 / 272.0) * odd
+            odd = 1.0 - t2 * (1.0 / 210.0) * odd
+            odd = 1.0 - t2 * (1.0 / 156.0) * odd
+            odd = 1.0 - t2 * (1.0 / 110.0) * odd
+            odd = 1.0 - t2 * (1.0 / 72.0) * odd
+            odd = 1.0 - t2 * (1.0 / 42.0) * odd
+            out_moments[2, n] = (1.0 / 6.0) * (1.0 - t2 * (1.0 / 20.0) * odd)
+            even = 1.0 - t2 * (1.0 / 756.0)
+            even = 1.0 - t2 * (1.0 / 650.0) * even
+            even = 1.0 - t2 * (1.0 / 552.0) * even
+            even = 1.0 - t2 * (1.0 / 462.0) * even
+            even = 1.0 - t2 * (1.0 / 380.0) * even
+            even = 1.0 - t2 * (1.0 / 306.0) * even
+            even = 1.0 - t2 * (1.0 / 240.0) * even
+            even = 1.0 - t2 * (1.0 / 182.0) * even
+            even = 1.0 - t2 * (1.0 / 132.0) * even
+            even = 1.0 - t2 * (1.0 / 90.0) * even
+            even = 1.0 - t2 * (1.0 / 56.0) * even
+            out_moments[3, n] = (1.0 / 24.0) * (1.0 - t2 * (1.0 / 30.0) * even)
+        return
+    now = np.empty(n_modes)
+    last = np.empty(n_modes)
+    for n in range(n_modes):
+        now[n] = 1.0
+        last[n] = 0.0
+        out_moments[2, n] = 0.0
+        out_moments[3, n] = 0.0
+    factor = 1.0 / 6.0
+    for j in range(1, 30):
+        after = factor / (j + 3.0)
+        for n in range(n_modes):
+            value = now[n]
+            out_moments[2, n] += value * factor
+            out_moments[3, n] += value * after
+            now[n] = -min(double[n], 2.0 * SERIES_END) * value - square[n] * last[n]
+            last[n] = value
+        factor = after
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def step_table(omega, zeta, h, out_table):
     """Coefficients of one exact step of length h for every mode, (12, n_modes).
 
     Rows: a11, a12, a21, a22; b1, b2 (constant force); c1, c2 (ramp t/h - 1/2); the step averages of the free motion
-    A1, A2 and of the two forces B0, B1.
+    A1, A2 and of the two forces B0, B1. Lightly damped modes take parallel lanes: their moments (see `mode_moments`)
+    by a power series below SERIES_END, by recursion above; the others go one by one.
     """
-    moments = np.empty(4)
+    n_modes = omega.size
+    free = np.empty((3, n_modes))
+    double = np.empty(n_modes)
+    m = np.empty((4, n_modes))
+    free_table(omega, zeta, h, free, double)
+    near_moments(omega, h, double, m)
+    for n in range(n_modes):
+        th = omega[n] * h
+        near = th < SERIES_END
+        inverse = 1.0 / (1.0 if near else th * th)
+        first = free[1, n] / h
+        m1 = (1.0 - double[n] * first - free[2, n]) * inverse
+        m2 = (1.0 - double[n] * m1 - first) * inverse
+        m3 = (0.5 - double[n] * m2 - m1) * inverse
+        m[0, n] = first
+        m[1, n] = 0.5 - double[n] * m[2, n] - th * th * m[3, n] if near else m1
+        m[2, n] = m[2, n] if near else m2
+        m[3, n] = m[3, n] if near else m3
     work = np.empty((2, 3))
-    for n in range(omega.size):
-        a11, a12, a22 = mode_moments(omega[n], zeta[n], h, 3, moments, work)
-        out_table[0, n] = a11
-        out_table[1, n] = a12
-        out_table[2, n] = -omega[n] * omega[n] * a12
-        out_table[3, n] = a22
-        out_table[4, n] = h * h * moments[1]
-        out_table[5, n] = a12
-        out_table[6, n] = h * h * (moments[2] - 0.5 * moments[1])
-        out_table[7, n] = h * (moments[1] - 0.5 * moments[0])
-        out_table[8, n] = moments[0] + 2.0 * zeta[n] * omega[n] * h * moments[1]
-        out_table[9, n] = h * moments[1]
-        out_table[10, n] = h * h * moments[2]
-        out_table[11, n] = h * h * (moments[3] - 0.5 * moments[2])
+    single = np.empty(4)
+    for n in range(n_modes):
+        if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT:
+            mode_moments(omega[n], zeta[n], h, 3, single, work)
+            double[n] = 2.0 * zeta[n] * omega[n] * h
+            for k in range(4):
+                m[k, n] = single[k]
+    for n in range(n_modes):
+        out_table[0, n] = free[0, n]
+        out_table[1, n] = free[1, n]
+        out_table[2, n] = -omega[n] * omega[n] * free[1, n]
+        out_table[3, n] = free[2, n]
+    for n in range(n_modes):
+        out_table[4, n] = h * h * m[1, n]
+        out_table[5, n] = free[1, n]
+        out_table[6, n] = h * h * (m[2, n] - 0.5 * m[1, n])
+        out_table[7, n] = h * (m[1, n] - 0.5 * m[0, n])
+    for n in range(n_modes):
+        out_table[8, n] = m[0, n] + double[n] * m[1, n]
+        out_table[9, n] = h * m[1, n]
+        out_table[10, n] = h * h * m[2, n]
+        out_table[11, n] = h * h * (m[3, n] - 0.5 * m[2, n])
 
 
 @njit(cache=True, error_model="numpy", fastmath=LOOSE)
@@ -619,18 +803,21 @@ def commit(shape, table, force, slope, free_q, free_p, out_q, out_p):
 @njit(cache=True, error_model="numpy")
 def free_flight(omega, zeta, bias, time, q, p):
     """Advance a state in place by the exact motion without contact."""
+    n_modes = omega.size
+    free = np.empty((3, n_modes))
+    double = np.empty(n_modes)
+    free_table(omega, zeta, time, free, double)
     moments = np.empty(2)
     work = np.empty((2, 1))
-    for n in range(omega.size):
+    for n in range(n_modes):
         q0 = q[n]
-        if bias[n] != 0.0 or omega[n] == 0.0:
-            a11, a12, a22 = mode_moments(omega[n], zeta[n], time, 1, moments, work)
-            push = bias[n] * time * time * moments[1]
-        else:
-            a11, a12, a22, _, _, _ = mode_matrix(omega[n], zeta[n], time)
-            push = 0.0
-        q[n] = a11 * q0 + a12 * p[n] + push
-        p[n] = -omega[n] * omega[n] * a12 * q0 + a22 * p[n] + a12 * bias[n]
+        q[n] = free[0, n] * q0 + free[1, n] * p[n]
+        p[n] = -omega[n] * omega[n] * free[1, n] * q0 + free[2, n] * p[n]
+    for n in range(n_modes):
+        if bias[n] != 0.0:
+            _, a12, _ = mode_moments(omega[n], zeta[n], time, 1, moments, work)
+            q[n] += bias[n] * time * time * moments[1]
+            p[n] += a12 * bias[n]
 
 
 @njit(cache=True, error_model="numpy", fastmath=LOOSE)
