@@ -11,6 +11,7 @@ ANGLE_LIMIT = 1e6  # [-] angle up to which the reduction in `waves` is exact
 OVERDAMPED = 1.2  # [-] damping ratio from which the two decay rates are far enough apart for partial fractions
 LEVELS = 40  # [-] halvings of the step that may be cached
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
+GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before
 LOOK_LIMIT = 300_000  # [-] looks ahead in one free flight before the run gives up
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
 EVENT_LIMIT = 64  # [-] events without one full step between them: chatter, passed with unlocated steps
@@ -872,46 +873,91 @@ def quadratic_wait(d, v, a):
     return (root - v) / a
 
 
+@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+def glide(table, q, p):
+    """Advance a state in place by the free motion whose table (6, n_modes) is given: a11, a12, a21, a22, pushes."""
+    for n in range(q.size):
+        q0 = q[n]
+        p0 = p[n]
+        q[n] = table[0, n] * q0 + table[1, n] * p0 + table[4, n]
+        p[n] = table[2, n] * q0 + table[3, n] * p0 + table[5, n]
+
+
 @njit(cache=True, error_model="numpy")
-def find_onset(omega, zeta, shape, offset, bias, limit, shortest, depth, still, q, p):
+def glide_table(omega, zeta, bias, h, out_table):
+    """Table for `glide` over h."""
+    n_modes = omega.size
+    double = np.empty(n_modes)
+    free_table(omega, zeta, h, out_table, double)
+    moments = np.empty(2)
+    work = np.empty((2, 1))
+    for n in range(n_modes):
+        out_table[3, n] = out_table[2, n]
+        out_table[2, n] = -omega[n] * omega[n] * out_table[1, n]
+        out_table[4, n] = 0.0
+        out_table[5, n] = 0.0
+        if bias[n] != 0.0:
+            _, a12, _ = mode_moments(omega[n], zeta[n], h, 1, moments, work)
+            out_table[4, n] = bias[n] * h * h * moments[1]
+            out_table[5, n] = bias[n] * a12
+
+
+@njit(cache=True, error_model="numpy")
+def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, still, tables, known, q, p):
     """Advance a state without contact in place to the next onset, never passing one (conservative advancement).
+
+    Each look ahead is no longer than bounds on the later motion allow. Long looks take steps base * 2**k, whose tables
+    (GLIDES, 6, n_modes) are kept from flight to flight; the last ones before an onset are exact.
 
     Returns (elapsed, contact, status): status 0 an onset at `contact`, 1 no contact ever again (proved),
     2 the limit reached, 3 too slow an advance (shorter than `shortest` per look): hand over to a stepping scheme,
     4 neither contact nor proof in LOOK_LIMIT looks. Rigid approaches no faster than `still` [m/s] and
     overlaps no deeper than `depth` [m] are rounding.
     """
-    n_contacts = shape.shape[0]
+    m = shape.shape[0]
     elapsed = 0.0
     slow = 0
-    for _ in range(LOOK_LIMIT):
+    bounds = np.empty((m, 6))
+    for look in range(LOOK_LIMIT):
         wait = np.inf
         first = -1
         final = True
-        for i in range(n_contacts):
-            d, v = approach(shape, offset, i, q, p)
-            r0, r1, r2, reach, fastest, hardest = motion_bounds(shape, omega, zeta, bias, i, q, p)
-            r0 += offset[i]
-            scale = abs(r0) + reach + abs(offset[i])
-            d = min(d, 0.0)
+        close = True
+        for i in range(m):
+            if look % 64 == 0:
+                r0, r1, r2, reach, fastest, hardest = motion_bounds(shape, omega, zeta, bias, i, q, p)
+                bounds[i, 0] = r0 + offset[i]
+                bounds[i, 1] = r1
+                bounds[i, 2] = r2
+                bounds[i, 3] = reach
+                bounds[i, 4] = fastest
+                bounds[i, 5] = hardest
+            r0 = bounds[i, 0]
+            r1 = bounds[i, 1]
+            r2 = bounds[i, 2]
+            reach = bounds[i, 3]
+            hardest = bounds[i, 5]
             if r1 <= still and r2 <= 0.0 and r0 + reach <= depth:
                 continue
             final = False
+            d, v = approach(shape, offset, i, q, p)
+            scale = abs(r0) + reach + abs(offset[i])
+            d = min(d, 0.0)
             driven = hardest > 0.0 or r2 > 0.0
             if -d <= 4e-16 * scale and (v > still or (driven and (v > 0.0 or (v == 0.0 and elapsed + r2 > 0.0)))):
                 return elapsed, i, 0
             bound = quadratic_wait(d, v, hardest + max(r2, 0.0))
-            bound = max(bound, quadratic_wait(d, max(0.0, r1 + fastest), max(r2, 0.0)))
+            bound = max(bound, quadratic_wait(d, max(0.0, r1 + bounds[i, 4]), max(r2, 0.0)))
             if r2 <= 0.0 and r0 + reach <= 0.0:
                 bound = max(bound, quadratic_wait(r0 + reach, max(0.0, r1), 0.0))
             if bound < wait:
                 wait = bound
                 first = i
+                close = v > 0.0 and -d < 2.0 * v * bound
         if final or wait == np.inf:
             return elapsed, -1, 1
         if elapsed + wait >= limit:
-            wait = limit - elapsed
-            free_flight(omega, zeta, bias, wait, q, p)
+            free_flight(omega, zeta, bias, limit - elapsed, q, p)
             return limit, -1, 2
         if wait <= 4e-16 * (elapsed + wait) or wait <= 1e-14 * shortest:
             d, v = approach(shape, offset, first, q, p)
@@ -922,8 +968,19 @@ def find_onset(omega, zeta, shape, offset, bias, limit, shortest, depth, still, 
             slow += 1
             if slow > 4000:
                 return elapsed, first, 3
-        free_flight(omega, zeta, bias, wait, q, p)
+        power_of_two = int(np.floor(np.log2(wait / base))) + GLIDES // 2
+        if close or q.size < 8 or power_of_two < 0 or power_of_two >= GLIDES:
+            free_flight(omega, zeta, bias, wait, q, p)
+        else:
+            wait = base * 2.0 ** (power_of_two - GLIDES // 2)
+            if known[power_of_two] == 0.0:
+                glide_table(omega, zeta, bias, wait, tables[power_of_two])
+                known[power_of_two] = 1.0
+            glide(tables[power_of_two], q, p)
         elapsed += wait
+        for i in range(m):
+            bounds[i, 0] += wait * (bounds[i, 1] + 0.5 * bounds[i, 2] * wait)
+            bounds[i, 1] += wait * bounds[i, 2]
     return elapsed, -1, 4
 
 
@@ -1062,6 +1119,8 @@ def run_energy(
     s = np.empty(m)
     rate = np.empty(m)
     pressed = np.zeros(m, np.bool_)
+    flights = np.empty((GLIDES, 6, n_modes))
+    flown = np.zeros(GLIDES)
     done = np.zeros(m)
     steps = np.zeros((64, 3 + 5 * m))
     n_steps = 0
@@ -1107,7 +1166,7 @@ def run_energy(
                 steps[n_steps, 6 + 5 * i] = 0.0
                 steps[n_steps, 7 + 5 * i] = 0.0
             elapsed, first, found = find_onset(
-                omega, zeta, shape, offset, bias, horizon - time, 1e-3 * base, depth, still, q, p
+                omega, zeta, shape, offset, bias, horizon - time, base, 1e-3 * base, depth, still, flights, flown, q, p
             )
             if found == 1:
                 time += elapsed
@@ -1529,6 +1588,8 @@ def run_collocation(
     matrix = np.empty((s * m, s * m))
     vector = np.empty(s * m)
     pressed = np.zeros(m, np.bool_)
+    flights = np.empty((GLIDES, 6, n_modes))
+    flown = np.zeros(GLIDES)
     done = np.zeros(m)
     coefficients = np.empty(s)
     stride = 3 + s
@@ -1573,7 +1634,7 @@ def run_collocation(
                 idle = False
         if idle:
             elapsed, first, found = find_onset(
-                omega, zeta, shape, offset, bias, horizon - time, 1e-6 * base, depth, still, q, p
+                omega, zeta, shape, offset, bias, horizon - time, base, 1e-6 * base, depth, still, flights, flown, q, p
             )
             if elapsed > 0.0:
                 steps[n_steps, 0] = time
