@@ -23,8 +23,12 @@ _HOME = {
     "collide": "integrator",
     "Scene": "scene",
     "load_scene": "scene",
+    "sweep": "maps",
 }
-_MODULES = ("mesh", "analytic", "spectra", "threshold", "accuracy", "export", "figures", "sound", "section", "contact", "doctor")
+_MODULES = (
+    "mesh", "analytic", "spectra", "threshold", "accuracy", "export", "figures", "charts", "sound", "section",
+    "contact", "doctor", "maps",
+)  # fmt: skip
 
 __all__ = [*_HOME, *_MODULES, "__version__"]
 

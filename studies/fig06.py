@@ -1,0 +1,40 @@
+"""Figure 6: spectra of the half sine for contact resonances of 300 and 1500 Hz."""
+
+import numpy as np
+import source_scenes as source
+
+import fem_impact as fi
+from fem_impact import charts
+from fem_impact.integrator import Touch
+
+RESONANCES = {300.0: charts.VERMILION, 1500.0: charts.BLACK}  # [Hz]
+MASS = 0.05  # [kg] does not matter
+FREQUENCIES = np.linspace(0.0, 8e3, 1601)  # [Hz]
+
+
+def compute():
+    """Level [dB] of the computed pulse's spectrum for each contact resonance, and that of the formula."""
+    result = {}
+    for resonance in RESONANCES:
+        law = fi.Contact.linear(MASS * (2.0 * np.pi * resonance) ** 2)
+        hit = fi.collide([fi.Modes.rigid(MASS)], [Touch(law, 0, None)], speeds=[1.0], tolerance=1e-6)
+        with np.errstate(divide="ignore"):
+            formula = 20.0 * np.log10(fi.spectra.half_sine_spectrum(FREQUENCIES, resonance))
+        result[resonance] = source.decibels(hit.spectrum(FREQUENCIES)), formula
+    return result
+
+
+def draw(result):
+    """Both levels over frequency."""
+    drawn = [
+        charts.Curve(FREQUENCIES, level, f"contact resonance {resonance:g} Hz", RESONANCES[resonance])
+        for resonance, (level, _) in result.items()
+    ]
+    axis = charts.Axis("frequency", "Hz", limits=(0.0, FREQUENCIES[-1]))
+    figure = charts.curves(drawn, x=axis, y=source.LEVEL, title="A stiffer or lighter hammer reaches higher")
+    columns = {"frequency [Hz]": FREQUENCIES}
+    return figure, columns | {f"level at {resonance:g} Hz [dB]": level for resonance, (level, _) in result.items()}
+
+
+if __name__ == "__main__":
+    source.run("fig06", compute, draw)

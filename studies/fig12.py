@@ -1,0 +1,27 @@
+"""Figure 12: contact time on a plate of 500 t with Hertz springs: the same trends."""
+
+import source_scenes as source
+
+from fem_impact import charts
+
+
+def compute(**wanted):
+    """Stick masses and Hertz springs on the plate of 500 t."""
+    return source.hertz_map(5e5, **wanted)
+
+
+def draw(table):
+    """The map with contours of the contact resonance."""
+    figure = source.draw_map(
+        table,
+        "contact_time",
+        charts.Axis("contact time", "s", log=True),
+        title="Contact time, plate of 500 t, Hertz spring",
+        marks=[source.mark(source.MARKED_HERTZ, "figures 8 and 9")],
+        hertz=True,
+    )
+    return figure, source.table_columns(table, "contact_time", "n_impacts")
+
+
+if __name__ == "__main__":
+    source.run("fig12", compute, draw)

@@ -1,0 +1,26 @@
+"""Figure 19: on a plate of 200 g contact times differ at the upper right, where the stick strikes more than once."""
+
+import source_scenes as source
+
+from fem_impact import charts
+
+
+def compute(**wanted):
+    """Stick masses and linear springs on the plate of 200 g."""
+    return source.linear_map(0.2, **wanted)
+
+
+def draw(table):
+    """The map with contours of the contact resonance."""
+    figure = source.draw_map(
+        table,
+        "contact_time",
+        charts.Axis("contact time", "s", log=True),
+        title="Contact time, plate of 200 g, linear spring",
+        marks=[source.mark(source.MARKED, "figure 21"), source.mark(source.STIFF, "figure 22", charts.BLACK)],
+    )
+    return figure, source.table_columns(table, "contact_time", "n_impacts")
+
+
+if __name__ == "__main__":
+    source.run("fig19", compute, draw)

@@ -1,0 +1,151 @@
+"""The scenes of Euphonics 12.1 that the figure studies share, what is chosen where the source is silent, and output.
+
+The source states masses, frequencies, the plate's proportions and the contact stiffness. It leaves open where the
+plate is struck, how fast and how much everything is damped. Chosen here: 0.3 of both sides, 1 m/s (30 m/s for the
+Hertz spring, so that the two marked springs stay in contact equally long), no damping.
+"""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fem_impact as fi
+from fem_impact import charts
+
+LENGTH, WIDTH = 1.55, 1.0  # [m] only their ratio is stated
+AT = (0.3 * LENGTH, 0.3 * WIDTH)  # [m] chosen
+SPEED, HERTZ_SPEED = 1.0, 30.0  # [m/s] chosen
+PLATE_MASSES = {"500 t": 5e5, "2 kg": 2.0, "200 g": 0.2}  # [kg]
+PLATE_COLORS = dict(zip(PLATE_MASSES, (charts.VERMILION, charts.BLUE, charts.GREEN)))
+PLATE_FREQUENCY, STICK_FREQUENCY = 100.0, 10e3  # [Hz]
+MARKED = 0.1, 88.6e3  # [kg] of the stick, [N/m]: the green circle
+STIFF = 0.1, 1000e3  # [kg], [N/m]: the black circle, chosen in the region where the stick is stopped
+MARKED_HERTZ = 0.1, 695e3  # [kg], [N/m**1.5]
+MASSES = np.linspace(10e-3, 200e-3, 20)  # [kg] of the maps
+STIFFNESSES = np.logspace(4, 6, 20)  # [N/m]
+HERTZ_STIFFNESSES = np.logspace(5, 7, 20)  # [N/m**1.5]
+BAND = 5e3  # [Hz] of every spectral centroid; the source does not state its own
+N_MODES = 300  # [-] of a plate, up to 20 kHz
+TOLERANCE = 1e-3  # [-]
+
+TIME = charts.Axis("time", "s")
+FORCE = charts.Axis("contact force", "N", limits=(0.0, None))
+LEVEL = charts.Axis("force spectrum", "dB", limits=(-60.0, 3.0))
+MASS = charts.Axis("mass of the stick", "g")
+STIFFNESS = charts.Axis("contact stiffness", "N/m", log=True)
+HERTZ_STIFFNESS = charts.Axis("contact stiffness", "N/m$^{1.5}$", log=True)
+
+
+def plate(mass: float, *, n_modes: int = N_MODES, damping_ratio: float = 0.0) -> fi.Modes:
+    """The hinged plate, 1.55 : 1, lowest mode 100 Hz, by closed formulas."""
+    return fi.analytic.rectangle(
+        LENGTH, WIDTH, mass=mass, first_frequency=PLATE_FREQUENCY, n_modes=n_modes, damping_ratio=damping_ratio
+    )
+
+
+def stick(mass: float = MARKED[0], first_frequency: float = STICK_FREQUENCY) -> fi.Striker:
+    """The stick, hinged at its far end, striking with its free end."""
+    return fi.Striker.stick(mass, first_frequency)
+
+
+def marked_blow(plate_mass: float, stiffness: float = MARKED[1], *, tolerance: float = 1e-4) -> fi.Response:
+    """The blow of the 100 g stick through a linear spring."""
+    law = fi.Contact.linear(stiffness)
+    return fi.strike(plate(plate_mass), stick(), law, at=AT, speed=SPEED, tolerance=tolerance)
+
+
+def marked_hertz_blow(*, tolerance: float = 1e-4) -> fi.Response:
+    """The blow of the 100 g stick on the plate of 500 t through the Hertz spring."""
+    law = fi.Contact.hertz(MARKED_HERTZ[1])
+    return fi.strike(plate(5e5), stick(), law, at=AT, speed=HERTZ_SPEED, tolerance=tolerance)
+
+
+def linear_map(
+    plate_mass: float,
+    masses: Any = MASSES,
+    stiffnesses: Any = STIFFNESSES,
+    *,
+    damping_ratio: float = 0.0,
+    **wanted: Any,
+) -> Any:
+    """All blows of a grid of sticks and linear springs on one plate; ``wanted`` replaces arguments of `fi.sweep`."""
+    arguments = {"at": AT, "speed": SPEED, "tolerance": TOLERANCE, "max_frequency": BAND, **wanted}
+    over = {"stiffness": stiffnesses, "mass": masses}
+    modes = plate(plate_mass, damping_ratio=damping_ratio)
+    return fi.sweep(modes, stick(), fi.Contact.linear(1e5), over=over, **arguments)
+
+
+def hertz_map(plate_mass: float, masses: Any = MASSES, stiffnesses: Any = HERTZ_STIFFNESSES, **wanted: Any) -> Any:
+    """All blows of a grid of sticks and Hertz springs on one plate."""
+    arguments = {"at": AT, "speed": HERTZ_SPEED, "tolerance": TOLERANCE, "max_frequency": BAND, **wanted}
+    over = {"stiffness": stiffnesses, "mass": masses}
+    return fi.sweep(plate(plate_mass), stick(), fi.Contact.hertz(1e6), over=over, **arguments)
+
+
+def contact_resonance(table: Any, exponent: float = 1.0, speed: float = SPEED) -> np.ndarray:
+    """Half the reciprocal of the time a rigid stick touches a rigid wall [Hz], (n_stiffnesses, n_masses)."""
+    return np.array(
+        [
+            [
+                0.5 / fi.accuracy.contact_duration(fi.Contact.power(k, exponent), mass / 3.0, speed)
+                for mass in table.mass.values
+            ]
+            for k in table.stiffness.values
+        ]
+    )
+
+
+def draw_map(table: Any, layer: str, colour: charts.Axis, *, hertz: bool = False, **wanted: Any) -> Any:
+    """One layer of a map of sticks in colour, with contours of the contact resonance."""
+    resonance = contact_resonance(table, 1.5 if hertz else 1.0, HERTZ_SPEED if hertz else SPEED)
+    levels = [50.0, 100.0, 200.0, 400.0, 800.0, 1600.0]
+    return charts.colour_map(
+        table[layer].assign_coords(mass=1e3 * table.mass),
+        x=MASS,
+        y=HERTZ_STIFFNESS if hertz else STIFFNESS,
+        colour=colour,
+        contours=[(resonance, levels, "Hz", "contact resonance")],
+        **wanted,
+    )
+
+
+def mark(case: tuple[float, float], label: str, color: str = charts.GREEN) -> charts.Mark:
+    """A circle around a case (mass, stiffness) of a map."""
+    return charts.Mark(1e3 * case[0], case[1], label, color)
+
+
+def decibels(spectrum: np.ndarray) -> np.ndarray:
+    """Level [dB] of a spectrum over its first value."""
+    size = np.abs(spectrum)
+    return 20.0 * np.log10(np.maximum(size, 1e-12 * size[0]) / size[0])
+
+
+def table_columns(table: Any, *layers: str) -> dict[str, np.ndarray]:
+    """A map as columns of a CSV file: one row for each cell."""
+    frame = table[list(layers)].to_dataframe().reset_index()
+    return {str(name): frame[name].to_numpy() for name in frame}
+
+
+def publish(name: str, figure: Any, columns: dict[str, Any]) -> None:
+    """Write NAME.png and NAME.csv to the folder given on the command line, studies/out without."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "out"
+    folder.mkdir(parents=True, exist_ok=True)
+    fi.figures.save(folder / f"{name}.png", figure)
+    width = max(len(values) for values in columns.values())
+    lines = [",".join(columns)]
+    for i in range(width):
+        lines.append(",".join(_text(values[i]) if i < len(values) else "" for values in columns.values()))
+    (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    print(f"{folder / name}.png and .csv")
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else f"{value:.9g}"
+
+
+def run(name: str, compute: Callable[[], Any], draw: Callable[[Any], tuple[Any, dict[str, Any]]]) -> None:
+    """Compute a figure, draw and write it."""
+    publish(name, *draw(compute()))
