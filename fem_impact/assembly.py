@@ -17,7 +17,8 @@ from .elements import (
     BentMapping,
     Hermite,
     HermiteSpace,
-    basis_of,
+    numbering,
+    quadrature,
     segments,
     triangles,
 )
@@ -26,8 +27,8 @@ from .section import Beam, Plate
 from .supports import Rim, cells_of_facets, constrain
 
 KINDS = ("clamped", "hinged", "free")
-STIFFNESS_ORDER = 10  # [-] of the quadrature where thickness varies or triangles are bent; 6 is exact otherwise
-MASS_ORDER = 10  # [-] exact for products of quintics
+MASS_ORDER = 10  # [-] of the quadrature: exact for products of quintics
+BEAM_ORDER = 8  # [-] exact for products of cubics where the height varies linearly
 RIGID = 1e-9  # [-] share of a rigid motion that supports may suppress by rounding alone
 
 
@@ -74,6 +75,7 @@ class System:
     held: np.ndarray = field(repr=False)  # (n_rigid,) unknowns that hold the rigid motions, statically determinate
     graded: bool = True  # whether rings of ever smaller triangles surround singular corners
     rim: Rim | None = field(default=None, repr=False)  # of the triangles solved on, in the frame; None on a beam
+    order: float = np.inf  # [-] power of the element size by which singular corners let the error of a frequency fall
     softness: float = 1.0  # [-] largest inertia over stiffness on the body, in the frame: its shortest waves
 
     @property
@@ -135,11 +137,18 @@ def assemble(
     if mesh.dimension == 1 and isinstance(section, Beam):
         return _assemble_beam(mesh, section, supports or {}, kinds, centre, length)
     if mesh.dimension == 2 and isinstance(section, Plate):
-        fine = around_corners(mesh, kinds, section.material.nu) if graded else mesh
+        order, fine = around_corners(mesh, kinds, section.material.nu)
+        fine = fine if graded else mesh
         kinds = _support_of_facets(fine, supports or {})
-        return replace(_assemble_plate(fine, section, supports or {}, kinds, centre, length), mesh=mesh, graded=graded)
+        made = _assemble_plate(fine, section, supports or {}, kinds, centre, length)
+        return replace(made, mesh=mesh, graded=graded, order=order)
     wanted = "Plate" if mesh.dimension == 2 else "Beam"
     raise ValueError(f"section must be a {wanted} on a mesh of dimension {mesh.dimension}, got {section!r:.80}")
+
+
+def reassemble(system: System, mesh: Mesh) -> System:
+    """The same body on another mesh of it."""
+    return assemble(mesh, system.section, system.supports, graded=system.graded)
 
 
 def _support_of_facets(mesh: Mesh, supports: dict) -> list[str]:
@@ -200,28 +209,28 @@ def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, kinds: list, centr
     line = segments(points, mesh.cells)
     space = HermiteSpace(line)
     element = Hermite(space)
-    basis = basis_of(line, element, 8)
-    x = basis.mapping.F(basis.X).transpose(1, 2, 0)  # (n_cells, n_q, 1)
+    x, dx = quadrature(line, element, BEAM_ORDER)  # (n_cells, n_q, 1), (n_cells, n_q)
     stiffness, inertia = _fields(section, centre + length * x)
     frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
+    stiffness, inertia = stiffness / frame.stiffness, inertia / frame.inertia
     value, bend = space.functions(np.arange(len(x)), x, (0, 2))
-    K = np.einsum("eqi,eq,eqj->eij", bend, stiffness / frame.stiffness * basis.dx, bend)
-    M = np.einsum("eqi,eq,eqj->eij", value, inertia / frame.inertia * basis.dx, value)
-    n_all = basis.N
+    K = np.einsum("eqi,eq,eqj->eij", bend, stiffness * dx, bend)
+    M = np.einsum("eqi,eq,eqj->eij", value, inertia * dx, value)
+    dofs, n_all = numbering(line, element)
     fixed = []
     for vertex, kind in zip(mesh.facets[:, 0], kinds):
-        deflection, slope = basis.nodal_dofs[:, vertex]
+        cell, end = np.argwhere(vertex == line.t.T)[0]
+        deflection, slope = dofs[2 * end : 2 * end + 2, cell].tolist()
         fixed += {"clamped": [deflection, slope], "hinged": [deflection], "free": []}[kind]
     free = np.setdiff1d(np.arange(n_all), fixed)
     if not free.size:
         raise ValueError("supports leave this mesh nothing to move; refine it")
     expand = csr_matrix((np.ones(len(free)), (free, np.arange(len(free)))), shape=(n_all, len(free)))
     project = expand.T.tocsr()
-    mass = float((inertia * basis.dx).sum() * length)
-    dofs = basis.element_dofs
+    mass = float((inertia * dx).sum()) * frame.mass
     matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all)
     system = _finish(mesh, section, supports, "hermite", mass, frame, *matrices, expand, project, dofs, space)
-    return replace(system, softness=float((inertia / stiffness).max()) * frame.stiffness / frame.inertia)
+    return replace(system, softness=float((inertia / stiffness).max()))
 
 
 def _fields(section, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -250,30 +259,29 @@ def _assemble_plate(
     bent = _bent(mesh, centre, length, points, plane)
     mapping = None if bent is None else BentMapping(plane, bent)
     space = ArgyrisSpace(plane, bent)
-    constant = not callable(section.thickness)
-    local = []
-    for order, derivative in ((6 if constant and bent is None else STIFFNESS_ORDER, 2), (MASS_ORDER, 0)):
-        element = Argyris(space)
-        basis = basis_of(plane, element, order, mapping)
-        x = basis.mapping.F(basis.X).transpose(1, 2, 0)
-        stiffness, inertia = _fields(section, centre + length * x)
-        if derivative:
-            reference = float(stiffness.max())
-            softness = float((inertia / np.minimum(stiffness[..., 0, 0], stiffness[..., 1, 1])).max()) * reference
-            hessian = element.fields[2][:, [0, 2, 1]]  # (n_cells, 3, n_q, 21) xx, yy, xy
-            bend = hessian.transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]  # (n_cells, n_q, 3, 21)
-            moment = (stiffness / reference * basis.dx[..., None, None]) @ bend
-            shape = (len(bend), -1, 21)
-            local.append(bend.reshape(shape).transpose(0, 2, 1) @ moment.reshape(shape))
-        else:
-            heaviest = float(inertia.max())
-            value = element.fields[0]  # (n_cells, n_q, 21)
-            local.append((value * (inertia / heaviest * basis.dx)[..., None]).transpose(0, 2, 1) @ value)
-            mass = float((inertia * basis.dx).sum() * length**2)
-    frame = Frame(centre, length, reference, heaviest)
+    element = Argyris(space)
+    x, dx = quadrature(plane, element, MASS_ORDER, mapping)
+    stiffness, inertia = _fields(section, centre + length * x)
+    frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
+    stiffness, inertia = stiffness / frame.stiffness, inertia / frame.inertia
+    softness = float((inertia / np.minimum(stiffness[..., 0, 0], stiffness[..., 1, 1])).max())
+    K, M = np.empty((len(x), 21, 21)), np.empty((len(x), 21, 21))
+    plain = ~space.curved & (not callable(section.thickness))
+    if plain.any():
+        cells = np.flatnonzero(plain)
+        K[cells], M[cells] = space.uniform(cells, stiffness[0, 0], MASS_ORDER)
+    if not plain.all():
+        cells = np.flatnonzero(~plain)
+        value, hessian = space.functions(cells, x[cells], (0, 2))
+        bend = hessian[:, [0, 2, 1]].transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]  # (n, n_q, 3, 21)
+        moment = (stiffness[cells] * dx[cells, :, None, None]) @ bend
+        shape = (len(cells), 3 * x.shape[1], 21)
+        K[cells] = bend.reshape(shape).transpose(0, 2, 1) @ moment.reshape(shape)
+        M[cells] = (value * (inertia * dx)[cells, :, None]).transpose(0, 2, 1) @ value
     rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, kinds)
-    expand, project, dofs = constrain(rim, space.vertices, basis.element_dofs, basis.N)
+    expand, project, dofs = constrain(rim, space.vertices, *numbering(plane, element))
     n_all = expand.shape[0]
-    matrices = _scatter(local[0], dofs, n_all), _scatter(local[1], dofs, n_all)
+    matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all)
+    mass = float((inertia * dx).sum()) * frame.mass
     system = _finish(mesh, section, supports, "argyris", mass, frame, *matrices, expand, project, dofs, space)
-    return replace(system, softness=softness / heaviest, rim=rim)
+    return replace(system, softness=softness, rim=rim)

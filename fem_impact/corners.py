@@ -8,9 +8,9 @@ import numpy as np
 from .curves import divided
 from .mesh import Mesh
 
-SHRINK = 0.35  # [-] of the distance to the corner from one ring of triangles to the next
+SHRINK = 0.5  # [-] of the distance to the corner from one ring of triangles to the next
 WIDE = 0.7  # [rad] triangles at a singular corner are bisected until they are narrower
-CORNER_ERROR = 1e-8  # [-] share of the energy that the innermost ring may miss, about twice that in frequency
+CORNER_ERROR = 1e-7  # [-] share of the energy that the innermost ring may miss, about twice that in frequency
 SMALLEST = 1e-10  # [-] of the facet: rings stop here, before the rounding of coordinates shows
 SMALLEST_FREE = 3e-3  # [-] likewise at a free corner: it moves, and rounding grows as (deflection / size)**2
 MILD = 2.5  # [-] exponents above this cost quintic triangles less than the rings would
@@ -80,8 +80,12 @@ def rings(angle: float, kinds: tuple[str, str], nu: float) -> int:
     return int(np.ceil(min(wanted, np.log(smallest) / np.log(SHRINK))))
 
 
-def around_corners(mesh: Mesh, kinds: list[str], nu: float) -> Mesh:
-    """The mesh with rings of shrinking triangles at every corner that is singular under its supports (n_facets,)."""
+def around_corners(mesh: Mesh, kinds: list[str], nu: float) -> tuple[float, Mesh]:
+    """Rings of shrinking triangles at every corner that is singular under its supports (n_facets,).
+
+    Returns the order by which the error of a frequency falls with the element size, and the mesh.
+    """
+    order = np.inf
     into: dict[int, int] = {}
     out_of: dict[int, int] = {}
     for facet, (a, b) in enumerate(mesh.facets.tolist()):
@@ -92,10 +96,12 @@ def around_corners(mesh: Mesh, kinds: list[str], nu: float) -> Mesh:
         if kinds[before] == kinds[facet] and (mesh.tangents[before, 1] @ mesh.tangents[facet, 0]) > 1.0 - 1e-12:
             continue
         (x, y), (u, v) = mesh.tangents[before, 1], mesh.tangents[facet, 0]
-        n = rings(float(np.pi - np.arctan2(x * v - y * u, x * u + y * v)), (kinds[facet], kinds[before]), nu)
+        angle, pair = float(np.pi - np.arctan2(x * v - y * u, x * u + y * v)), (kinds[facet], kinds[before])
+        n = rings(angle, pair, nu)
         if n:
             wanted[vertex] = n
-    return towards(mesh, wanted)
+            order = min(order, 2.0 * (exponent(round(angle, 9), pair, nu) - 1.0))
+    return order, towards(mesh, wanted)
 
 
 def towards(mesh: Mesh, wanted: dict[int, int]) -> Mesh:

@@ -12,7 +12,6 @@ from . import _check
 
 DENSE = 300  # [-] unknowns up to which a dense solution is faster
 SPARE = 6  # [-] modes computed beyond those wanted, to find a gap behind the last
-GAP = 1e-7  # [-] relative distance of eigenvalues that counts as a gap
 
 
 def factorise(A: csc_matrix) -> Any:
@@ -62,6 +61,8 @@ def lowest(flexibility: Flexibility, n: int) -> tuple[np.ndarray, np.ndarray]:
     """The n lowest flexible eigenvalues, ascending (n,), and their mass-normalised vectors (n_dofs, n)."""
     K, M = flexibility.K, flexibility.M
     size, n_rigid = K.shape[0], flexibility.rigid.shape[1]
+    if n == 0:
+        return np.zeros(0), np.zeros((size, 0))
     if n > size - n_rigid:
         raise ValueError(f"n_modes must not exceed the {size} unknowns of this mesh; refine it")
     if size <= DENSE or n + SPARE + n_rigid >= size // 2:

@@ -4,8 +4,9 @@ from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
-from skfem import CellBasis, ElementLineHermite, ElementTriArgyris, MappingAffine, MeshLine, MeshTri
+from skfem import Dofs, ElementLineHermite, ElementTriArgyris, MappingAffine, MeshLine, MeshTri
 from skfem.element import DiscreteField
+from skfem.quadrature import get_quadrature
 
 from .curves import Curves, powers
 
@@ -136,22 +137,46 @@ class ArgyrisSpace:
         Returns arrays (n, n_q, 21) for order 0, (n, 2, n_q, 21) for order 1, (n, 3, n_q, 21) for order 2 (xx, xy, yy).
         """
         local = self.local(cells, points)
-        inverse, coefficients = self.inverse[cells], self.coefficients[cells]
         result = []
         for order in orders:
-            raw = [monomials(local, order - k, k) @ coefficients for k in range(order + 1)]
+            raw = [monomials(local, order - k, k) @ self.coefficients[cells] for k in range(order + 1)]
             if order == 0:
                 result.append(raw[0])
                 continue
             stacked = np.stack(raw, axis=1)  # (n, order + 1, n_q, 21)
-            a, b, c, d = (inverse[:, i, j] for i, j in product(range(2), repeat=2))
-            if order == 1:
-                chain = [[a, c], [b, d]]
-            else:
-                chain = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
-            matrix = np.stack([np.stack(row, axis=-1) for row in chain], axis=1)
-            result.append(np.einsum("eij,ejqk->eiqk", matrix, stacked))
+            shape = stacked.shape
+            turned = self.chain(cells, order) @ stacked.reshape(*shape[:2], -1)
+            result.append(turned.reshape(shape))
         return result
+
+    def chain(self, cells: np.ndarray, order: int) -> np.ndarray:
+        """Derivatives by x and y from those in the triangle, (n, order + 1, order + 1), of cells (n,)."""
+        inverse = self.inverse[cells]
+        a, b, c, d = (inverse[:, i, j] for i, j in product(range(2), repeat=2))
+        if order == 1:
+            rows = [[a, c], [b, d]]
+        else:
+            rows = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
+        return np.stack([np.stack(row, axis=-1) for row in rows], axis=1)
+
+    def uniform(self, cells: np.ndarray, stiffness: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
+        """Bending and mass matrices (n, 21, 21) of straight cells (n,) of one stiffness (3, 3) and unit inertia.
+
+        The integrals of products of monomials are the same in every triangle, so they are taken once.
+        """
+        X, weight = get_quadrature(Argyris.refdom, order)
+        local = X.T - 1.0 / 3.0
+        values = monomials(local, 0, 0)
+        bends = np.stack([monomials(local, 2 - k, k) for k in range(3)])  # (3, n_q, 21)
+        products = np.einsum("iqa,q,jqb->ijab", bends, weight, bends).reshape(9, 441)
+        determinant = np.abs(np.linalg.det(self.jacobian[cells]))
+        engineering = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, 2.0, 0]])  # (xx, xy, yy) -> (xx, yy, 2 xy)
+        turn = engineering @ self.chain(cells, 2)
+        metric = turn.transpose(0, 2, 1) @ stiffness @ turn * determinant[:, None, None]
+        C = self.coefficients[cells]
+        bending = C.transpose(0, 2, 1) @ (metric.reshape(-1, 9) @ products).reshape(-1, 21, 21) @ C
+        mass = C.transpose(0, 2, 1) @ (values.T * weight @ values) @ C
+        return bending, mass * determinant[:, None, None]
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cell that holds each point (n, 2), or the nearest one, and whether the point lies in it."""
@@ -278,6 +303,14 @@ def segments(points: np.ndarray, cells: np.ndarray) -> MeshLine:
     return MeshLine(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
 
 
-def basis_of(mesh, element, order: int, mapping=None) -> CellBasis:
-    """scikit-fem's basis: quadrature exact to ``order`` on straight elements, and the numbering of unknowns."""
-    return CellBasis(mesh, element, intorder=order, mapping=mapping)
+def quadrature(mesh, element, order: int, mapping=None) -> tuple[np.ndarray, np.ndarray]:
+    """scikit-fem's quadrature on every cell: points (n_cells, n_q, dimension) and weights (n_cells, n_q)."""
+    X, weight = get_quadrature(element.refdom, order)
+    mapping = mesh._mapping() if mapping is None else mapping
+    return mapping.F(X).transpose(1, 2, 0), np.abs(mapping.detDF(X)) * weight
+
+
+def numbering(mesh, element) -> tuple[np.ndarray, int]:
+    """scikit-fem's numbers of the unknowns of each cell, (n_local, n_cells), and how many there are."""
+    dofs = Dofs(mesh, element)
+    return dofs.element_dofs, dofs.N

@@ -6,9 +6,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from . import _check, pointload
-from .assembly import System, assemble
-from .eigen import Flexibility, count_below, lowest
+from . import _check, pointload, spectrum
+from .assembly import System
+from .eigen import Flexibility
 
 
 class Shapes(Protocol):
@@ -373,29 +373,6 @@ class FieldShapes:
         return self.system.mesh.points, self.system.mesh.cells
 
 
-WAVE_PER_ELEMENT = {"argyris": 1.5, "hermite": 0.3}  # [rad] error 1e-7 (kh)**8 and 7e-4 (kh)**4: below 1e-5 either way
-
-
-def _fine_enough(system: System, n_modes: int | None, max_frequency: float | None) -> System:
-    """The system on a mesh that resolves the shortest wave asked for, where the user left the size open."""
-    mesh, frame = system.mesh, system.frame
-    softest = float(system.softness) * frame.inertia / frame.stiffness
-    if max_frequency is not None:
-        wave = (softest * (2.0 * np.pi * max_frequency) ** 2) ** 0.25  # [rad/m]
-    elif n_modes is None:
-        return system
-    elif mesh.dimension == 1:
-        wave = np.pi * (n_modes + 1) / float(np.ptp(mesh.points))
-    else:  # Weyl's law: modes grow with the area, and fewer fit along the edge
-        area, rim = mesh.area, mesh.perimeter
-        wave = np.sqrt(4.0 * np.pi * n_modes / area) + 0.5 * rim / area
-    size = WAVE_PER_ELEMENT[system.element] / wave
-    if size >= mesh.size:
-        return system
-    finer = mesh.refined(mesh.size / size)
-    return assemble(finer, system.section, system.supports, graded=system.graded)
-
-
 def find_modes(
     system: System,
     *,
@@ -432,23 +409,14 @@ def find_modes(
         raise ValueError(f"system must come from fi.assemble, got {type(system).__name__}")
     if (n_modes is None) == (max_frequency is None):
         raise ValueError("find_modes needs either n_modes or max_frequency")
-    if not system.mesh.size_stated:
-        system = _fine_enough(system, n_modes, max_frequency)
-    flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
-    n_rigid = system.rigid.shape[1]
+    if n_modes is not None:
+        n_modes = _check.count("n_modes", n_modes)
     if max_frequency is not None:
-        limit = _check.positive("max_frequency", max_frequency, "Hz")
-        wanted = count_below(system.K, system.M, (2.0 * np.pi * limit / system.frame.rate) ** 2) - n_rigid
+        max_frequency = _check.positive("max_frequency", max_frequency, "Hz")
+    if tolerance is not None:
+        found = spectrum.refine(system, n_modes, max_frequency, _check.between("tolerance", tolerance, 1e-10, 0.1))
     else:
-        wanted = _check.count("n_modes", n_modes) - n_rigid
-    if wanted > 0:
-        values, vectors = lowest(flexibility, wanted)
-    else:
-        values, vectors = np.zeros(0), np.zeros((system.n_dofs, 0))
-        if n_modes is None and n_rigid == 0:
-            raise ValueError(f"max_frequency must reach the first mode; there is none below {max_frequency:g} Hz")
-    omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * system.frame.rate])
-    vectors = np.column_stack([system.rigid, vectors])
-    keep = len(omega) if n_modes is None else n_modes
-    shapes = FieldShapes(system, vectors[:, :keep].copy(), flexibility)
-    return Modes(omega[:keep], damping_ratios(damping_ratio, omega[:keep]), shapes, system.mass)
+        found = spectrum.solve(spectrum.fine_enough(system, n_modes, max_frequency, None), n_modes, max_frequency)
+    shapes = FieldShapes(found.system, found.vectors.copy(), found.flexibility)
+    damping = damping_ratios(damping_ratio, found.omega)
+    return Modes(found.omega, damping, shapes, system.mass, frequency_error=found.error)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from skfem import BilinearForm, MeshTri
+from skfem import BilinearForm, CellBasis, MeshTri
 from skfem.helpers import dd, ddot, eye, trace
 
 from fem_impact import mesh
 from fem_impact.assembly import assemble
-from fem_impact.elements import Argyris, ArgyrisSpace, basis_of
+from fem_impact.elements import Argyris, ArgyrisSpace
 from fem_impact.section import Beam, Material, Plate
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
@@ -20,7 +20,7 @@ def test_stiffness_is_that_of_scikit_fem_s_own_assembly():
     system = assemble(square, PLATE)
     frame = system.frame
     plane = MeshTri((square.points.T - frame.centre[:, None]) / frame.length, square.cells.T)
-    basis = basis_of(plane, Argyris(ArgyrisSpace(plane)), 10)
+    basis = CellBasis(plane, Argyris(ArgyrisSpace(plane)), intorder=10)
 
     @BilinearForm
     def bending(u, v, _):

@@ -1,0 +1,164 @@
+"""The lowest modes of a system: on a mesh fine enough, none missed, refined until their error is known to be small."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import _check
+from .assembly import System, reassemble
+from .eigen import SPARE, Flexibility, count_below, lowest
+
+WAVE_PER_ELEMENT = {"argyris": 1.5, "hermite": 0.3}  # [rad] error 1e-7 (kh)**8 and 7e-4 (kh)**4: below 1e-5 either way
+ERROR_OF_WAVE = {
+    "argyris": (1e-7, 8.0),
+    "hermite": (7e-4, 4.0),
+}  # relative error of a frequency: factor and power of kh
+MOST_ORDER = 4.0  # [-] order of convergence that an error estimate relies on at most
+LEAST_ORDER = 1.0  # [-] and at least
+ROUNDING = 3e-12  # [-] error of a frequency that no refinement removes
+MOST_UNKNOWNS = 150_000  # [-] where refinement gives up
+HOPELESS = 10.0  # [-] times as many unknowns, extrapolated, and refinement gives up at once
+LEAST_STEP = 1.25  # [-] meshes closer in size than this say less about the error than their sizes suggest
+STEP = 2.0**0.5  # [-] from one mesh size to the next
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Eigenpairs of a system, rigid motions first."""
+
+    system: System
+    flexibility: Flexibility
+    omega: np.ndarray  # (n_modes,) [rad/s]
+    vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
+    error: np.ndarray | None = None  # (n_modes,) [-] estimated relative error of omega
+
+    @property
+    def n_rigid(self) -> int:
+        """Number of rigid motions."""
+        return self.flexibility.rigid.shape[1]
+
+
+def _wave(system: System, n_modes: int | None, max_frequency: float | None) -> float:
+    """Wavenumber [rad/m] of the shortest wave asked for."""
+    mesh, frame = system.mesh, system.frame
+    if max_frequency is not None:
+        softest = system.softness * frame.inertia / frame.stiffness
+        return float((softest * (2.0 * np.pi * max_frequency) ** 2) ** 0.25)
+    assert n_modes is not None
+    if mesh.dimension == 1:
+        return float(np.pi * (n_modes + 1) / np.ptp(mesh.points))
+    # Weyl's law: modes grow with the area, and fewer fit along the edge
+    return float(np.sqrt(4.0 * np.pi * n_modes / mesh.area) + 0.5 * mesh.perimeter / mesh.area)
+
+
+def solve(system: System, n_modes: int | None, max_frequency: float | None) -> Spectrum:
+    """The lowest modes on the mesh as it is: so many of them, or all below a frequency [Hz]; counted by inertia."""
+    flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
+    n_rigid, rate = system.rigid.shape[1], system.frame.rate
+    if n_modes is None:
+        assert max_frequency is not None
+        limit = (2.0 * np.pi * max_frequency / rate) ** 2
+        n_modes = count_below(system.K, system.M, limit)
+        if n_modes == 0:
+            raise ValueError(f"max_frequency must reach the first mode; there is none below {max_frequency:g} Hz")
+        values, vectors = lowest(flexibility, max(n_modes - n_rigid, 0))
+        if values.size and values[-1] >= limit * (1.0 + 1e-9):
+            raise _check.SimulationError(
+                f"{n_modes} modes lie below {max_frequency:g} Hz, but the last one found is at "
+                f"{np.sqrt(values[-1]) * rate / 2 / np.pi:g} Hz; change max_frequency a little"
+            )
+    elif n_modes <= n_rigid:
+        values, vectors = np.zeros(0), np.zeros((system.n_dofs, 0))
+    else:
+        values, vectors = _counted(system, flexibility, n_modes - n_rigid)
+    omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
+    return Spectrum(system, flexibility, omega, np.column_stack([system.rigid, vectors])[:, :n_modes])
+
+
+def _counted(system: System, flexibility: Flexibility, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """The n lowest flexible eigenpairs, their number below a gap behind the last confirmed by inertia."""
+    available = system.n_dofs - system.rigid.shape[1]
+    if n > available:
+        raise ValueError(f"n_modes must not exceed the {system.n_dofs} unknowns of this mesh; refine it")
+    more = min(n + SPARE, available)
+    values, vectors = lowest(flexibility, more)
+    if more == available:
+        return values[:n], vectors[:, :n]
+    gaps = np.diff(values[n - 1 :]) / values[n - 1 : -1]
+    at = n - 1 + int(gaps.argmax())
+    shift = 0.5 * (values[at] + values[at + 1])
+    found = at + 1 + flexibility.rigid.shape[1]
+    below = count_below(system.K, system.M, shift)
+    if below != found:
+        raise _check.SimulationError(
+            f"{below} modes lie below {np.sqrt(shift) * system.frame.rate / 2 / np.pi:g} Hz, but {found} were found; "
+            "ask for a few modes more"
+        )
+    return values[:n], vectors[:, :n]
+
+
+def fine_enough(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> System:
+    """The system on a mesh that resolves the shortest wave asked for, where the user left the size open."""
+    allowed = WAVE_PER_ELEMENT[system.element]
+    if tolerance is not None:
+        factor, power = ERROR_OF_WAVE[system.element]
+        allowed = (tolerance / factor) ** (1.0 / power)
+    size = allowed / _wave(system, n_modes, max_frequency)
+    if system.mesh.size_stated or size >= system.mesh.size:
+        return system
+    return reassemble(system, system.mesh.refined(system.mesh.size / size))
+
+
+def refine(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> Spectrum:
+    """Modes whose estimated relative error is below a tolerance, on meshes refined as often as that takes."""
+    if system.mesh.recipe is None:
+        raise ValueError(
+            "tolerance needs a mesh that can be refined; make it with fi.mesh or load it with fi.mesh.load"
+        )
+    start = fine_enough(system, n_modes, max_frequency, tolerance)
+    if max_frequency is not None:  # from here on by number, so that all meshes give the same ones
+        n_modes = len(solve(start, None, max_frequency).omega)
+    history: list[Spectrum] = []
+    for candidate in (reassemble(system, start.mesh.refined(1.0 / STEP)), start):
+        if candidate is not start and (start.mesh.size_stated or candidate.n_dofs >= start.n_dofs):
+            continue  # the user's own mesh, or one that cannot be coarsened
+        if candidate.n_dofs > 2 * (n_modes or 0):
+            history.append(solve(candidate, n_modes, None))
+    while True:
+        mesh = history[-1].system.mesh if history else start.mesh
+        finer = mesh.refined(STEP)
+        if len(finer.cells) <= len(mesh.cells):
+            finer = mesh.refined(2.0)
+        history.append(solve(reassemble(system, finer), n_modes, None))
+        if len(history) < 3:
+            continue
+        error, order = _estimate(history[-3:])
+        if (error <= tolerance).all():
+            last = history[-1]
+            return Spectrum(last.system, last.flexibility, last.omega, last.vectors, error)
+        worst, n_dofs = int(error.argmax()), history[-1].system.n_dofs
+        needed = n_dofs * (error[worst] / tolerance) ** (mesh.dimension / order[worst])
+        if n_dofs * STEP**2 > MOST_UNKNOWNS or needed > HOPELESS * MOST_UNKNOWNS:
+            raise _check.SimulationError(
+                f"tolerance = {tolerance:g} is not met: mode {worst + 1} is uncertain by {error[worst]:.1e} with "
+                f"{n_dofs} unknowns; loosen the tolerance, or ask for fewer modes"
+            )
+
+
+def _estimate(history: list[Spectrum]) -> tuple[np.ndarray, np.ndarray]:
+    """Relative error (n_modes,) of the last of three spectra from their differences, and the order they show."""
+    coarse, medium, fine = (s.omega for s in history)
+    cells = [len(s.system.mesh.cells) for s in history]
+    power = 1.0 / history[0].system.mesh.dimension
+    first, second = (max((cells[i + 1] / cells[i]) ** power, LEAST_STEP) for i in (0, 1))
+    flexible = fine > 0.0
+    scale = np.where(flexible, fine, 1.0)
+    older, newer = np.abs(coarse - medium) / scale, np.abs(medium - fine) / scale
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shown = np.log(older / newer) / np.log(0.5 * (first + second))
+    most = min(MOST_ORDER, history[-1].system.order)
+    order = np.clip(np.where(np.isfinite(shown), shown, most), min(LEAST_ORDER, most), most)
+    # a mode whose differences happen to be small borrows from its neighbours, which the same mesh resolves as well
+    error = newer / (second**order - 1.0)
+    near = np.array([np.median(error[max(0, i - 2) : i + 3]) for i in range(len(error))])
+    return np.where(flexible, np.maximum(np.maximum(error, 0.1 * near), ROUNDING), 0.0), order
