@@ -617,31 +617,87 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
 
 
 @njit(cache=True, error_model="numpy")
+def solve_ramp(h, d0, x0, f0, v0, rate0, e, ea, vf, sums, law):
+    """Scheme A4 for one contact: (settled, y, mean force, slope) by Newton's method, the loss by secants.
+
+    ``y`` is the approach at the step's end. Not settled where the iteration fails, the force would pull or the contact
+    would give energy; the step then belongs to scheme A.
+    """
+    a, loss, c = law[0, 1], law[0, 2], law[0, 3]
+    b0 = sums[0, 0, 0]
+    b1 = sums[1, 0, 0]
+    mean0 = sums[2, 0, 0]
+    mean1 = sums[3, 0, 0]
+    tangent = 0.0
+    if d0 > 0.0:
+        tangent = a * f0 / x0
+        tangent /= 1.0 + c * tangent
+    y = (e - b0 * f0 + 0.5 * b0 * tangent * d0) / (1.0 + 0.5 * b0 * tangent)
+    limit = 1e-2 * max(abs(e), abs(d0))
+    settled = False
+    old_y = 0.0
+    old_r = 0.0
+    f = 0.0
+    s = 0.0
+    for iteration in range(25):
+        x1, f1, v1 = law_at(y, law, 0)
+        g, d = law_pair(d0, x0, f0, v0, y, x1, f1, v1, law, 0)
+        middle = 0.5 * (d0 + y)
+        scale = 1.0 + d * mean0
+        if loss == 0.0:
+            s = f1 - f0
+            f = (g + d * (ea - mean1 * s - middle)) / scale
+        else:
+            right = g + d * (ea - middle) + loss * (v1 - v0) / h
+            top = f1 - f0 + loss * (f1 * vf - f0 * rate0)
+            m12 = d * mean1
+            m21 = loss * f1 * sums[4, 0, 0]
+            m22 = 1.0 + loss * f1 * sums[5, 0, 0]
+            det = scale * m22 - m12 * m21
+            f = (right * m22 - m12 * top) / det
+            s = (scale * top - m21 * right) / det
+        r = y - e + b0 * f + b1 * s
+        if settled or r == 0.0:
+            settled = True
+            break
+        if loss == 0.0 or iteration == 0:
+            tangent = 0.0
+            if y > 0.0 and x1 > 0.0:
+                tangent = a * f1 / x1
+                tangent /= 1.0 + c * tangent
+            span = y - d0
+            if abs(span) > 1e-6 * (abs(y) + abs(d0)):
+                turn = (f1 - g) / span
+                bend = (tangent - d) / span
+            else:
+                turn = 0.5 * d
+                bend = 0.0
+            rise = turn + bend * (ea - mean1 * s - middle - mean0 * f) - d * (mean1 * tangent + 0.5)
+            slope = 1.0 + b0 * rise / scale + b1 * tangent
+        else:
+            slope = (r - old_r) / (y - old_y)
+        step = -r / slope
+        if not abs(step) < 1e300:
+            return False, y, f, s
+        old_y = y
+        old_r = r
+        y += step
+        if abs(step) <= 2e-15 * max(abs(y), limit) or y == old_y:
+            settled = True
+    if not settled or not f >= 0.0:
+        return False, y, f, s
+    if loss > 0.0:
+        _, _, v1 = law_at(y, law, 0)
+        lost = f * (y - d0) + s * (0.5 * (d0 + y) - (ea - mean0 * f - mean1 * s))
+        if lost < v1 - v0:
+            return False, y, f, s
+    return True, y, f, s
+
+
+@njit(cache=True, error_model="numpy")
 def ramp_forces(h, y, now, law, e, ea, vf, sums, work, out_f, out_s, out_r):
     """Mean and slope of the forces of scheme A4 if the step ended at approaches y, and the residual in y."""
     m = law.shape[0]
-    if m == 1:
-        d0 = now[0, 0]
-        x1, f1, v1 = law_at(y[0], law, 0)
-        g, d = law_pair(d0, now[1, 0], now[2, 0], now[3, 0], y[0], x1, f1, v1, law, 0)
-        loss = law[0, 2]
-        right = g + d * (ea[0] - 0.5 * (d0 + y[0])) + loss * (v1 - now[3, 0]) / h
-        m11 = 1.0 + d * sums[2, 0, 0]
-        if loss == 0.0:
-            s = f1 - now[2, 0]
-            f = (right - d * sums[3, 0, 0] * s) / m11
-        else:
-            top = f1 - now[2, 0] + loss * (f1 * vf[0] - now[2, 0] * now[4, 0])
-            m12 = d * sums[3, 0, 0]
-            m21 = loss * f1 * sums[4, 0, 0]
-            m22 = 1.0 + loss * f1 * sums[5, 0, 0]
-            det = m11 * m22 - m12 * m21
-            f = (right * m22 - m12 * top) / det
-            s = (m11 * top - m21 * right) / det
-        out_f[0] = f
-        out_s[0] = s
-        out_r[0] = y[0] - e[0] + sums[0, 0, 0] * f + sums[1, 0, 0] * s
-        return True
     matrix = work[0]
     vector = work[2, 2]
     for i in range(m):
@@ -685,63 +741,34 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
     y2 = work[4, 0]
     jacobian = work[1]
     settled = False
-    if m == 1:
-        slope = 0.0
-        before = 0.0
-        scale = max(abs(e[0]), abs(now[0, 0]))
-        for iteration in range(25):
-            ramp_forces(h, out_y, now, law, e, ea, vf, sums, work, out_f, out_s, r)
-            if settled or r[0] == 0.0:
-                settled = True
-                break
-            if iteration == 0:
-                x1, f1, v1 = law_at(out_y[0], law, 0)
-                _, d = law_pair(now[0, 0], now[1, 0], now[2, 0], now[3, 0], out_y[0], x1, f1, v1, law, 0)
-                slope = 1.0 + 0.5 * sums[0, 0, 0] * d
-            else:
-                dr = r[0] - before
-                if dr != 0.0 and y2[0] != 0.0:
-                    slope = dr / y2[0]
-            if not abs(slope) > 0.0:
-                return False
-            step = -r[0] / slope
-            before = r[0]
-            old = out_y[0]
-            out_y[0] = old + step
-            y2[0] = out_y[0] - old
-            if not abs(step) < 1e300:
-                return False
-            if abs(step) <= 2e-15 * max(abs(out_y[0]), 1e-2 * scale) or y2[0] == 0.0:
-                settled = True
-    else:
-        for _ in range(20):
-            if not ramp_forces(h, out_y, now, law, e, ea, vf, sums, work, out_f, out_s, r):
-                return False
-            if settled:
-                break
-            scale = 0.0
+    for _ in range(20):
+        if not ramp_forces(h, out_y, now, law, e, ea, vf, sums, work, out_f, out_s, r):
+            return False
+        if settled:
+            break
+        scale = 0.0
+        for i in range(m):
+            scale = max(scale, abs(e[i]), abs(now[0, i]))
+        for j in range(m):
             for i in range(m):
-                scale = max(scale, abs(e[i]), abs(now[0, i]))
-            for j in range(m):
-                for i in range(m):
-                    y2[i] = out_y[i]
-                shift = 1e-7 * max(abs(out_y[j]), 1e-3 * scale)
-                y2[j] += shift
-                shift = y2[j] - out_y[j]
-                if not ramp_forces(h, y2, now, law, e, ea, vf, sums, work, f2, s2, r2):
-                    return False
-                for i in range(m):
-                    jacobian[i, j] = (r2[i] - r[i]) / shift
-            if not solve_linear(jacobian, r, m):
+                y2[i] = out_y[i]
+            shift = 1e-7 * max(abs(out_y[j]), 1e-3 * scale)
+            y2[j] += shift
+            shift = y2[j] - out_y[j]
+            if not ramp_forces(h, y2, now, law, e, ea, vf, sums, work, f2, s2, r2):
                 return False
-            largest = 0.0
             for i in range(m):
-                out_y[i] -= r[i]
-                largest = max(largest, abs(r[i]))
-            if not largest < 1e300:
-                return False
-            if largest <= 4e-15 * scale:
-                settled = True
+                jacobian[i, j] = (r2[i] - r[i]) / shift
+        if not solve_linear(jacobian, r, m):
+            return False
+        largest = 0.0
+        for i in range(m):
+            out_y[i] -= r[i]
+            largest = max(largest, abs(r[i]))
+        if not largest < 1e300:
+            return False
+        if largest <= 4e-15 * scale:
+            settled = True
     if not settled:
         return False
     for i in range(m):
@@ -1031,14 +1058,21 @@ def try_step(ramp, h, table, sums, shape, offset, bias, law, q, p, now, free_q, 
     """Solve one step of length h from the state; return 1 for A4, 0 for A (asked for, or fallen back to)."""
     m = y.size
     predict(shape, table, offset, bias, q, p, free_q, free_p, end)
-    solve_constants(h, now, law, end[0], sums, work, y, f)
     fine = 0
+    if m == 1 and ramp and (now[0, 0] > 0.0 or end[0, 0] > 0.0):
+        settled, y[0], f[0], s[0] = solve_ramp(
+            h, now[0, 0], now[1, 0], now[2, 0], now[3, 0], now[4, 0], end[0, 0], end[1, 0], end[2, 0], sums, law
+        )
+        if settled:
+            rate[0] = end[2, 0] - sums[4, 0, 0] * f[0] - sums[5, 0, 0] * s[0]
+            return 1
+    solve_constants(h, now, law, end[0], sums, work, y, f)
     pressed = False
     for i in range(m):
         s[i] = 0.0
         if f[i] > 0.0:
             pressed = True
-    if ramp and pressed:
+    if ramp and pressed and m > 1:
         keep = work[4, 1]
         for i in range(m):
             keep[i] = y[i]
@@ -1271,7 +1305,7 @@ def run_energy(
                     if guess >= high:
                         guess = 0.5 * high
                     continue
-                if abs(y[target]) <= 2e-15 * scale or high - low <= 4e-16 * high:
+                if abs(y[target]) <= 1e-13 * scale or high - low <= 4e-16 * high:
                     break
                 if (y[target] > 0.0) != pressed[target]:
                     high = h

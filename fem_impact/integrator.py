@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,12 @@ RICHARDSON = {"A": 3.0, "A4": 7.0, "collocation": 1.0}  # [-] difference of two 
 COLLOCATION_BELOW = 1e-7  # [-] tolerance from which collocation needs less work than A4
 NODES = 5  # [-] of collocation; more gain nothing where onset and release limit the smoothness
 RESOLVABLE = 0.3  # [-] contact stiffness times residual compliance up to which the estimate of its error holds
-STATIC_ERROR = 0.5  # [-] force error over k C omega_0/omega_c with residual compliance, see accuracy.py
+THINNED = 1.4  # [-] highest frequency kept over that of the run that tells what the modes left out do
+REST_FLOOR = 1e-12  # [-] residual compliance below this share of the whole is rounding
+REST_ABOVE = {
+    1: 1.53,
+    2: 1.73,
+}  # [-] by dimension: sqrt of sum u2/w2 over sum u2/w4 beyond the last mode, over omega**2
 NOISE = 1e-16  # [-] approaches below this times duration and speed are rounding: contacts that merely touch
 STILL = 1e-12  # [-] rigid approaches slower than this times the speed are rounding, not a contact to come
 ROUNDING = 1e-13  # [-] below this two runs cannot be told apart
@@ -175,8 +181,8 @@ def collide(
             "duration or max_impacts must be given where a constant force keeps pressing the bodies together"
         )
     pace = _pace(system)
-    history, step_error, ran = _controlled(system, scheme, dt, tolerance, pace, horizon, n_max)
-    truncation, resolvable = _truncation(bodies, contacts, system, pace[0], residual)
+    history, step_error, ran, coarse, size = _controlled(system, scheme, dt, tolerance, pace, horizon, n_max)
+    truncation, resolvable = _truncation(bodies, system, coarse, ran, size, pace, horizon, n_max)
     error = Error(step_error, truncation, _mesh_error(bodies, history), resolvable)
     laws = tuple(touch.law for touch in contacts)
     return Response(bodies, laws, history, arriving, tolerance, ran, error)
@@ -187,28 +193,26 @@ def _assemble(bodies, contacts, speeds, states, forces, residual) -> tuple[_Syst
     if not bodies or not contacts:
         raise ValueError(f"bodies and contacts must not be empty, got {len(bodies)} and {len(contacts)}")
     starts = np.concatenate([[0], np.cumsum([modes.n_modes for modes in bodies])])
-    omega = np.concatenate([modes.omega for modes in bodies])
-    zeta = np.concatenate([modes.damping_ratio for modes in bodies])
-    shape = np.zeros((len(contacts), len(omega)))
-    law = np.zeros((len(contacts), 4))
+    shape = np.zeros((len(contacts), starts[-1]))
+    law = np.array([[t.law.stiffness, t.law.exponent, t.law.loss, 0.0] for t in contacts])
+    ends: dict[int, list] = {body: [] for body in range(len(bodies))}  # (contact, point, sign) on each body
     first_row: dict[int, np.ndarray] = {}
-    first_point: dict[int, Any] = {}
     for i, touch in enumerate(contacts):
-        compliance = 0.0
         for body, at, sign in ((touch.first, touch.first_at, 1.0), (touch.second, touch.second_at, -1.0)):
             if body is None:
                 continue
-            if not 0 <= body < len(bodies):
+            if body not in ends:
                 raise ValueError(f"contacts must join bodies 0 to {len(bodies) - 1}, got {body}")
             modes = bodies[body]
             point = modes.points("at", at)[:1]
-            row = modes.shape_at(point if modes.dimension else None)[0]
+            row = modes.shapes.at(point)[0]
             shape[i, starts[body] : starts[body + 1]] += sign * row
             first_row.setdefault(body, row)
-            first_point.setdefault(body, point if modes.dimension else None)
-            if residual and modes.dimension:
-                compliance += max(0.0, float(modes.residual_compliance(point)[0, 0]))
-        law[i] = touch.law.stiffness, touch.law.exponent, touch.law.loss, compliance
+            ends[body].append((i, point, sign))
+    rest_omega, rest_zeta, rest_shape = _rest(bodies, ends, law, residual)
+    omega = np.concatenate([modes.omega for modes in bodies] + [rest_omega])
+    zeta = np.concatenate([modes.damping_ratio for modes in bodies] + [rest_zeta])
+    shape = np.hstack([shape, rest_shape])
     q, p, bias = np.zeros(len(omega)), np.zeros(len(omega)), np.zeros(len(omega))
     arriving = 0.0
     speeds = np.zeros(len(bodies)) if speeds is None else _check.array("speeds", speeds, (len(bodies),), "m/s")
@@ -221,7 +225,7 @@ def _assemble(bodies, contacts, speeds, states, forces, residual) -> tuple[_Syst
         if speeds[body] != 0.0:
             if not np.where(modes.omega == 0.0, row, 0.0).any():
                 raise ValueError(f"speeds must be zero for a body that cannot move rigidly, got {speeds[body]:g} m/s")
-            p[part] += speeds[body] * modes.rigid_motion(first_point[body])
+            p[part] += speeds[body] * modes.rigid_motion(ends[body][0][1] if modes.dimension else None)
             arriving = arriving or float(speeds[body])
         bias[part] = forces[body] * row
         if states is not None:
@@ -229,6 +233,38 @@ def _assemble(bodies, contacts, speeds, states, forces, residual) -> tuple[_Syst
             p[part] += _check.array("states", states[body][1], (modes.n_modes,))
     offset = np.array([-touch.law.gap for touch in contacts])
     return _System(omega, zeta, shape, offset, bias, law, q, p), arriving
+
+
+def _rest(bodies, ends, law, residual) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What the modes leave out: a compliance in series with a contact, written into ``law``, or modes standing for it.
+
+    A spring in series is exact only for one lossless contact on a body; elsewhere each eigenvector of the residual
+    compliance becomes a mode a little above the last one kept, so that loss and several contacts act on it as on any.
+    Returns frequencies, damping ratios and signed shapes (n_contacts, n_rest) of those modes.
+    """
+    omega, zeta, columns = [], [], []
+    for body, touched in ends.items():
+        modes = bodies[body]
+        if not residual or not modes.dimension or not touched:
+            continue
+        compliance = modes.residual_compliance(np.vstack([point for _, point, _ in touched]))
+        size, vectors = np.linalg.eigh(0.5 * (compliance + compliance.T))
+        whole = np.trace(modes.shapes.compliance(np.vstack([point for _, point, _ in touched])))
+        if not size[-1] > REST_FLOOR * whole:
+            continue
+        if len(touched) == 1 and law[touched[0][0], 2] == 0.0:
+            law[touched[0][0], 3] += size[-1]
+            continue
+        above = REST_ABOVE[min(modes.dimension, 2)] * modes.omega[-1]
+        for value, vector in zip(size, vectors.T):
+            if value > REST_FLOOR * size[-1] and above > 0.0:
+                column = np.zeros(len(law))
+                for (i, _, sign), part in zip(touched, vector):
+                    column[i] += sign * part * np.sqrt(value) * above
+                omega.append(above)
+                zeta.append(float(modes.damping_ratio[-1]))
+                columns.append(column)
+    return np.array(omega), np.array(zeta), np.array(columns).reshape(len(columns), len(law)).T
 
 
 def _pace(system: _System) -> tuple[float, float]:
@@ -270,8 +306,11 @@ def _wall_duration(k: float, exponent: float, mobility: np.ndarray, speed: float
     return 2.0 * np.sqrt(np.pi) * gamma(1.0 + q) / gamma(0.5 + q) * deepest / speed
 
 
-def _controlled(system, scheme, dt, tolerance, pace, horizon, n_max) -> tuple[History, float, str]:
-    """Run so that the tolerance is met, judged by a second, finer run; return the history and its estimated error."""
+def _controlled(system, scheme, dt, tolerance, pace, horizon, n_max) -> tuple[History, float, str, History, float]:
+    """Run so that the tolerance is met, judged by a second, finer run.
+
+    Returns the history, its estimated error, the scheme, and the coarser history with its size.
+    """
     if scheme is None:
         smooth = bool((system.law[:, 1] >= 1.0).all())
         scheme = "collocation" if tolerance < COLLOCATION_BELOW and smooth else "A4"
@@ -281,7 +320,7 @@ def _controlled(system, scheme, dt, tolerance, pace, horizon, n_max) -> tuple[Hi
     if dt is not None:
         fine = _run(system, scheme, dt, pace, horizon, n_max)
         coarse = _run(system, scheme, 2.0 * dt, pace, horizon, n_max)
-        return fine, _difference(coarse, fine, system) / RICHARDSON[scheme], scheme
+        return fine, _difference(coarse, fine) / RICHARDSON[scheme], scheme, coarse, 2.0 * dt
     if scheme == "collocation":
         sizes = [max(1e-15, tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)]
     else:
@@ -289,11 +328,11 @@ def _controlled(system, scheme, dt, tolerance, pace, horizon, n_max) -> tuple[Hi
         sizes = [shortest / count * 2.0 ** (1 - n) for n in range(DOUBLINGS + 1)]
     coarse = _run(system, scheme, sizes[0], pace, horizon, n_max)
     best = np.inf
-    for size in sizes[1:]:
+    for before, size in pairwise(sizes):
         fine = _run(system, scheme, size, pace, horizon, n_max)
-        estimate = _difference(coarse, fine, system) / RICHARDSON[scheme]
+        estimate = _difference(coarse, fine) / RICHARDSON[scheme]
         if estimate <= tolerance:
-            return fine, estimate, scheme
+            return fine, estimate, scheme, coarse, before
         best = min(best, estimate)
         coarse = fine
     raise SimulationError(
@@ -334,11 +373,11 @@ def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.append(nodes, 1.0), np.ascontiguousarray(powers)
 
 
-def _scalars(history: History, system: _System) -> np.ndarray:
+def _scalars(history: History) -> np.ndarray:
     """Restitution-like speed, impulse, contact time and peak force."""
     impacts = history.impacts
-    moving = system.omega == 0.0
-    scale = np.sqrt(max(float(system.start_p @ system.start_p), 1e-300))
+    moving = history.omega == 0.0
+    scale = np.sqrt(max(float(history.start_p @ history.start_p), 1e-300))
     speed = history.end_p[moving] / scale
     impulse = sum(impact.impulse for impact in impacts)
     return np.array(
@@ -346,36 +385,54 @@ def _scalars(history: History, system: _System) -> np.ndarray:
     )
 
 
-def _difference(coarse: History, fine: History, system: _System) -> float:
+def _difference(coarse: History, fine: History) -> float:
     """Largest difference of two runs in what the tolerance speaks of; 1 where they count impacts differently."""
     if len(coarse.impacts) != len(fine.impacts) or coarse.status != fine.status:
         return 1.0
-    one, two = _scalars(coarse, system), _scalars(fine, system)
+    one, two = _scalars(coarse), _scalars(fine)
     scale = np.ones_like(two)
     scale[-3:] = np.where(two[-3:] > 0.0, two[-3:], 1.0)
     return max(float(np.max(np.abs(one - two) / scale)), ROUNDING)
 
 
-def _truncation(bodies, contacts, system: _System, shortest: float, residual: bool) -> tuple[float, bool]:
-    """Estimated error [-] of leaving out modes, and whether the estimate can be trusted."""
-    if not residual or not (system.law[:, 3] > 0.0).any():
-        return 0.0, True
-    omega_0 = np.pi / shortest
-    worst, trusted = 0.0, True
-    for i, touch in enumerate(contacts):
-        k, exponent, _, compliance = system.law[i]
-        if compliance == 0.0:
+def _truncation(bodies, system: _System, whole: History, scheme, size, pace, horizon, n_max) -> tuple[float, bool]:
+    """Estimated error [-] of leaving out modes, and whether the estimate can be trusted.
+
+    The run is repeated with the upper modes left out as well, their compliance in their place; as the error falls
+    with the square of the highest frequency or faster, the change bounds what the modes left out already do.
+    """
+    law = system.law.copy()
+    keep = np.full(len(system.omega), True)
+    least = np.inf  # [-] ratio of the highest frequencies, of the body that loses least
+    start = 0
+    for modes in bodies:
+        part = slice(start, start + modes.n_modes)
+        start += modes.n_modes
+        complete = not modes.dimension or not (system.law[:, 3] * (system.shape[:, part] != 0.0).any(axis=1)).any()
+        if complete or modes.n_modes - modes.n_rigid < 2:
             continue
-        mobile = float(system.shape[i, system.omega <= omega_0] @ system.shape[i, system.omega <= omega_0])
-        stiffness = omega_0**2 / mobile if mobile > 0.0 else k
-        last = min(
-            bodies[b].omega[-1] for b in (touch.first, touch.second) if b is not None and bodies[b].omega[-1] > 0.0
-        )
-        ratio = omega_0 / last if last > 0.0 else 1.0
-        share = stiffness * compliance
-        worst = max(worst, STATIC_ERROR * share * ratio * (ratio if exponent > 1.2 else 1.0))
-        trusted &= share <= RESOLVABLE
-    return float(worst), bool(trusted)
+        omega = system.omega[part]
+        limit = max(omega[-1] / THINNED, omega[modes.n_rigid])
+        keep[part] = omega <= limit
+        least = min(least, omega[-1] / omega[omega <= limit][-1])
+    gone = ~keep
+    if not gone.any():
+        return 0.0, True
+    law[:, 3] += (system.shape[:, gone] ** 2 / system.omega[gone] ** 2).sum(axis=1)
+    fewer = replace(
+        system,
+        omega=system.omega[keep],
+        zeta=system.zeta[keep],
+        shape=np.ascontiguousarray(system.shape[:, keep]),
+        bias=system.bias[keep],
+        law=law,
+        start_q=system.start_q[keep],
+        start_p=system.start_p[keep],
+    )
+    less = _run(fewer, scheme, size, pace, horizon, n_max)
+    change = _difference(less, whole)
+    stiffness = (np.pi / pace[0]) ** 2 / np.maximum((system.shape**2) @ (system.omega <= np.pi / pace[0]), 1e-300)
+    return float(change / (least**2 - 1.0)), bool((stiffness * system.law[:, 3] <= RESOLVABLE).all())
 
 
 def _mesh_error(bodies: tuple[Modes, ...], history: History) -> float:

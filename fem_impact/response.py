@@ -392,7 +392,9 @@ class Response:
             part = self.body_slice(body)
             q, p = h.end_q[part], h.end_p[part]
             result[name] = float(0.5 * (p @ p + (h.omega[part] * q) @ (h.omega[part] * q)) - h.bias[part] @ q)
-        result["contact"] = self._balance["contact"]
+        rest = slice(self.body_slice(len(self.bodies) - 1).stop, None)  # modes standing for what the bodies leave out
+        q, p = h.end_q[rest], h.end_p[rest]
+        result["contact"] = self._balance["contact"] + float(0.5 * (p @ p + (h.omega[rest] * q) @ (h.omega[rest] * q)))
         result["dissipated"] = sum(self.dissipated.values())
         return result
 
