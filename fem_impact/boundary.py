@@ -46,21 +46,45 @@ def follow(points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndar
             place = points[np.append(loop[run, 0], loop[run[-1], 1])]
             known = np.array([given[f] for f in facets]) if all(f in given for f in facets) else None
             middles[facets], tangents[facets], curvatures[facets] = _fit(place, closed, known)
-        _join(numbers, tangents, curvatures)
+        join(np.column_stack([np.roll(numbers, 1), numbers]), tangents, curvatures)
     ends = points[np.concatenate(loops)]
     sag = np.linalg.norm(middles - ends.mean(axis=1), axis=1)
     curved = sag > 1e-9 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     return Rim(middles, tangents, curvatures, int(curved.sum()), n_corners)
 
 
-def _join(numbers: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> None:
-    """Give both facets at a vertex one tangent where a curve runs smoothly into its neighbour; in place."""
-    for before, facet in zip(np.roll(numbers, 1), numbers):
-        a, b = tangents[before, 1], tangents[facet, 0]
-        angle = abs(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
-        if 0.0 < angle < JOINT and np.any(curvatures[[before, facet]]):
-            mean = (a + b) / np.linalg.norm(a + b)
-            tangents[before, 1] = tangents[facet, 0] = mean
+def join(pairs: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> None:
+    """Give both facets at a vertex one tangent where a curve runs smoothly into its neighbour; in place.
+
+    pairs (n, 2) are the facets before and after each vertex.
+    """
+    a, b = tangents[pairs[:, 0], 1], tangents[pairs[:, 1], 0]
+    angle = np.abs(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)))
+    bent = curvatures[pairs].any(axis=(1, 2))
+    near = (angle > 0.0) & (angle < JOINT) & bent
+    mean = (a + b)[near] / np.linalg.norm((a + b)[near], axis=1)[:, None]
+    tangents[pairs[near, 0], 1] = mean
+    tangents[pairs[near, 1], 0] = mean
+
+
+def smooth_runs(place: np.ndarray) -> list[tuple]:
+    """Runs between the corners of a closed loop of points (n, 2).
+
+    Returns
+    -------
+    list of (points (m + 1, 2), tangents (m, 2, 2), curvatures (m, 2), circle), circle being None or (centre, radius)
+    """
+    runs = []
+    for run, closed in _runs(_corners(place)):
+        points = place[np.append(run, (run[-1] + 1) % len(place))]
+        _, tangents, curvatures = _fit(points, closed, None)
+        circle = None
+        if curvatures.any():
+            origin, radius = _circle(points)
+            if np.abs(np.linalg.norm(points - origin, axis=1) - radius).max() < ROUND * radius:
+                circle = origin, radius
+        runs.append((points, tangents, curvatures, circle))
+    return runs
 
 
 def _turns(place: np.ndarray) -> np.ndarray:

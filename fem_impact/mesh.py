@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from . import _check, boundary, meshfile
+from . import _check, boundary, drawing, meshfile
 from .curves import divided
-from .outline import Outline, circle, extent, straight_loop
-from .triangulation import check_simple, triangulate
+from .outline import Outline, circle, crossed, extent, straight_loop
+from .triangulation import triangulate
 
 DEFAULT_DIVISIONS = 8  # [-] elements across the shorter side where no size is stated; find_modes refines on its own
 
@@ -150,7 +150,9 @@ def line(length: float, *, size: float | None = None) -> Mesh:
 
 def fill(outline: Outline, *, size: float | None = None) -> Mesh:
     """Mesh within any outline; without a size, `find_modes` chooses one."""
-    check_simple(outline)
+    problem = crossed(outline)
+    if problem:
+        raise ValueError(problem)
     size, stated = _element_size(size, extent(outline.outer) / DEFAULT_DIVISIONS)
     arrays = triangulate(outline, size)
     return Mesh(**arrays, recipe=partial(fill, outline), size=size, size_stated=stated)
@@ -187,6 +189,35 @@ def polygon(corners: Any, holes: Sequence[Any] = (), *, size: float | None = Non
     outer = straight_loop("corners", corners, "edge{}")
     inner = [straight_loop(f"holes[{i}]", hole, f"hole{i}") for i, hole in enumerate(holes)]
     return fill(Outline.around(outer, tuple(inner)), size=size)
+
+
+def outline(source: Any, *, size: float | None = None, unit: str | None = None) -> Mesh:
+    """Plate from a drawing, its curves kept curved.
+
+    Parameters
+    ----------
+    source : str, Path, shapely Polygon or array_like (n, 2) [m]
+        An .svg or .dxf file (needs ``pip install 'fem-impact[cad]'``), or geometry. The largest closed loop is the
+        outline, those inside it are holes. Points that turn little by little are joined by smooth curves.
+    size : float [m], optional
+        Element size; without it `find_modes` chooses one fine enough for the modes it is asked for.
+    unit : str, optional
+        What a number in the source means: "m", "cm", "mm", "um", "in" or "km"; otherwise the file says (SVG: px of
+        1/96 inch unless its width has a unit; DXF: $INSUNITS).
+
+    Returns
+    -------
+    Mesh
+        Edges are named by the id of an SVG shape or the layer of a DXF entity; without those "edge0", "edge1" ... from
+        corner to corner and "hole0" ... for holes. `Mesh.notes` says what was assumed.
+
+    Raises
+    ------
+    ValueError
+        Where the outline is open, crosses itself, or looks like millimetres taken for metres.
+    """
+    curve, notes = drawing.read(source, unit)
+    return replace(fill(curve, size=size), notes=tuple(notes))
 
 
 def load(path: Any, *, unit: str | None = None) -> Mesh:

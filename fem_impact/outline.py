@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from math import comb
 
 import numpy as np
+import shapely
 
 from . import _check
 
@@ -32,6 +33,10 @@ class Arc:
         """The same piece run backwards."""
         return replace(self, start=self.start + self.sweep, sweep=-self.sweep)
 
+    def named(self, name: str) -> "Arc":
+        """The same piece as part of a named edge."""
+        return replace(self, name=name)
+
     def moved(self, matrix: np.ndarray, shift: np.ndarray) -> "Arc":
         """The piece after points are multiplied by a matrix (2, 2) and shifted."""
         return replace(self, centre=matrix @ self.centre + shift, a=matrix @ self.a, b=matrix @ self.b)
@@ -58,6 +63,10 @@ class Bezier:
     def reversed(self) -> "Bezier":
         """The same piece run backwards."""
         return replace(self, control=self.control[::-1].copy())
+
+    def named(self, name: str) -> "Bezier":
+        """The same piece as part of a named edge."""
+        return replace(self, name=name)
 
     def moved(self, matrix: np.ndarray, shift: np.ndarray) -> "Bezier":
         """The piece after points are multiplied by a matrix (2, 2) and shifted."""
@@ -193,3 +202,23 @@ def straight_loop(name: str, corners, label: str) -> Loop:
         i = int(gap.argmin())
         raise ValueError(f"{name} has corners {i} and {(i + 1) % len(points)} at the same place; leave one out")
     return tuple(segment(a, b, label.format(i)) for i, (a, b) in enumerate(zip(points, after)))
+
+
+def crossed(outline: Outline) -> str:
+    """What makes an outline no body: it crosses itself, or a hole leaves it; empty where all is well."""
+    size = extent(outline.outer) / 30.0
+    outer = shapely.Polygon(polyline(outline.outer, size))
+    if not outer.is_valid:
+        return f"outline must not cross or touch itself: {shapely.is_valid_reason(outer)}"
+    holes: list[shapely.Polygon] = []
+    for i, loop in enumerate(outline.holes):
+        hole = shapely.Polygon(polyline(loop, min(size, extent(loop) / 8.0)))
+        if not hole.is_valid:
+            return f"holes[{i}] must not cross or touch itself: {shapely.is_valid_reason(hole)}"
+        if not outer.contains_properly(hole):
+            return f"holes[{i}] must lie inside the outline and not touch it"
+        for j, other in enumerate(holes):
+            if hole.intersects(other):
+                return f"holes[{i}] must not overlap or touch holes[{j}]"
+        holes.append(hole)
+    return ""

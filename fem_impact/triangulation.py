@@ -4,33 +4,14 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import shapely
 from netgen.geom2d import SplineGeometry
 
 from . import _check
-from .outline import Outline, Piece, crossing, curvature, divide, extent, is_straight, polyline, tangent
+from .boundary import join
+from .outline import Outline, Piece, crossing, curvature, divide, extent, is_straight, tangent
 
 SPREAD = 1.3  # [-] how much longer than asked for a side inside may get before the mesher divides it
 GRADING = 0.35  # [-] how fast the mesher lets elements grow away from small ones
-
-
-def check_simple(outline: Outline) -> None:
-    """Raise ValueError where the outline crosses itself or a hole leaves the body; the mesher would not return."""
-    size = extent(outline.outer) / 30.0
-    outer = shapely.Polygon(polyline(outline.outer, size))
-    if not outer.is_valid:
-        raise ValueError(f"outline must not cross or touch itself: {shapely.is_valid_reason(outer)}")
-    holes: list[shapely.Polygon] = []
-    for i, loop in enumerate(outline.holes):
-        hole = shapely.Polygon(polyline(loop, size))
-        if not hole.is_valid:
-            raise ValueError(f"holes[{i}] must not cross or touch itself: {shapely.is_valid_reason(hole)}")
-        if not outer.contains_properly(hole):
-            raise ValueError(f"holes[{i}] must lie inside the outline and not touch it")
-        for j, other in enumerate(holes):
-            if hole.intersects(other):
-                raise ValueError(f"holes[{i}] must not overlap or touch holes[{j}]")
-        holes.append(hole)
 
 
 def triangulate(outline: Outline, size: float) -> dict[str, Any]:
@@ -39,7 +20,7 @@ def triangulate(outline: Outline, size: float) -> dict[str, Any]:
     Parameters
     ----------
     outline : Outline
-        Already known to be simple (`check_simple`).
+        Already known to be simple (`outline.crossed`).
     size : float [m]
         Longest side of a triangle, about; where the outline turns quickly they are smaller.
 
@@ -100,6 +81,9 @@ def _follow(
             tangents[mine, end] = tangent(piece, t[:, end])
             curvatures[mine, end] = curvature(piece, t[:, end])
         edges.setdefault(piece.name, []).extend(mine.tolist())
+    follower = {int(a): i for i, a in enumerate(facets[:, 0])}
+    leader = {int(b): i for i, b in enumerate(facets[:, 1])}
+    join(np.array([[leader[v], follower[v]] for v in follower]), tangents, curvatures)
     named = {name: np.array(sorted(numbers)) for name, numbers in edges.items() if name}
     if "outer" not in named:
         named["outer"] = np.flatnonzero([any(chords[j][0] is piece for piece in outer) for j in owner])
