@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _check, boundary, drawing, meshfile
+from . import _check, boundary, cad, meshfile
 from .curves import divided
 from .outline import Outline, circle, crossed, extent, straight_loop
 from .triangulation import triangulate
@@ -216,7 +216,7 @@ def outline(source: Any, *, size: float | None = None, unit: str | None = None) 
     ValueError
         Where the outline is open, crosses itself, or looks like millimetres taken for metres.
     """
-    curve, notes = drawing.read(source, unit)
+    curve, notes = cad.read(source, unit)
     return replace(fill(curve, size=size), notes=tuple(notes))
 
 

@@ -9,7 +9,7 @@ PACKAGE = Path(__file__).parents[1] / "fem_impact"
 FLOORS = [
     {"_check", "_files", "_kernels"},
     {"outline", "curves", "boundary", "meshfile"},
-    {"triangulation", "drawing"},
+    {"triangulation", "cad"},
     {"mesh", "section", "contact", "elements", "supports", "eigen"},
     {"corners"},
     {"assembly"},

@@ -1,0 +1,275 @@
+"""Outlines from drawings: SVG, DXF, shapely polygons and lists of points, with curves kept as curves."""
+
+import math
+import re
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import _check
+from .boundary import smooth_runs
+from .meshfile import LARGEST, UNITS
+from .outline import Arc, Bezier, Loop, Outline, Piece, crossed, extent, polyline, segment, signed_area, tangent
+
+PIXEL = 0.0254 / 96.0  # [m] what SVG calls px
+DXF_UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 13: 1e-6, 14: 0.1}  # $INSUNITS -> m
+CLOSED = 1e-9  # [-] of the extent: gaps below this are rounding
+BRIDGED = 1e-3  # [-] gaps below this are closed and said
+SHORT = 1e-7  # [-] pieces below this are dropped
+CORNER = 0.1  # [rad] turn at which an edge ends and the next begins, where the drawing gives no names
+
+
+def read(source: Any, unit: str | None) -> tuple[Outline, list[str]]:
+    """Outline [m] and what was assumed, from a file name, a shapely polygon or points (n, 2)."""
+    notes: list[str] = []
+    if isinstance(source, (str, Path)):
+        path = Path(source)
+        if not path.is_file():
+            raise ValueError(f"source must name an .svg or .dxf file, got {str(source)!r}; there is no such file")
+        readers = {".svg": _svg, ".dxf": _dxf}
+        if path.suffix.lower() not in readers:
+            raise ValueError(f"source must be an .svg or .dxf file, got {path.name!r}; meshes are read by fi.mesh.load")
+        return _nested(path.name, readers[path.suffix.lower()](path, unit, notes)), notes
+    scale = 1.0 if unit is None else UNITS[_check.one_of("unit", unit, UNITS)]
+    if hasattr(source, "geom_type"):
+        if source.geom_type != "Polygon":
+            raise ValueError(f"source must be one shapely Polygon, got a {source.geom_type}; mesh its parts one by one")
+        rings = [source.exterior.coords, *(ring.coords for ring in source.interiors)]
+    else:
+        rings = [source]
+    loops = [_smoothed(np.asarray(ring, float)[..., :2] * scale, notes) for ring in rings]
+    return _nested("source", loops), notes
+
+
+def _smoothed(points: np.ndarray, notes: list[str]) -> Loop:
+    """Loop through points (n, 2): straight between corners, a smooth curve where the points turn little by little."""
+    points = _check.array("source", points, (None, 2), "m")
+    if len(points) > 1 and np.array_equal(points[0], points[-1]):
+        points = points[:-1]
+    if len(points) < 3:
+        raise ValueError(f"source must have at least three points, got {len(points)}")
+    if np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).min() == 0.0:
+        raise ValueError("source has the same point twice in a row; leave one out")
+    if signed_area(points) < 0.0:
+        points = points[::-1]
+    pieces: list[Piece] = []
+    for place, tangents, curvatures, circle in smooth_runs(points):
+        if circle is not None:
+            centre, radius = circle
+            start = math.atan2(*(place[0] - centre)[::-1])
+            turns = np.unwrap(np.arctan2(*(place - centre).T[::-1]))
+            axes = np.array([radius, 0.0]), np.array([0.0, radius])
+            pieces.append(Arc(centre, *axes, start, float(turns[-1] - turns[0])))
+        elif not curvatures.any():
+            pieces += [segment(a, b) for a, b in pairwise(place)]
+        else:
+            pieces += _quintics(place, tangents, curvatures)
+    n_curved = sum(not isinstance(piece, Bezier) or len(piece.control) > 2 for piece in pieces)
+    if n_curved:
+        notes.append(
+            "points that turn little by little were joined by smooth curves; fi.mesh.polygon joins them straight"
+        )
+    return tuple(pieces)
+
+
+def _quintics(place: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> list[Piece]:
+    """Quintic pieces through points (n + 1, 2) that meet tangents (n, 2, 2) and curvatures (n, 2) at their ends."""
+    pieces: list[Piece] = []
+    for a, b, (t0, t1), (k0, k1) in zip(place[:-1], place[1:], tangents, curvatures):
+        length = float(np.linalg.norm(b - a))
+        normal = np.array([[-t0[1], t0[0]], [-t1[1], t1[0]]])
+        c1 = a + length / 5.0 * t0
+        c2 = 2.0 * c1 - a + length**2 / 20.0 * k0 * normal[0]
+        c4 = b - length / 5.0 * t1
+        c3 = 2.0 * c4 - b + length**2 / 20.0 * k1 * normal[1]
+        pieces.append(Bezier(np.array([a, c1, c2, c3, c4, b])))
+    return pieces
+
+
+def _svg(path: Path, unit: str | None, notes: list[str]) -> list[Loop]:
+    """Closed loops [m] of every shape in an SVG file, y upward."""
+    try:
+        import svgelements
+    except ImportError:
+        raise ValueError("reading SVG needs svgelements: pip install 'fem-impact[cad]'") from None
+    try:
+        drawing = svgelements.SVG.parse(str(path))
+    except (SyntaxError, ValueError, OSError) as error:
+        raise ValueError(f"{path.name} cannot be read as SVG: {error}") from None
+    scale = PIXEL
+    width = re.fullmatch(r"\s*([\d.eE+-]+)\s*(mm|cm|in)\s*", str(drawing.values.get("width", "")))
+    if unit is not None:
+        box = drawing.viewbox.width if drawing.viewbox is not None and drawing.viewbox.width else drawing.width
+        scale = UNITS[_check.one_of("unit", unit, UNITS)] * float(box) / float(drawing.width)
+    elif width is not None:  # taken from here, because svgelements keeps seven digits of a millimetre
+        scale = float(width[1]) * UNITS[width[2]] / float(drawing.width)
+    else:
+        notes.append(f"{path.name} states no unit; px were taken at 96 to the inch, pass unit= for another")
+    flip = np.diag([scale, -scale])
+    found: list[Piece] = []
+    for shape in drawing.elements():
+        if not isinstance(shape, svgelements.Shape):
+            continue
+        whole = svgelements.Path(shape)
+        whole.reify()
+        name = str(shape.id) if shape.id else ""
+        found += [piece.moved(flip, np.zeros(2)) for piece in _svg_pieces(whole, svgelements, name)]
+    return _chained(path.name, found, notes)
+
+
+def _svg_pieces(whole: Any, svgelements: Any, name: str) -> list[Piece]:
+    pieces: list[Piece] = []
+    for part in whole:
+        if isinstance(part, svgelements.Arc):
+            centre, a, b = (np.array([p.x, p.y]) for p in (part.center, part.prx, part.pry))
+            pieces.append(Arc(centre, a - centre, b - centre, float(part.get_start_t()), float(part.sweep), name))
+        elif isinstance(part, svgelements.CubicBezier):
+            control = [part.start, part.control1, part.control2, part.end]
+            pieces.append(Bezier(np.array([[p.x, p.y] for p in control], float), name))
+        elif isinstance(part, svgelements.QuadraticBezier):
+            control = [part.start, part.control, part.end]
+            pieces.append(Bezier(np.array([[p.x, p.y] for p in control], float), name))
+        elif (
+            isinstance(part, (svgelements.Line, svgelements.Close)) and part.start is not None and part.end is not None
+        ):
+            pieces.append(segment((part.start.x, part.start.y), (part.end.x, part.end.y), name))
+    return pieces
+
+
+def _dxf(path: Path, unit: str | None, notes: list[str]) -> list[Loop]:
+    """Closed loops [m] of the lines, arcs, ellipses, polylines and splines in a DXF file's model space."""
+    try:
+        import ezdxf
+    except ImportError:
+        raise ValueError("reading DXF needs ezdxf: pip install 'fem-impact[cad]'") from None
+    try:
+        drawing = ezdxf.readfile(path)
+    except (OSError, ezdxf.DXFError) as error:
+        raise ValueError(f"{path.name} cannot be read as DXF: {error}") from None
+    if unit is not None:
+        scale = UNITS[_check.one_of("unit", unit, UNITS)]
+    else:
+        scale = DXF_UNITS.get(int(drawing.header.get("$INSUNITS", 0)), 0.0)
+        if not scale:
+            scale = 1.0
+            notes.append(f"{path.name} states no unit; its numbers were taken as metres, pass unit= for another")
+    found: list[Piece] = []
+    for entity in drawing.modelspace():
+        found += _dxf_pieces(entity)
+    found = [piece.moved(scale * np.eye(2), np.zeros(2)) for piece in found]
+    loops = _chained(path.name, found, notes)
+    size = max(extent(loop) for loop in loops)
+    if unit is None and size > LARGEST:
+        raise ValueError(
+            f"{path.name} extends over {size:g} m, which looks like millimetres taken for metres; "
+            "pass unit='mm' to load it, or unit='m' if it is that large"
+        )
+    return loops
+
+
+def _dxf_pieces(entity: Any) -> list[Piece]:
+    kind, name = entity.dxftype(), "" if entity.dxf.get("layer", "0") == "0" else str(entity.dxf.layer)
+
+    def flat(point: Any) -> np.ndarray:
+        return np.array([point[0], point[1]], float)
+
+    if kind == "LINE":
+        return [segment(flat(entity.dxf.start), flat(entity.dxf.end), name)]
+    if kind in ("ARC", "CIRCLE"):
+        start = math.radians(entity.dxf.start_angle) if kind == "ARC" else 0.0
+        stop = math.radians(entity.dxf.end_angle) if kind == "ARC" else 2.0 * math.pi
+        sweep = (stop - start) % (2.0 * math.pi) or 2.0 * math.pi
+        side = -1.0 if entity.dxf.extrusion.z < 0.0 else 1.0  # seen from below, x is mirrored
+        radius = float(entity.dxf.radius)
+        centre = flat(entity.dxf.center) * [side, 1.0]
+        return [Arc(centre, np.array([side * radius, 0.0]), np.array([0.0, radius]), start, sweep, name)]
+    if kind == "ELLIPSE":
+        a, b = flat(entity.dxf.major_axis), flat(entity.minor_axis)
+        start = float(entity.dxf.start_param)
+        sweep = (float(entity.dxf.end_param) - start) % (2.0 * math.pi) or 2.0 * math.pi
+        return [Arc(flat(entity.dxf.center), a, b, start, sweep, name)]
+    if kind in ("LWPOLYLINE", "POLYLINE"):
+        return [piece for part in entity.virtual_entities() for piece in _dxf_pieces(part)]
+    if kind == "SPLINE":
+        curve = entity.construction_tool()
+        if curve.is_rational:
+            parts = [part.control_points for part in curve.cubic_bezier_approximation(level=8)]
+        else:
+            parts = list(curve.bezier_decomposition())
+        return [Bezier(np.array([flat(p) for p in part]), name) for part in parts]
+    return []
+
+
+def _chained(name: str, pieces: list[Piece], notes: list[str]) -> list[Loop]:
+    """Join pieces end to end into closed loops."""
+    if not pieces:
+        raise ValueError(f"{name} has no outline: no path, line, arc or spline was found in it")
+    span = extent(tuple(pieces))
+    left = [piece for piece in pieces if extent((piece,)) > SHORT * span]
+    loops: list[Loop] = []
+    while left:
+        chain = [left.pop(0)]
+        while True:
+            start, stop = _start(chain[0]), _stop(chain[-1])
+            if np.linalg.norm(stop - start) <= CLOSED * span:
+                break
+            gaps = [min(np.linalg.norm(_start(p) - stop), np.linalg.norm(_stop(p) - stop)) for p in left]
+            best = int(np.argmin(gaps)) if gaps else -1
+            home = float(np.linalg.norm(start - stop))
+            if best >= 0 and gaps[best] <= min(BRIDGED * span, home):
+                piece = left.pop(best)
+                chain.append(piece if np.linalg.norm(_start(piece) - stop) <= gaps[best] else piece.reversed())
+            elif home <= BRIDGED * span:
+                notes.append(f"{name}: a gap of {home:g} m was closed")
+                break
+            else:
+                raise ValueError(
+                    f"{name} has an open outline: it ends at ({stop[0]:g}, {stop[1]:g}) m, "
+                    f"{home:g} m from its start; close the path there"
+                )
+        loops.append(tuple(chain))
+    return loops
+
+
+def _start(piece: Piece) -> np.ndarray:
+    return piece.at(np.zeros(1))[0]
+
+
+def _stop(piece: Piece) -> np.ndarray:
+    return piece.at(np.ones(1))[0]
+
+
+def _nested(name: str, loops: list[Loop]) -> Outline:
+    """The largest loop as outline, the others as its holes, edges named where the drawing did not."""
+    areas = [abs(signed_area(polyline(loop, extent(loop) / 50.0))) for loop in loops]
+    order = np.argsort(areas)[::-1]
+    outer = loops[order[0]]
+    outline = Outline.around(outer, tuple(loops[i] for i in order[1:]))
+    problem = crossed(outline)
+    if problem:
+        raise ValueError(f"{name}: {problem}")
+    holes = tuple(tuple(_renamed(p, f"hole{i}") for p in loop) for i, loop in enumerate(outline.holes))
+    return Outline(_edges(outline.outer), holes)
+
+
+def _renamed(piece: Piece, name: str) -> Piece:
+    return piece if piece.name else piece.named(name)
+
+
+def _edges(loop: Loop) -> Loop:
+    """Name the unnamed pieces of a loop edge0, edge1 ..., a new one after each corner."""
+    directions = [(tangent(piece, np.zeros(1))[0], tangent(piece, np.ones(1))[0]) for piece in loop]
+    sharp = []
+    for i, (first, _) in enumerate(directions):
+        before = directions[i - 1][1]
+        angle = math.atan2(before[0] * first[1] - before[1] * first[0], float(before @ first))
+        sharp.append(abs(angle) > CORNER)
+    start = sharp.index(True) if any(sharp) else 0
+    number, result = -1, []
+    for i in [*range(start, len(loop)), *range(start)]:
+        if sharp[i] or number < 0:
+            number += 1
+        result.append(_renamed(loop[i], f"edge{number}"))
+    return tuple(result)
