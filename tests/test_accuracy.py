@@ -31,8 +31,8 @@ def test_modes_up_to_the_cutoff_meet_the_tolerance(contact, tolerance):
     mass, striker = 0.03, fi.Striker.rigid(0.03)
     choice = {"contact": contact, "mass": mass, "speed": 1.0, "tolerance": tolerance}
     cutoff = accuracy.cutoff_frequency(plate(20), AT, **choice)
-    kept, many = plate(4000).truncated(max_frequency=cutoff), plate(4000)
-    assert kept.n_modes < 2000
+    kept, many = plate(6000).truncated(max_frequency=cutoff), plate(6000)
+    assert kept.n_modes < 3000
     # The first impact only: a later one magnifies what came before.
     blow = {"at": AT, "speed": 1.0, "tolerance": 1e-6, "max_impacts": 1}
     few, reference = (fi.strike(modes, striker, contact, **blow) for modes in (kept, many))
