@@ -546,10 +546,45 @@ def solve_linear(matrix, vector, n):
 
 
 @njit(cache=True, error_model="numpy")
-def solve_constants(h, now, law, e, sums, work, out_y, out_f):
-    """Scheme A for several contacts: one contact at a time (descent of a convex function), sped up by Newton steps.
+def mean_force(h, y, now, law, i):
+    """Mean force of scheme A for one contact ending at approach y, and its slope; the force never pulls."""
+    x1, f1, v1 = law_at(y, law, i)
+    g, d = law_pair(now[0, i], now[1, i], now[2, i], now[3, i], y, x1, f1, v1, law, i)
+    loss = law[i, 2] / h
+    f = g + loss * (v1 - now[3, i])
+    if f <= 0.0:
+        return 0.0, 0.0
+    span = y - now[0, i]
+    turn = (f1 - g) / span if abs(span) > 1e-6 * (abs(y) + abs(now[0, i])) else 0.5 * d
+    return f, turn + loss * f1
 
-    ``now`` holds approach, compression, force, energy and rate of each contact, (5, n_contacts).
+
+@njit(cache=True, error_model="numpy")
+def sweep_constants(h, now, law, e, sums, out_y, out_f):
+    """Solve scheme A's equations one contact at a time, the others' forces held; the largest relative change."""
+    m = e.size
+    change = 0.0
+    for i in range(m):
+        rest = e[i]
+        for j in range(m):
+            if j != i:
+                rest -= sums[0, i, j] * out_f[j]
+        old = out_f[i]
+        out_y[i], out_f[i] = solve_constant(
+            now[0, i], now[1, i], now[2, i], now[3, i], rest, sums[0, i, i], law[i, 2] / h, law, i
+        )
+        if out_f[i] != old:
+            change = max(change, abs(out_f[i] - old) / max(abs(out_f[i]), abs(old)))
+    return change
+
+
+@njit(cache=True, error_model="numpy")
+def solve_constants(h, now, law, e, sums, work, out_y, out_f):
+    """Scheme A for several contacts, whose equations minimise a convex function of the forces g.
+
+    The function is g.B g / 2 + the sum of the contacts' work at the approaches e - B g; Newton's method with a search
+    along each direction descends on it, sweeps over the contacts one by one begin and end it. ``now`` holds approach,
+    compression, force, energy and rate of each contact, (5, n_contacts).
     """
     m = e.size
     if m == 1:
@@ -557,63 +592,63 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
             now[0, 0], now[1, 0], now[2, 0], now[3, 0], e[0], sums[0, 0, 0], law[0, 2] / h, law, 0
         )
         return
+    for i in range(m):
+        out_f[i] = 0.0
+    for _ in range(4):
+        if sweep_constants(h, now, law, e, sums, out_y, out_f) <= 1e-15:
+            return
     matrix = work[0]
     step = work[2, 0]
-    trial = work[2, 1]
-    for i in range(m):
-        out_y[i] = e[i]
-        out_f[i] = 0.0
-    for _ in range(400):
-        change = 0.0
-        scale = 0.0
-        for i in range(m):
-            rest = e[i]
-            for j in range(m):
-                if j != i:
-                    rest -= sums[0, i, j] * out_f[j]
-            old = out_f[i]
-            out_y[i], out_f[i] = solve_constant(
-                now[0, i], now[1, i], now[2, i], now[3, i], rest, sums[0, i, i], law[i, 2] / h, law, i
-            )
-            change = max(change, abs(out_f[i] - old))
-            scale = max(scale, out_f[i])
-        if change <= 2e-16 * scale:
-            break
-        residual = 0.0
-        for i in range(m):
-            x1, f1, v1 = law_at(out_y[i], law, i)
-            g, slope = law_pair(now[0, i], now[1, i], now[2, i], now[3, i], out_y[i], x1, f1, v1, law, i)
-            span = out_y[i] - now[0, i]
-            turn = (f1 - g) / span if abs(span) > 1e-6 * (abs(out_y[i]) + abs(now[0, i])) else 0.5 * slope
-            turn += law[i, 2] / h * f1
-            if out_f[i] == 0.0:
-                turn = 0.0
-            step[i] = out_y[i] - e[i]
-            for j in range(m):
-                step[i] += sums[0, i, j] * out_f[j]
-            residual = max(residual, abs(step[i]))
-            for j in range(m):
-                matrix[j, i] = sums[0, j, i] * turn
-        for i in range(m):
-            matrix[i, i] += 1.0
-        if not solve_linear(matrix, step, m):
-            continue
+    slope = work[2, 1]
+    best = np.inf
+    for _ in range(60):
         worst = 0.0
         for i in range(m):
-            trial[i] = out_y[i] - step[i]
-        for i in range(m):
-            x1, f1, v1 = law_at(trial[i], law, i)
-            g, slope = law_pair(now[0, i], now[1, i], now[2, i], now[3, i], trial[i], x1, f1, v1, law, i)
-            step[i] = max(0.0, g + law[i, 2] / h * (v1 - now[3, i]))
-        for i in range(m):
-            r = trial[i] - e[i]
+            y = e[i]
             for j in range(m):
-                r += sums[0, i, j] * step[j]
-            worst = max(worst, abs(r))
-        if worst < 0.5 * residual:
+                y -= sums[0, i, j] * out_f[j]
+            force, slope[i] = mean_force(h, y, now, law, i)
+            step[i] = force - out_f[i]
+            if step[i] != 0.0:
+                worst = max(worst, abs(step[i]) / max(force, abs(out_f[i])))
+        if worst <= 1e-15 or (worst <= 1e-11 and worst >= 0.5 * best):
+            break
+        best = min(best, worst)
+        for i in range(m):
+            for j in range(m):
+                matrix[i, j] = slope[i] * sums[0, i, j]
+            matrix[i, i] += 1.0
+        if not solve_linear(matrix, step, m):
+            break
+        begin = 0.0
+        low = 0.0
+        high = 0.0
+        t = 1.0
+        for look in range(40):
+            rise = 0.0
             for i in range(m):
-                out_y[i] = trial[i]
-                out_f[i] = step[i]
+                y = e[i]
+                lift = 0.0
+                for j in range(m):
+                    y -= sums[0, i, j] * (out_f[j] + (t if look > 0 else 0.0) * step[j])
+                    lift += sums[0, i, j] * step[j]
+                force, _ = mean_force(h, y, now, law, i)
+                rise += lift * (out_f[i] + (t if look > 0 else 0.0) * step[i] - force)
+            if look == 0:
+                begin = rise
+                continue
+            if abs(rise) <= 0.5 * abs(begin):
+                break
+            if rise > 0.0:
+                high = t
+            else:
+                low = t
+            t = 0.5 * (low + high) if high > 0.0 else 2.0 * t
+        for i in range(m):
+            out_f[i] = out_f[i] + t * step[i]
+    for _ in range(200):
+        if sweep_constants(h, now, law, e, sums, out_y, out_f) <= 1e-15:
+            break
 
 
 @njit(cache=True, error_model="numpy")
@@ -746,29 +781,27 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
             return False
         if settled:
             break
-        scale = 0.0
-        for i in range(m):
-            scale = max(scale, abs(e[i]), abs(now[0, i]))
         for j in range(m):
             for i in range(m):
                 y2[i] = out_y[i]
-            shift = 1e-7 * max(abs(out_y[j]), 1e-3 * scale)
+            shift = 1e-7 * max(abs(out_y[j]), 1e-3 * abs(now[0, j]))
             y2[j] += shift
             shift = y2[j] - out_y[j]
+            if not shift > 0.0:
+                return False
             if not ramp_forces(h, y2, now, law, e, ea, vf, sums, work, f2, s2, r2):
                 return False
             for i in range(m):
                 jacobian[i, j] = (r2[i] - r[i]) / shift
         if not solve_linear(jacobian, r, m):
             return False
-        largest = 0.0
+        settled = True
         for i in range(m):
             out_y[i] -= r[i]
-            largest = max(largest, abs(r[i]))
-        if not largest < 1e300:
-            return False
-        if largest <= 4e-15 * scale:
-            settled = True
+            if not abs(r[i]) < 1e300:
+                return False
+            if abs(r[i]) > 4e-15 * max(abs(out_y[i]), 1e-2 * abs(now[0, i])):
+                settled = False
     if not settled:
         return False
     for i in range(m):
