@@ -9,6 +9,7 @@ _HOME = {
     "Material": "section",
     "Plate": "section",
     "Beam": "section",
+    "Elastic": "section",
     "Contact": "contact",
     "assemble": "assembly",
     "Modes": "modal",

@@ -1,5 +1,6 @@
 """From mesh, section and supports to stiffness and mass: everything about the body that its modes depend on."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -8,6 +9,7 @@ from scipy.linalg import qr
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags
 
 from . import _check
+from .attached import beam_springs, check_masses, plate_springs
 from .corners import around_corners
 from .curves import Curves
 from .elements import (
@@ -23,7 +25,7 @@ from .elements import (
     triangles,
 )
 from .mesh import Mesh
-from .section import Beam, Plate
+from .section import Beam, Elastic, Plate
 from .supports import Rim, cells_of_facets, constrain
 
 KINDS = ("clamped", "hinged", "free")
@@ -75,8 +77,9 @@ class System:
     held: np.ndarray = field(repr=False)  # (n_rigid,) unknowns that hold the rigid motions, statically determinate
     graded: bool = True  # whether rings of ever smaller triangles surround singular corners
     rim: Rim | None = field(default=None, repr=False)  # of the triangles solved on, in the frame; None on a beam
-    order: float = np.inf  # [-] power of the element size by which singular corners let the error of a frequency fall
+    order: float = np.inf  # [-] power of the element size by which singular points let the error of a frequency fall
     softness: float = 1.0  # [-] largest inertia over stiffness on the body, in the frame: its shortest waves
+    point_masses: tuple = ()  # pairs of point [m] and mass [kg]
 
     @property
     def n_dofs(self) -> int:
@@ -89,12 +92,7 @@ class System:
 
     def interpolate(self, points: np.ndarray) -> csr_matrix:
         """Deflection at points (n_points, dimension) [m] from the unknowns, (n_points, n_dofs) [-]."""
-        local = self.frame.local(points)
-        cells = self.space.locate(local)[0]
-        values = self.space.functions(cells, local[:, None, :], (0,))[0][:, 0]  # (n_points, n_local)
-        dofs = self.element_dofs[:, cells].T
-        rows = np.repeat(np.arange(len(points)), dofs.shape[1])
-        full = csr_matrix((values.ravel(), (rows, dofs.ravel())), shape=(len(points), self.expand.shape[0]))
+        full = _interpolation(self.space, self.element_dofs, self.expand.shape[0], self.frame.local(points))
         return full @ self.expand
 
 
@@ -104,6 +102,7 @@ def assemble(
     supports: dict | None = None,
     element: str = "argyris",
     *,
+    point_masses: Sequence = (),
     graded: bool = True,
 ) -> System:
     """Stiffness and mass of a body, held at its named edges.
@@ -112,10 +111,12 @@ def assemble(
     ----------
     mesh : Mesh
     section : Plate on a plane mesh, Beam on a line
-    supports : dict, name of an edge -> "clamped", "hinged" or "free"
-        Edges not named are free; "boundary" stands for all edges, and an edge named itself goes before it.
+    supports : dict, name of an edge -> "clamped", "hinged", "free" or an Elastic
+        Edges not named are free; "boundary" stands for all edges, and a part named itself goes before the whole.
     element : str
         "argyris" on a plate; beams always take Hermite elements.
+    point_masses : sequence of (point [m], mass [kg])
+        Bodies without extent that ride on the plate or beam.
     graded : bool
         Whether rings of ever smaller triangles are put at corners where the supports make the solution singular.
 
@@ -130,28 +131,30 @@ def assemble(
     """
     if not isinstance(mesh, Mesh):
         raise ValueError(f"mesh must be made by fi.mesh, got {type(mesh).__name__}")
-    kinds = _support_of_facets(mesh, supports or {})
-    _check.one_of("element", element, ("argyris", "hermite"))
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    centre, length = 0.5 * (low + high), float((high - low).max())
+    if element == "hermite" and mesh.dimension == 1:
+        element = "argyris"
+    _check.one_of("element", element, ("argyris",))
+    supports = supports or {}
     if mesh.dimension == 1 and isinstance(section, Beam):
-        return _assemble_beam(mesh, section, supports or {}, kinds, centre, length)
-    if mesh.dimension == 2 and isinstance(section, Plate):
-        order, fine = around_corners(mesh, kinds, section.material.nu)
-        fine = fine if graded else mesh
-        kinds = _support_of_facets(fine, supports or {})
-        made = _assemble_plate(fine, section, supports or {}, kinds, centre, length)
-        return replace(made, mesh=mesh, graded=graded, order=order)
-    wanted = "Plate" if mesh.dimension == 2 else "Beam"
-    raise ValueError(f"section must be a {wanted} on a mesh of dimension {mesh.dimension}, got {section!r:.80}")
+        made = _assemble_beam(mesh, section, supports)
+    elif mesh.dimension == 2 and isinstance(section, Plate):
+        order, fine = around_corners(mesh, _kinds(_support_of_facets(mesh, supports)), section.material.nu)
+        made = _assemble_plate(fine if graded else mesh, section, supports)
+        made = replace(made, mesh=mesh, graded=graded, order=order)
+    else:
+        wanted = "Plate" if mesh.dimension == 2 else "Beam"
+        raise ValueError(f"section must be a {wanted} on a mesh of dimension {mesh.dimension}, got {section!r:.80}")
+    masses = check_masses(point_masses, mesh.dimension)
+    return _reduced(made if not masses else _loaded(made, masses))
 
 
 def reassemble(system: System, mesh: Mesh) -> System:
     """The same body on another mesh of it."""
-    return assemble(mesh, system.section, system.supports, graded=system.graded)
+    section, supports, masses = system.section, system.supports, system.point_masses
+    return assemble(mesh, section, supports, point_masses=masses, graded=system.graded)
 
 
-def _support_of_facets(mesh: Mesh, supports: dict) -> list[str]:
+def _support_of_facets(mesh: Mesh, supports: dict) -> list[str | Elastic]:
     """The support of each facet."""
     if not isinstance(supports, dict):
         raise ValueError(f"supports must be a dict of edge name -> support, got {supports!r:.80}")
@@ -161,17 +164,26 @@ def _support_of_facets(mesh: Mesh, supports: dict) -> list[str]:
                 f"supports names edge {name!r}, but the mesh has {', '.join(sorted(mesh.edges))}"
                 + _check.nearest(name, mesh.edges)
             )
-        _check.one_of(f"supports[{name!r}]", kind, KINDS)
-    kinds = ["free"] * len(mesh.facets)
+        if not isinstance(kind, Elastic):
+            _check.one_of(f"supports[{name!r}]", kind, KINDS)
+    kinds: list[str | Elastic] = ["free"] * len(mesh.facets)
     stated: dict[int, str] = {}
-    for name in sorted(supports, key=lambda name: name != "boundary"):
-        for facet in mesh.edges[name].tolist():
-            if name != "boundary" and stated.setdefault(facet, name) != name and kinds[facet] != supports[name]:
+    for name in sorted(supports, key=lambda name: -len(mesh.edges[name])):
+        mine = mesh.edges[name].tolist()
+        for facet in mine:
+            before = stated.get(facet)
+            nested = before is not None and set(mine) < set(mesh.edges[before].tolist())
+            if before is not None and not nested and kinds[facet] != supports[name]:
                 raise ValueError(
-                    f"supports gives edge {stated[facet]!r} and edge {name!r} different supports, but they overlap"
+                    f"supports gives edge {before!r} and edge {name!r} different supports, but they overlap"
                 )
-            kinds[facet] = supports[name]
+            kinds[facet], stated[facet] = supports[name], name
     return kinds
+
+
+def _kinds(supports: list[str | Elastic]) -> list[str]:
+    """The conditions of each facet; an elastic support leaves its edge free and adds stiffness instead."""
+    return ["free" if isinstance(kind, Elastic) else kind for kind in supports]
 
 
 def _scatter(local: np.ndarray, element_dofs: np.ndarray, n_all: int) -> csc_matrix:
@@ -181,31 +193,114 @@ def _scatter(local: np.ndarray, element_dofs: np.ndarray, n_all: int) -> csc_mat
     return coo_matrix((local.ravel(), (rows.ravel(), columns.ravel())), shape=(n_all, n_all)).tocsc()
 
 
-def _finish(mesh, section, supports, element, mass, frame, K, M, expand, project, element_dofs, space) -> System:
-    """Put the supports on the matrices and find the rigid motions they leave."""
-    n_all = expand.shape[0]
-    rigid_all = space.linear(element_dofs, n_all)
-    left = project @ rigid_all
-    lost = rigid_all - expand @ left
-    scale = np.abs(rigid_all).max()
+@dataclass(frozen=True, eq=False)
+class _Raw:
+    """A body before its supports are put on the matrices: the fields of a System, on all unknowns."""
+
+    mesh: Mesh
+    section: Plate | Beam
+    supports: dict[str, Any]
+    mass: float
+    frame: Frame
+    K: csc_matrix
+    M: csc_matrix
+    springs: csc_matrix  # (n_all, n_all) what elastic supports and tension add to K
+    expand: csr_matrix
+    project: csr_matrix
+    element_dofs: np.ndarray
+    space: Any
+    softness: float
+    rim: Rim | None = None
+    graded: bool = True
+    order: float = np.inf
+    point_masses: tuple = ()
+
+    def interpolate(self, points: np.ndarray) -> csr_matrix:
+        """Deflection at points (n_points, dimension) [m] from all unknowns, (n_points, n_all) [-]."""
+        return _interpolation(self.space, self.element_dofs, self.expand.shape[0], self.frame.local(points))
+
+
+def _interpolation(space: Any, element_dofs: np.ndarray, n_all: int, local: np.ndarray) -> csr_matrix:
+    cells = space.locate(local)[0]
+    values = space.functions(cells, local[:, None, :], (0,))[0][:, 0]  # (n_points, n_local)
+    dofs = element_dofs[:, cells].T
+    rows = np.repeat(np.arange(len(local)), dofs.shape[1])
+    return csr_matrix((values.ravel(), (rows, dofs.ravel())), shape=(len(local), n_all))
+
+
+def _loaded(raw: _Raw, masses: list[tuple[np.ndarray, float]]) -> _Raw:
+    """The body with point masses on it."""
+    points, weights = np.array([point for point, _ in masses]), np.array([mass for _, mass in masses])
+    inside = raw.space.locate(raw.frame.local(points))[1]
+    if not inside.all():
+        i = int(np.argmin(inside))
+        where = ", ".join(f"{x:g}" for x in points[i])
+        raise ValueError(f"point of point_masses[{i}] must lie on the body, got ({where}) m")
+    rows = raw.interpolate(points)
+    M = (raw.M + rows.T @ diags(weights / raw.frame.mass) @ rows).tocsc()
+    # under a force at a point the plate moves as r**2 log r, which elements follow to second order
+    order = min(raw.order, 2.0) if raw.mesh.dimension == 2 else raw.order
+    return replace(raw, M=M, mass=raw.mass + float(weights.sum()), order=order, point_masses=tuple(masses))
+
+
+def _rigid(raw: _Raw) -> np.ndarray:
+    """Motions (n_dofs, n_rigid) of the unknowns the supports leave that cost no energy."""
+    every = raw.space.linear(raw.element_dofs, raw.expand.shape[0])
+    left = raw.project @ every
+    lost = every - raw.expand @ left
+    scale = np.abs(every).max()
     _, lengths, turn = np.linalg.svd(lost.T @ lost / scale**2)
-    kept = turn[np.sqrt(lengths) < RIGID * np.sqrt(n_all)].T  # (n_motions, n_rigid)
-    K, M = (expand.T @ K @ expand).tocsc(), (expand.T @ M @ expand).tocsc()
+    kept = turn[np.sqrt(lengths) < RIGID * np.sqrt(len(every))].T  # (n_motions, n_rigid)
+    if raw.springs.nnz and kept.shape[1]:
+        moving = every @ kept
+        energy, turn = np.linalg.eigh(moving.T @ (raw.springs @ moving))
+        kept = kept @ turn[:, energy <= RIGID * energy[-1]]
+    return left @ kept
+
+
+def _reduced(raw: _Raw) -> System:
+    """Put the supports on the matrices and find the rigid motions they leave."""
+    expand, rigid = raw.expand, _rigid(raw)
+    K, M = (expand.T @ (raw.K + raw.springs) @ expand).tocsc(), (expand.T @ raw.M @ expand).tocsc()
     size = 1.0 / np.sqrt(K.diagonal())
     even = diags(size)
     K, M, expand = (even @ K @ even).tocsc(), (even @ M @ even).tocsc(), (expand @ even).tocsr()
-    rigid = left @ kept
     held = qr(rigid.T, pivoting=True, mode="economic")[2][: rigid.shape[1]]
     rigid = rigid / size[:, None]
-    if kept.shape[1]:
+    if rigid.shape[1]:
         factor = np.linalg.cholesky(rigid.T @ (M @ rigid))
         rigid = np.linalg.solve(factor, rigid.T).T
-    K, M = 0.5 * (K + K.T).tocsc(), 0.5 * (M + M.T).tocsc()
-    return System(mesh, section, supports, element, mass, frame, K, M, expand, element_dofs, space, rigid, held)
+    return System(
+        raw.mesh,
+        raw.section,
+        raw.supports,
+        "argyris" if raw.mesh.dimension == 2 else "hermite",
+        raw.mass,
+        raw.frame,
+        0.5 * (K + K.T).tocsc(),
+        0.5 * (M + M.T).tocsc(),
+        expand,
+        raw.element_dofs,
+        raw.space,
+        rigid,
+        held,
+        raw.graded,
+        raw.rim,
+        raw.order,
+        raw.softness,
+        raw.point_masses,
+    )
 
 
-def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, kinds: list, centre: np.ndarray, length: float) -> System:
-    points = (mesh.points - centre) / length
+def _centred(mesh: Mesh) -> tuple[np.ndarray, float, np.ndarray]:
+    """Centre (dimension,) and length [m] of the box around a mesh, and its points in those units."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    centre, length = 0.5 * (low + high), float((high - low).max())
+    return centre, length, (mesh.points - centre) / length
+
+
+def _assemble_beam(mesh: Mesh, section: Beam, supports: dict) -> _Raw:
+    centre, length, points = _centred(mesh)
     line = segments(points, mesh.cells)
     space = HermiteSpace(line)
     element = Hermite(space)
@@ -217,20 +312,24 @@ def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, kinds: list, centr
     K = np.einsum("eqi,eq,eqj->eij", bend, stiffness * dx, bend)
     M = np.einsum("eqi,eq,eqj->eij", value, inertia * dx, value)
     dofs, n_all = numbering(line, element)
-    fixed = []
-    for vertex, kind in zip(mesh.facets[:, 0], kinds):
+    fixed: list[int] = []
+    ends: list[tuple[int, int]] = []
+    held: list[Elastic] = []
+    for vertex, kind in zip(mesh.facets[:, 0], _support_of_facets(mesh, supports)):
         cell, end = np.argwhere(vertex == line.t.T)[0]
         deflection, slope = dofs[2 * end : 2 * end + 2, cell].tolist()
-        fixed += {"clamped": [deflection, slope], "hinged": [deflection], "free": []}[kind]
+        if isinstance(kind, Elastic):
+            ends, held = [*ends, (deflection, slope)], [*held, kind]
+        else:
+            fixed += {"clamped": [deflection, slope], "hinged": [deflection], "free": []}[kind]
     free = np.setdiff1d(np.arange(n_all), fixed)
     if not free.size:
         raise ValueError("supports leave this mesh nothing to move; refine it")
     expand = csr_matrix((np.ones(len(free)), (free, np.arange(len(free)))), shape=(n_all, len(free)))
-    project = expand.T.tocsr()
-    mass = float((inertia * dx).sum()) * frame.mass
-    matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all)
-    system = _finish(mesh, section, supports, "hermite", mass, frame, *matrices, expand, project, dofs, space)
-    return replace(system, softness=float((inertia / stiffness).max()))
+    springs = beam_springs(ends, held, frame, n_all)
+    matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), springs.tocsc()
+    mass, softness = float((inertia * dx).sum()) * frame.mass, float((inertia / stiffness).max())
+    return _Raw(mesh, section, supports, mass, frame, *matrices, expand, expand.T.tocsr(), dofs, space, softness)
 
 
 def _fields(section, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -251,10 +350,8 @@ def _bent(mesh: Mesh, centre: np.ndarray, length: float, points: np.ndarray, pla
     return Bent(curves, facets, *cells_of_facets(facets, plane.t.T), plane.t.T)
 
 
-def _assemble_plate(
-    mesh: Mesh, section: Plate, supports: dict, kinds: list, centre: np.ndarray, length: float
-) -> System:
-    points = (mesh.points - centre) / length
+def _assemble_plate(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
+    centre, length, points = _centred(mesh)
     plane = triangles(points, mesh.cells)
     bent = _bent(mesh, centre, length, points, plane)
     mapping = None if bent is None else BentMapping(plane, bent)
@@ -278,10 +375,23 @@ def _assemble_plate(
         shape = (len(cells), 3 * x.shape[1], 21)
         K[cells] = bend.reshape(shape).transpose(0, 2, 1) @ moment.reshape(shape)
         M[cells] = (value * (inertia * dx)[cells, :, None]).transpose(0, 2, 1) @ value
-    rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, kinds)
+    held = _support_of_facets(mesh, supports)
+    rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, _kinds(held))
     expand, project, dofs = constrain(rim, space.vertices, *numbering(plane, element))
     n_all = expand.shape[0]
-    matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all)
+    springs = csc_matrix((n_all, n_all))
+    on = np.flatnonzero([isinstance(kind, Elastic) for kind in held])
+    if on.size:
+        cells = cells_of_facets(mesh.facets[on], space.vertices)[0]
+        elastic = [kind for kind in held if isinstance(kind, Elastic)]
+        springs = _scatter(plate_springs(space, mesh.facets[on], cells, elastic, frame), dofs[:, cells], n_all)
+    if section.tension:
+        if "free" in held:
+            raise ValueError("tension needs every edge supported, as a free edge cannot be pulled")
+        slope = space.functions(np.arange(len(x)), x, (1,))[0].transpose(0, 2, 1, 3)  # (n_cells, n_q, 2, 21)
+        pulled = section.tension * length**2 / frame.stiffness * dx[..., None, None] * slope
+        shape = (len(x), 2 * x.shape[1], 21)
+        springs = springs + _scatter(slope.reshape(shape).transpose(0, 2, 1) @ pulled.reshape(shape), dofs, n_all)
+    matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), springs
     mass = float((inertia * dx).sum()) * frame.mass
-    system = _finish(mesh, section, supports, "argyris", mass, frame, *matrices, expand, project, dofs, space)
-    return replace(system, softness=softness, rim=rim)
+    return _Raw(mesh, section, supports, mass, frame, *matrices, expand, project, dofs, space, softness, rim)

@@ -16,8 +16,10 @@ REFERENCE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 
 
 def applies(system: System) -> bool:
-    """Whether the closed form covers the body: an isotropic plate of constant thickness without tension."""
+    """Whether the closed form covers the body: an isotropic plate of constant thickness and nothing attached to it."""
     plate = system.section
+    if system.point_masses or any(not isinstance(kind, str) for kind in system.supports.values()):
+        return False
     if not isinstance(plate, Plate) or system.element != "argyris":
         return False
     return not callable(plate.thickness) and plate.material.E_across is None and plate.tension == 0.0

@@ -136,6 +136,24 @@ class Plate:
         return self.material.rho * evaluate("thickness", self.thickness, points, "m")
 
 
+@dataclass(frozen=True)
+class Elastic:
+    """Elastic support of an edge: springs against deflection and, if wanted, against turning.
+
+    Parameters
+    ----------
+    stiffness : float [N/m^2] force per deflection and length of a plate's edge; [N/m] at the end of a beam
+    rotation : float [N] moment per angle and length of a plate's edge; [N m] at the end of a beam
+    """
+
+    stiffness: float
+    rotation: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check.non_negative("stiffness", self.stiffness, "N/m^2")
+        _check.non_negative("rotation", self.rotation, "N")
+
+
 @dataclass(frozen=True, eq=False)
 class Beam:
     """Slender (Euler-Bernoulli) beam; make it with `Beam.rectangular` or `Beam.circular`.

@@ -7,12 +7,15 @@ import numpy as np
 from . import _check
 from .assembly import System, reassemble
 from .eigen import SPARE, Flexibility, count_below, lowest
+from .section import Plate
 
 WAVE_PER_ELEMENT = {"argyris": 1.5, "hermite": 0.3}  # [rad] error 1e-7 (kh)**8 and 7e-4 (kh)**4: below 1e-5 either way
 ERROR_OF_WAVE = {
     "argyris": (1e-7, 8.0),
     "hermite": (7e-4, 4.0),
 }  # relative error of a frequency: factor and power of kh
+LAYERS = 10.0  # [-] elements under tension are no larger than this times sqrt(D / tension): error 1e-5 on a disk
+FINEST_LAYER = 40.0  # [-] nor are they made smaller than the extent over this
 MOST_ORDER = 4.0  # [-] order of convergence that an error estimate relies on at most
 LEAST_ORDER = 1.0  # [-] and at least
 ROUNDING = 3e-12  # [-] error of a frequency that no refinement removes
@@ -104,6 +107,9 @@ def fine_enough(system: System, n_modes: int | None, max_frequency: float | None
         factor, power = ERROR_OF_WAVE[system.element]
         allowed = (tolerance / factor) ** (1.0 / power)
     size = allowed / _wave(system, n_modes, max_frequency)
+    if isinstance(system.section, Plate) and system.section.tension:  # the edge of a drumhead bends within its layer
+        layer = (system.frame.stiffness / system.section.tension) ** 0.5
+        size = min(size, max(LAYERS * layer, system.frame.length / FINEST_LAYER))
     if system.mesh.size_stated or size >= system.mesh.size:
         return system
     return reassemble(system, system.mesh.refined(system.mesh.size / size))

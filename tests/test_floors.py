@@ -11,7 +11,7 @@ FLOORS = [
     {"outline", "curves", "boundary", "meshfile"},
     {"triangulation", "cad"},
     {"mesh", "section", "contact", "elements", "supports", "eigen"},
-    {"corners"},
+    {"corners", "attached"},
     {"assembly"},
     {"pointload", "spectrum"},
     {"modal"},
