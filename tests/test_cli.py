@@ -102,7 +102,7 @@ def test_bad_scene_is_one_line_status_2_and_no_file(scene, tmp_path, capsys, old
 
 def test_bad_tolerance_of_the_command_is_told(scene, tmp_path, capsys):
     assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out"), "--tolerance", "-1"]) == 2
-    assert "tolerance must be positive, got -1" in capsys.readouterr().err
+    assert "tolerance must lie between 1e-12 and 1, got -1" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

@@ -198,7 +198,7 @@ BAD = [
     ("at = [0.1395, 0.09]", "at = [0.1]", r"\[strike\] at must have shape"),
     ("at = [0.1395, 0.09]", 'at = "middle"', r"\[strike\] at must be coordinates in m, got 'middle'"),
     ("speed = 2.0", "speed = -2.0", r"\[strike\] speed must .*-2 m/s"),
-    ("tolerance = 1e-2", "tolerance = 0", r"\[strike\] tolerance must be positive"),
+    ("tolerance = 1e-2", "tolerance = 0", r"\[strike\] tolerance must lie between"),
     ('boundary = "hinged"', 'boundary = "hinge"', r"\[supports\] boundary must be one of clamped, hinged, free"),
     ('boundary = "hinged"', 'lef = "hinged"', r"\[supports\] .*lef.*did you mean 'left'"),
     ('title = "test"', "title = 3", r"title must be text, got 3"),

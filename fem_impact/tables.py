@@ -1,0 +1,169 @@
+"""What a scene file may say: its tables, their keys, and the public functions they stand for."""
+
+import inspect
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from . import _check, integrator, mesh
+from .contact import Contact
+from .section import Beam, Material, Plate
+from .striker import Striker
+
+LARGEST_FILE = 1_000_000  # [byte] a scene is written by hand; more is a mistake, refused before it is read
+
+
+@dataclass(frozen=True)
+class Part:
+    """One table of a scene: which public function it stands for and the arguments it gives."""
+
+    kind: str = ""
+    values: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+
+
+def _beam(material: Material, *, width: Any = None, height: Any = None, diameter: Any = None) -> Beam:
+    if diameter is not None and width is None and height is None:
+        return Beam.circular(material, diameter=diameter)
+    if diameter is not None or width is None or height is None:
+        raise ValueError("width and height must both be given, or diameter alone")
+    return Beam.rectangular(material, width=width, height=height)
+
+
+def _sphere(*, radius: float, E: float, nu: float, rho: float) -> Striker:
+    return Striker.sphere(Material(E=E, nu=nu, rho=rho), radius)
+
+
+def target_values(*, mass=None, first_frequency=None, nu=0.3, damping_ratio=0.0, source="fe") -> dict[str, Any]:
+    """The table [target], checked: what to scale to, nu where there is no material, damping and source."""
+    _check.between("nu", nu, -1.0, 0.5)
+    _check.non_negative("damping_ratio", damping_ratio)
+    scale = {"mass": (mass, "kg"), "first_frequency": (first_frequency, "Hz")}
+    given = {name: _check.positive(name, value, unit) for name, (value, unit) in scale.items() if value is not None}
+    return {
+        "scale": given,
+        "nu": nu,
+        "damping_ratio": damping_ratio,
+        "source": _check.one_of("source", source, SOURCES),
+    }
+
+
+def _observe(*, points: Any) -> Any:
+    if not isinstance(points, list) or not points:
+        raise ValueError(f"points must be a list of points such as [[0.1, 0.2]], got {points!r:.80}")
+    return points
+
+
+SOURCES = ("fe", "analytic")
+# What makes each part of a scene: the keys of its table are the arguments of these functions, no list is kept twice.
+# A table whose first entry is not empty names its maker by that key.
+MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
+    "mesh": (
+        "shape",
+        {
+            "rectangle": mesh.rectangle,
+            "disk": mesh.disk,
+            "polygon": mesh.polygon,
+            "line": mesh.line,
+            "file": mesh.load,
+        },
+    ),
+    "material": ("", {"": Material}),
+    "section": ("kind", {"plate": Plate, "beam": _beam}),
+    "target": ("", {"": target_values}),
+    "striker": ("kind", {"rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick}),
+    "contact": (
+        "kind",
+        {
+            "linear": Contact.linear,
+            "hertz": Contact.hertz,
+            "power": Contact.power,
+            "restituting": Contact.restituting,
+            "between": Contact.between,
+        },
+    ),
+    "strike": ("", {"": integrator.strike}),
+    "observe": ("", {"": _observe}),
+}
+TABLES = [*MAKERS, "supports"]
+REQUIRED = ("mesh", "striker", "contact", "strike")
+SUPPLIED = {"material", "modes", "striker", "contact", "sphere", "plate"}  # arguments that come from other tables
+SUPPORTS = ("clamped", "hinged", "free")
+PATHS = ("source", "path")  # keys that name a file, relative to the scene
+
+
+def fault(path: Path, text: str) -> ValueError:
+    """One line naming the file, whatever a key or a value holds: a scene may come from anyone."""
+    return ValueError(f"{path}: " + "".join(c if c.isprintable() else repr(c)[1:-1] for c in text))
+
+
+def read_tables(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file as plain dicts; ValueError in one line where it is none."""
+    with open(path, "rb") as file:
+        raw = file.read(LARGEST_FILE + 1)
+    if len(raw) > LARGEST_FILE:
+        raise fault(path, f"a scene must be smaller than {LARGEST_FILE} bytes")
+    try:
+        return tomllib.loads(raw.decode("utf-8"))
+    except UnicodeDecodeError:
+        raise fault(path, "a scene must be UTF-8 text") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise fault(path, f"not valid TOML: {error}") from None
+
+
+def read_part(path: Path, table: str, values: dict[str, Any]) -> Part:
+    """One table with its keys checked against what its function takes; ValueError names file, table and key."""
+
+    def wrong(text: str) -> ValueError:
+        return fault(path, f"[{table}] {text}")
+
+    bad = _not_finite(values)
+    if bad:
+        raise wrong(f"{bad[0]} must be finite, got {bad[1]}")
+    if table == "supports":
+        for edge, support in values.items():
+            if support not in SUPPORTS:
+                raise wrong(f"{edge} must be one of {', '.join(SUPPORTS)}, got {support!r:.80}")
+        return Part("", MappingProxyType(values))
+    selector, makers = MAKERS[table]
+    values = dict(values)
+    if selector and selector not in values:
+        raise wrong(f"{selector} is missing; it is one of {', '.join(makers)}")
+    kind = values.pop(selector) if selector else ""
+    try:
+        _check.one_of(selector, kind, makers)
+        _check_keys(selector, kind, values, makers[kind])
+    except ValueError as error:
+        raise wrong(str(error)) from None
+    if table == "mesh":
+        values.update({key: str(path.parent / values[key]) for key in PATHS if key in values})
+    return Part(kind, MappingProxyType(values))
+
+
+def _check_keys(selector: str, kind: str, values: dict[str, Any], maker: Callable[..., Any]) -> None:
+    arguments = {n: p for n, p in inspect.signature(maker).parameters.items() if n not in SUPPLIED}
+    known = [selector, *arguments] if selector else list(arguments)
+    for key in values:
+        if key not in arguments:
+            hint = _check.nearest(key, known) or f"; it has {', '.join(known)}"
+            raise ValueError(f"{key} is not a key of this table{hint}")
+    for key, argument in arguments.items():
+        if argument.default is inspect.Parameter.empty and key not in values:
+            raise ValueError(f"{key} is missing" + (f" for {selector} = {kind!r}" if selector else ""))
+    for key in PATHS:
+        if key in values and selector == "shape" and not isinstance(values[key], str):
+            raise ValueError(f"{key} must be the name of a file, got {values[key]!r:.80}")
+
+
+def _not_finite(value: Any, name: str = "") -> tuple[str, float] | None:
+    """Name and value of the first number in nested data that is not finite."""
+    if isinstance(value, dict):
+        found = (_not_finite(item, f"{name}.{key}" if name else str(key)) for key, item in value.items())
+    elif isinstance(value, list):
+        found = (_not_finite(item, f"{name}[{i}]") for i, item in enumerate(value))
+    else:
+        return (name, value) if isinstance(value, float) and not math.isfinite(value) else None
+    return next((hit for hit in found if hit), None)
