@@ -1166,7 +1166,7 @@ def run_energy(
     Returns (steps, q, p, now, done, time, status, n_fallback, n_blind). Each row of steps is a step or a flight:
     start, length, blind; then per contact start approach, start rate, whether it pushes, and the force as powers of
     the fraction of the step. now (5, n_contacts) ends with the last approach, .., rate; done (n_contacts,) is the
-    integral of force times rate [J].
+    integral of force times rate [J]. A finished run ends at the last separation.
     """
     m, n_modes = shape.shape
     q = start_q.copy()
@@ -1226,6 +1226,9 @@ def run_energy(
             if pressed[i]:
                 idle = False
         if idle and not stalled:
+            for n in range(n_modes):
+                free_q[n] = q[n]
+                free_p[n] = p[n]
             for i in range(m):
                 steps[n_steps, 3 + 5 * i] = now[0, i]
                 steps[n_steps, 4 + 5 * i] = now[4, i]
@@ -1236,12 +1239,9 @@ def run_energy(
                 omega, zeta, shape, offset, bias, horizon - time, base, 1e-3 * base, depth, still, flights, flown, q, p
             )
             if found == 1:
-                time += elapsed
-                if elapsed > 0.0:
-                    steps[n_steps, 0] = time - elapsed
-                    steps[n_steps, 1] = elapsed
-                    steps[n_steps, 2] = 0.0
-                    n_steps += 1
+                for n in range(n_modes):
+                    q[n] = free_q[n]
+                    p[n] = free_p[n]
                 status = FINISHED
                 break
             if found == 4:
@@ -1700,17 +1700,23 @@ def run_collocation(
             if pressed[i]:
                 idle = False
         if idle:
+            for n in range(n_modes):
+                new_q[n] = q[n]
+                new_p[n] = p[n]
             elapsed, first, found = find_onset(
                 omega, zeta, shape, offset, bias, horizon - time, base, 1e-6 * base, depth, still, flights, flown, q, p
             )
+            if found == 1:
+                for n in range(n_modes):
+                    q[n] = new_q[n]
+                    p[n] = new_p[n]
+                status = FINISHED
+                break
             if elapsed > 0.0:
                 steps[n_steps, 0] = time
                 steps[n_steps, 1] = elapsed
                 n_steps += 1
                 time += elapsed
-            if found == 1:
-                status = FINISHED
-                break
             if found >= 3:
                 status = FAILED if found == 3 else EXHAUSTED
                 break

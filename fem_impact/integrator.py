@@ -421,12 +421,10 @@ def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.append(nodes, 1.0), np.ascontiguousarray(powers)
 
 
-def _scalars(history: History) -> np.ndarray:
-    """Restitution-like speed, impulse, contact time and peak force."""
+def _scalars(history: History, scale: float) -> np.ndarray:
+    """Rigid speeds over the largest speed there is, impulse, contact time and peak force."""
     impacts = history.impacts
-    moving = history.omega == 0.0
-    scale = np.sqrt(max(float(history.start_p @ history.start_p), 1e-300))
-    speed = history.end_p[moving] / scale
+    speed = history.end_p[history.omega == 0.0] / scale
     impulse = sum(impact.impulse for impact in impacts)
     return np.array(
         [*speed, impulse, sum(i.duration for i in impacts), max((i.peak_force for i in impacts), default=0.0)]
@@ -440,7 +438,8 @@ def _difference(coarse: History, fine: History, over: tuple[float, float] = (1.0
     """
     if len(coarse.impacts) != len(fine.impacts) or coarse.status != fine.status:
         return 1.0
-    one, two = _scalars(coarse), _scalars(fine)
+    momentum = np.linalg.norm(fine.start_p) or np.linalg.norm(fine.end_p) or 1.0
+    one, two = _scalars(coarse, float(momentum)), _scalars(fine, float(momentum))
     scale = np.ones_like(two)
     scale[-3:] = np.where(two[-3:] > 0.0, two[-3:], 1.0)
     scale[:-2] *= over[0]

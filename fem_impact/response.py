@@ -377,6 +377,9 @@ class Response:
             "contact": end_contact,
             "contact_loss": work - (end_contact - start_contact),
             "modal_loss": -(end - start) - work,
+            "scale": max(
+                0.5 * float(h.start_p @ h.start_p), 0.5 * float(h.end_p @ h.end_p), start_contact, abs(start), abs(end)
+            ),
         }
 
     @property
@@ -410,12 +413,11 @@ class Response:
 
     @property
     def energy_error(self) -> float:
-        """Energy that appeared or vanished without a reason, over the energy at the start [-]."""
+        """Energy that appeared or vanished without a reason, over the largest of the blow's energies [-]."""
         balance, lost = self._balance, self.dissipated
         unexplained = [balance["modal_loss"] - lost["modes"], balance["contact_loss"] - lost["contact"]]
         unexplained += [min(0.0, value) for value in lost.values()]
-        scale = max(abs(balance["start"]), abs(balance["end"]))
-        return float(sum(abs(value) for value in unexplained) / scale) if scale else 0.0
+        return float(sum(abs(value) for value in unexplained) / balance["scale"]) if balance["scale"] else 0.0
 
     @property
     def momentum_error(self) -> float:
