@@ -19,6 +19,7 @@ from .striker import Striker
 from .tables import MAKERS, REQUIRED, TABLES, Part, fault, read_part, read_tables, target_values
 
 SHARE = 0.45  # [-] of the tolerance each for the modes left out and for the time steps; the rest is the mesh's
+MARGINS = (1.0, 4.0, 16.0)  # [-] stricter choices of modes, taken one after another while those left out matter
 FIRST_LOOK = 20  # [-] modes found first: enough to set the scale and to tell how densely the others follow
 
 WORST_FREQUENCY = 0.1  # [-] error of a frequency that `find_modes` accepts at most
@@ -78,15 +79,18 @@ class Scene:
         """
         stages = _Stages(watch)
         blow = {**self.blow.values, **changes}
-        modes = self._modes(stages, None, blow)
-        with self._blame("observe"):
-            for point in self.points:
-                modes.points("points", [point])
-        with stages("strike"), self._blame("strike"):
-            tolerance = _check.positive("tolerance", blow.get("tolerance", integrator.TOLERANCE))
-            blow = {**blow, "tolerance": SHARE * tolerance}
-            response = integrator.strike(modes, self._striker(), self._contact(), **blow)
-            response = replace(response, tolerance=tolerance)
+        for margin in MARGINS:
+            modes = self._modes(stages, None, blow, margin)
+            with self._blame("observe"):
+                for point in self.points:
+                    modes.points("points", [point])
+            with stages("strike"), self._blame("strike"):
+                tolerance = _check.positive("tolerance", blow.get("tolerance", integrator.TOLERANCE))
+                asked = {**blow, "tolerance": SHARE * tolerance}
+                response = integrator.strike(modes, self._striker(), self._contact(), **asked)
+                response = replace(response, tolerance=tolerance)
+            if response.error.truncation <= SHARE * tolerance or not blow.get("residual", True):
+                break
         return Run(response, MappingProxyType(stages.seconds))
 
     @property
@@ -105,7 +109,9 @@ class Scene:
         tables["strike"] |= changes
         return tables
 
-    def _modes(self, stages: "_Stages", count: int | None, blow: Mapping[str, Any] | None = None) -> Modes:
+    def _modes(
+        self, stages: "_Stages", count: int | None, blow: Mapping[str, Any] | None = None, margin: float = 1.0
+    ) -> Modes:
         blow = self.blow.values if blow is None else blow
         with self._blame("strike"):
             tolerance = _check.between("tolerance", blow.get("tolerance", integrator.TOLERANCE), 1e-12, 1.0)
@@ -125,7 +131,7 @@ class Scene:
                         contact=self._contact(),
                         mass=self._striker().felt_mass,
                         speed=speed,
-                        tolerance=SHARE * tolerance,
+                        tolerance=SHARE * tolerance / margin,
                     )
                     if limit > scaled.frequencies[-1]:
                         modes = find(FIRST_LOOK, limit * modes.frequencies[-1] / scaled.frequencies[-1], modes)
