@@ -13,6 +13,7 @@ LEVELS = 40  # [-] halvings of the step that may be cached
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
 GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before
 LOOK_LIMIT = 300_000  # [-] looks ahead in one free flight before the run gives up
+SECULAR_MISFIT = 1e-12  # [-] of the peak force: what recorded polynomials may miss of the exact force
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
 EVENT_LIMIT = 64  # [-] events without one full step between them: chatter, passed with unlocated steps
 CONTACT, FLIGHT = 0, 1  # what the run does next
@@ -1921,6 +1922,306 @@ def run_collocation(
             if energy <= 1e-24 * start_energy:
                 status = SETTLED
                 break
+    return resized(steps, n_steps, n_steps), q, p, now, done, time, status, 0, 0
+
+
+@njit(cache=True, error_model="numpy")
+def secular_modes(omega, shape, stiffness):
+    """Eigenpairs of diag(omega**2) + stiffness u u^T for ascending, distinct omega and non-zero u.
+
+    Returns the squared frequencies (n,) and the orthogonal eigenvectors (n, n), both to rounding: roots of
+    ``1 + k sum u**2 / (omega**2 - mu) = 0``, one behind each pole, sought as distances from the nearer pole; vectors
+    from the u for which those roots are exact.
+
+    References
+    ----------
+    Golub (1973), SIAM Rev. 15, 318; Gu and Eisenstat (1994), SIAM J. Matrix Anal. Appl. 15, 1266.
+    """
+    n = omega.size
+    origin = np.empty(n, np.int64)
+    distance = np.empty(n)
+    whole = 0.0
+    for i in range(n):
+        whole += stiffness * shape[i] * shape[i]
+    for j in range(n):
+        span = (omega[j + 1] - omega[j]) * (omega[j + 1] + omega[j]) if j + 1 < n else whole
+        middle = 0.5 * span
+        value = 1.0
+        for i in range(n):
+            gap = (omega[i] - omega[j]) * (omega[i] + omega[j])
+            value += stiffness * shape[i] * shape[i] / (gap - middle)
+        near = j
+        low = 0.0
+        high = span
+        if value < 0.0 and j + 1 < n:
+            near = j + 1
+            low = -middle
+            high = 0.0
+        elif value < 0.0:
+            low = middle
+        else:
+            high = middle
+        own = stiffness * shape[near] * shape[near]
+        t = 0.5 * (low + high)
+        for _ in range(200):
+            value = t - own
+            slope = 1.0
+            for i in range(n):
+                if i != near:
+                    gap = (omega[i] - omega[near]) * (omega[i] + omega[near])
+                    part = stiffness * shape[i] * shape[i] / (gap - t)
+                    value += part * t
+                    slope += part * gap / (gap - t)
+            if (value > 0.0) == (near == j):
+                high = t
+            else:
+                low = t
+            new = t - value / slope
+            if not low < new < high:
+                new = 0.5 * (low + high)
+            if abs(new - t) <= 2e-16 * abs(new):
+                t = new
+                break
+            t = new
+        origin[j] = near
+        distance[j] = t
+    square = np.empty(n)
+    vectors = np.empty((n, n))
+    for j in range(n):
+        square[j] = omega[origin[j]] * omega[origin[j]] + distance[j]
+    for i in range(n):
+        product = 1.0
+        for j in range(n):
+            top = distance[j] + (omega[origin[j]] - omega[i]) * (omega[origin[j]] + omega[i])
+            if j < i:
+                product *= top / ((omega[j] - omega[i]) * (omega[j] + omega[i]))
+            elif j + 1 < n:
+                product *= top / ((omega[j + 1] - omega[i]) * (omega[j + 1] + omega[i]))
+            else:
+                product *= top
+        size = np.sqrt(abs(product))
+        for j in range(n):
+            top = distance[j] + (omega[origin[j]] - omega[i]) * (omega[origin[j]] + omega[i])
+            vectors[i, j] = -(size if shape[i] > 0.0 else -size) / top
+    for j in range(n):
+        norm = 0.0
+        for i in range(n):
+            norm += vectors[i, j] * vectors[i, j]
+        norm = np.sqrt(norm)
+        for i in range(n):
+            vectors[i, j] /= norm
+    return square, vectors
+
+
+@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+def secular_approach(rate, weight, x, v, rest, t):
+    """Approach of a contact in contact and its rate after t, from the state (x, v) of the joint eigenmodes."""
+    d = rest
+    r = 0.0
+    for j in range(rate.size):
+        s = np.sin(rate[j] * t)
+        c = np.cos(rate[j] * t)
+        d += weight[j] * (x[j] * c + v[j] * s / rate[j])
+        r += weight[j] * (v[j] * c - x[j] * rate[j] * s)
+    return d, r
+
+
+@njit(cache=True, error_model="numpy")
+def run_secular(
+    omega, group, amplitude, shape, offset, bias, law, start_q, start_p, nodes, powers, base, depth, still,
+    horizon, max_impacts, max_steps,
+):  # fmt: skip
+    """Follow one lossless linear contact between undamped bodies by the exact motion in contact.
+
+    ``group`` (n_modes,) numbers the distinct frequencies of participating modes, -1 for those at rest at the contact;
+    ``amplitude`` (n_groups,) is the root of the sum of their squared shapes. The motion is exact to rounding; the
+    recorded force polynomials interpolate it, halved until they miss it by less than SECULAR_MISFIT of the peak.
+    Other parameters and results as in `run_collocation`.
+    """
+    n_modes = omega.size
+    n_groups = amplitude.size
+    s = nodes.size - 1
+    zeta = np.zeros(n_modes)
+    k = law[0, 0] / (1.0 + law[0, 0] * law[0, 3])
+    w = np.empty(n_groups)
+    push = np.zeros(n_groups)
+    for n in range(n_modes):
+        if group[n] >= 0:
+            w[group[n]] = omega[n]
+            push[group[n]] += shape[0, n] * bias[n] / amplitude[group[n]]
+    square, vectors = secular_modes(w, amplitude, k)
+    rate = np.sqrt(square)
+    weight = np.zeros(n_groups)
+    settled = np.zeros(n_groups)
+    rest = offset[0]
+    for j in range(n_groups):
+        for i in range(n_groups):
+            weight[j] += vectors[i, j] * amplitude[i]
+            settled[j] += vectors[i, j] * (push[i] - k * amplitude[i] * offset[0])
+        settled[j] /= square[j]
+        rest += weight[j] * settled[j]
+    q = start_q.copy()
+    p = start_p.copy()
+    old_q = np.empty(n_modes)
+    old_p = np.empty(n_modes)
+    a = np.empty(n_groups)
+    b = np.empty(n_groups)
+    x = np.empty(n_groups)
+    v = np.empty(n_groups)
+    flights = np.empty((GLIDES, 6, n_modes))
+    flown = np.zeros(GLIDES)
+    stride = 3 + s
+    steps = np.zeros((64, 3 + stride))
+    now = np.zeros((5, 1))
+    done = np.zeros(1)
+    values = np.empty(s)
+    n_steps = 0
+    n_released = 0
+    time = 0.0
+    status = EXHAUSTED
+    d, r = approach(shape, offset, 0, q, p)
+    pressed = d > 0.0 or (d == 0.0 and r > 0.0)
+    while n_steps < max_steps:
+        if time >= horizon:
+            status = HORIZON
+            break
+        if 0 < max_impacts <= n_released:
+            status = IMPACTS
+            break
+        if n_steps + 1 >= steps.shape[0]:
+            steps = resized(steps, n_steps, 2 * steps.shape[0])
+        for n in range(n_modes):
+            old_q[n] = q[n]
+            old_p[n] = p[n]
+        if not pressed:
+            elapsed, _, found = find_onset(
+                omega, zeta, shape, offset, bias, horizon - time, base, 1e-6 * base, depth, still, flights, flown, q, p
+            )
+            if found == 1:
+                for n in range(n_modes):
+                    q[n] = old_q[n]
+                    p[n] = old_p[n]
+                status = FINISHED
+                break
+            if elapsed > 0.0:
+                for j in range(steps.shape[1]):
+                    steps[n_steps, j] = 0.0
+                steps[n_steps, 0] = time
+                steps[n_steps, 1] = elapsed
+                steps[n_steps, 3] = d
+                steps[n_steps, 4] = r
+                n_steps += 1
+                time += elapsed
+            if found >= 3:
+                status = FAILED if found == 3 else EXHAUSTED
+                break
+            d, r = approach(shape, offset, 0, q, p)
+            d = min(d, 0.0)
+            if found == 0:
+                d = 0.0
+                pressed = True
+            continue
+        for i in range(n_groups):
+            a[i] = 0.0
+            b[i] = 0.0
+        for n in range(n_modes):
+            if group[n] >= 0:
+                a[group[n]] += shape[0, n] * q[n] / amplitude[group[n]]
+                b[group[n]] += shape[0, n] * p[n] / amplitude[group[n]]
+        hardest = 0.0
+        for j in range(n_groups):
+            x[j] = -settled[j]
+            v[j] = 0.0
+            for i in range(n_groups):
+                x[j] += vectors[i, j] * a[i]
+                v[j] += vectors[i, j] * b[i]
+            hardest += abs(weight[j]) * square[j] * np.sqrt(x[j] * x[j] + v[j] * v[j] / square[j])
+        elapsed = 0.0
+        left = horizon - time
+        dt, rt = d, r
+        released = False
+        for _ in range(LOOK_LIMIT):
+            wait = quadratic_wait(-dt, -rt, hardest)
+            if wait <= 4e-16 * elapsed or (elapsed > 0.0 and dt <= 0.0):
+                released = True
+                break
+            elapsed = min(left, elapsed + wait)
+            dt, rt = secular_approach(rate, weight, x, v, rest, elapsed)
+            if elapsed >= left:
+                break
+        else:
+            status = EXHAUSTED
+            break
+        n_parts = 16
+        misfit = np.inf
+        while misfit > SECULAR_MISFIT and n_parts < 4096:
+            n_parts *= 2
+            h = elapsed / n_parts
+            peak = 0.0
+            misfit = 0.0
+            for part in range(n_parts):
+                end = 0.0
+                for c in range(s):
+                    values[c], _ = secular_approach(rate, weight, x, v, rest, (part + nodes[c]) * h)
+                    peak = max(peak, values[c])
+                    for m in range(s):
+                        end += powers[c, m] * values[c]
+                exact, _ = secular_approach(rate, weight, x, v, rest, (part + 1.0) * h)
+                misfit = max(misfit, abs(exact - end))
+            misfit /= max(peak, 1e-300)
+        while n_steps + n_parts + 2 >= steps.shape[0]:
+            steps = resized(steps, n_steps, 2 * steps.shape[0])
+        for part in range(n_parts):
+            for j in range(steps.shape[1]):
+                steps[n_steps, j] = 0.0
+            steps[n_steps, 0] = time + part * h
+            steps[n_steps, 1] = h
+            steps[n_steps, 3], steps[n_steps, 4] = secular_approach(rate, weight, x, v, rest, part * h)
+            if part == 0:
+                steps[n_steps, 3] = d
+            steps[n_steps, 5] = 1.0
+            for c in range(s):
+                value, speed = secular_approach(rate, weight, x, v, rest, (part + nodes[c]) * h)
+                share = 0.0
+                for m in range(s):
+                    steps[n_steps, 6 + m] += powers[c, m] * k * value
+                    share += powers[c, m] / (m + 1.0)
+                done[0] += share * h * k * value * speed
+            n_steps += 1
+        free_flight(omega, zeta, bias, elapsed, q, p)
+        for j in range(n_groups):
+            sine = np.sin(rate[j] * elapsed)
+            cosine = np.cos(rate[j] * elapsed)
+            x0 = x[j]
+            x[j] = settled[j] + x0 * cosine + v[j] * sine / rate[j]
+            v[j] = v[j] * cosine - x0 * rate[j] * sine
+        for i in range(n_groups):
+            a0, a12, a22, _, _, _ = (
+                mode_matrix(w[i], 0.0, elapsed) if w[i] > 0.0 else (1.0, elapsed, 1.0, 0.0, 0.0, 0.0)
+            )
+            free_a = a0 * a[i] + a12 * b[i]
+            free_b = -w[i] * w[i] * a12 * a[i] + a22 * b[i]
+            if push[i] != 0.0:
+                half = np.sin(0.5 * w[i] * elapsed) / w[i] if w[i] > 0.0 else 0.5 * elapsed
+                free_a += 2.0 * half * half * push[i]
+                free_b += a12 * push[i]
+            a[i] = -free_a
+            b[i] = -free_b
+            for j in range(n_groups):
+                a[i] += vectors[i, j] * x[j]
+                b[i] += vectors[i, j] * v[j]
+        for n in range(n_modes):
+            if group[n] >= 0:
+                q[n] += shape[0, n] / amplitude[group[n]] * a[group[n]]
+                p[n] += shape[0, n] / amplitude[group[n]] * b[group[n]]
+        time += elapsed
+        d, r = approach(shape, offset, 0, q, p)
+        if released:
+            d = 0.0
+            pressed = False
+            n_released += 1
+    now[0, 0] = d
+    now[4, 0] = r
     return resized(steps, n_steps, n_steps), q, p, now, done, time, status, 0, 0
 
 

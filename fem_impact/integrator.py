@@ -16,14 +16,14 @@ from .response import Error, History, Response
 from .striker import Striker
 
 TOLERANCE = 1e-4  # [-] the default promise
-SCHEMES = ("A", "A4", "collocation")
+SCHEMES = ("A", "A4", "collocation", "secular")
 MAX_STEPS = 2_000_000  # [-] of one run, about a second for a few modes
 FIRST_STEPS = 12.0  # [-] steps per contact at which A4 errs by about FIRST_ERROR: measured 9e-6 linear, 1e-4 Hertz
 FIRST_ERROR = 1e-4  # [-]
 DOUBLINGS = 7  # [-] how often the step is halved before the run gives up
 # [-] Difference of two runs over the error of the finer one: for speeds and impulse, and for what hangs on one instant,
 # contact time and peak force, where modes faster than the step keep scheme A4 from its order.
-RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 2.0), "collocation": (1.0, 1.0)}
+RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 2.0), "collocation": (1.0, 1.0), "secular": (1.0, 1.0)}
 COLLOCATION_BELOW = 1e-7  # [-] tolerance from which collocation needs less work than A4
 NODES = 5  # [-] of collocation; more gain nothing where onset and release limit the smoothness
 RESOLVABLE = 0.3  # [-] contact stiffness times residual compliance up to which the estimate of its error holds
@@ -33,6 +33,7 @@ REST_ABOVE = {
     1: 1.53,
     2: 1.73,
 }  # [-] by dimension: sqrt of sum u2/w2 over sum u2/w4 beyond the last mode, over omega**2
+SILENT = 1e-15  # [-] shape at the contact over the largest below which a mode rests there
 NOISE = 1e-16  # [-] approaches below this times duration and speed are rounding: contacts that merely touch
 STILL = 1e-12  # [-] rigid approaches slower than this times the speed are rounding, not a contact to come
 ROUNDING = 1e-13  # [-] below this two runs cannot be told apart
@@ -114,7 +115,7 @@ def strike(
         Where to stop at the latest.
     max_impacts : int, optional
         Stop when so many impacts have ended.
-    scheme : {"A", "A4", "collocation"}, optional
+    scheme : {"A", "A4", "collocation", "secular"}, optional
         Fixes the scheme instead of leaving it to the tolerance.
     dt : float [s], optional
         Fixes the step in contact; the step error is then estimated, not held to the tolerance.
@@ -365,6 +366,10 @@ def _controlled(system, scheme, dt, tolerance, pace, horizon, n_max) -> tuple[Hi
     if scheme == "collocation" and (system.law[:, 1] < 1.0).any():
         raise ValueError(f"scheme collocation needs exponents of at least 1, got {system.law[:, 1].min():g}; take A4")
     shortest = pace[0]
+    if scheme == "secular":
+        _check_secular(system)
+        only = _run(system, scheme, shortest, pace, horizon, n_max)
+        return only, ROUNDING * max(1, len(only.impacts)), scheme, only, shortest
     if dt is not None:
         fine = _run(system, scheme, dt, pace, horizon, n_max)
         coarse = _run(system, scheme, 2.0 * dt, pace, horizon, n_max)
@@ -400,6 +405,18 @@ def _run(system: _System, scheme: str, size: float, pace: tuple[float, float], h
         result = _kernels.run_collocation(
             *parts, nodes, powers, pace[0] / 2.0, pace[1], float(size), *noise, float(horizon), n_max, MAX_STEPS
         )
+    elif scheme == "secular":
+        result = _kernels.run_secular(
+            system.omega,
+            *_distinct(system),
+            *parts[2:],
+            *_gauss(NODES),
+            pace[0],
+            *noise,
+            float(horizon),
+            n_max,
+            MAX_STEPS,
+        )
     else:
         result = _kernels.run_energy(*parts, int(scheme == "A4"), float(size), *noise, float(horizon), n_max, MAX_STEPS)
     time, status = result[5], result[6]
@@ -412,6 +429,27 @@ def _run(system: _System, scheme: str, size: float, pace: tuple[float, float], h
             f"scheme {scheme} found no next step at {time:.4g} s; take scheme A4, or check the units of the scene"
         )
     return History(*parts, *result)
+
+
+def _check_secular(system: _System) -> None:
+    """Raise ValueError where the motion in contact is not the one the secular equation solves."""
+    _, exponent, loss, _ = system.law[0]
+    moving = (system.shape[0] != 0.0) & (system.omega > 0.0)
+    if len(system.law) > 1 or exponent != 1.0 or loss > 0.0 or (system.zeta[moving] > 0.0).any():
+        raise ValueError(
+            "scheme secular needs one linear contact without loss between undamped bodies; take collocation, "
+            "which is as exact at tolerance=1e-12"
+        )
+
+
+def _distinct(system: _System) -> tuple[np.ndarray, np.ndarray]:
+    """Group of equal frequencies of each mode at the contact, -1 where it rests there; shape of each group."""
+    moving = np.flatnonzero(np.abs(system.shape[0]) > SILENT * np.abs(system.shape[0]).max())
+    values, index = np.unique(system.omega[moving], return_inverse=True)
+    group = np.full(len(system.omega), -1)
+    group[moving] = index
+    amplitude = np.sqrt(np.bincount(index, system.shape[0, moving] ** 2, minlength=len(values)))
+    return group, amplitude
 
 
 def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
