@@ -19,6 +19,8 @@ from .elements import (
     BentMapping,
     Hermite,
     HermiteSpace,
+    Morley,
+    MorleySpace,
     numbering,
     quadrature,
     segments,
@@ -29,6 +31,7 @@ from .section import Beam, Elastic, Plate
 from .supports import Rim, cells_of_facets, constrain
 
 KINDS = ("clamped", "hinged", "free")
+MORLEY_ORDER = 4  # [-] likewise for products of quadratics
 MASS_ORDER = 10  # [-] of the quadrature: exact for products of quintics
 BEAM_ORDER = 8  # [-] exact for products of cubics where the height varies linearly
 RIGID = 1e-9  # [-] share of a rigid motion that supports may suppress by rounding alone
@@ -72,7 +75,7 @@ class System:
     M: csc_matrix = field(repr=False)  # (n_dofs, n_dofs) [-]
     expand: csr_matrix = field(repr=False)  # (n_all, n_dofs) unknowns left -> all unknowns of the elements
     element_dofs: np.ndarray = field(repr=False)  # (n_local, n_cells) numbers among all unknowns
-    space: ArgyrisSpace | HermiteSpace = field(repr=False)  # shape functions
+    space: ArgyrisSpace | HermiteSpace | MorleySpace = field(repr=False)  # shape functions
     rigid: np.ndarray = field(repr=False)  # (n_dofs, n_rigid) [-] rigid motions left, mass-normalised
     held: np.ndarray = field(repr=False)  # (n_rigid,) unknowns that hold the rigid motions, statically determinate
     graded: bool = True  # whether rings of ever smaller triangles surround singular corners
@@ -100,7 +103,7 @@ def assemble(
     mesh: Mesh,
     section: Plate | Beam,
     supports: dict | None = None,
-    element: str = "argyris",
+    element: str | None = None,
     *,
     point_masses: Sequence = (),
     graded: bool = True,
@@ -113,8 +116,9 @@ def assemble(
     section : Plate on a plane mesh, Beam on a line
     supports : dict, name of an edge -> "clamped", "hinged", "free" or an Elastic
         Edges not named are free; "boundary" stands for all edges, and a part named itself goes before the whole.
-    element : str
-        "argyris" on a plate; beams always take Hermite elements.
+    element : str, optional
+        On a plate "argyris" (as where left out; frequencies from above) or "morley" (from below, straight edges only;
+        a second opinion); on a beam "hermite".
     point_masses : sequence of (point [m], mass [kg])
         Bodies without extent that ride on the plate or beam.
     graded : bool
@@ -131,12 +135,13 @@ def assemble(
     """
     if not isinstance(mesh, Mesh):
         raise ValueError(f"mesh must be made by fi.mesh, got {type(mesh).__name__}")
-    if element == "hermite" and mesh.dimension == 1:
-        element = "argyris"
-    _check.one_of("element", element, ("argyris",))
+    kinds = ("argyris", "morley") if mesh.dimension == 2 else ("hermite",)
+    element = kinds[0] if element is None else _check.one_of("element", element, kinds)
     supports = supports or {}
     if mesh.dimension == 1 and isinstance(section, Beam):
         made = _assemble_beam(mesh, section, supports)
+    elif isinstance(section, Plate) and element == "morley":
+        made = _assemble_morley(mesh, section, supports)
     elif mesh.dimension == 2 and isinstance(section, Plate):
         order, fine = around_corners(mesh, _kinds(_support_of_facets(mesh, supports)), section.material.nu)
         made = _assemble_plate(fine if graded else mesh, section, supports)
@@ -151,7 +156,7 @@ def assemble(
 def reassemble(system: System, mesh: Mesh) -> System:
     """The same body on another mesh of it."""
     section, supports, masses = system.section, system.supports, system.point_masses
-    return assemble(mesh, section, supports, point_masses=masses, graded=system.graded)
+    return assemble(mesh, section, supports, system.element, point_masses=masses, graded=system.graded)
 
 
 def _support_of_facets(mesh: Mesh, supports: dict) -> list[str | Elastic]:
@@ -214,6 +219,7 @@ class _Raw:
     graded: bool = True
     order: float = np.inf
     point_masses: tuple = ()
+    element: str = "argyris"
 
     def interpolate(self, points: np.ndarray) -> csr_matrix:
         """Deflection at points (n_points, dimension) [m] from all unknowns, (n_points, n_all) [-]."""
@@ -274,7 +280,7 @@ def _reduced(raw: _Raw) -> System:
         raw.mesh,
         raw.section,
         raw.supports,
-        "argyris" if raw.mesh.dimension == 2 else "hermite",
+        raw.element,
         raw.mass,
         raw.frame,
         0.5 * (K + K.T).tocsc(),
@@ -329,7 +335,20 @@ def _assemble_beam(mesh: Mesh, section: Beam, supports: dict) -> _Raw:
     springs = beam_springs(ends, held, frame, n_all)
     matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), springs.tocsc()
     mass, softness = float((inertia * dx).sum()) * frame.mass, float((inertia / stiffness).max())
-    return _Raw(mesh, section, supports, mass, frame, *matrices, expand, expand.T.tocsr(), dofs, space, softness)
+    return _Raw(
+        mesh,
+        section,
+        supports,
+        mass,
+        frame,
+        *matrices,
+        expand,
+        expand.T.tocsr(),
+        dofs,
+        space,
+        softness,
+        element="hermite",
+    )
 
 
 def _fields(section, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -395,3 +414,42 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
     matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), springs
     mass = float((inertia * dx).sum()) * frame.mass
     return _Raw(mesh, section, supports, mass, frame, *matrices, expand, project, dofs, space, softness, rim)
+
+
+def _assemble_morley(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
+    if mesh.curved.any():
+        raise ValueError("element 'morley' needs straight edges; use 'argyris', or a polygon")
+    held = _support_of_facets(mesh, supports)
+    if section.tension or not all(isinstance(kind, str) for kind in held):
+        raise ValueError("element 'morley' knows no tension and no elastic supports; use 'argyris'")
+    centre, length, points = _centred(mesh)
+    plane = triangles(points, mesh.cells)
+    space = MorleySpace(plane)
+    x, dx = quadrature(plane, Morley(), MORLEY_ORDER)
+    stiffness, inertia = _fields(section, centre + length * x)
+    frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
+    stiffness, inertia = stiffness / frame.stiffness, inertia / frame.inertia
+    value, hessian = space.functions(np.arange(len(x)), x, (0, 2))
+    bend = hessian[:, [0, 2, 1]].transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]  # (n, n_q, 3, 6)
+    moment = (stiffness * dx[..., None, None]) @ bend
+    shape = (len(x), 3 * x.shape[1], 6)
+    K = bend.reshape(shape).transpose(0, 2, 1) @ moment.reshape(shape)
+    M = (value * (inertia * dx)[..., None]).transpose(0, 2, 1) @ value
+    dofs, n_all = numbering(plane, Morley())
+    cells, sides = cells_of_facets(mesh.facets, space.vertices)
+    fixed = np.zeros(n_all, bool)
+    for facet, kind in enumerate(held):
+        if kind != "free":
+            corner = np.isin(space.vertices[cells[facet]], mesh.facets[facet])
+            fixed[dofs[:3, cells[facet]][corner]] = True
+        if kind == "clamped":
+            fixed[dofs[3 + sides[facet], cells[facet]]] = True
+    free = np.flatnonzero(~fixed)
+    if not free.size:
+        raise ValueError("supports leave this mesh nothing to move; refine it")
+    expand = csr_matrix((np.ones(len(free)), (free, np.arange(len(free)))), shape=(n_all, len(free)))
+    matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), csc_matrix((n_all, n_all))
+    mass = float((inertia * dx).sum()) * frame.mass
+    softness = float((inertia / np.minimum(stiffness[..., 0, 0], stiffness[..., 1, 1])).max())
+    made = _Raw(mesh, section, supports, mass, frame, *matrices, expand, expand.T.tocsr(), dofs, space, softness)
+    return replace(made, order=2.0, element="morley")

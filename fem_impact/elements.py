@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
-from skfem import Dofs, ElementLineHermite, ElementTriArgyris, MappingAffine, MeshLine, MeshTri
+from skfem import Dofs, ElementLineHermite, ElementTriArgyris, ElementTriMorley, MappingAffine, MeshLine, MeshTri
 from skfem.element import DiscreteField
 from skfem.quadrature import get_quadrature
 
@@ -16,6 +16,7 @@ ON_BODY = 1e-9  # [-] of a triangle: how far outside a point may lie by rounding
 NEAR_CURVE = 1e-5  # [-] of a triangle on a curved edge: it leaves the true curve by less
 CANDIDATES = 8  # [-] nearest triangles looked at before all of them are
 CURVE_STEPS = 12  # [-] fixed-point steps from a point to its place in a curved triangle
+REFERENCE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) - 1.0 / 3.0  # corners in coordinates of the triangle
 DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 
 
@@ -73,17 +74,12 @@ class BentMapping(MappingAffine):
         return J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
 
 
-class ArgyrisSpace:
-    """Quintic shape functions of every triangle of one mesh, in coordinates of the triangle itself.
-
-    scikit-fem inverts a Vandermonde matrix of raw monomials in physical coordinates, which is singular once elements
-    are a thousandth of the coordinates. Here each triangle is mapped to the reference one first, and its unknowns are
-    turned into the reference directions before the inversion.
-    """
+class Triangles:
+    """The triangles of one mesh: coordinates in each, normals of its sides, and which one holds a point."""
 
     def __init__(self, mesh: MeshTri, bent: Bent | None = None) -> None:
         corners = mesh.p[:, mesh.t].transpose(2, 1, 0)  # (n_cells, 3, 2)
-        self.vertices = mesh.t.T
+        self.corners, self.vertices, self.bent = corners, mesh.t.T, bent
         self.origin = corners.mean(axis=1)
         self.jacobian = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
         self.inverse = np.linalg.inv(self.jacobian)
@@ -91,63 +87,16 @@ class ArgyrisSpace:
         up = np.stack([self.vertices[:, p] < self.vertices[:, q] for p, q in SIDES], axis=1)
         along = along * np.where(up, 1.0, -1.0)[..., None]  # the same for both triangles of a side
         self.normals = np.stack([along[..., 1], -along[..., 0]], axis=-1) / np.linalg.norm(along, axis=2)[..., None]
-        self.middles = np.stack([0.5 * (corners[:, p] + corners[:, q]) for p, q in SIDES], axis=1)
-        self.bent = bent
         self.curved = np.zeros(len(corners), bool)
         if bent is not None:
             self.curved[bent.cells] = True
-            at = bent.cells, bent.sides
-            self.middles[at], self.normals[at] = bent.curves.middle()
-        self.coefficients = self._invert(corners, self.middles)
         self.tree = cKDTree(self.origin)
-
-    def _invert(self, corners: np.ndarray, middles: np.ndarray) -> np.ndarray:
-        n = len(corners)
-        functionals = np.zeros((n, 21, 21))
-        turn = np.zeros((n, 21, 21))  # physical unknowns -> unknowns along the reference directions
-        J = self.jacobian
-        for k in range(3):
-            at = self.local(np.arange(n), corners[:, k])
-            for row, (dx, dy) in enumerate(DERIVATIVES):
-                functionals[:, 6 * k + row] = monomials(at, dx, dy)
-            a, b, c, d = J[:, 0, 0], J[:, 0, 1], J[:, 1, 0], J[:, 1, 1]
-            block = turn[:, 6 * k : 6 * k + 6, 6 * k : 6 * k + 6]
-            block[:, 0, 0] = 1.0
-            block[:, 1:3, 1:3] = np.stack([np.stack([a, c], -1), np.stack([b, d], -1)], axis=1)
-            hessian = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
-            block[:, 3:, 3:] = np.stack([np.stack(row, axis=-1) for row in hessian], axis=1)
-        for side in range(3):
-            weight = np.einsum("eij,ej->ei", self.inverse, self.normals[:, side])  # reference derivative along it
-            size = np.linalg.norm(weight, axis=1)
-            at = self.local(np.arange(n), middles[:, side])
-            row = weight[:, :1] * monomials(at, 1, 0) + weight[:, 1:] * monomials(at, 0, 1)
-            functionals[:, 18 + side] = row / size[:, None]
-            turn[:, 18 + side, 18 + side] = 1.0 / size
-        return np.linalg.solve(functionals, turn)
 
     def local(self, cells: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Coordinates (n, ..., 2) in the triangle, zero at its centre, of points (n, ..., 2)."""
         shape = (len(cells),) + (1,) * (points.ndim - 2)
         offset = points - self.origin[cells].reshape(*shape, 2)
         return np.einsum("eij,e...j->e...i", self.inverse[cells], offset)
-
-    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
-        """Shape functions of cells (n,) at points (n, n_q, 2) for each derivative order asked for.
-
-        Returns arrays (n, n_q, 21) for order 0, (n, 2, n_q, 21) for order 1, (n, 3, n_q, 21) for order 2 (xx, xy, yy).
-        """
-        local = self.local(cells, points)
-        result = []
-        for order in orders:
-            raw = [monomials(local, order - k, k) @ self.coefficients[cells] for k in range(order + 1)]
-            if order == 0:
-                result.append(raw[0])
-                continue
-            stacked = np.stack(raw, axis=1)  # (n, order + 1, n_q, 21)
-            shape = stacked.shape
-            turned = self.chain(cells, order) @ stacked.reshape(*shape[:2], -1)
-            result.append(turned.reshape(shape))
-        return result
 
     def chain(self, cells: np.ndarray, order: int) -> np.ndarray:
         """Derivatives by x and y from those in the triangle, (n, order + 1, order + 1), of cells (n,)."""
@@ -158,25 +107,6 @@ class ArgyrisSpace:
         else:
             rows = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
         return np.stack([np.stack(row, axis=-1) for row in rows], axis=1)
-
-    def uniform(self, cells: np.ndarray, stiffness: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
-        """Bending and mass matrices (n, 21, 21) of straight cells (n,) of one stiffness (3, 3) and unit inertia.
-
-        The integrals of products of monomials are the same in every triangle, so they are taken once.
-        """
-        X, weight = get_quadrature(Argyris.refdom, order)
-        local = X.T - 1.0 / 3.0
-        values = monomials(local, 0, 0)
-        bends = np.stack([monomials(local, 2 - k, k) for k in range(3)])  # (3, n_q, 21)
-        products = np.einsum("iqa,q,jqb->ijab", bends, weight, bends).reshape(9, 441)
-        determinant = np.abs(np.linalg.det(self.jacobian[cells]))
-        engineering = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, 2.0, 0]])  # (xx, xy, yy) -> (xx, yy, 2 xy)
-        turn = engineering @ self.chain(cells, 2)
-        metric = turn.transpose(0, 2, 1) @ stiffness @ turn * determinant[:, None, None]
-        C = self.coefficients[cells]
-        bending = C.transpose(0, 2, 1) @ (metric.reshape(-1, 9) @ products).reshape(-1, 21, 21) @ C
-        mass = C.transpose(0, 2, 1) @ (values.T * weight @ values) @ C
-        return bending, mass * determinant[:, None, None]
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cell that holds each point (n, 2), or the nearest one, and whether the point lies in it."""
@@ -209,12 +139,95 @@ class ArgyrisSpace:
         row = np.arange(len(points))
         return cells[row, best], depth[row, best]
 
+
+class ArgyrisSpace:
+    """Quintic shape functions of every triangle of one mesh, in coordinates of the triangle itself.
+
+    scikit-fem inverts a Vandermonde matrix of raw monomials in physical coordinates, which is singular once elements
+    are a thousandth of the coordinates. Here each triangle is mapped to the reference one first, and its unknowns are
+    turned into the reference directions before the inversion.
+    """
+
+    def __init__(self, mesh: MeshTri, bent: Bent | None = None) -> None:
+        self.inner = Triangles(mesh, bent)
+        self.origin, self.inverse, self.jacobian = self.inner.origin, self.inner.inverse, self.inner.jacobian
+        self.vertices, self.curved, self.bent = self.inner.vertices, self.inner.curved, bent
+        corners, self.normals = self.inner.corners, self.inner.normals.copy()
+        self.middles = np.stack([0.5 * (corners[:, p] + corners[:, q]) for p, q in SIDES], axis=1)
+        if bent is not None:
+            at = bent.cells, bent.sides
+            self.middles[at], self.normals[at] = bent.curves.middle()
+        self.coefficients = self._invert(corners, self.middles)
+
+    def _invert(self, corners: np.ndarray, middles: np.ndarray) -> np.ndarray:
+        n = len(corners)
+        functionals = np.zeros((n, 21, 21))
+        turn = np.zeros((n, 21, 21))  # physical unknowns -> unknowns along the reference directions
+        J = self.jacobian
+        for k in range(3):
+            at = self.inner.local(np.arange(n), corners[:, k])
+            for row, (dx, dy) in enumerate(DERIVATIVES):
+                functionals[:, 6 * k + row] = monomials(at, dx, dy)
+            a, b, c, d = J[:, 0, 0], J[:, 0, 1], J[:, 1, 0], J[:, 1, 1]
+            block = turn[:, 6 * k : 6 * k + 6, 6 * k : 6 * k + 6]
+            block[:, 0, 0] = 1.0
+            block[:, 1:3, 1:3] = np.stack([np.stack([a, c], -1), np.stack([b, d], -1)], axis=1)
+            hessian = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
+            block[:, 3:, 3:] = np.stack([np.stack(row, axis=-1) for row in hessian], axis=1)
+        for side in range(3):
+            weight = np.einsum("eij,ej->ei", self.inverse, self.normals[:, side])  # reference derivative along it
+            size = np.linalg.norm(weight, axis=1)
+            at = self.inner.local(np.arange(n), middles[:, side])
+            row = weight[:, :1] * monomials(at, 1, 0) + weight[:, 1:] * monomials(at, 0, 1)
+            functionals[:, 18 + side] = row / size[:, None]
+            turn[:, 18 + side, 18 + side] = 1.0 / size
+        return np.linalg.solve(functionals, turn)
+
+    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+        """Shape functions of cells (n,) at points (n, n_q, 2) for each derivative order asked for.
+
+        Returns arrays (n, n_q, 21) for order 0, (n, 2, n_q, 21) for order 1, (n, 3, n_q, 21) for order 2 (xx, xy, yy).
+        """
+        local = self.inner.local(cells, points)
+        result = []
+        for order in orders:
+            raw = [monomials(local, order - k, k) @ self.coefficients[cells] for k in range(order + 1)]
+            if order == 0:
+                result.append(raw[0])
+                continue
+            stacked = np.stack(raw, axis=1)  # (n, order + 1, n_q, 21)
+            shape = stacked.shape
+            turned = self.inner.chain(cells, order) @ stacked.reshape(*shape[:2], -1)
+            result.append(turned.reshape(shape))
+        return result
+
+    def uniform(self, cells: np.ndarray, stiffness: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
+        """Bending and mass matrices (n, 21, 21) of straight cells (n,) of one stiffness (3, 3) and unit inertia.
+
+        The integrals of products of monomials are the same in every triangle, so they are taken once.
+        """
+        X, weight = get_quadrature(Argyris.refdom, order)
+        local = X.T - 1.0 / 3.0
+        values = monomials(local, 0, 0)
+        bends = np.stack([monomials(local, 2 - k, k) for k in range(3)])  # (3, n_q, 21)
+        products = np.einsum("iqa,q,jqb->ijab", bends, weight, bends).reshape(9, 441)
+        determinant = np.abs(np.linalg.det(self.jacobian[cells]))
+        engineering = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, 2.0, 0]])  # (xx, xy, yy) -> (xx, yy, 2 xy)
+        turn = engineering @ self.inner.chain(cells, 2)
+        metric = turn.transpose(0, 2, 1) @ stiffness @ turn * determinant[:, None, None]
+        C = self.coefficients[cells]
+        bending = C.transpose(0, 2, 1) @ (metric.reshape(-1, 9) @ products).reshape(-1, 21, 21) @ C
+        mass = C.transpose(0, 2, 1) @ (values.T * weight @ values) @ C
+        return bending, mass * determinant[:, None, None]
+
+    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cell that holds each point (n, 2), or the nearest one, and whether the point lies in it."""
+        return self.inner.locate(points)
+
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 3) of the deflections 1, x and y: the rigid motions of a plate."""
         result = np.zeros((n_all, 3))
-        corner = self.origin[:, None] + (np.array([[0, 0], [1, 0], [0, 1]]) - 1.0 / 3.0) @ self.jacobian.transpose(
-            0, 2, 1
-        )
+        corner = self.inner.corners
         for k in range(3):
             result[element_dofs[6 * k], 0] = 1.0
             result[element_dofs[6 * k], 1:] = corner[:, k]
@@ -241,6 +254,66 @@ class Argyris(ElementTriArgyris):
         xx, xy, yy = hessian[:, 0, :, i], hessian[:, 1, :, i], hessian[:, 2, :, i]
         grad = gradient[..., i].transpose(1, 0, 2)
         return (DiscreteField(value=value[..., i], grad=grad, hess=np.array([[xx, xy], [xy, yy]])),)
+
+
+class MorleySpace:
+    """Quadratic Morley shape functions of every straight triangle: deflection at corners, slope at mid-sides.
+
+    They are continuous at those points only, and their frequencies come from below: a second opinion on Argyris.
+    """
+
+    def __init__(self, mesh: MeshTri) -> None:
+        self.inner = Triangles(mesh)
+        self.origin, self.inverse, self.jacobian = self.inner.origin, self.inner.inverse, self.inner.jacobian
+        self.vertices, self.normals, self.bent = self.inner.vertices, self.inner.normals, None
+        n = len(self.origin)
+        functionals = np.zeros((n, 6, 6))
+        for k, corner in enumerate(REFERENCE):
+            functionals[:, k] = _quadratic(corner[None], 0, 0)
+        for side, (p, q) in enumerate(SIDES):
+            weight = np.einsum("eij,ej->ei", self.inverse, self.normals[:, side])
+            at = 0.5 * (REFERENCE[p] + REFERENCE[q])[None]
+            functionals[:, 3 + side] = weight[:, :1] * _quadratic(at, 1, 0) + weight[:, 1:] * _quadratic(at, 0, 1)
+        self.coefficients = np.linalg.inv(functionals)
+
+    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+        """Derivatives of the shape functions as `ArgyrisSpace.functions` gives them, six to a cell."""
+        offset = points - self.origin[cells][:, None]
+        local = np.einsum("eij,eqj->eqi", self.inverse[cells], offset)
+        result = []
+        for order in orders:
+            raw = [_quadratic(local, order - k, k) @ self.coefficients[cells] for k in range(order + 1)]
+            if order == 0:
+                result.append(raw[0])
+                continue
+            stacked = np.stack(raw, axis=1)
+            shape = stacked.shape
+            result.append((self.inner.chain(cells, order) @ stacked.reshape(*shape[:2], -1)).reshape(shape))
+        return result
+
+    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cell that holds each point (n, 2), or the nearest one, and whether the point lies in it."""
+        return self.inner.locate(points)
+
+    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+        """Unknowns (n_all, 3) of the deflections 1, x and y."""
+        result = np.zeros((n_all, 3))
+        for k in range(3):
+            result[element_dofs[k], 0] = 1.0
+            result[element_dofs[k], 1:] = self.origin + self.jacobian @ REFERENCE[k]
+            result[element_dofs[3 + k], 1:] = self.normals[:, k]
+        return result
+
+
+class Morley(ElementTriMorley):
+    """scikit-fem's Morley element, for the numbering of its unknowns; make a new one for each mesh."""
+
+
+def _quadratic(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
+    """Derivative of the six monomials of degree 2 at local coordinates (..., 2), shape (..., 6)."""
+    x, y = powers(local[..., 0], 2, dx), powers(local[..., 1], 2, dy)
+    i, j = np.array([(i, j) for i in range(3) for j in range(3 - i)]).T
+    return x[..., i] * y[..., j]
 
 
 class HermiteSpace:

@@ -380,6 +380,7 @@ def find_modes(
     max_frequency: float | None = None,
     damping_ratio: Damping = 0.0,
     tolerance: float | None = None,
+    bounds: bool = False,
 ) -> Modes:
     """The lowest modes of a body, none missed; rigid motions first, with frequency exactly zero.
 
@@ -393,10 +394,14 @@ def find_modes(
     damping_ratio : float, array (n_modes,) or function of frequency [Hz] returning [-]
     tolerance : float [-], optional
         Largest relative error accepted in any frequency: the mesh is refined until the estimate meets it.
+    bounds : bool
+        Whether to enclose each frequency between guaranteed bounds (`Modes.bounds`): isotropic plates of constant
+        thickness with straight edges. Rounding and the eigensolver are covered by a margin, not by a proof.
 
     Returns
     -------
     Modes
+        With `frequency_error` where a tolerance was given.
 
     Raises
     ------
@@ -419,4 +424,11 @@ def find_modes(
         found = spectrum.solve(spectrum.fine_enough(system, n_modes, max_frequency, None), n_modes, max_frequency)
     shapes = FieldShapes(found.system, found.vectors.copy(), found.flexibility)
     damping = damping_ratios(damping_ratio, found.omega)
-    return Modes(found.omega, damping, shapes, system.mass, frequency_error=found.error)
+    enclosed = spectrum.enclosure(found) if bounds else None
+    if bounds and enclosed is None:
+        raise ValueError(
+            "bounds need an isotropic plate of constant thickness with straight edges and nothing attached; "
+            "give a tolerance instead, which estimates the error of any body"
+        )
+    in_hertz = None if enclosed is None else enclosed / (2.0 * np.pi)
+    return Modes(found.omega, damping, shapes, system.mass, frequency_error=found.error, bounds=in_hertz)

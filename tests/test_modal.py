@@ -228,6 +228,38 @@ def test_tolerance_is_kept_and_the_estimate_is_honest(shape, supports, wanted, t
     assert ((ratio > 0.3) & (ratio < 10.0)).all()
 
 
+@pytest.mark.parametrize(
+    ("shape", "supports", "wanted"),
+    [
+        (mesh.rectangle(1.55, 1.0), "hinged", hinged(1.55, 1.0, 8)),
+        (mesh.rectangle(1.0, 1.0), "clamped", SQUARE_CLAMPED),
+        (mesh.rectangle(1.0, 1.0), "free", [0.0, 0.0, 0.0, *SQUARE_FREE[:5]]),
+        (mesh.polygon([(0, 0), (1, 0), (0, 1)]), "hinged", np.pi**2 * np.array([5.0, 10.0, 13.0])),
+        (mesh.polygon([(0, 0), (1, 0), (0, 1)]), "clamped", [93.789178, 157.786324, 194.765341]),
+    ],
+)
+def test_bounds_enclose_the_exact_frequencies(shape, supports, wanted):
+    modes = find_modes(assemble(shape, PLATE, {"boundary": supports}), n_modes=len(wanted), bounds=True)
+    bounds = modes.bounds * 2 * np.pi * PER_RATE
+    slack = 1e-8 * np.array(wanted)  # the last digit printed
+    assert (bounds[:, 0] <= wanted + slack).all() and (bounds[:, 1] >= wanted - slack).all()
+    flexible = np.array(wanted) > 0
+    assert (
+        np.ptp(bounds[flexible], axis=1) < 0.02 * np.array(wanted)[flexible]
+    ).all()  # tight enough to mean something
+
+
+@pytest.mark.parametrize("supports", ["hinged", "clamped"])
+def test_morley_converges_from_below_at_second_order(supports):
+    wanted = hinged(1.0, 1.0, 3) if supports == "hinged" else np.array(SQUARE_CLAMPED[:3])
+    errors = []
+    for size in (1 / 16, 1 / 32):
+        system = assemble(mesh.rectangle(1.0, 1.0, size=size), PLATE, {"boundary": supports}, "morley")
+        errors.append(1.0 - find_modes(system, n_modes=3).omega * PER_RATE / wanted)
+    assert (errors[1] > 0).all()
+    assert_allclose(np.log2(errors[0] / errors[1]), 2.0, atol=0.2)  # theory 2
+
+
 def test_a_tolerance_out_of_reach_is_refused():
     # hinged sides that meet at 170 degrees make the plate move as r**1.06: no mesh resolves that
     corners = [(0, 0), (2, 0), (2, 1), (1, 1.0875), (0, 1)]
@@ -253,6 +285,11 @@ def test_modes_survive_a_pickle():
     assert_allclose(again.residual_compliance([(0.3, 0.3)]), modes.residual_compliance([(0.3, 0.3)]), rtol=1e-12)
 
 
+def test_bounds_are_refused_where_no_proof_covers_the_body():
+    with pytest.raises(ValueError, match="bounds need an isotropic plate of constant thickness with straight edges"):
+        find_modes(assemble(mesh.disk(1.0), PLATE, {"boundary": "hinged"}), n_modes=1, bounds=True)
+
+
 def test_strike_point_off_the_body_is_refused():
     modes = find_modes(assemble(mesh.rectangle(1.0, 1.0, size=0.5), PLATE), n_modes=4)
     with pytest.raises(ValueError, match=r"at must lie on the body, got \(1.2, 0.5\) m"):
@@ -267,6 +304,7 @@ def test_strike_point_off_the_body_is_refused():
         ({"n_modes": 0}, "n_modes must be at least 1"),
         ({"max_frequency": 1e-3}, "max_frequency must reach the first mode"),
         ({"n_modes": 10**6}, "n_modes must not exceed"),
+        ({"n_modes": 2, "tolerance": -1.0}, "tolerance must lie between"),
     ],
 )
 def test_refuses_requests_that_make_no_sense(options, text):
