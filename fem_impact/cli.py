@@ -41,7 +41,7 @@ def main(arguments: list[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else Python complains again at its exit
         return FAILED
     except OSError as error:
-        return _complain(f"{error.filename}: {error.strerror}" if error.filename else error, FAILED)
+        return _complain(f"{error.filename}: {error.strerror}" if error.filename else error.strerror or error, FAILED)
     except MemoryError:
         return _complain("not enough memory; allow a larger tolerance", FAILED)
     except RuntimeError as error:
@@ -136,9 +136,15 @@ def _write(folder: Path, scene: Any, run: Any, changes: Mapping[str, Any]) -> di
 
 def _modes(options: argparse.Namespace) -> None:
     scene = fi.load_scene(options.scene)
-    modes = scene.modes(options.count)
-    if options.vtk is not None:
-        fi.export.write_vtk(options.vtk, modes)
+    if options.vtk is None:
+        with _progress("modes"):
+            modes = scene.modes(options.count)
+    else:
+        fi.export.vtk_ending(options.vtk)
+        with fi.export.staged(options.vtk.parent) as staging:  # found wanting before the work, not after it
+            with _progress("modes"):
+                modes = scene.modes(options.count)
+            fi.export.write_vtk(staging / options.vtk.name, modes)
     if options.json:
         data = {"frequencies": modes.frequencies, "damping_ratios": modes.damping_ratio, "mass": modes.mass}
         print(json.dumps(fi.export.plain({**data, "versions": fi.export.versions()}), indent=2, allow_nan=False))

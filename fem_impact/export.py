@@ -18,7 +18,17 @@ from ._files import replacing, staged
 from .modal import Modes
 from .response import Response
 
-__all__ = ["numbers", "plain", "staged", "versions", "write_force", "write_json", "write_vtk", "write_wav"]
+__all__ = [
+    "numbers",
+    "plain",
+    "staged",
+    "versions",
+    "vtk_ending",
+    "write_force",
+    "write_json",
+    "write_vtk",
+    "write_wav",
+]
 
 CENTROID_BAND = 20e3  # [Hz] the spectral centroid is that of the force up to here: about what is heard
 PACKAGES = ("fem-impact", "numpy", "scipy", "scikit-fem", "netgen-mesher", "numba")
@@ -49,7 +59,7 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
         Where the path has another ending, or times are missing.
     """
     path = Path(path)
-    suffix = _check.one_of("path ending", path.suffix, (".vtu", ".pvd"))
+    suffix = vtk_ending(path)
     points, cells = drawing.grid(modes)
     if response is None:
         parts = _mode_parts(modes, points)
@@ -68,6 +78,11 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
         _write_vtu(path, points, cells, *parts[0])
     else:
         raise ValueError(f"times must be one time for a .vtu, got {len(parts)}; write a .pvd")
+
+
+def vtk_ending(path: str | Path) -> str:
+    """The ending of a path that `write_vtk` takes; ValueError for any other."""
+    return _check.one_of("path ending", Path(path).suffix, (".vtu", ".pvd"))
 
 
 def write_wav(path: str | Path, response: Response, at: Any = None, **options: Any) -> sound.Sound:

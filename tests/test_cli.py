@@ -206,3 +206,21 @@ def test_completion_offers_verbs_and_their_options():
     assert offered("fem-impact", "st") == ["strike"]
     assert offered("fem-impact", "strike", "--t") == ["--tolerance"]
     assert offered("fem-impact", "modes", "a.toml", "--") == ["--count", "--help", "--json", "--vtk"]
+
+
+def test_shapes_that_cannot_be_written_are_told_before_the_work(scene, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(fi.Scene, "modes", lambda *_: pytest.fail("the work must not begin"))
+    assert cli.main(["modes", str(scene), "--vtk", str(tmp_path / "m.stl")]) == 2
+    assert "path ending must be one of .vtu, .pvd" in capsys.readouterr().err
+    assert cli.main(["modes", str(scene), "--vtk", str(scene / "m.pvd")]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_full_disk_is_a_sentence(scene, tmp_path, capsys, monkeypatch):
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(fi.export, "write_wav", full)
+    assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out")]) == 1
+    assert capsys.readouterr().err == "fem-impact: No space left on device\n"
+    assert not (tmp_path / "out").exists()
