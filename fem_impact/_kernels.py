@@ -20,6 +20,11 @@ CONTACT, FLIGHT = 0, 1  # what the run does next
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = 0, 1, 2, 3, 4, 5  # why a run ended
 
 
+def inner(**options):
+    """Compile for use by other kernels only; part of them when they are cached, and cheaper to compile."""
+    return njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
+
+
 @njit(cache=True, error_model="numpy")
 def mode_matrix(w, z, h):
     """Exact free motion of one flexible mode: a11, a12, a22 of the state's step, then slow and fast rate and half gap.
@@ -44,7 +49,7 @@ def mode_matrix(w, z, h):
     return e1 + slow * s, s, np.exp(-fast * h) - slow * s, slow, fast, root
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def exponential_sums(z, count, out_sums):
     """phi_k of -z, k = 1 .. count, z >= 0: the integrals of (1-r)**(k-1)/(k-1)! exp(-z r) over [0, 1].
 
@@ -194,7 +199,7 @@ def decays(exponent, out_decay):
         out_decay[n] = out_decay[n] * scale[n] if exponent[n] < 700.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@inner(fastmath={"contract"})
 def free_table(omega, zeta, h, out_free, out_decayed):
     """Exact free motion of every mode over h: rows a11, a12, a22 of out_free (3, n_modes); a21 is -omega**2 a12.
 
@@ -231,7 +236,7 @@ def free_table(omega, zeta, h, out_free, out_decayed):
             out_free[2, n] = a22
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@inner(fastmath={"contract"})
 def near_moments(omega, h, double, out_moments):
     """Moments 2 and 3 (rows of out_moments) by power series, for every mode with omega h < SERIES_END."""
     n_modes = omega.size
@@ -341,7 +346,7 @@ def step_table(omega, zeta, h, out_table):
         out_table[11, n] = h * h * (m[3, n] - 0.5 * m[2, n])
 
 
-@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+@inner(fastmath=LOOSE)
 def contact_sums(shape, table, out_sums):
     """Sums over the modes of u_i u_j times b1, c1, B0, B1, b2, c2: (6, n_contacts, n_contacts)."""
     n_contacts, n_modes = shape.shape
@@ -371,7 +376,7 @@ def contact_sums(shape, table, out_sums):
                 out_sums[r, j, i] = out_sums[r, i, j]
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def power(x, exponent):
     """x**exponent for x > 0 without the general power where a root will do."""
     if exponent == 1.0:
@@ -381,7 +386,7 @@ def power(x, exponent):
     return x**exponent
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def compression(d, k, a, c):
     """Compression x of the contact spring when a residual compliance c in series takes c k x**a of the approach d."""
     if c == 0.0:
@@ -518,7 +523,7 @@ def solve_constant(d0, x0, f0, v0, e, b, loss, law, i):
     return y, max(0.0, f)
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def solve_linear(matrix, vector, n):
     """Solve the leading n x n system in place by elimination with row exchange; False where it is singular."""
     for i in range(n):
@@ -546,7 +551,7 @@ def solve_linear(matrix, vector, n):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def mean_force(h, y, now, law, i):
     """Mean force of scheme A for one contact ending at approach y, and its slope; the force never pulls."""
     x1, f1, v1 = law_at(y, law, i)
@@ -560,7 +565,7 @@ def mean_force(h, y, now, law, i):
     return f, turn + loss * f1
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def sweep_constants(h, now, law, e, sums, out_y, out_f):
     """Solve scheme A's equations one contact at a time, the others' forces held; the largest relative change."""
     m = e.size
@@ -579,7 +584,7 @@ def sweep_constants(h, now, law, e, sums, out_y, out_f):
     return change
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def solve_constants(h, now, law, e, sums, work, out_y, out_f):
     """Scheme A for several contacts, whose equations minimise a convex function of the forces g.
 
@@ -730,7 +735,7 @@ def solve_ramp(h, d0, x0, f0, v0, rate0, e, ea, vf, sums, law):
     return True, y, f, s
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def ramp_forces(h, y, now, law, e, ea, vf, sums, work, out_f, out_s, out_r):
     """Mean and slope of the forces of scheme A4 if the step ended at approaches y, and the residual in y."""
     m = law.shape[0]
@@ -763,7 +768,7 @@ def ramp_forces(h, y, now, law, e, ea, vf, sums, work, out_f, out_s, out_r):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
     """Scheme A4: mean and slope of the forces of one step, starting from the approaches of scheme A in out_y.
 
@@ -819,7 +824,7 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
     return True
 
 
-@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+@inner(fastmath=LOOSE)
 def predict(shape, table, offset, bias, q, p, out_q, out_p, out_end):
     """Free motion over one step: the new state and, per contact, end approach, mean approach and end rate (3, m)."""
     n_contacts, n_modes = shape.shape
@@ -840,7 +845,7 @@ def predict(shape, table, offset, bias, q, p, out_q, out_p, out_end):
         out_end[2, i] = rate
 
 
-@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+@inner(fastmath=LOOSE)
 def commit(shape, table, force, slope, free_q, free_p, out_q, out_p):
     """Add the motion the step's forces (mean, slope) cause to the free motion."""
     n_contacts, n_modes = shape.shape
@@ -862,7 +867,7 @@ def commit(shape, table, force, slope, free_q, free_p, out_q, out_p):
         out_p[n] = free_p[n] - f * table[5, n] - s * table[7, n]
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def free_flight(omega, zeta, bias, time, q, p):
     """Advance a state in place by the exact motion without contact."""
     n_modes = omega.size
@@ -882,7 +887,7 @@ def free_flight(omega, zeta, bias, time, q, p):
             p[n] += a12 * bias[n]
 
 
-@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+@inner(fastmath=LOOSE)
 def approach(shape, offset, i, q, p):
     """Approach of contact i and its rate."""
     d = 0.0
@@ -893,7 +898,7 @@ def approach(shape, offset, i, q, p):
     return offset[i] + d, v
 
 
-@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+@inner(fastmath=LOOSE)
 def motion_bounds(shape, omega, zeta, bias, i, q, p):
     """Rigid part and bounds of the flexible part of contact i's approach, valid for all later free time.
 
@@ -923,7 +928,7 @@ def motion_bounds(shape, omega, zeta, bias, i, q, p):
     return position, rate, acceleration, reach, fastest, hardest
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def quadratic_wait(d, v, a):
     """Largest t with d + v t + a t**2 / 2 <= 0 all along, for d <= 0 and a >= 0; infinity if never."""
     if a <= 0.0:
@@ -934,7 +939,7 @@ def quadratic_wait(d, v, a):
     return (root - v) / a
 
 
-@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+@inner(fastmath=LOOSE)
 def glide(table, q, p):
     """Advance a state in place by the free motion whose table (6, n_modes) is given: a11, a12, a21, a22, pushes."""
     for n in range(q.size):
@@ -944,7 +949,7 @@ def glide(table, q, p):
         p[n] = table[2, n] * q0 + table[3, n] * p0 + table[5, n]
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def glide_table(omega, zeta, bias, h, out_table):
     """Table for `glide` over h."""
     n_modes = omega.size
@@ -963,7 +968,7 @@ def glide_table(omega, zeta, bias, h, out_table):
             out_table[5, n] = bias[n] * a12
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, still, tables, known, q, p):
     """Advance a state without contact in place to the next onset, never passing one (conservative advancement).
 
@@ -1087,7 +1092,7 @@ def hermite_root(d0, v0, d1, v1, h):
     return high * h
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def try_step(ramp, h, table, sums, shape, offset, bias, law, q, p, now, free_q, free_p, end, work, y, f, s, rate):
     """Solve one step of length h from the state; return 1 for A4, 0 for A (asked for, or fallen back to)."""
     m = y.size
@@ -1126,7 +1131,7 @@ def try_step(ramp, h, table, sums, shape, offset, bias, law, q, p, now, free_q, 
     return fine
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def resized(array, n, length):
     """The first n rows of an array in a new one of another length."""
     result = np.empty((length, array.shape[1]))
@@ -1136,7 +1141,7 @@ def resized(array, n, length):
     return result
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def modal_energy(omega, bias, q, p):
     """Kinetic and strain energy less the work of the bias force."""
     total = 0.0
@@ -1145,7 +1150,7 @@ def modal_energy(omega, bias, q, p):
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def crossed(pressed, d0, v0, y, depth, still):
     """Whether a contact opened (was pressed and ends apart) or closed (was apart and ends pressed) within a step."""
     if pressed:
@@ -1415,7 +1420,7 @@ def run_energy(
     return resized(steps, n_steps, n_steps), q, p, now, done, time, status, n_fallback, n_blind
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def collocation_table(omega, zeta, shape, h, nodes, powers, out_free, out_end, out_inner):
     """Coefficients of one collocation step of length h.
 
@@ -1469,7 +1474,7 @@ def collocation_table(omega, zeta, shape, h, nodes, powers, out_free, out_end, o
                             out_inner[1, a, b, i, j] += uu * v
 
 
-@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+@inner(fastmath=LOOSE)
 def free_approach(shape, offset, bias, free, q, p, out_d, out_v):
     """Approach and rate (s + 1, n_contacts) at a step's nodes if nothing pushed."""
     m, n_modes = shape.shape
@@ -1485,7 +1490,7 @@ def free_approach(shape, offset, bias, free, q, p, out_d, out_v):
             out_v[a, i] = v
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def smooth_force(x, v, law, i):
     """Force of a pressed contact and its slopes in compression and rate, continued smoothly below zero compression."""
     k, a, loss = law[i, 0], law[i, 1], law[i, 2]
@@ -1500,7 +1505,7 @@ def smooth_force(x, v, law, i):
     return f * factor, slope * factor, f * loss
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def solve_collocation(inner, law, pressed, free_d, free_v, matrix, vector, out_f):
     """Forces at the nodes (s, n_contacts) by Newton's method from those in out_f; False where it does not settle."""
     s, m = out_f.shape
@@ -1553,7 +1558,7 @@ def solve_collocation(inner, law, pressed, free_d, free_v, matrix, vector, out_f
     return False
 
 
-@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+@inner(fastmath=LOOSE)
 def collocation_end(shape, offset, bias, free, last, f, q, p, out_q, out_p, out_y, out_rate):
     """State at a collocation step's end, and approach and rate of each contact there."""
     m, n_modes = shape.shape
@@ -1578,7 +1583,7 @@ def collocation_end(shape, offset, bias, free, last, f, q, p, out_q, out_p, out_
         out_rate[i] = v
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def collocate(
     shape, offset, bias, law, pressed, now, nodes, edges, free, last, inner, q, p, guess, small,
     free_d, free_v, f, matrix, vector, out_q, out_p, out_y, out_rate,
@@ -2013,7 +2018,7 @@ def secular_modes(omega, shape, stiffness):
     return square, vectors
 
 
-@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+@inner(fastmath=LOOSE)
 def secular_approach(rate, weight, x, v, rest, t):
     """Approach of a contact in contact and its rate after t, from the state (x, v) of the joint eigenmodes."""
     d = rest
@@ -2225,7 +2230,7 @@ def run_secular(
     return resized(steps, n_steps, n_steps), q, p, now, done, time, status, 0, 0
 
 
-@njit(cache=True, error_model="numpy")
+@inner()
 def push(omega, zeta, shape, bias, row, n_coefficients, length, q, p, out_q, out_p):
     """State after a part of a step, (n_modes,), from the step's start; exact for its polynomial forces."""
     if length <= 0.0:
