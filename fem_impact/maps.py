@@ -1,18 +1,19 @@
 """Maps: one blow at every point of a grid of parameters, as an xarray Dataset."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray
 
-from . import _check
+from . import _check, bounces
 from ._check import SimulationError
 from .contact import Contact
 from .integrator import strike
-from .modal import Modes
+from .modal import Modes, SampledShapes
 from .response import Response
 from .striker import Striker
 
@@ -43,6 +44,8 @@ ALIASES = {  # the same parameters by their place in a scene file
     "target.first_frequency": "target_frequency",
     "target.damping_ratio": "damping_ratio",
 }
+FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  # that change the kernels
+BLOCK = 2**17  # [-] cells struck at once: some 30 MB
 LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
     "n_impacts": ("", "number of unbroken contacts"),
     "contact_time": ("s", "total time in contact"),
@@ -52,6 +55,9 @@ LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
     "error": ("", "estimated error of the time steps: absolute in restitution, relative in the others"),
     "centroid": ("Hz", "mean frequency of the force spectrum's magnitude"),
 }
+
+
+Watch = Callable[[int, int], Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,20 +86,17 @@ class Case:
         key = "mass" if name == "target_mass" else "first_frequency"
         return replace(self, modes=self.modes.scaled(**{key: value}))
 
-    def strike(self, tolerance: float, residual: bool) -> Response:
-        """The single blow."""
-        return strike(
-            self.modes, self.striker, self.contact,
-            at=self.at, speed=self.speed, tolerance=tolerance, residual=residual,
-        )  # fmt: skip
-
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """The blow all cells start from and the axes that change it."""
+    """The blow all cells start from, the axes that change it, and what is wanted of each."""
 
     base: Case
     axes: Mapping[str, np.ndarray]  # name: (n,) values, for `at` (n, dimension)
+    tolerance: float  # [-]
+    residual: bool
+    band: float | None  # [Hz] of the centroid
+    extra: Mapping[str, Callable[[Response], float]]  # more layers
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -101,7 +104,12 @@ class Grid:
 
     @property
     def n_cases(self) -> int:
-        return int(np.prod(self.shape, dtype=int))
+        return math.prod(self.shape)
+
+    @property
+    def layers(self) -> list[str]:
+        """Names of the numbers kept of each cell."""
+        return [name for name in LAYERS if name != "centroid" or self.band is not None] + list(self.extra)
 
     def case(self, index: int) -> Case:
         """The blow of one cell, counted along the last axis first."""
@@ -109,6 +117,44 @@ class Grid:
         for (name, values), i in zip(self.axes.items(), np.unravel_index(index, self.shape)):
             case = case.changed(name, values[i])
         return case
+
+    def strike(self, index: int) -> tuple[np.ndarray, str]:
+        """The layers of one cell by the modal engine, and its error text ('' where there is none)."""
+        case = self.case(index)
+        try:
+            hit = strike(
+                case.modes, case.striker, case.contact,
+                at=case.at, speed=case.speed, tolerance=self.tolerance, residual=self.residual,
+            )  # fmt: skip
+            row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force, hit.error.step]
+            row += [hit.spectral_centroid(self.band)] if self.band is not None else []
+            row += [function(hit) for function in self.extra.values()]
+        except SimulationError as error:
+            return np.full(len(self.layers), np.nan), str(error)
+        return np.array(row, float), ""
+
+    def sampled(self) -> "Grid":
+        """The same grid with bodies known at their contact points only: all that blows need, and fit to be sent."""
+        places = self.axes.get("at", self.base.at[None])
+        striker = self.base.striker
+        if striker.modes.dimension:
+            striker = replace(striker, modes=_sampled(striker.modes, striker.at[None]))
+        places = np.unique(np.vstack([places, self.base.at[None]]), axis=0)
+        return replace(self, base=replace(self.base, modes=_sampled(self.base.modes, places), striker=striker))
+
+    def without_speed(self) -> "Grid | None":
+        """The grid with one speed, where all springs are linear and hence speed only scales forces."""
+        exponents = self.axes.get("exponent", np.array([self.base.contact.exponent]))
+        lossy = self.base.contact.loss or "loss" in self.axes
+        if "speed" not in self.axes or (exponents != 1.0).any() or lossy or self.base.contact.gap or self.extra:
+            return None
+        return replace(self, axes={**self.axes, "speed": self.axes["speed"][:1]})
+
+
+def _sampled(modes: Modes, points: np.ndarray) -> Modes:
+    """Modes known at points only; the compliance between different points, which no blow needs, is left out."""
+    static = np.diag([float(modes.shapes.compliance(point[None])[0, 0]) for point in points])
+    return replace(modes, shapes=SampledShapes(points, modes.shape_at(points), static))
 
 
 def sweep(
@@ -123,6 +169,8 @@ def sweep(
     max_frequency: float | None = None,
     layers: Mapping[str, Callable[[Response], float]] | None = None,
     residual: bool = True,
+    workers: int | None = None,
+    watch: Watch | None = None,
 ) -> xarray.Dataset:
     """Strike once for every combination of parameters.
 
@@ -141,6 +189,10 @@ def sweep(
         More scalars to keep. Every cell is then struck one by one.
     residual : bool
         As in `strike`.
+    workers : int, optional
+        Threads; one for each core by default.
+    watch : callable, optional
+        Called now and then with the number of cells done and of all.
 
     Returns
     -------
@@ -156,31 +208,95 @@ def sweep(
     """
     tolerance = _check.between("tolerance", tolerance, 1e-12, 1.0)
     base = Case(modes, striker, contact, modes.points("at", at)[0], _check.positive("speed", speed, "m/s"))
-    grid = Grid(base, _axes(base, over))
     band = None if max_frequency is None else _check.positive("max_frequency", max_frequency, "Hz")
-    extra = dict(layers or {})
-    names = [name for name in LAYERS if name != "centroid" or band is not None]
-    numbers = np.full((len(names) + len(extra), grid.n_cases), np.nan)
+    workers = None if workers is None else _check.count("workers", workers)
+    grid = Grid(base, _axes(base, over), tolerance, residual, band, dict(layers or {}))
+    fewer = grid.without_speed()
+    numbers, failures = _local(fewer or grid, workers, watch)
+    if fewer is not None:
+        numbers, failures = _with_speed(grid, fewer, numbers, failures)
+    return _dataset(grid, numbers, failures)
+
+
+def _local(grid: Grid, workers: int | None, watch: Watch | None) -> tuple[np.ndarray, np.ndarray]:
+    """All cells by threads of this process, block by block."""
+    numbers = np.empty((len(grid.layers), grid.n_cases))
     failures = np.full(grid.n_cases, "", dtype=object)
-    for index in range(grid.n_cases):
-        row, failures[index] = strike_cell(grid.case(index), tolerance, residual, band, extra)
-        numbers[:, index] = row
-    return _dataset(grid, [*names, *extra], numbers, failures, tolerance, band, residual)
+    kernels: bounces.Kernels = {}
+    for start in range(0, grid.n_cases, BLOCK):
+        stop = min(start + BLOCK, grid.n_cases)
+        part = slice(start, stop)
+        numbers[:, part], failures[part] = solve(grid, start, stop, workers=workers, kernels=kernels)
+        if watch is not None:
+            watch(stop, grid.n_cases)
+    return numbers, failures
 
 
-def strike_cell(
-    case: Case, tolerance: float, residual: bool, band: float | None, extra: Mapping[str, Callable[[Response], float]]
-) -> tuple[np.ndarray, str]:
-    """The layers of one cell by the modal engine, and its error text ('' where there is none)."""
-    width = len(LAYERS) - (band is None) + len(extra)
-    try:
-        hit = case.strike(tolerance, residual)
-        row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force, hit.error.step]
-        row += [hit.spectral_centroid(band)] if band is not None else []
-        row += [function(hit) for function in extra.values()]
-    except SimulationError as error:
-        return np.full(width, np.nan), str(error)
-    return np.array(row, float), ""
+def _with_speed(grid: Grid, fewer: Grid, numbers: np.ndarray, failures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Blows at all speeds from those at one: forces grow with the speed, everything else stays."""
+    along = list(grid.axes).index("speed")
+    shape = [1] * len(grid.shape)
+    shape[along] = -1
+    ratio = (grid.axes["speed"] / grid.axes["speed"][0]).reshape(shape)
+    whole = np.broadcast_to(numbers.reshape(-1, *fewer.shape), (len(numbers), *grid.shape)).copy()
+    for row, name in enumerate(grid.layers):
+        if name in ("impulse", "peak_force"):
+            whole[row] *= ratio
+    failures = np.broadcast_to(failures.reshape(fewer.shape), grid.shape)
+    return whole.reshape(len(numbers), -1), failures.reshape(-1)
+
+
+def solve(
+    grid: Grid, start: int, stop: int, *, workers: int | None = None, kernels: bounces.Kernels | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Strike the cells from ``start`` to ``stop``.
+
+    Returns
+    -------
+    numbers : ndarray, shape (n_layers, n_cells)
+    failures : ndarray of str, shape (n_cells,)
+    """
+    names = grid.layers
+    numbers = np.full((len(names), stop - start), np.nan)
+    failures = np.full(stop - start, "", dtype=object)
+    place = dict(zip(grid.axes, np.unravel_index(np.arange(start, stop), grid.shape)))
+    law = grid.base.contact
+    column = {
+        name: grid.axes[name][place[name]] if name in place else np.full(stop - start, value)
+        for name, value in (
+            ("target_mass", grid.base.modes.mass),
+            ("mass", grid.base.striker.mass),
+            ("stiffness", law.stiffness),
+            ("exponent", law.exponent),
+            ("speed", grid.base.speed),
+            ("loss", law.loss),
+            ("gap", law.gap),
+        )
+    }
+    quick = (column["exponent"] >= 1.0) & (column["loss"] == 0.0) & (column["gap"] >= 0.0) & (not grid.extra)
+    cells = np.flatnonzero(quick)
+    if cells.size:
+        kind = np.zeros(stop - start, int)
+        for name in FAMILY_AXES:
+            if name in place:
+                kind = kind * len(grid.axes[name]) + place[name]
+        kinds, first, family = np.unique(kind[cells], return_index=True, return_inverse=True)
+        families = {}
+        for which, i in zip(kinds, cells[first]):
+            case = grid.case(start + i)
+            families[int(which)] = bounces.Family.of(case.modes, case.at, case.striker, grid.residual)
+        blows = bounces.Blows(
+            families,
+            kinds[family],
+            *(column[name][cells] for name in ("target_mass", "mass", "stiffness", "exponent", "speed")),
+        )
+        found = bounces.bounce(blows, tolerance=grid.tolerance, band=grid.band or 0.0, workers=workers, kernels=kernels)
+        for row, name in enumerate(names):
+            numbers[row, cells] = getattr(found, name)
+        quick[cells] = found.done
+    for i in np.flatnonzero(~quick):
+        numbers[:, i], failures[i] = grid.strike(start + int(i))
+    return numbers, failures
 
 
 def _axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
@@ -204,29 +320,21 @@ def _axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
     return axes
 
 
-def _dataset(
-    grid: Grid,
-    names: Sequence[str],
-    numbers: np.ndarray,
-    failures: np.ndarray,
-    tolerance: float,
-    band: float | None,
-    residual: bool,
-) -> xarray.Dataset:
+def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray) -> xarray.Dataset:
     """Layers and axes with their units."""
     dims = tuple(grid.axes)
     data: dict[str, Any] = {}
-    for name, values in zip(names, numbers):
+    for name, values in zip(grid.layers, numbers):
         unit, meaning = LAYERS.get(name, ("", name))
         attributes: dict[str, Any] = {"units": unit or "1", "long_name": meaning}
         if name == "n_impacts":
             values = np.where(np.isnan(values), -1, values).astype(np.int32)
         if name == "centroid":
-            attributes["max_frequency"] = band
+            attributes["max_frequency"] = grid.band
         data[name] = (dims, values.reshape(grid.shape), attributes)
     data["failure"] = (dims, failures.reshape(grid.shape).astype(str), {"long_name": "why the cell failed"})
     table = xarray.Dataset(data, attrs={"title": "Map of blows", "scene": json.dumps(_scene(grid.base))})
-    table.attrs |= {"tolerance": tolerance, "residual": int(residual)}
+    table.attrs |= {"tolerance": grid.tolerance, "residual": int(grid.residual)}
     for name, values in grid.axes.items():
         attributes = {"units": AXES[name][0] or "1", "long_name": AXES[name][1]}
         if name != "at":

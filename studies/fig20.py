@@ -17,7 +17,8 @@ MIDDLE = (0.45 * source.LENGTH, 0.5 * source.WIDTH)  # [m]
 def compute(at=MIDDLE, damping_ratio=0.0, **wanted):
     """Blows on the plate of 200 g and, for each mass, the stiffness at which the plate would stop the stick [N/m]."""
     table = source.linear_map(0.2, at=at, damping_ratio=damping_ratio, **wanted)
-    return table, threshold_stiffness(source.plate(0.2, n_modes=300), at, table.mass.values / 3.0)
+    limit = threshold_stiffness(source.plate(0.2, n_modes=300), at, table.mass.values / 3.0)
+    return table, table.mass.copy(data=limit)
 
 
 def threshold_stiffness(modes, at, felt_masses):

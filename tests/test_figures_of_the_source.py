@@ -179,10 +179,10 @@ def test_fig20_the_threshold_lies_inside_the_region_of_several_impacts():
     source, fig20 = study("source_scenes"), study(20)
     few = {"masses": source.MASSES[1::3], "stiffnesses": source.STIFFNESSES[1::2], "max_frequency": None}
     table, limit = fig20.compute(fig20.MIDDLE, **few)
-    several, beyond = table.n_impacts.values > 1, table.stiffness.values[:, None] >= limit
-    assert several[beyond].all()
+    several, beyond = table.n_impacts > 1, table.stiffness >= limit
+    assert several.where(beyond, True).all()
     assert (several & ~beyond).sum() > 0.2 * several.sum()  # "a substantial range" below the threshold
-    assert not several[table.stiffness.values < 0.1 * limit.min()].any()  # single impacts where springs are soft
+    assert not several[0].any()  # the softest springs
 
 
 def test_fig20_depends_on_the_strike_point_and_not_on_damping():
@@ -191,8 +191,8 @@ def test_fig20_depends_on_the_strike_point_and_not_on_damping():
     few = {"masses": source.MASSES[1::6], "stiffnesses": source.STIFFNESSES[1::3], "max_frequency": None}
     for at, damping_ratio, share in ((fig20.MIDDLE, 0.01, 1.0), (source.AT, 0.0, 0.6)):
         table, limit = fig20.compute(at, damping_ratio=damping_ratio, **few)
-        several, beyond = table.n_impacts.values > 1, table.stiffness.values[:, None] >= limit
-        assert several[beyond].mean() >= share  # at 0.3 of both sides 0.75 on a finer grid
+        several, beyond = table.n_impacts > 1, table.stiffness >= limit
+        assert several.values[beyond.values].mean() >= share  # at 0.3 of both sides 0.75 on a finer grid
 
 
 def test_fig21_two_humps_in_one_contact():

@@ -7,7 +7,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "fem_impact"
 FLOORS = [
-    {"_check", "_files", "_kernels"},
+    {"_check", "_files", "_kernels", "_batch"},
     {"outline", "curves", "boundary", "meshfile"},
     {"triangulation", "cad"},
     {"mesh", "section", "contact", "elements", "supports", "eigen"},
@@ -22,12 +22,12 @@ FLOORS = [
     {"export"},
     {"integrator"},
     {"tables"},
-    {"scene", "charts"},
+    {"scene", "charts", "bounces"},
     {"doctor", "report", "maps"},
     {"cli"},
 ]
 FLOOR = {name: level for level, names in enumerate(FLOORS) for name in names}
-OWNERS = {"numba": {"_kernels"}, "skfem": {"elements"}, "matplotlib": {"figures", "charts"}}
+OWNERS = {"numba": {"_kernels", "_batch"}, "skfem": {"elements"}, "matplotlib": {"figures", "charts"}}
 
 
 def imports(path):

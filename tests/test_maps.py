@@ -1,0 +1,172 @@
+"""Maps: cells against single blows, axes, units, failures and input errors."""
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact import maps
+
+AT = (0.465, 0.3)
+
+
+def plate(**wanted):
+    return fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=80, **wanted)
+
+
+def stick(mass=0.1, first_frequency=10e3):
+    return fi.Striker.stick(mass, first_frequency)
+
+
+def test_a_map_as_the_design_says_it():
+    over = {"mass": [0.05, 0.1], "stiffness": [2e4, 1e5, 5e5]}
+    table = fi.sweep(plate(), stick(), fi.Contact.linear(1e5), at=AT, speed=1.0, over=over, tolerance=1e-3)
+    assert table.n_impacts.dims == ("mass", "stiffness")
+    assert table.n_impacts.dtype.kind == "i"
+    assert {name: table[name].attrs["units"] for name in ("mass", "stiffness", "contact_time", "restitution")} == {
+        "mass": "kg",
+        "stiffness": "N/m**exponent",
+        "contact_time": "s",
+        "restitution": "1",
+    }
+    scene = json.loads(table.attrs["scene"])
+    assert scene["target"]["mass"] == 0.2
+    assert len(scene["target"]["frequencies"]) == 80
+    assert (table.failure == "").all()
+
+
+VALUES = {
+    "mass": [0.03, 0.15],
+    "striker_frequency": [800.0, 5e3],
+    "stiffness": [3e4, 4e5],
+    "exponent": [1.0, 1.3],
+    "loss": [0.0, 0.2],
+    "gap": [0.0, 1e-3],
+    "speed": [0.3, 4.0],
+    "at": [(0.465, 0.3), (0.7, 0.45)],
+    "target_mass": [0.1, 2.0],
+    "target_frequency": [60.0, 150.0],
+    "damping_ratio": [0.0, 0.03],
+}
+
+
+def single(name, value, tolerance, law):
+    """The blow of one cell by `strike` alone."""
+    change = {name: value}
+    target = plate().scaled(mass=change.get("target_mass", 0.2), first_frequency=change.get("target_frequency", 100.0))
+    target = target.damped(change.get("damping_ratio", 0.0))
+    striker = stick(change.get("mass", 0.1), change.get("striker_frequency", 10e3))
+    terms = {key: change.get(key, getattr(law, key)) for key in ("stiffness", "exponent", "loss", "gap")}
+    return fi.strike(
+        target,
+        striker,
+        fi.Contact(**terms),
+        at=change.get("at", AT),
+        speed=change.get("speed", 1.0),
+        tolerance=tolerance,
+    )
+
+
+@pytest.mark.parametrize("law", [fi.Contact.linear(1e5), fi.Contact.hertz(2e6)], ids=["linear", "hertz"])
+@pytest.mark.parametrize("name", VALUES)
+def test_every_axis_gives_the_single_blow(name, law):
+    table = fi.sweep(plate(), stick(), law, at=AT, speed=1.0, over={name: VALUES[name]}, max_frequency=3e3)
+    for i, value in enumerate(VALUES[name]):
+        lossy = name == "loss" and value > 0.0
+        hit = single(name, value, 1e-3 if lossy else 1e-5, law)  # lossy cells are single blows themselves
+        cell = table.isel({name: i})
+        assert int(cell.n_impacts) == hit.n_impacts
+        assert_allclose(float(cell.restitution), hit.restitution, atol=1e-3)
+        for layer in ("contact_time", "impulse", "peak_force"):
+            assert_allclose(float(cell[layer]), getattr(hit, layer), rtol=1e-3)
+        assert_allclose(float(cell.centroid), hit.spectral_centroid(3e3), rtol=2e-3)  # 1e-3 each of the two
+
+
+def test_random_cells_of_a_map_are_the_single_blows():
+    rng = np.random.default_rng(3)
+    over = {"stiffness": np.geomspace(1e4, 1e6, 12), "mass": np.linspace(0.01, 0.2, 11), "target_mass": [0.2, 0.5, 5.0]}
+    table = fi.sweep(plate(), stick(), fi.Contact.linear(1e5), at=AT, speed=1.0, over=over)
+    for _ in range(12):
+        place = {name: int(rng.integers(len(values))) for name, values in over.items()}
+        cell = table.isel(place)
+        hit = fi.strike(
+            plate().scaled(mass=float(cell.target_mass)),
+            stick(float(cell.mass)),
+            fi.Contact.linear(float(cell.stiffness)),
+            at=AT,
+            speed=1.0,
+            tolerance=1e-3,
+        )
+        assert int(cell.n_impacts) == hit.n_impacts
+        assert_allclose(float(cell.restitution), hit.restitution, atol=1e-3)
+        assert_allclose(float(cell.contact_time), hit.contact_time, rtol=1e-3)
+
+
+def test_speed_only_scales_the_forces_of_linear_springs():
+    over = {"speed": [0.5, 1.0, 3.0], "stiffness": [5e4, 8e5]}
+    table = fi.sweep(plate(), stick(), fi.Contact.linear(1e5), at=AT, speed=7.0, over=over)
+    direct = fi.sweep(plate(), stick(), fi.Contact.linear(1e5), at=AT, speed=3.0, over={"stiffness": [5e4, 8e5]})
+    assert_allclose(table.contact_time.sel(speed=3.0), direct.contact_time, rtol=1e-12)
+    assert_allclose(table.peak_force.sel(speed=3.0), direct.peak_force, rtol=1e-12)
+    assert_allclose(table.impulse.sel(speed=0.5) * 6.0, direct.impulse, rtol=1e-12)
+
+
+def test_a_cell_that_fails_says_why_and_the_others_go_on(monkeypatch):
+    def fail(modes, striker, contact, **wanted):
+        if contact.loss > 0.5:
+            raise fi.SimulationError("the motion may be chaotic")
+        return fi.strike(modes, striker, contact, **wanted)
+
+    monkeypatch.setattr(maps, "strike", fail)
+    table = fi.sweep(plate(), stick(), fi.Contact.linear(1e5), at=AT, speed=1.0, over={"loss": [0.1, 0.9]})
+    assert table.failure.values.tolist() == ["", "the motion may be chaotic"]
+    assert table.n_impacts.values.tolist() == [1, -1]
+    assert np.isnan(table.restitution.values).tolist() == [False, True]
+
+
+def test_layers_of_ones_own():
+    layers = {"kept": lambda hit: hit.energies["striker"]}
+    table = fi.sweep(
+        plate(), stick(), fi.Contact.linear(1e5), at=AT, speed=1.0, over={"strike.speed": [1.0, 2.0]}, layers=layers
+    )
+    assert_allclose(table.kept[1], 4.0 * table.kept[0], rtol=1e-3)  # energy goes with the square of the speed
+
+
+def test_points_are_an_axis_with_coordinates():
+    table = fi.sweep(plate(), stick(), fi.Contact.linear(1e5), at=AT, speed=1.0, over={"at": [(0.2, 0.3), (0.4, 0.5)]})
+    assert_allclose(table.at_x, [0.2, 0.4])
+    assert_allclose(table.at_y, [0.3, 0.5])
+
+
+def test_bodies_known_at_their_points_only_give_the_same():
+    bodies = maps.Case(plate(), stick(), fi.Contact.linear(4e5), np.array(AT), 1.0)
+    grid = maps.Grid(bodies, {"mass": np.array([0.05, 0.1])}, 1e-3, True, None, {})
+    whole, few = maps.solve(grid, 0, 2)[0], maps.solve(grid.sampled(), 0, 2)[0]
+    assert_allclose(few, whole, rtol=1e-9)  # the same numbers but for rounding in the compliance
+    assert_allclose(grid.sampled().strike(1)[0], grid.strike(1)[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("over", "message"),
+    [
+        ({}, "over must name at least one axis"),
+        ({"masss": [1.0]}, "over must be one of .*did you mean 'mass'"),
+        ({"mass": [0.1, -1.0]}, "mass must be positive, got -1 kg"),
+        ({"mass": []}, "must hold at least one value"),
+        ({"mass": [0.1], "striker.mass": [0.1]}, "names the axis mass twice"),
+        ({"stiffness": [1e5, np.nan]}, r"over\['stiffness'\] must be finite"),
+        ({"exponent": [0.1]}, "exponent must lie between"),
+        ({"at": [(9.0, 0.1)]}, "must lie on the body"),
+    ],
+)
+def test_wrong_axes_are_told_at_once(over, message):
+    with pytest.raises(ValueError, match=message):
+        fi.sweep(plate(), stick(), fi.Contact.linear(1e5), at=AT, speed=1.0, over=over)
+
+
+def test_sweep_stays_a_function_whatever_was_imported():
+    import fem_impact.maps  # noqa: F401
+
+    assert callable(fi.sweep)
