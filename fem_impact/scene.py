@@ -211,7 +211,7 @@ class Scene:
         return self._make("contact", self.contact, sphere=self._striker(), plate=self._section("plate"))
 
     def _make(self, table: str, part: Part, **supplied: Any) -> Any:
-        with self._blame(table):
+        with self._blame(table), np.errstate(all="ignore"):  # what overflows is not finite, and refused as such
             return MAKERS[table][1][part.kind](**supplied, **part.values)
 
     @contextmanager

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 import pyvista
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 import fem_impact as fi
 from fem_impact import cli
@@ -224,3 +226,19 @@ def test_full_disk_is_a_sentence(scene, tmp_path, capsys, monkeypatch):
     assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out")]) == 1
     assert capsys.readouterr().err == "fem-impact: No space left on device\n"
     assert not (tmp_path / "out").exists()
+
+
+WORDS = st.sampled_from(["strike", "modes", "--out", "--count", "--vtk", "--json", "--tolerance", "3", "-1", "nan", ""])
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(arguments=st.lists(st.one_of(WORDS, st.text(max_size=6)), max_size=6))
+def test_any_arguments_end_in_a_status_and_a_message(tmp_path, monkeypatch, capsys, arguments):
+    monkeypatch.chdir(tmp_path)
+    try:
+        status = cli.main(arguments)
+    except SystemExit as end:
+        status = end.code
+    captured = capsys.readouterr()
+    assert status in (0, 1, 2) and (captured.err if status else captured.out)
+    assert not list(tmp_path.iterdir())
