@@ -34,6 +34,9 @@ KINDS = ("clamped", "hinged", "free")
 MORLEY_ORDER = 4  # [-] likewise for products of quadratics
 MASS_ORDER = 10  # [-] of the quadrature: exact for products of quintics
 BEAM_ORDER = 8  # [-] exact for products of cubics where the height varies linearly
+UNEVEN = 20.0  # [-] largest over smallest triangle from which eigenvalues are taken from the strain energy
+TINY = 4e-3  # [-] of the extent: likewise for the root of the area of the smallest triangle
+CHUNK = 256  # [-] triangles whose strain is computed together
 RIGID = 1e-9  # [-] share of a rigid motion that supports may suppress by rounding alone
 
 
@@ -62,6 +65,30 @@ class Frame:
 
 
 @dataclass(frozen=True, eq=False)
+class Strain:
+    """What the strain energy of a plate is made of, kept where triangles are so unequal that K loses digits.
+
+    The stiffness of a triangle grows as its size to the minus two: rounding of K costs that much of the energy of the
+    whole, while the curvature within the triangle, squared and weighed by its area, is as accurate as any other.
+    """
+
+    x: np.ndarray  # (n_cells, n_q, 2) quadrature points
+    stiffness: np.ndarray  # (n_cells, n_q, 3, 3) times their weights
+
+    def energy(self, system: "System", vectors: np.ndarray) -> np.ndarray:
+        """Twice the strain energy (n_modes,) of vectors (n_dofs, n_modes)."""
+        total = np.zeros(vectors.shape[1])
+        moved = system.expand @ vectors
+        for start in range(0, len(self.x), CHUNK):
+            cells = np.arange(start, min(start + CHUNK, len(self.x)))
+            hessian = system.space.functions(cells, self.x[cells], (2,))[0][:, [0, 2, 1]]
+            bend = hessian.transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]  # (n, n_q, 3, n_local)
+            curved = bend @ moved[system.element_dofs[:, cells].T][:, None]  # (n, n_q, 3, n_modes)
+            total += np.einsum("nqik,nqik->k", self.stiffness[cells] @ curved, curved)
+        return total
+
+
+@dataclass(frozen=True, eq=False)
 class System:
     """Stiffness and mass of a supported body in the units of its frame, and how to evaluate a deflection."""
 
@@ -83,6 +110,7 @@ class System:
     order: float = np.inf  # [-] power of the element size by which singular points let the error of a frequency fall
     softness: float = 1.0  # [-] largest inertia over stiffness on the body, in the frame: its shortest waves
     point_masses: tuple = ()  # pairs of point [m] and mass [kg]
+    strain: Strain | None = field(default=None, repr=False)
 
     @property
     def n_dofs(self) -> int:
@@ -220,6 +248,7 @@ class _Raw:
     order: float = np.inf
     point_masses: tuple = ()
     element: str = "argyris"
+    strain: Strain | None = None
 
     def interpolate(self, points: np.ndarray) -> csr_matrix:
         """Deflection at points (n_points, dimension) [m] from all unknowns, (n_points, n_all) [-]."""
@@ -295,6 +324,7 @@ def _reduced(raw: _Raw) -> System:
         raw.order,
         raw.softness,
         raw.point_masses,
+        raw.strain,
     )
 
 
@@ -413,7 +443,10 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
         springs = springs + _scatter(slope.reshape(shape).transpose(0, 2, 1) @ pulled.reshape(shape), dofs, n_all)
     matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), springs
     mass = float((inertia * dx).sum()) * frame.mass
-    return _Raw(mesh, section, supports, mass, frame, *matrices, expand, project, dofs, space, softness, rim)
+    made = _Raw(mesh, section, supports, mass, frame, *matrices, expand, project, dofs, space, softness, rim)
+    area = np.abs(np.linalg.det(space.jacobian))
+    uneven = area.min() < max(area.max() / UNEVEN**2, TINY**2) and not springs.nnz
+    return replace(made, strain=Strain(x, stiffness * dx[..., None, None])) if uneven else made
 
 
 def _assemble_morley(mesh: Mesh, section: Plate, supports: dict) -> _Raw:

@@ -10,6 +10,7 @@ from .mesh import Mesh
 
 SHRINK = 0.5  # [-] of the distance to the corner from one ring of triangles to the next
 WIDE = 0.7  # [rad] triangles at a singular corner are bisected until they are narrower
+ROUNDS = 3  # [-] of such bisections
 CORNER_ERROR = 1e-7  # [-] share of the energy that the innermost ring may miss, about twice that in frequency
 SMALLEST = 1e-10  # [-] of the facet: rings stop here, before the rounding of coordinates shows
 SMALLEST_FREE = 3e-3  # [-] likewise at a free corner: it moves, and rounding grows as (deflection / size)**2
@@ -108,65 +109,84 @@ def towards(mesh: Mesh, wanted: dict[int, int]) -> Mesh:
     """The mesh with rings of triangles that shrink towards some of its vertices (vertex -> number of rings)."""
     if not wanted:
         return mesh
-    points, cells = list(mesh.points), mesh.cells.tolist()
+    points, rim = list(mesh.points), _Rim(mesh)
+    corner = mesh.points[mesh.cells]
+    clockwise = np.linalg.det(corner[:, 1:] - corner[:, :1]) < 0.0
+    anticlockwise = np.where(clockwise[:, None], mesh.cells[:, ::-1], mesh.cells).tolist()
+    cells = _narrowed(points, anticlockwise, set(wanted), rim)
     touching: dict[int, list[int]] = {vertex: [] for vertex in wanted}
     for c, cell in enumerate(cells):
         for vertex in cell:
             if vertex in touching:
                 touching[vertex].append(c)
-    rim = _Rim(mesh)
-    _narrow(points, cells, touching, rim)
     for vertex, n in wanted.items():
         for _ in range(n):
             nearer: dict[int, int] = {}
             for c in touching[vertex]:
-                a, b = (p for p in cells[c] if p != vertex)
+                k = cells[c].index(vertex)
+                a, b = cells[c][k - 2], cells[c][k - 1]  # anticlockwise after the corner
                 for p in (a, b):
                     if p not in nearer:
                         nearer[p] = len(points)
                         points.append(rim.split(vertex, p, len(points), points, SHRINK))
                 cells[c] = [vertex, nearer[a], nearer[b]]
-                for new in ([nearer[a], a, b], [nearer[a], b, nearer[b]]):
-                    for p in new:
-                        if p in touching and p != vertex:
-                            touching[p].append(len(cells))
-                    cells.append(new)
-            for p in nearer:  # the cells that held the split side at its far end hold it no more
-                if p in touching:
-                    touching[p] = [c for c in touching[p] if p in cells[c]]
+                cells += _strip(points, nearer[a], a, b, nearer[b])
     return rim.finish(mesh, np.array(points), np.array(cells))
 
 
-def _narrow(points: list[np.ndarray], cells: list[list[int]], touching: dict[int, list[int]], rim: "_Rim") -> None:
-    """Bisect wide triangles at the vertices of ``touching``: the rings cannot mend a coarse division of the angle."""
-    sides: dict[tuple[int, int], list[int]] = {}
-    for c, cell in enumerate(cells):
-        for i in range(3):
-            a, b = sorted((cell[i], cell[i - 1]))
-            sides.setdefault((a, b), []).append(c)
-    for vertex, mine in touching.items():
-        for c in list(mine):
-            a, b = (p for p in cells[c] if p != vertex)
-            u, v = points[a] - points[vertex], points[b] - points[vertex]
-            if np.arccos(np.clip(u @ v / np.linalg.norm(u) / np.linalg.norm(v), -1.0, 1.0)) < WIDE:
-                continue
-            new = len(points)
-            points.append(rim.split(a, b, new, points, 0.5))
-            for other in list(sides.pop((min(a, b), max(a, b)))):
-                top = next(p for p in cells[other] if p not in (a, b))
-                fresh = len(cells)
-                cells.append([top, new, b])
-                cells[other] = [top, a, new]
-                sides.setdefault((min(new, a), max(new, a)), []).append(other)
-                sides.setdefault((min(new, b), max(new, b)), []).append(fresh)
-                sides[min(new, top), max(new, top)] = [other, fresh]
-                far = sides[min(b, top), max(b, top)]
-                far[far.index(other)] = fresh
-                for p, holders in touching.items():
-                    if p == top:
-                        holders.append(fresh)
-                    elif p == b:
-                        holders[holders.index(other)] = fresh
+def _narrowed(points: list[np.ndarray], cells: list[list[int]], corners: set[int], rim: "_Rim") -> list[list[int]]:
+    """Triangles with sides bisected until those at corners are narrow and no two corners share a triangle.
+
+    The rings cannot mend a coarse division of the angle. What is done depends on the place of the triangles only, not
+    on their order. New points are appended to ``points``.
+    """
+    for _ in range(ROUNDS):
+        marked = sorted({side for cell in cells for side in _wide_sides(points, cell, corners)})
+        if not marked:
+            break
+        middle = {}
+        for a, b in marked:
+            middle[a, b] = middle[b, a] = len(points)
+            points.append(rim.split(a, b, len(points), points, 0.5))
+        cells = [piece for cell in cells for piece in _bisected(points, cell, middle)]
+    return cells
+
+
+def _wide_sides(points: list[np.ndarray], cell: list[int], corners: set[int]) -> list[tuple[int, int]]:
+    """Sides of a triangle to bisect: those between two corners, and those opposite a wide angle at a corner."""
+    sides = []
+    for k in range(3):
+        corner, a, b = cell[k], cell[k - 1], cell[k - 2]
+        if corner not in corners:
+            continue
+        sides += [(min(corner, p), max(corner, p)) for p in (a, b) if p in corners]
+        u, v = points[a] - points[corner], points[b] - points[corner]
+        if np.arccos(np.clip(u @ v / np.linalg.norm(u) / np.linalg.norm(v), -1.0, 1.0)) > WIDE:
+            sides.append((min(a, b), max(a, b)))
+    return sides
+
+
+def _bisected(points: list[np.ndarray], cell: list[int], middle: dict[tuple[int, int], int]) -> list[list[int]]:
+    """A triangle divided at the middles of some of its sides."""
+    a, b, c = cell
+    found = [middle.get((a, b)), middle.get((b, c)), middle.get((c, a))]
+    count = sum(m is not None for m in found)
+    if count == 0:
+        return [cell]
+    while found[0] is None or (count == 2 and found[2] is None):  # turn it until the divided sides come first and last
+        a, b, c, found = b, c, a, [*found[1:], found[0]]
+    ab, bc, ca = found
+    if count == 1:
+        return [[a, ab, c], [ab, b, c]]
+    if count == 3:
+        return [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+    return [[a, ab, ca], *_strip(points, ab, b, c, ca)]
+
+
+def _strip(points: list[np.ndarray], a: int, b: int, c: int, d: int) -> list[list[int]]:
+    """The quadrilateral a, b, c, d divided along its shorter diagonal; along a-c where they are alike."""
+    ac, bd = np.linalg.norm(points[a] - points[c]), np.linalg.norm(points[b] - points[d])
+    return [[a, b, d], [b, c, d]] if bd < ac * (1.0 - 1e-6) else [[a, b, c], [a, c, d]]
 
 
 class _Rim:

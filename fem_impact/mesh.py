@@ -13,6 +13,7 @@ from .curves import divided
 from .outline import Outline, circle, crossed, extent, straight_loop
 from .triangulation import triangulate
 
+LONG_DIVISIONS = 64  # [-] likewise along a strip, whose elements are then longer than wide
 DEFAULT_DIVISIONS = 8  # [-] elements across the shorter side where no size is stated; find_modes refines on its own
 
 
@@ -100,8 +101,10 @@ def rectangle(length: float, width: float, *, size: float | None = None) -> Mesh
     """
     length = _check.positive("length", length, "m")
     width = _check.positive("width", width, "m")
-    size, stated = _element_size(size, min(length, width) / DEFAULT_DIVISIONS)
-    nx, ny = max(1, round(length / size)), max(1, round(width / size))
+    short, long = sorted((length, width))
+    size, stated = _element_size(size, max(short / DEFAULT_DIVISIONS, long / LONG_DIVISIONS))
+    least = 1 if stated else 2
+    nx, ny = max(least, round(length / size)), max(least, round(width / size))
     x, y = np.meshgrid(np.linspace(0.0, length, nx + 1), np.linspace(0.0, width, ny + 1), indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel()])
     number = np.arange((nx + 1) * (ny + 1)).reshape(nx + 1, ny + 1)

@@ -6,7 +6,7 @@ import numpy as np
 
 from . import _check
 from .assembly import System, assemble, reassemble
-from .eigen import SPARE, Flexibility, count_below, lowest
+from .eigen import RESIDUAL, SPARE, Flexibility, count_below, lowest
 from .mesh import Mesh
 from .section import Plate
 
@@ -30,6 +30,8 @@ ROUNDING = 3e-12  # [-] error of a frequency that no refinement removes
 MOST_UNKNOWNS = 150_000  # [-] where refinement gives up
 HOPELESS = 10.0  # [-] times as many unknowns, extrapolated, and refinement gives up at once
 LEAST_STEP = 1.25  # [-] meshes closer in size than this say less about the error than their sizes suggest
+SEARCHES = 3  # [-] attempts to find every mode of a cluster
+STRICT = 1e-11  # [-] residual of the attempts after the first
 STEP = 2.0**0.5  # [-] from one mesh size to the next
 
 
@@ -66,46 +68,59 @@ def solve(system: System, n_modes: int | None, max_frequency: float | None) -> S
     """The lowest modes on the mesh as it is: so many of them, or all below a frequency [Hz]; counted by inertia."""
     flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
     n_rigid, rate = system.rigid.shape[1], system.frame.rate
+    limit = None if max_frequency is None else (2.0 * np.pi * max_frequency / rate) ** 2
     if n_modes is None:
-        assert max_frequency is not None
-        limit = (2.0 * np.pi * max_frequency / rate) ** 2
+        assert limit is not None
         n_modes = count_below(system.K, system.M, limit)
         if n_modes == 0:
             raise ValueError(f"max_frequency must reach the first mode; there is none below {max_frequency:g} Hz")
-        values, vectors = lowest(flexibility, max(n_modes - n_rigid, 0))
-        if values.size and values[-1] >= limit * (1.0 + 1e-9):
-            raise _check.SimulationError(
-                f"{n_modes} modes lie below {max_frequency:g} Hz, but the last one found is at "
-                f"{np.sqrt(values[-1]) * rate / 2 / np.pi:g} Hz; change max_frequency a little"
-            )
-    elif n_modes <= n_rigid:
+    if n_modes <= n_rigid:
         values, vectors = np.zeros(0), np.zeros((system.n_dofs, 0))
     else:
-        values, vectors = _counted(system, flexibility, n_modes - n_rigid)
+        values, vectors = _counted(system, flexibility, n_modes - n_rigid, limit)
+        values, vectors = sharpened(system, values, vectors)
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
     return Spectrum(system, flexibility, omega, np.column_stack([system.rigid, vectors])[:, :n_modes])
 
 
-def _counted(system: System, flexibility: Flexibility, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """The n lowest flexible eigenpairs, their number below a gap behind the last confirmed by inertia."""
-    available = system.n_dofs - system.rigid.shape[1]
+def _counted(system: System, flexibility: Flexibility, n: int, limit: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """The n lowest flexible eigenpairs, none missed.
+
+    Either they are known to be all below a limit, or their number below a gap behind the last is confirmed by inertia.
+    In a dense cluster the first search may miss some; it is then repeated for more of them and more strictly.
+    """
+    n_rigid = flexibility.rigid.shape[1]
+    available = system.n_dofs - n_rigid
     if n > available:
         raise ValueError(f"n_modes must not exceed the {system.n_dofs} unknowns of this mesh; refine it")
-    more = min(n + SPARE, available)
-    values, vectors = lowest(flexibility, more)
-    if more == available:
-        return values[:n], vectors[:, :n]
-    gaps = np.diff(values[n - 1 :]) / values[n - 1 : -1]
-    at = n - 1 + int(gaps.argmax())
-    shift = 0.5 * (values[at] + values[at + 1])
-    found = at + 1 + flexibility.rigid.shape[1]
-    below = count_below(system.K, system.M, shift)
-    if below != found:
-        raise _check.SimulationError(
-            f"{below} modes lie below {np.sqrt(shift) * system.frame.rate / 2 / np.pi:g} Hz, but {found} were found; "
-            "ask for a few modes more"
-        )
-    return values[:n], vectors[:, :n]
+    more, residual = min(n + (SPARE if limit is None else 0), available), RESIDUAL
+    for _ in range(SEARCHES):
+        values, vectors = lowest(flexibility, more, residual)
+        if more == available:
+            return values[:n], vectors[:, :n]
+        if limit is not None:
+            below, found = n, int((values < limit * (1.0 + 1e-12)).sum())
+        else:
+            gaps = np.diff(values[n - 1 :]) / values[n - 1 : -1]
+            at = n - 1 + int(gaps.argmax())
+            below, found = count_below(system.K, system.M, 0.5 * (values[at] + values[at + 1])) - n_rigid, at + 1
+        if below == found:
+            return values[:n], vectors[:, :n]
+        more, residual = min(max(below, more) + 4 * SPARE, available), STRICT
+    raise _check.SimulationError(
+        f"{below} flexible modes lie below {np.sqrt(values[min(n, more) - 1]) * system.frame.rate / 2 / np.pi:g} Hz, "
+        f"but {found} were found; ask for a few modes more"
+    )
+
+
+def sharpened(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The eigenvalues from the strain energy of their vectors, which small triangles leave more digits than K does."""
+    if system.strain is None or not len(values):
+        return values, vectors
+    energy = system.strain.energy(system, vectors)
+    mass = np.einsum("ij,ij->j", vectors, system.M @ vectors)
+    order = np.argsort(energy / mass, kind="stable")
+    return (energy / mass)[order], vectors[:, order]
 
 
 def fine_enough(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> System:

@@ -96,11 +96,11 @@ def _split(
 
 def cells_of_facets(facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The triangle of each boundary facet and which of its sides that is, both (n_facets,)."""
-    n = int(cells.max()) + 1
+    cells, n = cells.astype(np.int64), int(cells.max()) + 1
     pairs = np.stack([np.sort(cells[:, side], axis=1) for side in SIDES], axis=1).reshape(-1, 2)
     keys = pairs[:, 0] * n + pairs[:, 1]
     order = np.argsort(keys)
-    wanted = np.sort(facets, axis=1)
+    wanted = np.sort(facets, axis=1).astype(np.int64)
     found = order[np.searchsorted(keys, wanted[:, 0] * n + wanted[:, 1], sorter=order)]
     return found // 3, found % 3
 

@@ -1,0 +1,122 @@
+"""Extremes: any unit, stiffness, place, order of nodes and shape of triangle gives the same frequencies."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from fem_impact import mesh
+from fem_impact.assembly import assemble
+from fem_impact.eigen import count_below
+from fem_impact.modal import find_modes
+from fem_impact.section import Beam, Material, Plate
+
+STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
+PLATE = Plate(STEEL, 2e-3)
+PER_RATE = np.sqrt(7850 * 2e-3 / (210e9 * 2e-3**3 / (12 * (1 - 0.3**2))))
+QUADRILATERAL = mesh.polygon([(0, 0), (1.3, 0.1), (1.1, 0.9), (0.2, 1.0)], size=0.2)
+
+
+def turned(angle=0.0, shift=0.0, seed=None):
+    """The quadrilateral turned [rad], shifted [m] and with its nodes and triangles in another order."""
+    shape = QUADRILATERAL
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    rng = np.random.default_rng(seed)
+    order = np.arange(len(shape.points)) if seed is None else rng.permutation(len(shape.points))
+    place = np.argsort(order)
+    cells = place[shape.cells] if seed is None else rng.permuted(place[shape.cells], axis=1)[::-1]
+    return replace(
+        shape,
+        points=(shape.points @ turn.T + shift)[order],
+        cells=np.ascontiguousarray(cells),
+        facets=place[shape.facets],
+        middles=shape.middles @ turn.T + shift,
+        tangents=shape.tangents @ turn.T,
+    )
+
+
+@pytest.mark.parametrize("supports", [{"boundary": "hinged"}, {"boundary": "clamped"}, {}, {"edge0": "clamped"}])
+@pytest.mark.parametrize(
+    "change", [{"angle": 0.7}, {"shift": 1e3}, {"seed": 4}, {"angle": 2.1, "shift": 5.0, "seed": 5}]
+)
+def test_place_turn_and_order_of_nodes_do_not_matter(supports, change):
+    here = find_modes(assemble(QUADRILATERAL, PLATE, supports), n_modes=8)
+    there = find_modes(assemble(turned(**change), PLATE, supports), n_modes=8)
+    assert here.n_rigid == there.n_rigid
+    assert_allclose(there.omega, here.omega, rtol=1e-9)  # 4e-12 was measured
+
+
+@pytest.mark.parametrize("length", [1e-6, 1e-3, 1e3])
+def test_frequencies_scale_with_length(length):
+    wanted = find_modes(assemble(mesh.disk(1.0, size=0.3), PLATE), n_modes=6).omega
+    found = find_modes(assemble(mesh.disk(length, size=0.3 * length), PLATE), n_modes=6).omega
+    assert_allclose(found * length**2, wanted, rtol=1e-9)  # rounding
+
+
+@pytest.mark.parametrize("E", [1e3, 1e13])
+@pytest.mark.parametrize("thickness", [1e-6, 0.1])
+def test_frequencies_scale_with_stiffness_and_thickness(E, thickness):
+    plate = Plate(Material(E=E, nu=0.3, rho=1e3), thickness)
+    unit = np.sqrt(E * thickness**2 / (12 * (1 - 0.3**2) * 1e3))
+    wanted = find_modes(assemble(mesh.rectangle(1, 1, size=0.2), PLATE, {"boundary": "clamped"}), n_modes=3)
+    found = find_modes(assemble(mesh.rectangle(1, 1, size=0.2), plate, {"boundary": "clamped"}), n_modes=3)
+    assert_allclose(found.omega / unit, wanted.omega * PER_RATE, rtol=1e-11)  # rounding
+
+
+@pytest.mark.parametrize(("aspect", "rtol"), [(100, 4e-5), (1000, 1e-6)])
+def test_a_free_strip_is_a_free_beam(aspect, rtol):
+    width = 1.0 / aspect
+    strip = find_modes(assemble(mesh.rectangle(1.0, width), PLATE), n_modes=5)
+    beam = find_modes(assemble(mesh.line(1.0), Beam.rectangular(STEEL, width=width, height=2e-3)), n_modes=4)
+    # the sides of the strip curl over its width: relative (k width)**2 / 40, 2e-5 of the second at 1 : 100
+    assert_allclose(strip.omega[3:], beam.omega[2:], rtol=rtol)
+
+
+def test_needle_triangles_bend_like_others():
+    fine = mesh.rectangle(1.0, 1.0, size=1 / 6)
+    # squeeze the middle column of nodes: triangles of 1 : 300
+    points = fine.points.copy()
+    inner = np.isclose(points[:, 0], 0.5)
+    points[inner, 0] = points[np.isclose(points[:, 0], 2 / 3), 0][0] - 5e-4
+    squeezed = mesh.straight(points, fine.cells, fine.facets, fine.edges, size=fine.size)
+    wanted = np.pi**2 * np.array([2.0, 5.0, 5.0])
+    found = find_modes(assemble(squeezed, PLATE, {"boundary": "hinged"}), n_modes=3).omega * PER_RATE
+    assert_allclose(found, wanted, rtol=3e-5)  # the wide triangles beside them are a third of the plate: (kh)**8
+
+
+def test_no_mode_is_missed_in_a_dense_cluster():
+    # a narrow ring clamped outside: a cantilever all round, whose modes crowd within 1e-4
+    ring = assemble(mesh.disk(1.0, 0.97), PLATE, {"outer": "clamped"})
+    modes = find_modes(ring, n_modes=12)
+    system = modes.shapes.system
+    above = (modes.omega[-1] / system.frame.rate) ** 2 * (1 + 1e-9)
+    assert count_below(system.K, system.M, above) >= 12
+    below = (modes.omega[0] / system.frame.rate) ** 2 * (1 - 1e-9)
+    assert count_below(system.K, system.M, below) == 0
+
+
+@pytest.mark.parametrize("n_modes", [60, 120])
+def test_number_of_modes_follows_weyl(n_modes):
+    modes = find_modes(assemble(mesh.rectangle(1.55, 1.0), PLATE, {"boundary": "hinged"}), n_modes=n_modes)
+    wave2 = modes.omega[-1] * PER_RATE
+    # Weyl's law with its boundary term for hinged plates, N = A k^2 / 4 pi - P k / 4 pi, fluctuates by about k / 10
+    expected = 1.55 * wave2 / (4 * np.pi) - 5.1 * np.sqrt(wave2) / (4 * np.pi)
+    assert abs(n_modes - expected) < 0.15 * np.sqrt(wave2)
+
+
+def test_smallest_meshes_solve():
+    one = find_modes(assemble(mesh.rectangle(1, 1, size=9.0), PLATE, {"boundary": "hinged"}), n_modes=1)
+    assert one.omega[0] * PER_RATE > 2 * np.pi**2  # from above, with two triangles
+    with pytest.raises(ValueError, match="n_modes must not exceed"):
+        find_modes(assemble(mesh.rectangle(1, 1, size=9.0), PLATE, {"boundary": "clamped"}), n_modes=50)
+
+
+@pytest.mark.slow
+def test_a_hundred_thousand_unknowns():
+    shape = mesh.rectangle(1.55, 1.0, size=1 / 84)
+    modes = find_modes(assemble(shape, PLATE, {"boundary": "hinged"}), n_modes=10)
+    assert modes.shapes.system.n_dofs > 95_000
+    m = np.arange(1, 12)
+    exact = np.sort(np.pi**2 * ((m[:, None] / 1.55) ** 2 + m**2), axis=None)[:10]
+    assert_allclose(modes.omega * PER_RATE, exact, rtol=1e-8)  # rounding grows as the elements shrink: (1 / h)**4
