@@ -11,36 +11,86 @@ from .supports import cells_of_facets
 
 FACET_POINTS = 12  # [-] Gauss points on a boundary facet; S is smooth there unless the load is on the edge
 CELL_POINTS = 6  # [-] Gauss points along each direction of a triangle: exact to degree 10, as in the assembly
+DIP_POINTS = 10  # [-] the same for the dip itself, whose third derivative is infinite under the load
+DISTINCT = 1e-4  # [-] roots nearer to each other than this leave the anisotropic form no digits
 NEAREST = 0.02  # [-] of a facet: nearer to the edge the dip is as rough there as the load itself: nothing is gained
 REFERENCE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 
 
 def applies(system: System) -> bool:
-    """Whether the closed form covers the body: an isotropic plate of constant thickness and nothing attached to it."""
+    """Whether the closed form covers the body: a plate of constant thickness and nothing attached to it."""
     plate = system.section
     if system.point_masses or any(not isinstance(kind, str) for kind in system.supports.values()):
         return False
-    if not isinstance(plate, Plate) or system.element != "argyris":
+    if not isinstance(plate, Plate) or system.element != "argyris" or callable(plate.thickness) or plate.tension:
         return False
-    return not callable(plate.thickness) and plate.material.E_across is None and plate.tension == 0.0
+    roots = _characteristic(plate.material.plane_stress)
+    return plate.material.E_across is None or abs(roots[0] - roots[1]) > DISTINCT
 
 
-def _dip(offset: np.ndarray) -> tuple[np.ndarray, ...]:
-    """The dip r**2 log(r) / 8 pi of an infinite plate of unit rigidity and what follows from it.
+def _characteristic(C: np.ndarray) -> np.ndarray:
+    """The two mu with positive imaginary part for which any f(x + mu y) is a free deflection of the plate."""
+    roots = np.roots([C[1, 1], 4 * C[1, 2], 2 * C[0, 1] + 4 * C[2, 2], 4 * C[0, 2], C[0, 0]])
+    return roots[roots.imag > 0.0]
 
-    offset (..., 2) from the load; returns value (...), gradient (..., 2), Hessian (..., 2, 2), gradient of the
-    Laplacian (..., 2), and the gradient (..., 2) and value of a U whose Laplacian is the dip.
+
+class Dip:
+    """Deflection of an infinite plate under a unit force at the origin, and its derivatives up to the third.
+
+    Isotropic: r**2 log(r) / 8 pi. Otherwise 2 Re sum of A z**2 log(z) over z = x + mu y, where the A make deflection,
+    slope and curvature single-valued and the shear force carry the load.
     """
-    square = (offset**2).sum(axis=-1)
-    log = 0.5 * np.log(square)
-    outer = offset[..., :, None] * offset[..., None, :] / square[..., None, None]
-    value = square * log
-    gradient = (2.0 * log + 1.0)[..., None] * offset
-    hessian = (2.0 * log + 1.0)[..., None, None] * np.eye(2) + 2.0 * outer
-    laplacian_slope = 4.0 * offset / square[..., None]
-    potential = square**2 * (log / 16.0 - 1.0 / 32.0)
-    potential_slope = (square * (log / 4.0 - 1.0 / 16.0))[..., None] * offset
-    return tuple(x / (8.0 * np.pi) for x in (value, gradient, hessian, laplacian_slope, potential_slope, potential))
+
+    def __init__(self, C: np.ndarray, isotropic: bool) -> None:
+        """C : (3, 3) bending stiffness on the curvatures xx, yy and 2 xy."""
+        self.C = C
+        self.mu = None if isotropic else _characteristic(C)
+        if self.mu is not None:
+            conditions = np.array([np.concatenate([(self.mu**k).imag, (self.mu**k).real]) for k in range(4)])
+            parts = np.linalg.solve(conditions, [0.0, 0.0, 0.0, 1.0 / (8.0 * np.pi * C[1, 1])])
+            self.weight = parts[:2] + 1j * parts[2:]
+
+    def __call__(self, offset: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Value (...), gradient (..., 2), Hessian (..., 2, 2), third derivatives (..., 2, 2, 2) at offsets (..., 2)."""
+        if self.mu is None:
+            return self._isotropic(offset)
+        z = offset[..., :1] + self.mu * offset[..., 1:]  # (..., 2)
+        log = np.log(z)
+        slope = np.stack([np.ones(2), self.mu])  # of z along x and y, (2, 2 roots)
+        value = 2.0 * (self.weight * z**2 * log).sum(axis=-1).real
+        gradient = 2.0 * np.einsum("...m,im->...i", self.weight * (2.0 * z * log + z), slope).real
+        hessian = 2.0 * np.einsum("...m,im,jm->...ij", self.weight * (2.0 * log + 3.0), slope, slope).real
+        third = 2.0 * np.einsum("...m,im,jm,km->...ijk", self.weight * 2.0 / z, slope, slope, slope).real
+        return value, gradient, hessian, third
+
+    def _isotropic(self, offset: np.ndarray) -> tuple[np.ndarray, ...]:
+        square = (offset**2).sum(axis=-1)
+        log = 0.5 * np.log(square)
+        unit = offset / np.sqrt(square)[..., None]
+        value = square * log
+        gradient = (2.0 * log + 1.0)[..., None] * offset
+        hessian = (2.0 * log + 1.0)[..., None, None] * np.eye(2) + 2.0 * unit[..., :, None] * unit[..., None, :]
+        one = np.einsum("...i,jk->...ijk", unit, np.eye(2))
+        even = one + np.moveaxis(one, -3, -2) + np.moveaxis(one, -3, -1)
+        third = 2.0 * even - 4.0 * np.einsum("...i,...j,...k->...ijk", unit, unit, unit)
+        factor = 8.0 * np.pi * self.C[0, 0]
+        third /= np.sqrt(square)[..., None, None, None]
+        return tuple(x / factor for x in (value, gradient, hessian, third))
+
+    def edge_forces(self, offset: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Bending moment vector (..., 2) and shear force (...) on an edge of a given normal (..., 2)."""
+        hessian, third = self(offset)[2:]
+        moment = _tensor(self.C, hessian)
+        shear = np.stack([_tensor(self.C, third[..., k]) for k in range(2)], axis=-1)  # (..., i, j, k) derivative k
+        force = np.einsum("...ijj->...i", shear)
+        return np.einsum("...ij,...j->...i", moment, normal), np.einsum("...i,...i->...", force, normal)
+
+
+def _tensor(C: np.ndarray, hessian: np.ndarray) -> np.ndarray:
+    """Moments (..., 2, 2) under curvatures (..., 2, 2)."""
+    voigt = np.stack([hessian[..., 0, 0], hessian[..., 1, 1], 2.0 * hessian[..., 0, 1]], axis=-1)
+    xx, yy, xy = np.moveaxis(voigt @ C, -1, 0)
+    return np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-2)
 
 
 def _place(space: Any, cells: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -76,23 +126,35 @@ class Edge:
         self.held_vertex = np.full(len(rim.points), False)
         self.held_vertex[rim.facets[self.held]] = True
         self.layer = np.flatnonzero(self.held_vertex[space.vertices].any(axis=1))
-        self.bending = _bending(system, self.layer) if self.layer.size else np.zeros((0, 21, 21))
+        plate: Any = system.section
+        C = plate.stiffness(np.zeros((1, 2)))[0] / system.frame.stiffness
+        self.dip = Dip(C, plate.material.E_across is None)
+        self.bending = np.zeros((0, 21, 21))
+        if self.layer.size:
+            self.bending = _bending(system, Cells(system, self.layer, CELL_POINTS), C)
 
 
-def _bending(system: System, cells: np.ndarray) -> np.ndarray:
+class Cells:
+    """Quadrature inside some cells on their true shape."""
+
+    def __init__(self, system: System, cells: np.ndarray, n_points: int) -> None:
+        node, weight = np.polynomial.legendre.leggauss(n_points)
+        a, b = np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij")
+        w = 0.25 * np.outer(weight * (1.0 - a[:, 0]), weight).ravel()
+        u, v = a.ravel(), (b * (1.0 - a)).ravel()
+        area = np.broadcast_to(np.column_stack([1.0 - u - v, u, v]), (len(cells), len(w), 3))
+        self.cells = cells
+        self.x, gradient = _place(system.space, cells, area)
+        self.dx = np.abs(np.linalg.det(gradient[..., 1:] - gradient[..., :1])) * w  # (n, n_q)
+
+
+def _bending(system: System, inside: Cells, C: np.ndarray) -> np.ndarray:
     """Stiffness matrices (n, 21, 21) of some cells."""
-    node, weight = np.polynomial.legendre.leggauss(CELL_POINTS)
-    a, b = np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij")
-    w = 0.25 * np.outer(weight * (1.0 - a[:, 0]), weight).ravel()
-    u, v = a.ravel(), (b * (1.0 - a)).ravel()
-    area = np.broadcast_to(np.column_stack([1.0 - u - v, u, v]), (len(cells), len(w), 3))
-    x, gradient = _place(system.space, cells, area)
-    dx = np.abs(np.linalg.det(gradient[..., 1:] - gradient[..., :1])) * w
-    hessian = system.space.functions(cells, x, (2,))[0][:, [0, 2, 1]].transpose(0, 2, 1, 3)  # (n, n_q, 3, 21)
+    space: Any = system.space
+    hessian = space.functions(inside.cells, inside.x, (2,))[0][:, [0, 2, 1]].transpose(0, 2, 1, 3)  # (n, n_q, 3, 21)
     bend = hessian * np.array([1.0, 1.0, 2.0])[:, None]
-    C = system.section.stiffness(np.zeros((1, 2)))[0] / system.frame.stiffness
-    shape = (len(cells), -1, 21)
-    moment = (dx[..., None, None] * C) @ bend
+    shape = (len(inside.cells), -1, 21)
+    moment = (inside.dx[..., None, None] * C) @ bend
     return bend.reshape(shape).transpose(0, 2, 1) @ moment.reshape(shape)
 
 
@@ -111,15 +173,13 @@ def compliance(system: System, flexibility: Flexibility, points: np.ndarray) -> 
 
     References
     ----------
-    Timoshenko and Woinowsky-Krieger, Theory of plates and shells, art. 19 and 76, for the dip; Green's second
-    identity of the bi-Laplacian for the boundary terms.
+    Timoshenko and Woinowsky-Krieger, Theory of plates and shells, art. 19 and 76, and Lekhnitskii, Anisotropic
+    plates, ch. 9, for the dip; Green's second identity for the boundary terms.
     """
     local = system.frame.local(points)
     rows = system.interpolate(points)
     result = rows @ flexibility.solve(rows.toarray().T)
     edge = Edge(system)
-    if system.rigid.shape[1] and edge.held.any():
-        return 0.5 * (result + result.T)  # the rigid share of what the boundary carries has no closed form
     for j, point in enumerate(local):
         distance = np.linalg.norm(edge.x - point, axis=2).min(axis=1)
         if distance.min() > NEAREST * edge.lengths[distance.argmin()]:
@@ -131,11 +191,7 @@ def _column(
     system: System, flexibility: Flexibility, edge: Edge, local: np.ndarray, point: np.ndarray, rows
 ) -> np.ndarray:
     """Deflection (n_points,) at local points under a unit force at one of them."""
-    curve, shear, potential_slope, potential = _dip(edge.x - point)[2:]
-    nu = system.section.material.nu
-    moment = (1.0 - nu) * curve + nu * np.trace(curve, axis1=2, axis2=3)[..., None, None] * np.eye(2)
-    bent = np.einsum("fqij,fqj->fqi", moment, edge.normal)
-    force = np.einsum("fqi,fqi->fq", shear, edge.normal)
+    bent, force = edge.dip.edge_forces(edge.x - point, edge.normal)
     driven = np.einsum("fqi,fiqk->kf", bent, edge.slope) - np.einsum("fq,fqk->kf", force, edge.value)
     load = np.zeros(system.expand.shape[0])
     np.subtract.at(load, edge.dofs, driven)
@@ -148,20 +204,25 @@ def _column(
     offset = local - point
     apart = (offset**2).sum(axis=1) > 0.0
     dip = np.zeros(len(local))
-    dip[apart] = _dip(offset[apart])[0]
+    dip[apart] = edge.dip(offset[apart])[0]
     cell = system.space.locate(local)[0]
     shape = system.space.functions(cell, local[:, None], (0,))[0][:, 0]
     total = dip - np.einsum("nk,kn->n", shape, lifted[system.element_dofs[:, cell]]) + rows @ rest
-    if system.rigid.shape[1]:  # linear shapes: Green's identity turns the integral of the dip into one along the edge
-        at = edge.x.reshape(-1, 2)
-        corners = system.mesh.points[system.mesh.cells[0]]
-        plane = np.column_stack([np.ones(3), system.frame.local(corners)])
-        motions = np.linalg.solve(plane, system.interpolate(corners) @ system.rigid)  # (3, n_rigid): 1, x, y
-        values = (motions[0] + at @ motions[1:]).reshape(*edge.x.shape[:2], -1)
-        flux = np.einsum("fqi,fqi->fq", potential_slope, edge.normal)
-        share = np.einsum("fq,fqr->r", flux, values) - np.einsum("fq,fqi,ir->r", potential, edge.normal, motions[1:])
-        total = total - (rows @ system.rigid) @ share
+    if system.rigid.shape[1]:
+        total = total - (rows @ system.rigid) @ _rigid_share(system, edge, point, lifted)
     return total
+
+
+def _rigid_share(system: System, edge: Edge, point: np.ndarray, lifted: np.ndarray) -> np.ndarray:
+    """Rigid motions (n_rigid,) in what the elements do not carry: the dip less its values at the held edges."""
+    space: Any = system.space
+    inside = Cells(system, np.arange(len(space.vertices)), DIP_POINTS)
+    carried = edge.dip(inside.x - point)[0]  # (n_cells, n_q)
+    values = space.functions(inside.cells, inside.x, (0,))[0]  # (n_cells, n_q, 21)
+    if edge.held.any():
+        carried = carried - np.einsum("eqk,ke->eq", values, lifted[system.element_dofs])
+    motions = (system.expand @ system.rigid)[system.element_dofs]  # (21, n_cells, n_rigid)
+    return np.einsum("eq,eqk,ker->r", carried * inside.dx, values, motions, optimize=True)
 
 
 def _jets(system: System, edge: Edge, point: np.ndarray) -> np.ndarray:
@@ -172,12 +233,12 @@ def _jets(system: System, edge: Edge, point: np.ndarray) -> np.ndarray:
     for k in range(3):
         vertex = space.vertices[:, k]
         cells = np.flatnonzero(edge.held_vertex[vertex])
-        value, slope, curve = _dip(vertices[vertex[cells]] - point)[:3]
+        value, slope, curve = edge.dip(vertices[vertex[cells]] - point)[:3]
         table = [value, slope[:, 0], slope[:, 1], curve[:, 0, 0], curve[:, 0, 1], curve[:, 1, 1]]
         for row, entry in enumerate(table):
             jets[system.element_dofs[6 * k + row, cells]] = entry
     facets = np.flatnonzero(edge.held)
     cells, sides = edge.cells[facets], edge.sides[facets]
-    slope = _dip(space.middles[cells, sides] - point)[1]
+    slope = edge.dip(space.middles[cells, sides] - point)[1]
     jets[system.element_dofs[18 + sides, cells]] = (slope * space.normals[cells, sides]).sum(axis=1)
     return jets
