@@ -22,6 +22,7 @@ SHARE = 0.45  # [-] of the tolerance each for the modes left out and for the tim
 MARGINS = (1.0, 4.0, 16.0)  # [-] stricter choices of modes, taken one after another while those left out matter
 FIRST_LOOK = 20  # [-] modes found first: enough to set the scale and to tell how densely the others follow
 
+MOST_MODES = {"fe": 2000, "analytic": 50_000}  # [-] about 2 GB, and minutes
 WORST_FREQUENCY = 0.1  # [-] error of a frequency that `find_modes` accepts at most
 SHORT_WAVES = 1e-5  # [-] error of the frequencies that `find_modes` sets the size of its elements for
 NOTHING = Part()  # a table left out
@@ -133,9 +134,20 @@ class Scene:
                         speed=speed,
                         tolerance=SHARE * tolerance / margin,
                     )
+                    self._check_affordable(scaled, limit, target["source"])
                     if limit > scaled.frequencies[-1]:
                         modes = find(FIRST_LOOK, limit * modes.frequencies[-1] / scaled.frequencies[-1], modes)
             return modes.scaled(**target["scale"]).damped(target["damping_ratio"])
+
+    def _check_affordable(self, first: Modes, limit: float, source: str) -> None:
+        """Raise SimulationError where the modes up to a frequency [Hz] would fill the memory."""
+        growth = max(1.0, limit / first.frequencies[-1]) ** (0.5 * first.dimension)  # Weyl's law
+        number = first.n_modes * growth
+        if number > MOST_MODES[source]:
+            raise _check.SimulationError(
+                f"{self.path}: this blow needs some {number:.2g} modes, up to {limit:.2g} Hz, more than "
+                f"{MOST_MODES[source]}; allow a larger tolerance, a softer contact or a lower speed"
+            )
 
     def _finite_elements(self, stages: "_Stages", tolerance: float) -> Finder:
         with stages("mesh"), self._blame("mesh"):

@@ -246,6 +246,14 @@ def test_formulas_decline_what_they_do_not_know(tmp_path):
         scene.load_scene(edited(tmp_path, 'boundary = "hinged"', 'left = "clamped"')).modes(3)
 
 
+@pytest.mark.parametrize("source", ["analytic", "fe"])
+def test_blow_that_needs_too_many_modes_is_refused_before_they_are_sought(tmp_path, source):
+    text = TEXT.replace("695e3", "1e14").replace('"analytic"', f'"{source}"')
+    with pytest.raises(_check.SimulationError, match=r"needs some .* modes, up to .* Hz, more than") as caught:
+        scene.load_scene(write(tmp_path, text)).strike()
+    assert str(caught.value).startswith(f"{tmp_path / 'scene.toml'}: ")
+
+
 LINES = TEXT.strip().splitlines()
 VALUES = st.one_of(
     st.floats(), st.integers(-(10**30), 10**30), st.booleans(), st.text(max_size=8), st.lists(st.floats(), max_size=3)
