@@ -355,16 +355,8 @@ class FieldShapes:
     def compliance(self, points: np.ndarray) -> np.ndarray:
         key = points.tobytes()
         if key not in self._static:
-            self._static[key] = self._compliance(points)
+            self._static[key] = pointload.static_compliance(self.system, self.flexibility, points)
         return self._static[key]
-
-    def _compliance(self, points: np.ndarray) -> np.ndarray:
-        if pointload.applies(self.system):
-            static = pointload.compliance(self.system, self.flexibility, points)
-        else:
-            rows = self.system.interpolate(points)
-            static = rows @ self.flexibility.solve(rows.toarray().T)
-        return 0.5 * (static + static.T) / (self.system.frame.mass * self.system.frame.rate**2)
 
     def take(self, n_modes: int) -> "FieldShapes":
         return replace(self, vectors=self.vectors[:, :n_modes].copy())
