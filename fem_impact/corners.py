@@ -169,11 +169,11 @@ def _wide_sides(points: list[np.ndarray], cell: list[int], corners: set[int]) ->
 def _bisected(points: list[np.ndarray], cell: list[int], middle: dict[tuple[int, int], int]) -> list[list[int]]:
     """A triangle divided at the middles of some of its sides."""
     a, b, c = cell
-    found = [middle.get((a, b)), middle.get((b, c)), middle.get((c, a))]
-    count = sum(m is not None for m in found)
+    found = [middle.get((a, b), -1), middle.get((b, c), -1), middle.get((c, a), -1)]
+    count = sum(m >= 0 for m in found)
     if count == 0:
         return [cell]
-    while found[0] is None or (count == 2 and found[2] is None):  # turn it until the divided sides come first and last
+    while found[0] < 0 or (count == 2 and found[2] < 0):  # turn it until the divided sides come first and last
         a, b, c, found = b, c, a, [*found[1:], found[0]]
     ab, bc, ca = found
     if count == 1:
