@@ -85,9 +85,18 @@ def vtk_ending(path: str | Path) -> str:
     return _check.one_of("path ending", Path(path).suffix, (".vtu", ".pvd"))
 
 
-def write_wav(path: str | Path, response: Response, at: Any = None, **options: Any) -> sound.Sound:
-    """Write the sound at a point as 32-bit float WAV and return it; options are those of `sound.synthesise`."""
-    heard = sound.synthesise(response, at, **options)
+def write_wav(
+    path: str | Path, response: Response, at: Any = None, *, listener: Any = None, **options: Any
+) -> sound.Sound:
+    """Write the sound of a blow as 32-bit float WAV and return it.
+
+    The velocity of the point ``at`` (see `sound.synthesise`, which takes the options), or the pressure at a
+    ``listener`` beside a plate (see `sound.radiate`).
+    """
+    if listener is None:
+        heard = sound.synthesise(response, at, **options)
+    else:
+        heard = sound.radiate(response, listener, **options)
     with replacing(path) as temporary:
         wavfile.write(temporary, heard.rate, heard.samples.astype(np.float32))
     return heard

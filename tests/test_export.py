@@ -116,6 +116,12 @@ def test_sound_file_holds_the_samples_as_float(tmp_path, hit):
     np.testing.assert_array_equal(samples, heard.samples.astype(np.float32))
 
 
+def test_sound_at_a_listener_is_the_radiated_pressure(tmp_path, hit):
+    heard = export.write_wav(tmp_path / "a.wav", hit, listener=(0.2, 0.15, 1.0), duration=0.1)
+    assert heard.unit == "Pa"
+    np.testing.assert_array_equal(heard.samples, sound.radiate(hit, (0.2, 0.15, 1.0), duration=0.1).samples)
+
+
 def test_numbers_are_those_of_the_response_and_valid_json(tmp_path, hit):
     export.write_json(tmp_path / "a.json", export.numbers(hit))
     data = json.loads((tmp_path / "a.json").read_text(), parse_constant=pytest.fail)
