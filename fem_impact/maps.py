@@ -4,12 +4,13 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray
 
-from . import _check, bounces
+from . import _check, bounces, farm
 from ._check import SimulationError
 from .contact import Contact
 from .integrator import strike
@@ -133,6 +134,16 @@ class Grid:
             return np.full(len(self.layers), np.nan), str(error)
         return np.array(row, float), ""
 
+    def scene(self) -> dict[str, Any]:
+        """The blow that all cells share, in plain numbers."""
+        law = self.base.contact
+        return {
+            "target": _plain(self.base.modes, self.base.at),
+            "striker": _plain(self.base.striker.modes, self.base.striker.at),
+            "contact": {"stiffness": law.stiffness, "exponent": law.exponent, "loss": law.loss, "gap": law.gap},
+            "speed": self.base.speed,
+        }
+
     def sampled(self) -> "Grid":
         """The same grid with bodies known at their contact points only: all that blows need, and fit to be sent."""
         places = self.axes.get("at", self.base.at[None])
@@ -170,6 +181,8 @@ def sweep(
     layers: Mapping[str, Callable[[Response], float]] | None = None,
     residual: bool = True,
     workers: int | None = None,
+    client: Any = None,
+    store: Any = None,
     watch: Watch | None = None,
 ) -> xarray.Dataset:
     """Strike once for every combination of parameters.
@@ -191,6 +204,11 @@ def sweep(
         As in `strike`.
     workers : int, optional
         Threads; one for each core by default.
+    client : dask.distributed.Client or address of a scheduler, optional
+        Cluster that strikes instead of this process.
+    store : path, optional
+        Folder that keeps finished cells (Zarr); a run that was killed goes on from there. The workers of a cluster
+        write to it themselves, under the same path.
     watch : callable, optional
         Called now and then with the number of cells done and of all.
 
@@ -212,17 +230,23 @@ def sweep(
     workers = None if workers is None else _check.count("workers", workers)
     grid = Grid(base, _axes(base, over), tolerance, residual, band, dict(layers or {}))
     fewer = grid.without_speed()
-    numbers, failures = _local(fewer or grid, workers, watch)
+    numbers, failures = _solve_all(fewer or grid, workers, client, store, watch)
     if fewer is not None:
         numbers, failures = _with_speed(grid, fewer, numbers, failures)
     return _dataset(grid, numbers, failures)
 
 
-def _local(grid: Grid, workers: int | None, watch: Watch | None) -> tuple[np.ndarray, np.ndarray]:
-    """All cells by threads of this process, block by block."""
+def _solve_all(
+    grid: Grid, workers: int | None, client: Any, store: Any, watch: Watch | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """All cells, by a cluster or by threads of this process, block by block."""
+    if client is not None:
+        return farm.by_cluster(grid, client, store, partial(solve, workers=1), watch)
+    kernels: bounces.Kernels = {}
+    if store is not None:
+        return farm.by_store(grid, store, partial(solve, workers=workers, kernels=kernels), watch)
     numbers = np.empty((len(grid.layers), grid.n_cases))
     failures = np.full(grid.n_cases, "", dtype=object)
-    kernels: bounces.Kernels = {}
     for start in range(0, grid.n_cases, BLOCK):
         stop = min(start + BLOCK, grid.n_cases)
         part = slice(start, stop)
@@ -315,8 +339,13 @@ def _axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
             axes[name] = _check.array(f"over[{given!r}]", values, (None,), AXES[name][0])
         if not len(axes[name]):
             raise ValueError(f"over[{given!r}] must hold at least one value")
-        for value in axes[name]:
-            base.changed(name, value)  # raises ValueError where the value cannot be
+        if name in ("stiffness", "exponent", "loss", "gap"):
+            for value in axes[name]:
+                base.changed(name, value)
+        elif name != "at":
+            for value in axes[name]:
+                (_check.non_negative if name == "damping_ratio" else _check.positive)(name, value, AXES[name][0])
+            base.changed(name, axes[name][0])  # where the body cannot change so, any value tells
     return axes
 
 
@@ -333,7 +362,7 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray) -> xarray.Da
             attributes["max_frequency"] = grid.band
         data[name] = (dims, values.reshape(grid.shape), attributes)
     data["failure"] = (dims, failures.reshape(grid.shape).astype(str), {"long_name": "why the cell failed"})
-    table = xarray.Dataset(data, attrs={"title": "Map of blows", "scene": json.dumps(_scene(grid.base))})
+    table = xarray.Dataset(data, attrs={"title": "Map of blows", "scene": json.dumps(grid.scene())})
     table.attrs |= {"tolerance": grid.tolerance, "residual": int(grid.residual)}
     for name, values in grid.axes.items():
         attributes = {"units": AXES[name][0] or "1", "long_name": AXES[name][1]}
@@ -348,24 +377,14 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray) -> xarray.Da
     return table
 
 
-def _scene(base: Case) -> dict[str, Any]:
-    """The blow that all cells share, in plain numbers."""
-
-    def body(modes: Modes, at: np.ndarray) -> dict[str, Any]:
-        place = at[None] if modes.dimension else None
-        return {
-            "mass": modes.mass,
-            "frequencies": modes.frequencies.tolist(),
-            "damping_ratios": modes.damping_ratio.tolist(),
-            "at": at.tolist(),
-            "shape": modes.shape_at(place)[0].tolist(),
-            "residual_compliance": float(modes.residual_compliance(place)[0, 0]) if modes.dimension else 0.0,
-        }
-
-    law = base.contact
+def _plain(modes: Modes, at: np.ndarray) -> dict[str, Any]:
+    """A body and its contact point in plain numbers."""
+    place = at[None] if modes.dimension else None
     return {
-        "target": body(base.modes, base.at),
-        "striker": body(base.striker.modes, base.striker.at),
-        "contact": {"stiffness": law.stiffness, "exponent": law.exponent, "loss": law.loss, "gap": law.gap},
-        "speed": base.speed,
+        "mass": modes.mass,
+        "frequencies": modes.frequencies.tolist(),
+        "damping_ratios": modes.damping_ratio.tolist(),
+        "at": at.tolist(),
+        "shape": modes.shape_at(place)[0].tolist(),
+        "residual_compliance": float(modes.residual_compliance(place)[0, 0]) if modes.dimension else 0.0,
     }

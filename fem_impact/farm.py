@@ -1,0 +1,197 @@
+"""Maps that take long or many machines: blocks of cells, kept in a Zarr store as they finish, resumed after any end."""
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+LARGEST_BLOCK = 2**17  # [-] cells: about half a second of work, some 30 MB
+BLOCKS = 64  # [-] at least, where a map has so many cells: what a killed run loses at most is one per worker
+TEXT = 240  # [byte] kept of an error text
+EXTRA = "pip install 'fem-impact[cluster]'"
+
+Solve = Callable[[Any, int, int], tuple[np.ndarray, np.ndarray]]  # grid, start, stop: numbers, failures
+Watch = Callable[[int, int], Any]
+
+
+def block_size(n_cases: int) -> int:
+    """Cells solved at once."""
+    return max(1, min(LARGEST_BLOCK, math.ceil(n_cases / BLOCKS)))
+
+
+class Store:
+    """Results of a map on disk, block by block; a block is there once its flag is, and its flag is written last.
+
+    Parameters
+    ----------
+    path : folder, reachable under this path by everyone who works
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with _needed("a store"):
+            import zarr
+        group: Any = zarr.open_group(str(path), mode="r")
+        self.group = group
+        self.n_cases, self.block = (int(group.attrs[name]) for name in ("n_cases", "block"))
+
+    @classmethod
+    def open(cls, path: str | Path, grid: Any) -> "Store":
+        """The store of a map, made if there is none; ValueError where the path holds anything else."""
+        path = Path(path).resolve()
+        with _needed("a store"):
+            import zarr
+        mark = fingerprint(grid)
+        if path.exists() and any(path.iterdir()):
+            known = None
+            if (path / "zarr.json").exists():
+                known = zarr.open_group(str(path), mode="r").attrs.get("fingerprint")
+            if known is None:
+                raise ValueError(f"store must be a new folder or the store of this map, got {path}")
+            if known != mark:
+                raise ValueError(
+                    f"store holds another map (other bodies, axes or tolerance): {path}; name a new folder"
+                )
+            return cls(path)
+        n_layers, n_cases, block = len(grid.layers), grid.n_cases, block_size(grid.n_cases)
+        group = zarr.open_group(str(path), mode="w")
+        group.create_array(
+            "numbers", shape=(n_layers, n_cases), chunks=(n_layers, block), dtype="f8", fill_value=np.nan
+        )
+        group.create_array("failures", shape=(n_cases, TEXT), chunks=(block, TEXT), dtype="u1", fill_value=0)
+        group.create_array("done", shape=(math.ceil(n_cases / block),), chunks=(1,), dtype="u1", fill_value=0)
+        group.attrs.update({"n_cases": n_cases, "block": block, "fingerprint": mark})
+        return cls(path)
+
+    def missing(self) -> list[int]:
+        """Blocks not there yet."""
+        return np.flatnonzero(self.group["done"][:] == 0).tolist()
+
+    def bounds(self, block: int) -> tuple[int, int]:
+        """First cell of a block and the one after its last."""
+        return block * self.block, min((block + 1) * self.block, self.n_cases)
+
+    def write(self, block: int, numbers: np.ndarray, failures: np.ndarray) -> None:
+        """Keep a block."""
+        import zarr
+
+        group: Any = zarr.open_group(str(self.path), mode="r+")
+        start, stop = self.bounds(block)
+        group["numbers"][:, start:stop] = numbers
+        if any(failures):
+            group["failures"][start:stop] = _encode(failures)
+        group["done"][block] = 1
+
+    def read(self) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers (n_layers, n_cases) and error texts (n_cases,) of all cells."""
+        failures = np.full(self.n_cases, "", dtype=object)
+        texts = self.group["failures"]
+        for block in range(math.ceil(self.n_cases / self.block)):
+            start, stop = self.bounds(block)
+            raw = texts[start:stop]
+            for i in np.flatnonzero(raw.any(axis=1)):
+                failures[start + i] = bytes(raw[i]).rstrip(b"\0").decode("utf-8", "ignore")
+        return self.group["numbers"][:], failures
+
+
+def fingerprint(grid: Any) -> str:
+    """What tells a map from any other."""
+    body = hashlib.sha256(json.dumps(grid.scene(), sort_keys=True).encode())
+    for name, values in grid.axes.items():
+        body.update(name.encode() + np.ascontiguousarray(values, float).tobytes())
+    body.update(repr((grid.tolerance, grid.residual, grid.band, grid.layers)).encode())
+    return body.hexdigest()
+
+
+def by_store(grid: Any, path: str | Path, solve: Solve, watch: Watch | None) -> tuple[np.ndarray, np.ndarray]:
+    """Solve what a store lacks in this process; return all of it."""
+    store = Store.open(path, grid)
+    missing = store.missing()
+    done = grid.n_cases - sum(np.diff(store.bounds(block))[0] for block in missing)
+    for block in missing:
+        start, stop = store.bounds(block)
+        store.write(block, *solve(grid, start, stop))
+        done += stop - start
+        if watch is not None:
+            watch(int(done), grid.n_cases)
+    return store.read()
+
+
+def by_cluster(
+    grid: Any, client: Any, path: str | Path | None, solve: Solve, watch: Watch | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solve on a Dask cluster; workers keep finished blocks in the store themselves, if there is one.
+
+    Parameters
+    ----------
+    client : dask.distributed.Client or the address of a scheduler
+    """
+    with _needed("client"):
+        from distributed import Client, as_completed
+    with _connected(Client, client) as connected:
+        store = None if path is None else Store.open(path, grid)
+        block = block_size(grid.n_cases)
+        todo = store.missing() if store is not None else list(range(math.ceil(grid.n_cases / block)))
+        shared = connected.scatter(grid.sampled(), broadcast=True)
+        name = f"map-{fingerprint(grid)[:12]}"
+        futures = {
+            connected.submit(_work, shared, i, block, solve, None if store is None else str(store.path),
+                             key=f"{name}-{i}", pure=False): i
+            for i in todo
+        }  # fmt: skip
+        numbers = np.empty((len(grid.layers), grid.n_cases)) if store is None else np.empty((0, 0))
+        failures = np.full(grid.n_cases, "", dtype=object)
+        done = grid.n_cases - sum(min(block, grid.n_cases - i * block) for i in todo)
+        for future, result in as_completed(futures, with_results=True):
+            start = futures[future] * block
+            stop = min(start + block, grid.n_cases)
+            if result is not None:
+                numbers[:, start:stop], failures[start:stop] = result
+            done += stop - start
+            if watch is not None:
+                watch(done, grid.n_cases)
+            future.release()
+        return (numbers, failures) if store is None else Store(store.path).read()
+
+
+def _work(grid: Any, block: int, size: int, solve: Solve, path: str | None) -> tuple[np.ndarray, np.ndarray] | None:
+    """One block, on a worker; nothing where the store has it already or takes it."""
+    if path is None:
+        return solve(grid, block * size, min((block + 1) * size, grid.n_cases))
+    store = Store(Path(path))
+    if store.group["done"][block]:  # a worker died between keeping it and saying so
+        return None
+    store.write(block, *solve(grid, *store.bounds(block)))
+    return None
+
+
+@contextmanager
+def _connected(make: Any, client: Any) -> Iterator[Any]:
+    """The client, or one to an address, closed afterwards."""
+    if not isinstance(client, str):
+        yield client
+        return
+    try:
+        with make(client, timeout=10) as made:
+            yield made
+    except OSError as error:
+        raise OSError(f"no cluster answers at {client}: {error}") from None
+
+
+@contextmanager
+def _needed(name: str) -> Iterator[None]:
+    """Say how to install what an argument needs."""
+    try:
+        yield
+    except ImportError as error:
+        raise ValueError(f"{name} needs {error.name}: {EXTRA}") from None
+
+
+def _encode(failures: np.ndarray) -> np.ndarray:
+    """Texts as bytes, (n_cells, TEXT)."""
+    return np.array([list(text.encode()[:TEXT].ljust(TEXT, b"\0")) for text in failures], np.uint8)

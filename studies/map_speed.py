@@ -1,0 +1,94 @@
+"""How fast maps are: the source's grids and a million bounces, beside a plain loop over `strike` and over solve_ivp.
+
+    python studies/map_speed.py [--bounces 1000000]
+
+Stick and hinged plate of the source with 300 modes, tolerance 1e-3; the times are after compilation, best of some runs.
+"""
+
+import argparse
+import os
+import resource
+import time
+
+import numpy as np
+import source_scenes as source
+from scipy.integrate import solve_ivp
+
+import fem_impact as fi
+
+STICK = source.stick()
+
+
+def best(repeats, work, *arguments):
+    """Shortest wall time [s] of some runs."""
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work(*arguments)
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def grid(modes, side):
+    """One map of sticks and linear springs, side times side."""
+    over = {"mass": np.linspace(10e-3, 200e-3, side), "stiffness": np.geomspace(1e4, 1e6, side)}
+    return fi.sweep(modes, STICK, fi.Contact.linear(1e5), at=source.AT, speed=1.0, over=over, tolerance=1e-3)
+
+
+def by_solve_ivp(plate_mass, mass, stiffness, n_modes=300):
+    """One bounce off the plate by SciPy's DOP853 at the same tolerance, up to the first separation."""
+    modes = source.plate(plate_mass, n_modes=n_modes)
+    shape, omega = modes.shape_at(source.AT)[0], np.array(modes.omega)
+
+    def slope(_, state):
+        approach = state[0] - shape @ state[2 : 2 + n_modes]
+        force = stiffness * max(approach, 0.0)
+        q, p = state[2 : 2 + n_modes], state[2 + n_modes :]
+        return np.concatenate([[state[1], -force / mass], p, shape * force - omega**2 * q])
+
+    def parted(_, state):
+        return state[0] - shape @ state[2 : 2 + n_modes] + 1e-12
+
+    parted.terminal, parted.direction = True, -1
+    start = np.zeros(2 + 2 * n_modes)
+    start[1] = 1.0
+    return solve_ivp(slope, (0.0, 0.1), start, "DOP853", events=parted, rtol=1e-4, atol=1e-9)
+
+
+def main():
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--bounces", type=int, default=1_000_000)
+    bounces = parser.parse_args().bounces
+    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
+    plates = {name: source.plate(mass) for name, mass in source.PLATE_MASSES.items()}
+    for name, modes in plates.items():
+        grid(modes, 20)
+        small, large = best(9, grid, modes, 20), best(5, grid, modes, 100)
+        print(f"plate {name}: 20 x 20 in {1e3 * small:.1f} ms, 100 x 100 in {1e3 * large:.0f} ms")
+    side = round(bounces**0.5)
+    for name, modes in plates.items():
+        seconds = best(1, grid, modes, side)
+        print(f"plate {name}: {side**2} bounces in {seconds:.2f} s, {1e6 * seconds / side**2:.2f} us each")
+    print(f"largest memory so far: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
+    sticks = [source.stick(mass) for mass in np.linspace(10e-3, 200e-3, 50)]
+
+    def loop():
+        for stick in sticks:
+            law = fi.Contact.linear(88.6e3)
+            fi.strike(plates["2 kg"], stick, law, at=source.AT, speed=1.0, tolerance=1e-3)
+
+    loop()
+    each, batch = best(3, loop) / 50, best(5, grid, plates["2 kg"], 100) / 1e4
+    ivp = best(1, by_solve_ivp, 2.0, 0.1 / 3.0, 88.6e3)
+    print(
+        f"one bounce off 2 kg: map {1e6 * batch:.2f} us; loop over strike {1e6 * each:.0f} us, {each / batch:.0f} times"
+    )
+    print(f"solve_ivp (DOP853, rigid stick, first contact only) {1e6 * ivp:.0f} us, {ivp / batch:.0f} times")
+    for n_modes in (30, 300, 3000):
+        seconds = best(2, grid, source.plate(2.0, n_modes=n_modes), 300)
+        print(f"{n_modes} modes: {1e6 * seconds / 9e4:.2f} us each of 90 000")
+
+
+if __name__ == "__main__":
+    main()
