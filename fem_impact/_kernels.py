@@ -13,6 +13,7 @@ LEVELS = 40  # [-] halvings of the step that may be cached
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
 GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before
 LOOK_LIMIT = 300_000  # [-] looks ahead in one free flight before the run gives up
+WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it
 SECULAR_MISFIT = 1e-12  # [-] of the peak force: what recorded polynomials may miss of the exact force
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
 EVENT_LIMIT = 64  # [-] events without one full step between them: chatter, passed with unlocated steps
@@ -727,12 +728,11 @@ def solve_ramp(h, d0, x0, f0, v0, rate0, e, ea, vf, sums, law):
             settled = True
     if not settled or not f >= 0.0:
         return False, y, f, s
-    if loss > 0.0:
-        _, _, v1 = law_at(y, law, 0)
-        lost = f * (y - d0) + s * (0.5 * (d0 + y) - (ea - mean0 * f - mean1 * s))
-        if lost < v1 - v0:
-            return False, y, f, s
-    return True, y, f, s
+    _, _, v1 = law_at(y, law, 0)
+    work = f * (y - d0) + s * (0.5 * (d0 + y) - (ea - mean0 * f - mean1 * s))
+    if work - (v1 - v0) < (0.0 if loss > 0.0 else -WORK_ERROR * (v0 + v1)):
+        return False, y, f, s
+    return loss > 0.0 or work - (v1 - v0) <= WORK_ERROR * (v0 + v1), y, f, s
 
 
 @inner()
@@ -813,14 +813,16 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
     for i in range(m):
         if not out_f[i] >= 0.0:
             return False
-        if law[i, 2] > 0.0:
-            _, _, v1 = law_at(out_y[i], law, i)
-            mean = ea[i]
-            for j in range(m):
-                mean -= sums[2, i, j] * out_f[j] + sums[3, i, j] * out_s[j]
-            lost = out_f[i] * (out_y[i] - now[0, i]) + out_s[i] * (0.5 * (now[0, i] + out_y[i]) - mean)
-            if lost < v1 - now[3, i]:
-                return False
+        _, _, v1 = law_at(out_y[i], law, i)
+        mean = ea[i]
+        for j in range(m):
+            mean -= sums[2, i, j] * out_f[j] + sums[3, i, j] * out_s[j]
+        work_done = out_f[i] * (out_y[i] - now[0, i]) + out_s[i] * (0.5 * (now[0, i] + out_y[i]) - mean)
+        lost = work_done - (v1 - now[3, i])
+        if lost < (0.0 if law[i, 2] > 0.0 else -WORK_ERROR * (v1 + now[3, i])):
+            return False
+        if law[i, 2] == 0.0 and lost > WORK_ERROR * (v1 + now[3, i]):
+            return False
     return True
 
 
