@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from . import _check, pointload, spectrum
+from . import _check, pointload, spectrum, uff
 from .assembly import System
 from .eigen import Flexibility
 
@@ -188,6 +188,30 @@ class Modes:
             static = _check.array("compliance", compliance, (len(points), len(points)), "m/N")
         damping = damping_ratios(damping_ratio, omega)
         return cls(omega, damping, SampledShapes(points, values, static), _check.positive("mass", mass, "kg"))
+
+    @classmethod
+    def from_uff(cls, path: Any, *, mass: float, direction: str = "z") -> "Modes":
+        """Measured modes from a universal file (nodes in data set 15 or 2411, shapes in 55); needs pyuff.
+
+        Parameters
+        ----------
+        path : str or Path
+        mass : float [kg] of the whole body
+        direction : "x", "y" or "z", in which the body is struck and was measured
+
+        Returns
+        -------
+        Modes
+            Known at the measured points only; shapes are divided by the root of the modal mass the file states.
+        """
+        found = uff.read(path, direction)
+        return cls.from_arrays(
+            found["frequencies"],
+            found["shapes"],
+            points=found["points"],
+            mass=mass,
+            damping_ratio=found["damping_ratio"],
+        )
 
     @property
     def n_modes(self) -> int:

@@ -13,7 +13,7 @@ FLOORS = [
     {"mesh", "section", "contact", "elements", "supports", "eigen"},
     {"corners", "attached"},
     {"assembly"},
-    {"pointload", "spectrum"},
+    {"pointload", "spectrum", "uff"},
     {"modal"},
     {"analytic"},
     {"drawing", "striker", "spectra"},
