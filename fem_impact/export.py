@@ -13,7 +13,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from scipy.io import wavfile
 
-from . import _check, drawing, sound
+from . import _check, drawing, sound, uff
 from ._files import replacing, staged
 from .modal import Modes
 from .response import Response
@@ -26,6 +26,7 @@ __all__ = [
     "vtk_ending",
     "write_force",
     "write_json",
+    "write_uff",
     "write_vtk",
     "write_wav",
 ]
@@ -83,6 +84,19 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
 def vtk_ending(path: str | Path) -> str:
     """The ending of a path that `write_vtk` takes; ValueError for any other."""
     return _check.one_of("path ending", Path(path).suffix, (".vtu", ".pvd"))
+
+
+def write_uff(path: str | Path, modes: Modes) -> None:
+    """Write mode shapes as a universal file for modal-test programs: nodes (15, 2411), cells (2412), shapes (55).
+
+    The deflection stands in z, mass-normalised with modal mass 1; numbers keep six digits. Needs pyuff:
+    ``pip install 'fem-impact[uff]'``. `Modes.from_uff` reads it back.
+    """
+    if modes.dimension == 0:
+        raise ValueError("modes must be those of a plate or beam; a rigid mass has no shape to write")
+    points, cells = modes.shapes.grid()
+    with replacing(path) as temporary:
+        uff.write(temporary, modes.frequencies, modes.damping_ratio, modes.shape_at(points), points, cells)
 
 
 def write_wav(

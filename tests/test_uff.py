@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fem_impact import mesh, uff
+from fem_impact import export, mesh, uff
 from fem_impact.assembly import assemble
 from fem_impact.modal import Modes, find_modes
 from fem_impact.section import Beam, Material, Plate
@@ -17,7 +17,7 @@ def written(tmp_path):
     modes = find_modes(assemble(mesh.rectangle(0.4, 0.3), PLATE), n_modes=8, damping_ratio=0.01)
     points, cells = modes.shapes.grid()
     path = tmp_path / "plate.uff"
-    uff.write(path, modes.frequencies, modes.damping_ratio, modes.shape_at(points), points, cells)
+    export.write_uff(path, modes)
     return modes, points, cells, path
 
 
@@ -83,3 +83,8 @@ def test_what_a_file_lacks_is_said(tmp_path):
         Modes.from_uff(tmp_path / "none.uff", mass=1.0)
     with pytest.raises(ValueError, match="direction must be one of x, y, z"):
         Modes.from_uff(path, mass=1.0, direction="up")
+
+
+def test_a_rigid_mass_has_no_shape_to_write(tmp_path):
+    with pytest.raises(ValueError, match="no shape to write"):
+        export.write_uff(tmp_path / "mass.uff", Modes.rigid(1.0))
