@@ -38,6 +38,8 @@ STYLE: Any = {
 SPECTRUM_BAND = (10.0, 20e3)  # [Hz] shown unless another is asked for: about what is heard
 SPECTRUM_POINTS = 1200  # [-] enough for a line of one pixel each
 SPECTRUM_DEPTH = 1e-4  # [-] 80 dB below the largest value the axis ends
+MOST_NUMBERS = 20  # [-] contacts numbered: more numbers would run into each other
+HEADROOM = 1.15  # [-] height of the force axis over the peak: room for the numbers
 TIMES = 800  # [-] instants shown of the energies
 MODE_DEPTH = 1e-8  # [-] 80 dB below the most energetic mode the axis ends
 FLAT = 1e-9  # [-] of the largest deflection: below, a shape is zero to rounding
@@ -104,16 +106,13 @@ def _draw_force(axes: Any, response: Response) -> None:
     axes.plot(response.time, response.force)
     for number, impact in enumerate(response.impacts, 1):
         axes.axvspan(impact.start, impact.end, color=SKY, alpha=0.2, lw=0)
-        axes.annotate(
-            str(number),
-            (0.5 * (impact.start + impact.end), 1.0),
-            xycoords=axes.get_xaxis_transform(),
-            ha="center",
-            va="bottom",
-            color="#555555",
-        )
+        if response.n_impacts <= MOST_NUMBERS:
+            place = (0.5 * (impact.start + impact.end), 0.97)
+            axes.annotate(
+                str(number), place, xycoords=axes.get_xaxis_transform(), ha="center", va="top", color="#555555"
+            )
     axes.set(xlim=(start - room, end + room), xlabel="time", ylabel="contact force", title="Contact force")
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, HEADROOM * (response.peak_force or 1.0))
     axes.xaxis.set_major_formatter(EngFormatter(unit="s", sep=" "))
     axes.yaxis.set_major_formatter(EngFormatter(unit="N", sep=" "))
 
