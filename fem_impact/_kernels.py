@@ -12,7 +12,7 @@ OVERDAMPED = 1.2  # [-] damping ratio from which the two decay rates are far eno
 LEVELS = 40  # [-] halvings of the step that may be cached
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
 GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before
-LOOK_LIMIT = 300_000  # [-] looks ahead in one free flight before the run gives up
+LOOK_LIMIT = 20_000_000  # [-] looks ahead times modes in one free flight before the run gives up: some 0.1 s
 WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it
 SECULAR_MISFIT = 1e-12  # [-] of the peak force: what recorded polynomials may miss of the exact force
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
@@ -979,14 +979,14 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
 
     Returns (elapsed, contact, status): status 0 an onset at `contact`, 1 no contact ever again (proved),
     2 the limit reached, 3 too slow an advance (shorter than `shortest` per look): hand over to a stepping scheme,
-    4 neither contact nor proof in LOOK_LIMIT looks. Rigid approaches no faster than `still` [m/s] and
+    4 neither contact nor proof within LOOK_LIMIT. Rigid approaches no faster than `still` [m/s] and
     overlaps no deeper than `depth` [m] are rounding.
     """
     m = shape.shape[0]
     elapsed = 0.0
     slow = 0
     bounds = np.empty((m, 6))
-    for look in range(LOOK_LIMIT):
+    for look in range(LOOK_LIMIT // (q.size + 50)):
         wait = np.inf
         first = -1
         final = True
@@ -1037,7 +1037,7 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
             if slow > 4000:
                 return elapsed, first, 3
         power_of_two = int(np.floor(np.log2(wait / base))) + GLIDES // 2
-        if close or q.size < 8 or power_of_two < 0 or power_of_two >= GLIDES:
+        if close or bounds[first, 5] == 0.0 or power_of_two < 0 or power_of_two >= GLIDES:
             free_flight(omega, zeta, bias, wait, q, p)
         else:
             wait = base * 2.0 ** (power_of_two - GLIDES // 2)
@@ -2147,7 +2147,7 @@ def run_secular(
         left = horizon - time
         dt, rt = d, r
         released = False
-        for _ in range(LOOK_LIMIT):
+        for _ in range(LOOK_LIMIT // (n_groups + 50)):
             wait = quadratic_wait(-dt, -rt, hardest)
             if wait <= 4e-16 * elapsed or (elapsed > 0.0 and dt <= 0.0):
                 released = True

@@ -17,7 +17,7 @@ from .striker import Striker
 
 TOLERANCE = 1e-4  # [-] the default promise
 SCHEMES = ("A", "A4", "collocation", "secular")
-MAX_STEPS = 2_000_000  # [-] of one run, about a second for a few modes
+MAX_STEPS = 500_000  # [-] of one run, some seconds
 FIRST_STEPS = 12.0  # [-] steps per contact at which A4 errs by about FIRST_ERROR: measured 9e-6 linear, 1e-4 Hertz
 FIRST_ERROR = 1e-4  # [-]
 DOUBLINGS = 7  # [-] how often the step is halved before the run gives up
