@@ -55,6 +55,7 @@ class Scene:
     target: Part = NOTHING
     supports: Part = NOTHING
     observe: Part | None = None
+    map: Part | None = None
 
     def strike(self) -> Response:
         """Build everything and strike; ValueError names file, table and key of what cannot be."""
@@ -301,8 +302,10 @@ def _check_whole(scene: Scene) -> None:
         raise fault(scene.path, f"[{missing}] is missing; [{there}] needs it")
     if scene.section is None and not {"mass", "first_frequency"} <= set(target):
         raise fault(scene.path, "[target] needs mass and first_frequency where there is no [material]")
-    if scene.observe is not None:
-        scene._make("observe", scene.observe)
+    for table in ("observe", "map"):
+        part = getattr(scene, table)
+        if part is not None:
+            scene._make(table, part)
     if scene.section is not None:
         scene._section(scene.section.kind)
     if scene.contact.kind == "between" and (scene.striker.kind != "sphere" or scene.section is None):

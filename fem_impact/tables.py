@@ -9,6 +9,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from . import _check, integrator, mesh
 from .contact import Contact
 from .section import Beam, Material, Plate
@@ -57,6 +59,29 @@ def _observe(*, points: Any) -> Any:
     return points
 
 
+def map_values(*, over: Any, max_frequency: Any = None) -> dict[str, Any]:
+    """The table [map], checked: values along each axis, and the band of the spectral centroid [Hz]."""
+    if not isinstance(over, dict) or not over:
+        raise ValueError(f'over must be a table of axes such as "striker.mass" = [0.05, 0.1], got {over!r:.80}')
+    band = None if max_frequency is None else _check.positive("max_frequency", max_frequency, "Hz")
+    return {"over": {name: _along(name, values) for name, values in over.items()}, "max_frequency": band}
+
+
+def _along(name: str, values: Any) -> np.ndarray:
+    """Values along an axis: a list, or a range {from, to, count, scale}."""
+    if isinstance(values, list):
+        return np.array(values)
+    if not isinstance(values, dict) or not {"from", "to", "count"} <= set(values) <= {"from", "to", "count", "scale"}:
+        raise ValueError(
+            f"{name} must be a list or {{ from, to, count, scale = 'linear' or 'log' }}, got {values!r:.80}"
+        )
+    low, high = _check.number(f"{name}.from", values["from"]), _check.number(f"{name}.to", values["to"])
+    count = _check.count(f"{name}.count", values["count"])
+    if _check.one_of(f"{name}.scale", values.get("scale", "linear"), ("linear", "log")) == "linear":
+        return np.linspace(low, high, count)
+    return np.geomspace(_check.positive(f"{name}.from", low), _check.positive(f"{name}.to", high), count)
+
+
 SOURCES = ("fe", "analytic")
 # What makes each part of a scene: the keys of its table are the arguments of these functions, no list is kept twice.
 # A table whose first entry is not empty names its maker by that key.
@@ -87,6 +112,7 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
     ),
     "strike": ("", {"": integrator.strike}),
     "observe": ("", {"": _observe}),
+    "map": ("", {"": map_values}),
 }
 TABLES = [*MAKERS, "supports"]
 REQUIRED = ("mesh", "striker", "contact", "strike")

@@ -92,11 +92,27 @@ def threshold_frequency(modes: Modes, at: Any, mass: float) -> float | None:
 
     if density == 0.0 and mass * squared.sum() <= 1.0:
         return float("inf")
-    flexible = omega[omega > 0.0]
-    low = np.log(1e-3 * flexible[0])
+    low = np.log(_harmless(omega, squared, density, exponent, mass))
     while excess(low) > 0.0:
         low -= 1.0
     high = low
     while excess(high) <= 0.0:
         low, high = high, high + np.log(STEP)
     return float(np.exp(optimize.brentq(excess, low, high, xtol=1e-13)) / (2.0 * np.pi))
+
+
+def _harmless(omega: np.ndarray, squared: np.ndarray, density: float, exponent: float, mass: float) -> float:
+    """A contact frequency [rad/s] up to which no pulse takes all the energy, by a bound that rises with it.
+
+    The spectrum of the half sine is at most 1, and at most 4/3 (contact frequency / frequency)**2 from twice the
+    contact frequency on.
+    """
+    flexible = omega > 0.0
+    ends, shares = omega[flexible], squared[flexible]
+    beyond = density * ends[-1] ** (-3.0 - exponent) / (3.0 + exponent)
+    fourth = shares / ends**4
+    above = beyond + np.append(np.cumsum(fourth[::-1])[::-1][1:], 0.0)  # of the modes after each
+    half = 0.5 * ends
+    bound = squared[~flexible].sum() + np.cumsum(shares) + 16.0 / 9.0 * half**4 * above
+    safe = int(np.argmax(mass * bound >= 1.0)) if (mass * bound >= 1.0).any() else len(ends)
+    return float(half[safe - 1]) if safe else 1e-3 * float(ends[0])
