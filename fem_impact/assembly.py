@@ -10,7 +10,7 @@ from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags
 
 from . import _check
 from .attached import beam_springs, check_masses, plate_springs
-from .corners import around_corners
+from .corners import around_corners, towards_points
 from .curves import Curves
 from .elements import (
     Argyris,
@@ -35,6 +35,7 @@ MORLEY_ORDER = 4  # [-] likewise for products of quadratics
 MASS_ORDER = 10  # [-] of the quadrature: exact for products of quintics
 BEAM_ORDER = 8  # [-] exact for products of cubics where the height varies linearly
 UNEVEN = 20.0  # [-] largest over smallest triangle from which eigenvalues are taken from the strain energy
+POINT_RINGS = 8  # [-] of triangles towards a point asked for: the innermost are a 256th of the others
 TINY = 4e-3  # [-] of the extent: likewise for the root of the area of the smallest triangle
 CHUNK = 256  # [-] triangles whose strain is computed together
 RIGID = 1e-9  # [-] share of a rigid motion that supports may suppress by rounding alone
@@ -111,6 +112,7 @@ class System:
     softness: float = 1.0  # [-] largest inertia over stiffness on the body, in the frame: its shortest waves
     point_masses: tuple = ()  # pairs of point [m] and mass [kg]
     strain: Strain | None = field(default=None, repr=False)
+    near: np.ndarray | None = None  # (n_points, 2) [m] towards which the triangles shrink
 
     @property
     def n_dofs(self) -> int:
@@ -134,6 +136,7 @@ def assemble(
     element: str | None = None,
     *,
     point_masses: Sequence = (),
+    near: Any = None,
     graded: bool = True,
 ) -> System:
     """Stiffness and mass of a body, held at its named edges.
@@ -149,6 +152,8 @@ def assemble(
         a second opinion); on a beam "hermite".
     point_masses : sequence of (point [m], mass [kg])
         Bodies without extent that ride on the plate or beam.
+    near : array_like, shape (n_points, 2) [m], optional
+        Points of a plate, such as the strike point, towards which the triangles shrink.
     graded : bool
         Whether rings of ever smaller triangles are put at corners where the supports make the solution singular.
 
@@ -172,8 +177,12 @@ def assemble(
         made = _assemble_morley(mesh, section, supports)
     elif mesh.dimension == 2 and isinstance(section, Plate):
         order, fine = around_corners(mesh, _kinds(_support_of_facets(mesh, supports)), section.material.nu)
-        made = _assemble_plate(fine if graded else mesh, section, supports)
-        made = replace(made, mesh=mesh, graded=graded, order=order)
+        fine = fine if graded else mesh
+        if near is not None:
+            near = _check.array("near", np.atleast_2d(near), (None, 2), "m")
+            fine = towards_points(fine, near, POINT_RINGS)
+        made = _assemble_plate(fine, section, supports)
+        made = replace(made, mesh=mesh, graded=graded, order=order, near=near)
     else:
         wanted = "Plate" if mesh.dimension == 2 else "Beam"
         raise ValueError(f"section must be a {wanted} on a mesh of dimension {mesh.dimension}, got {section!r:.80}")
@@ -184,7 +193,9 @@ def assemble(
 def reassemble(system: System, mesh: Mesh) -> System:
     """The same body on another mesh of it."""
     section, supports, masses = system.section, system.supports, system.point_masses
-    return assemble(mesh, section, supports, system.element, point_masses=masses, graded=system.graded)
+    return assemble(
+        mesh, section, supports, system.element, point_masses=masses, near=system.near, graded=system.graded
+    )
 
 
 def _support_of_facets(mesh: Mesh, supports: dict) -> list[str | Elastic]:
@@ -249,6 +260,7 @@ class _Raw:
     point_masses: tuple = ()
     element: str = "argyris"
     strain: Strain | None = None
+    near: np.ndarray | None = None
 
     def interpolate(self, points: np.ndarray) -> csr_matrix:
         """Deflection at points (n_points, dimension) [m] from all unknowns, (n_points, n_all) [-]."""
@@ -325,6 +337,7 @@ def _reduced(raw: _Raw) -> System:
         raw.softness,
         raw.point_masses,
         raw.strain,
+        raw.near,
     )
 
 

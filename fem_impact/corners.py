@@ -10,6 +10,7 @@ from .mesh import Mesh
 
 SHRINK = 0.5  # [-] of the distance to the corner from one ring of triangles to the next
 WIDE = 0.7  # [rad] triangles at a singular corner are bisected until they are narrower
+AT_VERTEX = 1e-6  # [-] in area coordinates: a point nearer to a corner or side of a triangle lies on it
 ROUNDS = 3  # [-] of such bisections
 CORNER_ERROR = 1e-7  # [-] share of the energy that the innermost ring may miss, about twice that in frequency
 SMALLEST = 1e-10  # [-] of the facet: rings stop here, before the rounding of coordinates shows
@@ -132,6 +133,35 @@ def towards(mesh: Mesh, wanted: dict[int, int]) -> Mesh:
                 cells[c] = [vertex, nearer[a], nearer[b]]
                 cells += _strip(points, nearer[a], a, b, nearer[b])
     return rim.finish(mesh, np.array(points), np.array(cells))
+
+
+def towards_points(mesh: Mesh, points: np.ndarray, n_rings: int) -> Mesh:
+    """The mesh with each point (n_points, 2) [m] as a vertex and rings of shrinking triangles towards it."""
+    wanted: dict[int, int] = {}
+    for point in points:
+        corners = mesh.points[mesh.cells]  # (n_cells, 3, 2)
+        sides = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+        area = np.linalg.solve(sides, (point - corners[:, 0])[..., None])[..., 0]
+        area = np.column_stack([1.0 - area.sum(axis=1), area])
+        holds = np.flatnonzero(area.min(axis=1) > -AT_VERTEX)
+        if not holds.size:
+            raise ValueError(f"near must lie on the body and off its curved rim, got ({point[0]:g}, {point[1]:g}) m")
+        vertex = int(mesh.cells[holds[0], area[holds[0]].argmax()])
+        if area[holds[0]].max() < 1.0 - AT_VERTEX:
+            if len(holds) == 1 and area[holds[0]].min() < AT_VERTEX:
+                raise ValueError(
+                    f"near must lie inside the body or at a corner, got ({point[0]:g}, {point[1]:g}) m on an edge"
+                )
+            vertex, fresh = len(mesh.points), []
+            for c in holds:
+                cell = mesh.cells[c].tolist()
+                for k in range(3):
+                    if area[c, k] > AT_VERTEX:
+                        fresh.append([vertex if i == k else p for i, p in enumerate(cell)])
+            kept = np.delete(mesh.cells, holds, axis=0)
+            mesh = replace(mesh, points=np.vstack([mesh.points, point]), cells=np.vstack([kept, fresh]))
+        wanted[vertex] = n_rings
+    return towards(mesh, wanted)
 
 
 def _narrowed(points: list[np.ndarray], cells: list[list[int]], corners: set[int], rim: "_Rim") -> list[list[int]]:
