@@ -9,7 +9,7 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -27,9 +27,8 @@ SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` w
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; the exit status is 0, 2 for bad input, 1 for a run that failed, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        # The dense algebra is small: on two busy cores two threads took 18 s where one took 4 s. numpy reads it once.
-        os.environ.setdefault(name, "1")
+    if options.run is not _doctor:
+        _prepare(os.environ)
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that temporary files go away
     try:
@@ -51,6 +50,19 @@ def main(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _complain("interrupted; nothing was written", INTERRUPTED)
     return 0
+
+
+def _prepare(environment: MutableMapping[str, str]) -> None:
+    """Set what numpy and numba read once, when they are loaded; whatever the user has set stays."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        # The dense algebra is small: on two busy cores two threads took 18 s where one took 4 s.
+        environment.setdefault(name, "1")
+    package = Path(str(fi.__file__)).parent
+    source = (package / "_kernels.py").stat().st_mtime
+    compiled = (package / "__pycache__").glob("_kernels.run_energy-*.nbi")
+    if "numba" not in sys.modules and not any(file.stat().st_mtime >= source for file in compiled):
+        # A single strike takes some 0.3 to 1 s in plain Python, compiling it 30 s: `doctor` does that once.
+        environment.setdefault("NUMBA_DISABLE_JIT", "1")
 
 
 def _complain(error: object, status: int) -> int:

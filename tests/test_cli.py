@@ -242,3 +242,20 @@ def test_any_arguments_end_in_a_status_and_a_message(tmp_path, monkeypatch, caps
     captured = capsys.readouterr()
     assert status in (0, 1, 2) and (captured.err if status else captured.out)
     assert not list(tmp_path.iterdir())
+
+
+def test_uncompiled_kernels_run_as_plain_python(monkeypatch, tmp_path):
+    (tmp_path / "_kernels.py").write_text("")
+    monkeypatch.setattr(fi, "__file__", str(tmp_path / "__init__.py"))
+    monkeypatch.delitem(sys.modules, "numba", raising=False)
+    fresh: dict[str, str] = {}
+    cli._prepare(fresh)
+    assert fresh["NUMBA_DISABLE_JIT"] == "1" and fresh["OMP_NUM_THREADS"] == "1"
+    chosen = {"NUMBA_DISABLE_JIT": "0", "OMP_NUM_THREADS": "7"}
+    cli._prepare(chosen)
+    assert chosen["NUMBA_DISABLE_JIT"] == "0" and chosen["OMP_NUM_THREADS"] == "7"
+    (tmp_path / "__pycache__").mkdir()
+    (tmp_path / "__pycache__" / "_kernels.run_energy-1.py311.nbi").write_text("")
+    compiled: dict[str, str] = {}
+    cli._prepare(compiled)
+    assert "NUMBA_DISABLE_JIT" not in compiled
