@@ -172,7 +172,8 @@ def _modes(options: argparse.Namespace) -> None:
 def _doctor(options: argparse.Namespace) -> None:
     for name, version in fi.export.versions().items():
         print(f"{name:<22} {version}")
-    findings = fi.doctor.examine()
+    with _progress("examining, and compiling if it was not done before"):
+        findings = fi.doctor.examine()
     for finding in findings:
         state = "works" if finding.works else "fails" if finding.vital else "missing"
         print(_wrapped(f"{finding.name:<22} {state:<8} {finding.seconds:5.2f} s  {finding.remedy}".rstrip()))

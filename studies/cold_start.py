@@ -27,13 +27,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=5)
     repeats = parser.parse_args().repeats
-    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}, {repeats} runs each; the first may compile kernels")
+    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}, {repeats} runs each")
     with tempfile.TemporaryDirectory() as folder:
         scene = str(STUDIES / "scenes" / "drumstick.toml")
         jobs = {"--help": ["--help"], "strike drumstick.toml": ["strike", scene, "--out", folder]}
         for name, arguments in jobs.items():
             times = wall_times([str(PROGRAM), *arguments], repeats)
-            print(f"{name:>24}: first {times[0]:6.2f} s, median {statistics.median(times):6.2f} s")
+            print(f"{name:>22}: first {times[0]:6.2f} s, median {statistics.median(times):6.2f} s")
 
 
 if __name__ == "__main__":
