@@ -92,6 +92,7 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
             "rectangle": mesh.rectangle,
             "disk": mesh.disk,
             "polygon": mesh.polygon,
+            "outline": mesh.outline,
             "line": mesh.line,
             "file": mesh.load,
         },
