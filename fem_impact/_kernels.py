@@ -2297,3 +2297,104 @@ def compressions(approach, k, a, c):
         if approach[n] > 0.0:
             result[n] = compression(approach[n], k, a, c)
     return result
+
+
+@inner()
+def force_within(steps, now, law, n_coefficients, row, i, part):
+    """Force of contact i at a fraction of a step: the law on the cubic through both ends, or a higher polynomial."""
+    first = 3 + (3 + n_coefficients) * i
+    if n_coefficients > 2:
+        value = 0.0
+        for k in range(n_coefficients - 1, -1, -1):
+            value = value * part + steps[row, first + 3 + k]
+        return max(value, 0.0)
+    last = row + 1 == steps.shape[0]
+    h = steps[row, 1]
+    d0 = steps[row, first]
+    v0 = steps[row, first + 1]
+    d1 = now[0, i] if last else steps[row + 1, first]
+    v1 = now[4, i] if last else steps[row + 1, first + 1]
+    a = 2.0 * (d0 - d1) + h * (v0 + v1)
+    b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
+    d = d0 + part * (h * v0 + part * (b + part * a))
+    if d <= 0.0:
+        return 0.0
+    rate = v0 + part * (2.0 * b + 3.0 * a * part) / h
+    _, f, _ = law_at(d, law, i)
+    return max(f * (1.0 + law[i, 2] * rate), 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def find_impacts(steps, now, law, n_coefficients, looks, touch):
+    """Every unbroken contact, (n_impacts, 5): start, end, peak force, impulse, contact; contact by contact.
+
+    Bodies that touch and approach no faster than ``touch`` [m/s] before the first push press from the start of that
+    time. The peak is sought with ``looks`` per step about the largest of a few, and refined by a parabola.
+    """
+    n_steps = steps.shape[0]
+    m = law.shape[0]
+    width = 3 + n_coefficients
+    result = np.empty((8, 5))
+    count = 0
+    for i in range(m):
+        first = 3 + width * i
+        row = 0
+        while row < n_steps:
+            if steps[row, first + 2] == 0.0:
+                row += 1
+                continue
+            if count == result.shape[0]:
+                result = resized(result, count, 2 * count)
+            begin = row
+            start = steps[row, 0]
+            impulse = 0.0
+            peak = 0.0
+            peak_row = row
+            peak_part = 0.0
+            while row < n_steps and steps[row, first + 2] != 0.0:
+                for k in range(n_coefficients):
+                    impulse += steps[row, 1] * steps[row, first + 3 + k] / (k + 1.0)
+                for look in range(n_coefficients):
+                    f = force_within(steps, now, law, n_coefficients, row, i, look / n_coefficients)
+                    if f > peak:
+                        peak = f
+                        peak_row = row
+                row += 1
+            last = row - 1
+            for near in range(max(begin, peak_row - 1), min(last, peak_row + 1) + 1):
+                for look in range(looks + 1):
+                    f = force_within(steps, now, law, n_coefficients, near, i, look / looks)
+                    if f >= peak:
+                        peak = f
+                        peak_row = near
+                        peak_part = look / looks
+            end = steps[last, 0] + steps[last, 1]
+            final = row == n_steps
+            after = now[0, i] if final else steps[row, first]
+            following = now[0, i] if begin + 1 == n_steps else steps[begin + 1, first]
+            if steps[begin, first] < 0.0 and following > 0.0:
+                v1 = now[4, i] if begin + 1 == n_steps else steps[begin + 1, first + 1]
+                start += hermite_root(steps[begin, first], steps[begin, first + 1], following, v1, steps[begin, 1])
+            if steps[last, first] > 0.0 and after < 0.0:
+                v1 = now[4, i] if final else steps[row, first + 1]
+                end = steps[last, 0]
+                end += hermite_root(steps[last, first], steps[last, first + 1], after, v1, steps[last, 1])
+            if steps[begin, first] == 0.0:
+                while begin > 0 and steps[begin - 1, first] == 0.0 and abs(steps[begin - 1, first + 1]) <= touch:
+                    begin -= 1
+                    start = steps[begin, 0]
+            middle = min(max(peak_part, 1.0 / looks), 1.0 - 1.0 / looks)
+            low = force_within(steps, now, law, n_coefficients, peak_row, i, middle - 1.0 / looks)
+            top = force_within(steps, now, law, n_coefficients, peak_row, i, middle)
+            high = force_within(steps, now, law, n_coefficients, peak_row, i, middle + 1.0 / looks)
+            bend = low - 2.0 * top + high
+            if bend < 0.0:
+                shift = min(max(0.5 * (low - high) / bend, -1.0), 1.0)
+                peak = max(peak, force_within(steps, now, law, n_coefficients, peak_row, i, middle + shift / looks))
+            result[count, 0] = start
+            result[count, 1] = end
+            result[count, 2] = peak
+            result[count, 3] = impulse
+            result[count, 4] = i
+            count += 1
+    return resized(result, count, count)

@@ -64,6 +64,27 @@ class _System:
     start_p: np.ndarray
 
 
+@dataclass(frozen=True)
+class _Options:
+    """How far to follow, how well, and with what."""
+
+    tolerance: float
+    horizon: float
+    n_max: int
+    scheme: str | None
+    dt: float | None
+
+    @classmethod
+    def checked(cls, tolerance, duration, max_impacts, scheme, dt) -> "_Options":
+        return cls(
+            _check.between("tolerance", tolerance, 1e-12, 1.0),
+            np.inf if duration is None else _check.positive("duration", duration, "s"),
+            0 if max_impacts is None else _check.count("max_impacts", max_impacts),
+            None if scheme is None else _check.one_of("scheme", scheme, SCHEMES),
+            None if dt is None else _check.positive("dt", dt, "s"),
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class _Part:
     """One body as the engine sees it."""
@@ -134,21 +155,18 @@ def strike(
         Where the tolerance cannot be met, or no end can be proved and none was given.
     """
     speed = _check.non_negative("speed", speed, "m/s")
+    forces = [
+        _check.number(name, x, "N") for name, x in (("striker_force", striker_force), ("target_force", target_force))
+    ]
     point = modes.points("at", at)[:1]
+    options = _Options.checked(tolerance, duration, max_impacts, scheme, dt)
     touch = Touch(contact, 0, 1, striker.at[None] if striker.modes.dimension else None, point)
-    bodies = (striker.modes, modes)
-    response = collide(
-        bodies,
-        [touch],
-        speeds=(speed, 0.0),
-        tolerance=tolerance,
-        residual=residual,
-        duration=duration,
-        max_impacts=max_impacts,
-        scheme=scheme,
-        dt=dt,
-        forces=(striker_force, target_force),
-    )
+    whole = striker.compliance if residual and striker.modes.dimension else None
+    arriving = _part(striker.modes, ((0, 1.0),), striker.shape[None], whole, forces[0])
+    whole = modes.shapes.compliance(point) if residual and modes.dimension else None
+    struck = _part(modes, ((0, -1.0),), modes.shapes.at(point), whole, forces[1])
+    arriving = replace(arriving, p=speed * striker.motion)
+    response = _follow((striker.modes, modes), [touch], [arriving, struck], speed, options)
     return replace(response, striker=striker, at=point[0])
 
 
@@ -186,26 +204,29 @@ def collide(
     -------
     Response
     """
-    tolerance = _check.between("tolerance", tolerance, 1e-12, 1.0)
-    horizon = np.inf if duration is None else _check.positive("duration", duration, "s")
-    n_max = 0 if max_impacts is None else _check.count("max_impacts", max_impacts)
-    if scheme is not None:
-        scheme = _check.one_of("scheme", scheme, SCHEMES)
-    if dt is not None:
-        dt = _check.positive("dt", dt, "s")
+    options = _Options.checked(tolerance, duration, max_impacts, scheme, dt)
     bodies, contacts = tuple(bodies), tuple(contacts)
     parts, arriving = _parts(bodies, contacts, speeds, states, forces, residual)
+    return _follow(bodies, contacts, parts, arriving, options)
+
+
+def _follow(bodies, contacts, parts, speed, options) -> Response:
+    """Run the bodies to the options' tolerance and estimate what is left of error."""
     system = _joined(parts, contacts)
-    if not np.isfinite(horizon) and not n_max and (system.bias @ system.shape.T > 0.0).any():
+    endless = not np.isfinite(options.horizon) and not options.n_max
+    if endless and (system.bias @ system.shape.T > 0.0).any():
         raise ValueError(
             "duration or max_impacts must be given where a constant force keeps pressing the bodies together"
         )
     pace = _pace(system)
-    history, step_error, ran, coarse, size = _controlled(system, scheme, dt, tolerance, pace, horizon, n_max)
-    truncation, resolvable = _truncation(parts, contacts, system, coarse, ran, size, pace, horizon, n_max)
+    last = options.horizon, options.n_max
+    history, step_error, ran, coarse, size = _controlled(
+        system, options.scheme, options.dt, options.tolerance, pace, *last
+    )
+    truncation, resolvable = _truncation(parts, contacts, system, coarse, ran, size, pace, *last)
     error = Error(step_error, truncation, _mesh_error(bodies, history), resolvable)
     laws = tuple(touch.law for touch in contacts)
-    return Response(bodies, laws, history, arriving, tolerance, ran, error)
+    return Response(tuple(bodies), laws, history, speed, options.tolerance, ran, error)
 
 
 def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Part], float]:
@@ -224,37 +245,37 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Pa
             ends[body].append((i, sign, bodies[body].points("at", at)[:1]))
     parts, arriving = [], 0.0
     for body, modes in enumerate(bodies):
-        start = (np.zeros(modes.n_modes), np.zeros(modes.n_modes)) if states is None else states[body]
-        part = _part(modes, ends[body], float(speeds[body]), float(forces[body]), start, residual)
-        arriving = arriving or float(speeds[body])
+        points = np.vstack([point for _, _, point in ends[body]] or [np.zeros((0, modes.dimension))])
+        rows = np.atleast_2d(modes.shapes.at(points)) if ends[body] else np.zeros((0, modes.n_modes))
+        whole = modes.shapes.compliance(points) if residual and modes.dimension and ends[body] else None
+        part = _part(modes, tuple((i, sign) for i, sign, _ in ends[body]), rows, whole, float(forces[body]))
+        if states is not None:
+            q, p = (_check.array("states", value, (modes.n_modes,)) for value in states[body])
+            part = replace(part, q=q, p=p)
+        speed = float(speeds[body])
+        if speed != 0.0:
+            if not ends[body] or not rows[0, modes.omega == 0.0].any():
+                raise ValueError(f"speeds must be zero for a body that cannot move rigidly, got {speed:g} m/s")
+            part = replace(part, p=part.p + speed * modes.rigid_motion(points[:1] if modes.dimension else None))
+        arriving = arriving or speed
         parts.append(part)
     return parts, arriving
 
 
-def _part(modes: Modes, ends: list, speed: float, force: float, start: tuple, residual: bool) -> _Part:
-    """One body: its modes and their shapes at its contacts, how it starts, and what its modes leave out."""
-    q, p = (_check.array("states", value, (modes.n_modes,)) for value in start)
-    if not ends:
-        rows, points = np.zeros((0, modes.n_modes)), np.zeros((0, modes.dimension))
-    else:
-        points = np.vstack([point for _, _, point in ends])
-        rows = np.atleast_2d(modes.shapes.at(points))  # (n_ends, n_modes)
-    if speed != 0.0:
-        if not ends or not rows[0, modes.omega == 0.0].any():
-            raise ValueError(f"speeds must be zero for a body that cannot move rigidly, got {speed:g} m/s")
-        p = p + speed * modes.rigid_motion(points[:1] if modes.dimension else None)
-    rest = np.zeros((len(ends), len(ends)))
-    if residual and modes.dimension and ends:
+def _part(modes: Modes, touched: tuple, rows: np.ndarray, whole: np.ndarray | None, force: float) -> _Part:
+    """One body at rest: its modes, their shapes at its contacts, and what they leave out of its compliance there."""
+    rest = np.zeros((len(touched), len(touched)))
+    if whole is not None:
         flexible = modes.omega > 0.0
         scaled = rows[:, flexible] / modes.omega[flexible]
-        whole = modes.shapes.compliance(points)
         rest = 0.5 * (whole + whole.T) - scaled @ scaled.T
-        if np.linalg.eigvalsh(rest)[-1] <= REST_FLOOR * np.trace(whole):
+        largest = rest[0, 0] if len(rest) == 1 else np.linalg.eigvalsh(rest)[-1]
+        if largest <= REST_FLOOR * np.trace(whole):
             rest = np.zeros_like(rest)
-    touched = tuple((i, sign) for i, sign, _ in ends)
-    bias = force * rows[0] if ends else np.zeros(modes.n_modes)
+    still = np.zeros(modes.n_modes)
+    bias = force * rows[0] if force else still
     above = REST_ABOVE[min(modes.dimension, 2)] if modes.dimension else 1.0
-    return _Part(modes.omega, modes.damping_ratio, rows, touched, rest, above, q, p, bias, force)
+    return _Part(modes.omega, modes.damping_ratio, rows, touched, rest, above, still, still, bias, force)
 
 
 def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
@@ -369,7 +390,7 @@ def _controlled(system, scheme, dt, tolerance, pace, horizon, n_max) -> tuple[Hi
     if scheme == "secular":
         _check_secular(system)
         only = _run(system, scheme, shortest, pace, horizon, n_max)
-        return only, ROUNDING * max(1, len(only.impacts)), scheme, only, shortest
+        return only, ROUNDING * max(1, len(only.contacts)), scheme, only, shortest
     if dt is not None:
         fine = _run(system, scheme, dt, pace, horizon, n_max)
         coarse = _run(system, scheme, 2.0 * dt, pace, horizon, n_max)
@@ -390,7 +411,7 @@ def _controlled(system, scheme, dt, tolerance, pace, horizon, n_max) -> tuple[Hi
         coarse = fine
     raise SimulationError(
         f"the step error stays at {best:.1e}, tolerance {tolerance:.1e}, with {len(fine.steps)} steps; after "
-        f"{len(fine.impacts)} impacts the motion may be chaotic: raise tolerance, or give duration or max_impacts"
+        f"{len(fine.contacts)} impacts the motion may be chaotic: raise tolerance, or give duration or max_impacts"
     )
 
 
@@ -461,12 +482,9 @@ def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _scalars(history: History, scale: float) -> np.ndarray:
     """Rigid speeds over the largest speed there is, impulse, contact time and peak force."""
-    impacts = history.impacts
+    start, end, peak, impulse, _ = history.contacts.T
     speed = history.end_p[history.omega == 0.0] / scale
-    impulse = sum(impact.impulse for impact in impacts)
-    return np.array(
-        [*speed, impulse, sum(i.duration for i in impacts), max((i.peak_force for i in impacts), default=0.0)]
-    )
+    return np.array([*speed, impulse.sum(), (end - start).sum(), peak.max(initial=0.0)])
 
 
 def _difference(coarse: History, fine: History, over: tuple[float, float] = (1.0, 1.0)) -> float:
@@ -474,7 +492,7 @@ def _difference(coarse: History, fine: History, over: tuple[float, float] = (1.0
 
     ``over`` divides the differences of speeds and impulse, and those of contact time and peak force.
     """
-    if len(coarse.impacts) != len(fine.impacts) or coarse.status != fine.status:
+    if len(coarse.contacts) != len(fine.contacts) or coarse.status != fine.status:
         return 1.0
     momentum = np.linalg.norm(fine.start_p) or np.linalg.norm(fine.end_p) or 1.0
     one, two = _scalars(coarse, float(momentum)), _scalars(fine, float(momentum))

@@ -12,7 +12,7 @@ from .modal import Modes
 from .striker import Striker
 
 TOUCH = 1e-12  # [-] of the fastest approach: bodies that touch and hardly move press from the first push on
-PEAK_LOOKS = 17  # [-] looks per step for the peak force before a parabola refines it: (pi/11/16)**2/8 of it at worst
+PEAK_LOOKS = 16  # [-] looks per step for the peak force before a parabola refines it: (pi/11/16)**2/8 of it at worst
 
 
 @dataclass(frozen=True)
@@ -127,39 +127,17 @@ class History:
         return np.maximum(k * pressed**exponent * (1.0 + loss * rate), 0.0)
 
     @cached_property
+    def contacts(self) -> np.ndarray:
+        """Every unbroken contact, (n_impacts, 5): start, end, peak force, impulse, contact; contact by contact."""
+        rate = np.abs(self._column(1)).max(initial=0.0)
+        return _kernels.find_impacts(self.steps, self.now, self.law, self.n_coefficients, PEAK_LOOKS, TOUCH * rate)
+
+    @cached_property
     def impacts(self) -> tuple[Impact, ...]:
         """Every unbroken contact, in order of its beginning."""
-        found = []
-        for i in range(self.n_contacts):
-            edges = np.flatnonzero(np.diff(np.concatenate([[False], self.pressed[:, i], [False]])))
-            found += [self._impact(i, first, last) for first, last in zip(edges[::2], edges[1::2] - 1)]
+        rows = self.contacts.tolist()
+        found = [Impact(start, end, peak, impulse, int(i)) for start, end, peak, impulse, i in rows]
         return tuple(sorted(found, key=lambda impact: (impact.start, impact.contact)))
-
-    def _impact(self, i: int, first: int, last: int) -> Impact:
-        d0, v0, d1, v1 = (end[:, i] for end in self.ends)
-        start, end = self.steps[first, 0], self.steps[last, 0] + self.steps[last, 1]
-        if d0[first] < 0.0 < d1[first]:
-            start += _kernels.hermite_root(d0[first], v0[first], d1[first], v1[first], self.steps[first, 1])
-        if d0[last] > 0.0 > d1[last]:
-            end = self.steps[last, 0]
-            end += _kernels.hermite_root(d0[last], v0[last], d1[last], v1[last], self.steps[last, 1])
-        began = first
-        while began and d0[began] == 0.0 == d0[began - 1] and abs(v0[began - 1]) <= TOUCH * np.abs(v0).max():
-            began -= 1
-        start = min(start, self.steps[began, 0])
-        rows = np.arange(first, last + 1)
-        force = self.force(rows, i, np.linspace(0.0, 1.0, PEAK_LOOKS)[None])
-        row, column = np.unravel_index(int(force.argmax()), force.shape)
-        step = 1.0 / (PEAK_LOOKS - 1)
-        middle = min(max(column * step, step), 1.0 - step)
-        low, top, high = self.force(rows[row : row + 1], i, np.array([[middle - step, middle, middle + step]]))[0]
-        bend = low - 2.0 * top + high
-        peak = float(force.max())
-        if bend < 0.0:
-            shift = min(max(0.5 * (low - high) / bend, -1.0), 1.0)
-            peak = max(peak, float(self.force(rows[row : row + 1], i, np.array([[middle + shift * step]]))[0, 0]))
-        impulse = float(self.impulses[rows, i].sum())
-        return Impact(float(start), float(end), peak, impulse, i)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,7 @@
 """What strikes: a rigid mass, a sphere, a stick or any body with modes, and the point it strikes with."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -83,9 +84,23 @@ class Striker:
         return self.modes.mass
 
     @property
+    def _points(self) -> np.ndarray:
+        return self.at[None] if self.modes.dimension else np.zeros((1, 0))
+
+    @cached_property
     def shape(self) -> np.ndarray:
         """Mass-normalised shapes at the contact point, (n_modes,) [kg**-0.5]."""
-        return self.modes.shape_at(self.at[None] if self.modes.dimension else None)[0]
+        return self.modes.shapes.at(self._points)[0]
+
+    @cached_property
+    def motion(self) -> np.ndarray:
+        """Modal velocities (n_modes,) [kg**0.5] of the arrival at unit speed of the contact point."""
+        return self.modes.rigid_motion(self._points if self.modes.dimension else None)
+
+    @cached_property
+    def compliance(self) -> np.ndarray:
+        """Static compliance of the whole body at the contact point, (1, 1) [m/N]; inertia relief."""
+        return self.modes.shapes.compliance(self._points)
 
     @property
     def felt_mass(self) -> float:
