@@ -155,11 +155,11 @@ class Scene:
             body = self._make("mesh", self.mesh)
         with stages("assembly"):
             section = self._section("beam" if body.dimension == 1 else "plate")
-            with self._blame("supports"):
+            with self._blame("supports"), np.errstate(all="ignore"):
                 system = assembly.assemble(body, section, supports=dict(self.supports.values))
 
         def find(n_modes: int, max_frequency: float | None = None, first: Any = None) -> Modes:
-            with self._blame("mesh"):
+            with self._blame("mesh"), np.errstate(all="ignore"):
                 if max_frequency is None:
                     return modal.find_modes(system, n_modes=n_modes, tolerance=min(tolerance, WORST_FREQUENCY))
                 # The mesh that was fine enough for the first modes, finer still where the shortest wave asks for it.

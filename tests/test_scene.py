@@ -291,6 +291,12 @@ def test_mutated_scene_loads_or_says_why(tmp_path, line, value, how):
         assert np.isfinite(loaded.modes(2).frequencies).all()
 
 
+def test_section_beyond_the_range_of_floats_is_an_error_without_warnings(tmp_path):
+    text = (SCENES / "marimba_bar.toml").read_text(encoding="utf-8").replace("width = 0.05", "width = 1e308")
+    with pytest.raises(ValueError, match=r"scene\.toml: \["):  # warnings are errors here, and would come first
+        scene.load_scene(write(tmp_path, text)).strike()
+
+
 WORDS = ["nan", "-inf", "-1", "0", "1e308", "1e-308", "true", '"x"', "[]", "[[]]", "[1]", "[1, 2, 3]", "{}", "{a = 1}"]
 WORDS += ["9" * 400, '""', "1979-05-27", "'\\u0000'", "[nan]", "[[0.1, 0.1]]", '"hinged"', '"between"', "0x1", "1_0"]
 
