@@ -1,0 +1,142 @@
+"""How close the contact loop comes to what the machine can do, and how its cost grows with modes.
+
+    python studies/roofline.py [--out DIR]
+
+Measures one core's multiply-add peak and its read bandwidth at several array sizes with small compiled loops, then the
+time of one step of scheme A4 from 10 to 10 000 modes. A mode-step of one contact takes about 36 floating-point
+operations and 26 reads and writes of 8 bytes; the bound is the slower of the two. Draws time per step and the share
+of the bound reached.
+"""
+
+import argparse
+import os
+import time
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numba
+import numpy as np
+
+from fem_impact import _kernels
+
+COUNTS = [10, 30, 100, 300, 1000, 3000, 10000]
+OPERATIONS = 36.0  # [-] per mode-step: free motion and bias 10, three sums 2 + 7 + 2, response 10, the rest 5
+BYTES = 8.0 * 26.0  # [-] per mode-step: 8 + 2 for the free motion, 9 for the sums, 7 for the response
+
+
+@numba.njit(fastmath=True)
+def multiply_adds(x: np.ndarray, out: np.ndarray, turns: int) -> None:
+    """Two polynomials at every x: 16 multiply-adds per value, in two independent chains."""
+    for _ in range(turns):
+        for n in range(x.size):
+            v = x[n]
+            a = v
+            b = v + 0.5
+            a = a * v + 0.1
+            b = b * v + 0.2
+            a = a * v + 0.3
+            b = b * v + 0.4
+            a = a * v + 0.5
+            b = b * v + 0.6
+            a = a * v + 0.7
+            b = b * v + 0.8
+            a = a * v + 0.9
+            b = b * v + 0.11
+            a = a * v + 0.12
+            b = b * v + 0.13
+            a = a * v + 0.14
+            b = b * v + 0.15
+            a = a * v + 0.16
+            b = b * v + 0.17
+            out[n] = a * b
+
+
+@numba.njit(fastmath=True)
+def read(one: np.ndarray, other: np.ndarray, turns: int) -> float:
+    """Inner product of two arrays, several times."""
+    total = 0.0
+    for turn in range(turns):
+        part = 0.0
+        for n in range(one.size):
+            part += one[n] * other[n]
+        total += part * turn
+    return total
+
+
+def best(run, repeats: int = 15) -> float:
+    """Best time [s] of some runs, the first not counted."""
+    run()
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+def peak() -> float:
+    """Floating-point operations per second of one core."""
+    x, out = np.linspace(0.0, 0.9, 1024), np.empty(1024)
+    return 2.0 * 16.0 * 1024 * 5000 / best(lambda: multiply_adds(x, out, 5000))
+
+
+def bandwidth(n_bytes: int) -> float:
+    """Bytes per second one core reads from two arrays of together a size."""
+    one, other = np.ones((2, max(64, n_bytes // 16)))
+    turns = max(1, int(2e7 / one.size))
+    return 16.0 * one.size * turns / best(lambda: read(one, other, turns), 5)
+
+
+def step_time(n_modes: int, compliance: float = 0.0) -> float:
+    """Seconds per step of A4: the slope between a long and a short run in sustained contact, set-up taken out."""
+    rng = np.random.default_rng(0)
+    omega = np.append(0.0, np.sort(rng.uniform(1e2, 1e5, n_modes - 1)))
+    shape = np.append(1.0, -rng.normal(0.0, 1.0, n_modes - 1) * n_modes**-0.5)[None]
+    zeros, law = np.zeros(n_modes), np.array([[1e4, 1.5, 0.0, compliance]])
+    p = zeros.copy()
+    p[0] = 1.0
+
+    def run(n_steps: int) -> float:
+        return best(
+            lambda: _kernels.run_energy(
+                omega, zeros, shape, np.zeros(1), zeros, law, zeros, p, 1, 1e-7, 0.0, 0.0, np.inf, 0, n_steps
+            )
+        )
+
+    return (run(1000) - run(200)) / 800.0
+
+
+def main() -> None:
+    """Measure, print, draw."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "out")
+    out = parser.parse_args().out
+    out.mkdir(parents=True, exist_ok=True)
+    top = peak()
+    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; one core: {top / 1e9:.1f} Gflop/s")
+    print("modes   step (us)   mode-steps/s   read (GB/s)   bound (us)   share of bound")
+    rows = []
+    for count in COUNTS:
+        taken, reading = step_time(count), bandwidth(16 * 8 * count)
+        bound = count * max(OPERATIONS / top, BYTES / reading)
+        rows.append((count, taken, bound))
+        print(
+            f"{count:5d}  {taken * 1e6:10.3f}  {count / taken:13.3e}  {reading / 1e9:12.1f}  {bound * 1e6:11.3f}"
+            f"  {bound / taken:10.0%}"
+        )
+    counts, taken, bound = np.array(rows).T
+    figure, axes = plt.subplots(figsize=(6, 4.5))
+    axes.loglog(counts, taken * 1e6, "o-", label="A4, one contact")
+    axes.loglog(counts, bound * 1e6, "k--", label="bound of the machine")
+    axes.set(xlabel="modes", ylabel="time per step (µs)")
+    axes.grid(alpha=0.3)
+    axes.legend()
+    figure.tight_layout()
+    figure.savefig(out / "roofline.png", dpi=150)
+
+
+if __name__ == "__main__":
+    main()
