@@ -15,7 +15,8 @@ ROUNDS = 3  # [-] of such bisections
 CORNER_ERROR = 1e-7  # [-] share of the energy that the innermost ring may miss, about twice that in frequency
 SMALLEST = 1e-10  # [-] of the facet: rings stop here, before the rounding of coordinates shows
 SMALLEST_FREE = 3e-3  # [-] likewise at a free corner: it moves, and rounding grows as (deflection / size)**2
-MILD = 2.5  # [-] exponents above this cost quintic triangles less than the rings would
+MILD = 2.95  # [-] exponents above this cost quintic triangles less than the rings would
+MILD_FREE = 2.5  # [-] likewise between free edges, where the singular part is small
 
 
 def _rows(kind: str, z: np.ndarray, angle: float, nu: float) -> list[np.ndarray]:
@@ -75,7 +76,7 @@ def exponent(angle: float, kinds: tuple[str, str], nu: float) -> float:
 def rings(angle: float, kinds: tuple[str, str], nu: float) -> int:
     """Number of rings of triangles towards a corner that leave less than CORNER_ERROR of the energy unresolved."""
     z = exponent(round(angle, 9), kinds, nu)
-    if z >= MILD - 1e-3:
+    if z >= (MILD_FREE if kinds == ("free", "free") else MILD - 1e-3):
         return 0
     wanted = np.log(CORNER_ERROR) / (2.0 * (z - 1.0) * np.log(SHRINK))
     smallest = SMALLEST_FREE if kinds == ("free", "free") else SMALLEST

@@ -1,6 +1,7 @@
 """The lowest modes of a system: on a mesh fine enough, none missed, refined until their error is known to be small."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -22,6 +23,8 @@ ERROR_OF_WAVE = {
 MORLEY = 0.2574578  # [-] error of the Morley interpolation, over h**2 (Carstensen and Gallistl 2014)
 MORLEY_UNKNOWNS = 20_000  # [-] spent on a second opinion
 ALGEBRA = 1e-9  # [-] margin for rounding and the eigensolver on either side of an enclosure
+FINE_WAVE = 1.1  # [rad] likewise where the triangles stay fewer than the next number: error 2e-7, clamped 1e-5
+CHEAP_CELLS = 700  # [-]
 LAYERS = 10.0  # [-] elements under tension are no larger than this times sqrt(D / tension): error 1e-5 on a disk
 FINEST_LAYER = 40.0  # [-] nor are they made smaller than the extent over this
 MOST_ORDER = 4.0  # [-] order of convergence that an error estimate relies on at most
@@ -29,6 +32,8 @@ LEAST_ORDER = 1.0  # [-] and at least
 ROUNDING = 3e-12  # [-] error of a frequency that no refinement removes
 MOST_UNKNOWNS = 150_000  # [-] where refinement gives up
 HOPELESS = 10.0  # [-] times as many unknowns, extrapolated, and refinement gives up at once
+FAR_APART = 3.6  # [-] times as many cells: two such meshes tell the error without a third
+TWO_LEVEL_ORDER = 3.0  # [-] order then relied on
 LEAST_STEP = 1.25  # [-] meshes closer in size than this say less about the error than their sizes suggest
 SEARCHES = 3  # [-] attempts to find every mode of a cluster
 STRICT = 1e-11  # [-] residual of the attempts after the first
@@ -125,11 +130,14 @@ def sharpened(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[
 
 def fine_enough(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> System:
     """The system on a mesh that resolves the shortest wave asked for, where the user left the size open."""
-    allowed = WAVE_PER_ELEMENT[system.element]
+    wave = _wave(system, n_modes, max_frequency)
+    size = WAVE_PER_ELEMENT[system.element] / wave
     if tolerance is not None:
         factor, power = ERROR_OF_WAVE[system.element]
-        allowed = (tolerance / factor) ** (1.0 / power)
-    size = allowed / _wave(system, n_modes, max_frequency)
+        size = (tolerance / factor) ** (1.0 / power) / wave
+    elif system.element == "argyris":  # few modes are cheap enough to be had more exactly
+        affordable = (2.3 * system.mesh.area / CHEAP_CELLS) ** 0.5
+        size = min(size, max(affordable, FINE_WAVE / wave))
     if isinstance(system.section, Plate) and system.section.tension:  # the edge of a drumhead bends within its layer
         layer = (system.frame.stiffness / system.section.tension) ** 0.5
         size = min(size, max(LAYERS * layer, system.frame.length / FINEST_LAYER))
@@ -159,7 +167,8 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         if len(finer.cells) <= len(mesh.cells):
             finer = mesh.refined(2.0)
         history.append(solve(reassemble(system, finer), n_modes, None))
-        if len(history) < 3:
+        cells = [len(found.system.mesh.cells) for found in history[-2:]]
+        if len(history) < (2 if cells[-1] > FAR_APART * cells[0] else 3):
             continue
         error, order = _estimate(history[-3:])
         if (error <= tolerance).all():
@@ -175,18 +184,24 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
 
 
 def _estimate(history: list[Spectrum]) -> tuple[np.ndarray, np.ndarray]:
-    """Relative error (n_modes,) of the last of three spectra from their differences, and the order they show."""
-    coarse, medium, fine = (s.omega for s in history)
+    """Relative error (n_modes,) of the last spectrum from its difference to those before, and the order they show.
+
+    Of two spectra only, on meshes far apart, the order is taken as TWO_LEVEL_ORDER or that of the corners.
+    """
+    fine, medium = history[-1].omega, history[-2].omega
     cells = [len(s.system.mesh.cells) for s in history]
     power = 1.0 / history[0].system.mesh.dimension
-    first, second = (max((cells[i + 1] / cells[i]) ** power, LEAST_STEP) for i in (0, 1))
+    steps = [max((b / a) ** power, LEAST_STEP) for a, b in pairwise(cells)]
+    second, most = steps[-1], min(MOST_ORDER, history[-1].system.order)
     flexible = fine > 0.0
     scale = np.where(flexible, fine, 1.0)
-    older, newer = np.abs(coarse - medium) / scale, np.abs(medium - fine) / scale
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shown = np.log(older / newer) / np.log(0.5 * (first + second))
-    most = min(MOST_ORDER, history[-1].system.order)
-    order = np.clip(np.where(np.isfinite(shown), shown, most), min(LEAST_ORDER, most), most)
+    newer = np.abs(medium - fine) / scale
+    order = np.full(len(fine), min(TWO_LEVEL_ORDER, most))
+    if len(history) > 2:
+        older = np.abs(history[0].omega - medium) / scale
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shown = np.log(older / newer) / np.log(0.5 * (steps[0] + second))
+        order = np.clip(np.where(np.isfinite(shown), shown, most), min(LEAST_ORDER, most), most)
     # a mode whose differences happen to be small borrows from its neighbours, which the same mesh resolves as well
     error = newer / (second**order - 1.0)
     near = np.array([np.median(error[max(0, i - 2) : i + 3]) for i in range(len(error))])

@@ -83,6 +83,37 @@ def test_cantilever_with_a_tip_mass():
     assert_allclose(modes.mass, PER_LENGTH + mass, rtol=1e-12)
 
 
+def test_a_stepped_cantilever_meets_its_transfer_matrices():
+    step = 0.37
+
+    def field(beta, x):
+        """Deflection, slope, moment and shear over E I of the thin part, carried over a length x."""
+        b = beta * x
+        c, s, C, S = np.cos(b), np.sin(b), np.cosh(b), np.sinh(b)
+        A, B, F, G = (C + c) / 2, (S + s) / 2 / beta, (C - c) / 2 / beta**2, (S - s) / 2 / beta**3
+        return np.array(
+            [
+                [A, B, F, G],
+                [beta**4 * G, A, B, F],
+                [beta**4 * F, beta**4 * G, A, B],
+                [beta**4 * B, beta**4 * F, beta**4 * G, A],
+            ]
+        )
+
+    def condition(omega):
+        thin = np.sqrt(omega * np.sqrt(7850 * 12 / (210e9 * 0.01**2)))
+        thick = np.sqrt(omega * np.sqrt(7850 * 12 / (210e9 * 0.02**2)))
+        total = field(thick, 1 - step) @ np.diag([1, 1, 1 / 8, 1 / 8]) @ field(thin, step)
+        return np.linalg.det(total[2:, 2:])
+
+    grid = np.linspace(20, 2500, 4000)
+    values = np.array([condition(w) for w in grid])
+    exact = [brentq(condition, grid[i], grid[i + 1]) for i in np.flatnonzero(values[1:] * values[:-1] < 0)][:3]
+    stepped = Beam.rectangular(STEEL, width=0.01, height=lambda x: np.where(x[:, 0] < step, 0.01, 0.02))
+    modes = find_modes(assemble(mesh.line(1.0), stepped, {"left": "clamped"}), n_modes=3)
+    assert_allclose(modes.omega, exact, rtol=1e-5)  # a node stands at the step; else 1e-2 is lost
+
+
 def test_a_heavy_mass_swings_on_the_static_compliance_of_the_plate():
     at, mass = (0.5, 0.4), 1e4
     bare = find_modes(assemble(mesh.rectangle(1.0, 0.8), PLATE, {"boundary": "hinged"}), n_modes=1)
