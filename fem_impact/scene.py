@@ -234,6 +234,8 @@ class Scene:
             yield
         except ValueError as error:
             raise fault(self.path, f"[{table}] {error}") from None
+        except (OverflowError, ZeroDivisionError):
+            raise fault(self.path, f"[{table}] has numbers too large or too small to reckon with") from None
 
 
 class _Stages:

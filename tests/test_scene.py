@@ -291,6 +291,12 @@ def test_mutated_scene_loads_or_says_why(tmp_path, line, value, how):
         assert np.isfinite(loaded.modes(2).frequencies).all()
 
 
+def test_sphere_beyond_the_range_of_floats_is_an_error(tmp_path):
+    text = (SCENES / "disk.toml").read_text(encoding="utf-8").replace("radius = 5e-3", "radius = 1e308")
+    with pytest.raises(ValueError, match=r"\[striker\] has numbers too large or too small"):
+        scene.load_scene(write(tmp_path, text))
+
+
 def test_section_beyond_the_range_of_floats_is_an_error_without_warnings(tmp_path):
     text = (SCENES / "marimba_bar.toml").read_text(encoding="utf-8").replace("width = 0.05", "width = 1e308")
     with pytest.raises(ValueError, match=r"scene\.toml: \["):  # warnings are errors here, and would come first
