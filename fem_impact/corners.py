@@ -13,8 +13,8 @@ WIDE = 0.7  # [rad] triangles at a singular corner are bisected until they are n
 AT_VERTEX = 1e-6  # [-] in area coordinates: a point nearer to a corner or side of a triangle lies on it
 ROUNDS = 3  # [-] of such bisections
 CORNER_ERROR = 1e-7  # [-] share of the energy that the innermost ring may miss, about twice that in frequency
-SMALLEST = 1e-10  # [-] of the facet: rings stop here, before the rounding of coordinates shows
-SMALLEST_FREE = 3e-3  # [-] likewise at a free corner: it moves, and rounding grows as (deflection / size)**2
+SMALLEST = 1e-10  # [-] of the extent: rings stop here, before the rounding of coordinates shows
+SMALLEST_FREE = 3e-3  # [-] of the extent, likewise at a free corner: it moves, and rounding grows as its size to the -2
 MILD = 2.95  # [-] exponents above this cost quintic triangles less than the rings would
 MILD_FREE = 2.5  # [-] likewise between free edges, where the singular part is small
 
@@ -73,14 +73,17 @@ def exponent(angle: float, kinds: tuple[str, str], nu: float) -> float:
     return float(z.real[settled].min()) if settled.any() else MILD
 
 
-def rings(angle: float, kinds: tuple[str, str], nu: float) -> int:
-    """Number of rings of triangles towards a corner that leave less than CORNER_ERROR of the energy unresolved."""
+def rings(angle: float, kinds: tuple[str, str], nu: float, share: float = 1.0) -> int:
+    """Number of rings of triangles towards a corner that leave less than CORNER_ERROR of the energy unresolved.
+
+    ``share`` is the length of the facets there over the extent of the body.
+    """
     z = exponent(round(angle, 9), kinds, nu)
     if z >= (MILD_FREE if kinds == ("free", "free") else MILD - 1e-3):
         return 0
     wanted = np.log(CORNER_ERROR) / (2.0 * (z - 1.0) * np.log(SHRINK))
     smallest = SMALLEST_FREE if kinds == ("free", "free") else SMALLEST
-    return int(np.ceil(min(wanted, np.log(smallest) / np.log(SHRINK))))
+    return max(0, int(np.ceil(min(wanted, np.log(smallest / share) / np.log(SHRINK)))))
 
 
 def around_corners(mesh: Mesh, kinds: list[str], nu: float) -> tuple[float, Mesh]:
@@ -94,13 +97,15 @@ def around_corners(mesh: Mesh, kinds: list[str], nu: float) -> tuple[float, Mesh
     for facet, (a, b) in enumerate(mesh.facets.tolist()):
         out_of[a], into[b] = facet, facet
     wanted = {}
+    length = np.linalg.norm(np.diff(mesh.points[mesh.facets], axis=1)[:, 0], axis=1)
+    extent = float(np.ptp(mesh.points, axis=0).max())
     for vertex, facet in out_of.items():
         before = into[vertex]
         if kinds[before] == kinds[facet] and (mesh.tangents[before, 1] @ mesh.tangents[facet, 0]) > 1.0 - 1e-12:
             continue
         (x, y), (u, v) = mesh.tangents[before, 1], mesh.tangents[facet, 0]
         angle, pair = float(np.pi - np.arctan2(x * v - y * u, x * u + y * v)), (kinds[facet], kinds[before])
-        n = rings(angle, pair, nu)
+        n = rings(angle, pair, nu, length[[before, facet]].max() / extent)
         if n:
             wanted[vertex] = n
             order = min(order, 2.0 * (exponent(round(angle, 9), pair, nu) - 1.0))
