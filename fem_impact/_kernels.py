@@ -51,11 +51,12 @@ def mode_matrix(w, z, h):
 
 
 @inner()
-def exponential_sums(z, count, out_sums):
-    """phi_k of -z, k = 1 .. count, z >= 0: the integrals of (1-r)**(k-1)/(k-1)! exp(-z r) over [0, 1].
+def exponential_sums(z, out_sums):
+    """phi_k of -z, k = 1 .. out_sums.size, z >= 0: the integrals of (1-r)**(k-1)/(k-1)! exp(-z r) over [0, 1].
 
     Upwards by recursion while that keeps digits (k <= z), downwards from a power series at the top.
     """
+    count = out_sums.size
     upward = min(count, int(min(z, 1e6)))
     inverse = 1.0
     if upward > 0:
@@ -81,13 +82,14 @@ def exponential_sums(z, count, out_sums):
 
 
 @njit(cache=True, error_model="numpy")
-def mode_moments(w, z, h, count, out_moments, work):
+def mode_moments(w, z, h, out_moments, work):
     """Exact step of one mode: a11, a12, a22, and in out_moments the moments of its impulse response g.
 
-    Moment k = 0 .. count is ``h**(-k-1)`` times the integral over [0, h] of ``(h-t)**(k-1)/(k-1)! g(t)``, k = 0 being
+    Moment k is ``h**(-k-1)`` times the integral over [0, h] of ``(h-t)**(k-1)/(k-1)! g(t)``, k = 0 being
     g(h)/h. They obey ``th**2 m[k+1] = 1/k! - 2 x m[k] - m[k-1]`` with ``th = w h``, ``x = z th``: upwards while
     k < th, downwards from a power series above; heavily damped modes take partial fractions.
     """
+    count = out_moments.size - 1
     if w == 0.0:
         value = 1.0
         for k in range(count + 1):
@@ -100,8 +102,8 @@ def mode_moments(w, z, h, count, out_moments, work):
     out_moments[0] = a12 / h
     heavy = z >= OVERDAMPED and fast * h >= SERIES_LIMIT
     if heavy:
-        exponential_sums(slow * h, count, work[0])
-        exponential_sums(fast * h, count, work[1])
+        exponential_sums(slow * h, work[0])
+        exponential_sums(fast * h, work[1])
         for k in range(1, count + 1):
             out_moments[k] = (work[0, k - 1] - work[1, k - 1]) / (2.0 * root * h)
         return a11, a12, a22
@@ -326,7 +328,7 @@ def step_table(omega, zeta, h, out_table):
     single = np.empty(4)
     for n in range(n_modes):
         if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT:
-            mode_moments(omega[n], zeta[n], h, 3, single, work)
+            mode_moments(omega[n], zeta[n], h, single, work)
             double[n] = 2.0 * zeta[n] * omega[n] * h
             for k in range(4):
                 m[k, n] = single[k]
@@ -596,7 +598,7 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
     m = e.size
     if m == 1:
         out_y[0], out_f[0] = solve_constant(
-            now[0, 0], now[1, 0], now[2, 0], now[3, 0], e[0], sums[0, 0, 0], law[0, 2] / h, law, 0
+            now[0, 0], now[1, 0], now[2, 0], now[3, 0], e[0], sums[0, 0, 0], law[0, 2] / h, law, m - 1
         )
         return
     for i in range(m):
@@ -665,7 +667,8 @@ def solve_ramp(h, d0, x0, f0, v0, rate0, e, ea, vf, sums, law):
     ``y`` is the approach at the step's end. Not settled where the iteration fails, the force would pull or the contact
     would give energy; the step then belongs to scheme A.
     """
-    a, loss, c = law[0, 1], law[0, 2], law[0, 3]
+    i = law.shape[0] - 1
+    a, loss, c = law[i, 1], law[i, 2], law[i, 3]
     b0 = sums[0, 0, 0]
     b1 = sums[1, 0, 0]
     mean0 = sums[2, 0, 0]
@@ -682,8 +685,8 @@ def solve_ramp(h, d0, x0, f0, v0, rate0, e, ea, vf, sums, law):
     f = 0.0
     s = 0.0
     for iteration in range(25):
-        x1, f1, v1 = law_at(y, law, 0)
-        g, d = law_pair(d0, x0, f0, v0, y, x1, f1, v1, law, 0)
+        x1, f1, v1 = law_at(y, law, i)
+        g, d = law_pair(d0, x0, f0, v0, y, x1, f1, v1, law, i)
         middle = 0.5 * (d0 + y)
         scale = 1.0 + d * mean0
         if loss == 0.0:
@@ -728,7 +731,7 @@ def solve_ramp(h, d0, x0, f0, v0, rate0, e, ea, vf, sums, law):
             settled = True
     if not settled or not f >= 0.0:
         return False, y, f, s
-    _, _, v1 = law_at(y, law, 0)
+    _, _, v1 = law_at(y, law, i)
     work = f * (y - d0) + s * (0.5 * (d0 + y) - (ea - mean0 * f - mean1 * s))
     if work - (v1 - v0) < (0.0 if loss > 0.0 else -WORK_ERROR * (v0 + v1)):
         return False, y, f, s
@@ -884,7 +887,7 @@ def free_flight(omega, zeta, bias, time, q, p):
         p[n] = -omega[n] * omega[n] * free[1, n] * q0 + free[2, n] * p[n]
     for n in range(n_modes):
         if bias[n] != 0.0:
-            _, a12, _ = mode_moments(omega[n], zeta[n], time, 1, moments, work)
+            _, a12, _ = mode_moments(omega[n], zeta[n], time, moments, work)
             q[n] += bias[n] * time * time * moments[1]
             p[n] += a12 * bias[n]
 
@@ -965,7 +968,7 @@ def glide_table(omega, zeta, bias, h, out_table):
         out_table[4, n] = 0.0
         out_table[5, n] = 0.0
         if bias[n] != 0.0:
-            _, a12, _ = mode_moments(omega[n], zeta[n], h, 1, moments, work)
+            _, a12, _ = mode_moments(omega[n], zeta[n], h, moments, work)
             out_table[4, n] = bias[n] * h * h * moments[1]
             out_table[5, n] = bias[n] * a12
 
@@ -991,6 +994,7 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
         first = -1
         final = True
         close = True
+        leading = 0.0
         for i in range(m):
             if look % 64 == 0:
                 r0, r1, r2, reach, fastest, hardest = motion_bounds(shape, omega, zeta, bias, i, q, p)
@@ -1021,6 +1025,7 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
             if bound < wait:
                 wait = bound
                 first = i
+                leading = v
                 close = v > 0.0 and -d < 2.0 * v * bound
         if final or wait == np.inf:
             return elapsed, -1, 1
@@ -1028,10 +1033,7 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
             free_flight(omega, zeta, bias, limit - elapsed, q, p)
             return limit, -1, 2
         if wait <= 4e-16 * (elapsed + wait) or wait <= 1e-14 * shortest:
-            d, v = approach(shape, offset, first, q, p)
-            if v > 0.0:
-                return elapsed, first, 0
-            return elapsed, first, 3
+            return elapsed, first, 0 if leading > 0.0 else 3
         if wait < shortest:
             slow += 1
             if slow > 4000:
@@ -1449,7 +1451,7 @@ def collocation_table(omega, zeta, shape, h, nodes, powers, out_free, out_end, o
         for a in range(s + 1):
             c = nodes[a]
             t = c * h
-            a11, a12, a22 = mode_moments(omega[n], zeta[n], t, s, moments, work)
+            a11, a12, a22 = mode_moments(omega[n], zeta[n], t, moments, work)
             out_free[a, 0, n] = a11
             out_free[a, 1, n] = a12
             out_free[a, 2, n] = -omega[n] * omega[n] * a12
@@ -2255,7 +2257,7 @@ def push(omega, zeta, shape, bias, row, n_coefficients, length, q, p, out_q, out
                 active = True
     for n in range(q.size):
         q0 = q[n]
-        a11, a12, a22 = mode_moments(omega[n], zeta[n], length, n_coefficients if active else 1, moments, work)
+        a11, a12, a22 = mode_moments(omega[n], zeta[n], length, moments, work)
         x = bias[n] * moments[1]
         v = bias[n] * moments[0]
         if active:
@@ -2329,7 +2331,7 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
     """Every unbroken contact, (n_impacts, 5): start, end, peak force, impulse, contact; contact by contact.
 
     Bodies that touch and approach no faster than ``touch`` [m/s] before the first push press from the start of that
-    time. The peak is sought with ``looks`` per step about the largest of a few, and refined by a parabola.
+    time. The peak is sought with ``looks`` per step about the largest of a few, and refined by parabolas.
     """
     n_steps = steps.shape[0]
     m = law.shape[0]
@@ -2383,14 +2385,18 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
                 while begin > 0 and steps[begin - 1, first] == 0.0 and abs(steps[begin - 1, first + 1]) <= touch:
                     begin -= 1
                     start = steps[begin, 0]
-            middle = min(max(peak_part, 1.0 / looks), 1.0 - 1.0 / looks)
-            low = force_within(steps, now, law, n_coefficients, peak_row, i, middle - 1.0 / looks)
-            top = force_within(steps, now, law, n_coefficients, peak_row, i, middle)
-            high = force_within(steps, now, law, n_coefficients, peak_row, i, middle + 1.0 / looks)
-            bend = low - 2.0 * top + high
-            if bend < 0.0:
-                shift = min(max(0.5 * (low - high) / bend, -1.0), 1.0)
-                peak = max(peak, force_within(steps, now, law, n_coefficients, peak_row, i, middle + shift / looks))
+            spread = 1.0 / looks
+            for _ in range(4):
+                middle = min(max(peak_part, spread), 1.0 - spread)
+                low = force_within(steps, now, law, n_coefficients, peak_row, i, middle - spread)
+                top = force_within(steps, now, law, n_coefficients, peak_row, i, middle)
+                high = force_within(steps, now, law, n_coefficients, peak_row, i, middle + spread)
+                bend = low - 2.0 * top + high
+                if bend >= 0.0:
+                    break
+                peak_part = middle + min(max(0.5 * (low - high) / bend, -1.0), 1.0) * spread
+                peak = max(peak, force_within(steps, now, law, n_coefficients, peak_row, i, peak_part))
+                spread *= 0.125
             result[count, 0] = start
             result[count, 1] = end
             result[count, 2] = peak

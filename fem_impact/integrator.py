@@ -63,6 +63,9 @@ class _System:
     start_q: np.ndarray
     start_p: np.ndarray
 
+    def __post_init__(self) -> None:
+        _check.lock_arrays(self)  # always, or the kernels would be compiled once for locked and once for open arrays
+
 
 @dataclass(frozen=True)
 class _Options:
