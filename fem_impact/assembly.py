@@ -115,6 +115,7 @@ class System:
     point_masses: tuple = ()  # pairs of point [m] and mass [kg]
     strain: Strain | None = field(default=None, repr=False)
     near: np.ndarray | None = None  # (n_points, 2) [m] towards which the triangles shrink
+    unresolved: float = 0.0  # [-] about the relative error that singular corners leave on any mesh
 
     @property
     def n_dofs(self) -> int:
@@ -178,13 +179,13 @@ def assemble(
     elif isinstance(section, Plate) and element == "morley":
         made = _assemble_morley(mesh, section, supports)
     elif mesh.dimension == 2 and isinstance(section, Plate):
-        order, fine = around_corners(mesh, _kinds(_support_of_facets(mesh, supports)), section.material.nu)
+        order, unresolved, fine = around_corners(mesh, _kinds(_support_of_facets(mesh, supports)), section.material.nu)
         fine = fine if graded else mesh
         if near is not None:
             near = _check.array("near", np.atleast_2d(near), (None, 2), "m")
             fine = towards_points(fine, near, POINT_RINGS)
         made = _assemble_plate(fine, section, supports)
-        made = replace(made, mesh=mesh, graded=graded, order=order, near=near)
+        made = replace(made, mesh=mesh, graded=graded, order=order, near=near, unresolved=unresolved)
     else:
         wanted = "Plate" if mesh.dimension == 2 else "Beam"
         raise ValueError(f"section must be a {wanted} on a mesh of dimension {mesh.dimension}, got {section!r:.80}")
@@ -263,6 +264,7 @@ class _Raw:
     element: str = "argyris"
     strain: Strain | None = None
     near: np.ndarray | None = None
+    unresolved: float = 0.0
 
     def interpolate(self, points: np.ndarray) -> csr_matrix:
         """Deflection at points (n_points, dimension) [m] from all unknowns, (n_points, n_all) [-]."""
@@ -341,6 +343,7 @@ def _reduced(raw: _Raw) -> System:
         raw.point_masses,
         raw.strain,
         raw.near,
+        raw.unresolved,
     )
 
 

@@ -86,12 +86,14 @@ def rings(angle: float, kinds: tuple[str, str], nu: float, share: float = 1.0) -
     return max(0, int(np.ceil(min(wanted, np.log(smallest / share) / np.log(SHRINK)))))
 
 
-def around_corners(mesh: Mesh, kinds: list[str], nu: float) -> tuple[float, Mesh]:
+def around_corners(mesh: Mesh, kinds: list[str], nu: float) -> tuple[float, float, Mesh]:
     """Rings of shrinking triangles at every corner that is singular under its supports (n_facets,).
 
-    Returns the order by which the error of a frequency falls with the element size, and the mesh.
+    Returns the order by which the error of a frequency falls with the element size, the relative error about which no
+    mesh can resolve, and the mesh. Hinged edges that meet at nearly a straight angle are the worst: r**1.07 at 172.5
+    degrees leaves 13 percent below the rounding of coordinates (9 were measured on a regular polygon of 48 sides).
     """
-    order = np.inf
+    order, unresolved = np.inf, 0.0
     into: dict[int, int] = {}
     out_of: dict[int, int] = {}
     for facet, (a, b) in enumerate(mesh.facets.tolist()):
@@ -108,8 +110,10 @@ def around_corners(mesh: Mesh, kinds: list[str], nu: float) -> tuple[float, Mesh
         n = rings(angle, pair, nu, length[[before, facet]].max() / extent)
         if n:
             wanted[vertex] = n
-            order = min(order, 2.0 * (exponent(round(angle, 9), pair, nu) - 1.0))
-    return order, towards(mesh, wanted)
+            power = 2.0 * (exponent(round(angle, 9), pair, nu) - 1.0)
+            innermost = length[[before, facet]].max() / extent * SHRINK**n
+            order, unresolved = min(order, power), max(unresolved, float(innermost**power))
+    return order, unresolved, towards(mesh, wanted)
 
 
 def towards(mesh: Mesh, wanted: dict[int, int]) -> Mesh:

@@ -417,7 +417,7 @@ def find_modes(
     Returns
     -------
     Modes
-        With `frequency_error` where a tolerance was given.
+        With `frequency_error` where a tolerance was given, or where singular corners leave more than 1e-3 on any mesh.
 
     Raises
     ------

@@ -35,6 +35,7 @@ HOPELESS = 10.0  # [-] times as many unknowns, extrapolated, and refinement give
 FAR_APART = 3.6  # [-] times as many cells: two such meshes tell the error without a third
 TWO_LEVEL_ORDER = 3.0  # [-] order then relied on
 LEAST_STEP = 1.25  # [-] meshes closer in size than this say less about the error than their sizes suggest
+SAY = 1e-3  # [-] errors at singular corners beyond this are stated whether a tolerance was given or not
 SEARCHES = 3  # [-] attempts to find every mode of a cluster
 STRICT = 1e-11  # [-] residual of the attempts after the first
 STEP = 2.0**0.5  # [-] from one mesh size to the next
@@ -85,7 +86,8 @@ def solve(system: System, n_modes: int | None, max_frequency: float | None) -> S
         values, vectors = _counted(system, flexibility, n_modes - n_rigid, limit)
         values, vectors = sharpened(system, values, vectors)
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
-    return Spectrum(system, flexibility, omega, np.column_stack([system.rigid, vectors])[:, :n_modes])
+    error = np.where(omega > 0.0, system.unresolved, 0.0) if system.unresolved > SAY else None
+    return Spectrum(system, flexibility, omega, np.column_stack([system.rigid, vectors])[:, :n_modes], error)
 
 
 def _counted(system: System, flexibility: Flexibility, n: int, limit: float | None) -> tuple[np.ndarray, np.ndarray]:
@@ -205,7 +207,8 @@ def _estimate(history: list[Spectrum]) -> tuple[np.ndarray, np.ndarray]:
     # a mode whose differences happen to be small borrows from its neighbours, which the same mesh resolves as well
     error = newer / (second**order - 1.0)
     near = np.array([np.median(error[max(0, i - 2) : i + 3]) for i in range(len(error))])
-    return np.where(flexible, np.maximum(np.maximum(error, 0.1 * near), ROUNDING), 0.0), order
+    least = max(ROUNDING, history[-1].system.unresolved if history[-1].system.unresolved > SAY else 0.0)
+    return np.where(flexible, np.maximum(np.maximum(error, 0.1 * near), least), 0.0), order
 
 
 def enclosure(found: Spectrum) -> np.ndarray | None:

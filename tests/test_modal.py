@@ -260,6 +260,17 @@ def test_morley_converges_from_below_at_second_order(supports):
     assert_allclose(np.log2(errors[0] / errors[1]), 2.0, atol=0.2)  # theory 2
 
 
+@pytest.mark.slow
+def test_an_error_that_no_mesh_removes_is_stated():
+    angle = 2.0 * np.pi * np.arange(24) / 24
+    shape = mesh.polygon(np.column_stack([np.cos(angle), np.sin(angle)]), size=0.3)
+    modes = find_modes(assemble(shape, PLATE, {"boundary": "hinged"}), n_modes=1)
+    # the membrane's 24-gon: 5.783186 pi / area (1 + 4 zeta(3) / 24**3), Grinfeld and Strang (2012) to this order
+    exact = 5.783186 * np.pi / (12 * np.sin(np.pi / 12)) * (1 + 4 * 1.2020569 / 24**3)
+    true = modes.omega[0] * PER_RATE / exact - 1.0
+    assert 0.3 < modes.frequency_error[0] / true < 10.0
+
+
 def test_a_tolerance_out_of_reach_is_refused():
     # hinged sides that meet at 170 degrees make the plate move as r**1.06: no mesh resolves that
     corners = [(0, 0), (2, 0), (2, 1), (1, 1.0875), (0, 1)]
