@@ -9,7 +9,7 @@ from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
-from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, _styled
 
@@ -64,8 +64,10 @@ class Mark:
     color: str = GREEN
 
 
-def curves(drawn: Sequence[Curve], *, x: Axis, y: Axis, title: str = "", filled: Curve | None = None) -> Figure:
-    """Curves over one pair of axes; ``filled`` is shaded down to zero.
+def curves(
+    drawn: Sequence[Curve], *, x: Axis, y: Axis, title: str = "", filled: Curve | None = None, between: Any = None
+) -> Figure:
+    """Curves over one pair of axes; ``filled`` is shaded down to zero, ``between`` (x, low, high) from low to high.
 
     Returns
     -------
@@ -75,6 +77,8 @@ def curves(drawn: Sequence[Curve], *, x: Axis, y: Axis, title: str = "", filled:
         axes = figure.subplots()
         if filled is not None:
             axes.fill_between(filled.x, filled.y, color=filled.color, alpha=0.3, lw=0)
+        if between is not None:
+            axes.fill_between(*between, color=GREEN, alpha=0.25, lw=0)
         for curve in drawn:
             axes.plot(curve.x, curve.y, curve.style, color=curve.color, label=curve.label or None)
         axes.set_title(title)
@@ -144,6 +148,9 @@ def colour_map(
             bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         bar.ax.yaxis.set_minor_formatter(NullFormatter())
         bar.ax.yaxis.set_major_formatter(EngFormatter(unit=colour.unit, sep=" ") if colour.unit else "{x:g}")
+        whole = field.count() and bool((field == field.round()).all())
+        if whole and not colour.unit and not colour.log:
+            bar.ax.yaxis.set_major_locator(MaxNLocator(integer=True))
         if handles:
             legend = figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=9)
             legend.set_frame_on(True)

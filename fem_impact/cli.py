@@ -15,7 +15,15 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 import fem_impact as fi
 
@@ -27,8 +35,7 @@ SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` w
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; the exit status is 0, 2 for bad input, 1 for a run that failed, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
-    if options.run is not _doctor:
-        _prepare(os.environ)
+    _prepare(os.environ, once=options.run in (_strike, _modes))
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that temporary files go away
     try:
@@ -52,15 +59,20 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def _prepare(environment: MutableMapping[str, str]) -> None:
-    """Set what numpy and numba read once, when they are loaded; whatever the user has set stays."""
+def _prepare(environment: MutableMapping[str, str], once: bool) -> None:
+    """Set what numpy and numba read when they are loaded; whatever the user has set stays.
+
+    A command that strikes once runs in plain Python until the kernels are compiled.
+    """
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         # The dense algebra is small: on two busy cores two threads took 18 s where one took 4 s.
         environment.setdefault(name, "1")
+    if not once or "numba" in sys.modules:
+        return
     package = Path(str(fi.__file__)).parent
     source = (package / "_kernels.py").stat().st_mtime
     compiled = (package / "__pycache__").glob("_kernels.run_energy-*.nbi")
-    if "numba" not in sys.modules and not any(file.stat().st_mtime >= source for file in compiled):
+    if not any(file.stat().st_mtime >= source for file in compiled):
         # A single strike takes some 0.3 to 1 s in plain Python, compiling it 30 s: `doctor` does that once.
         environment.setdefault("NUMBA_DISABLE_JIT", "1")
 
@@ -90,6 +102,31 @@ def _parser() -> argparse.ArgumentParser:
     modes.add_argument("--count", metavar="N", type=int, default=12, help="how many modes (default: 12)")
     modes.add_argument("--vtk", metavar="FILE", type=Path, help="write the shapes to a .pvd or .vtu file")
     modes.add_argument("--json", action="store_true", help="print the numbers as JSON")
+
+    chart = verbs.add_parser("map", help="strike a scene over the axes of its table [map]; write numbers and pictures")
+    chart.set_defaults(run=_map)
+    chart.add_argument(
+        "scene", metavar="SCENE", type=Path, help="a TOML file, such as studies/scenes/drumstick_map.toml"
+    )
+    chart.add_argument("--out", metavar="DIR", type=Path, help="where the files go (default: out/NAME-OF-SCENE)")
+    chart.add_argument("--tolerance", metavar="T", type=float, help="largest error accepted, instead of the scene's")
+    chart.add_argument("--format", choices=("nc", "zarr"), default="nc", help="map.nc or map.zarr (default: nc)")
+    chart.add_argument("--workers", metavar="N", type=int, help="threads (default: one for each core)")
+    chart.add_argument("--cluster", metavar="ADDRESS", help="strike on the Dask cluster whose scheduler is there")
+    chart.add_argument(
+        "--store", metavar="DIR", type=Path, help="keep finished cells there; a killed run goes on from it"
+    )
+
+    hammer = verbs.add_parser("hammer", help="choose a hammer: bandwidth without a double hit")
+    hammer.set_defaults(run=_hammer)
+    hammer.add_argument("scene", metavar="SCENE", type=Path, help="a TOML file; its body and strike point are used")
+    hammer.add_argument("--bandwidth", metavar="F", type=float, required=True, help="wanted [Hz]")
+    hammer.add_argument(
+        "--drop", metavar="D", type=float, default=10.0, help="of the spectrum there, in dB (default: 10)"
+    )
+    hammer.add_argument("--masses", metavar="KG", type=float, nargs="+", help="of the hammers (default: 1 g to 1 kg)")
+    hammer.add_argument("--out", metavar="FILE", type=Path, help="write the picture there")
+    hammer.add_argument("--json", action="store_true", help="print the numbers as JSON")
 
     doctor = verbs.add_parser("doctor", help="check this installation; say what to do about what fails")
     doctor.set_defaults(run=_doctor)
@@ -144,6 +181,49 @@ def _write(folder: Path, scene: Any, run: Any, changes: Mapping[str, Any]) -> di
     )
     fi.export.write_json(folder / "response.json", data)
     return data
+
+
+def _map(options: argparse.Namespace) -> None:
+    began = time.perf_counter()
+    scene = fi.load_scene(options.scene)
+    folder = options.out if options.out is not None else Path("out") / options.scene.stem
+    with fi.export.staged(folder) as staging:
+        with _counted("cells") as watch:
+            table = fi.atlas.map_scene(
+                scene, tolerance=options.tolerance, workers=options.workers, client=options.cluster,
+                store=options.store, watch=watch,
+            )  # fmt: skip
+        with _progress("files"):
+            names = fi.atlas.write(staging, table, options.format)
+    print(_wrapped(scene.title or str(scene.path)))
+    axes = ", ".join(f"{name} ({size})" for name, size in table.sizes.items())
+    single, failed = int((table.n_impacts == 1).sum()), int((table.n_impacts < 0).sum())
+    print(_wrapped(f"{table.n_impacts.size} blows over {axes}: {single} hit once, {failed} failed"))
+    print(_wrapped(f"Time: {time.perf_counter() - began:.2f} s"))
+    print(_wrapped(f"Files in {folder}{os.sep}: {', '.join(names)}"))
+
+
+def _hammer(options: argparse.Namespace) -> None:
+    scene = fi.load_scene(options.scene)
+    masses = options.masses or [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]
+    with _progress("hammers"):
+        hammers = fi.atlas.hammers_for(scene, options.bandwidth, masses, drop=options.drop)
+        if options.out is not None:
+            fi.figures.save(options.out, fi.hammers.draw(hammers, options.bandwidth, options.drop))
+    if options.json:
+        data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [vars(hammer) for hammer in hammers]}
+        print(json.dumps(fi.export.plain({**data, "versions": fi.export.versions()}), indent=2, allow_nan=False))
+        return
+    print(_wrapped(scene.title or str(scene.path)))
+    print(_wrapped(f"Tips that reach {options.bandwidth:g} Hz (spectrum {options.drop:g} dB down) and hit once:"))
+    print(f"{'mass':>9} {'softest tip':>14} {'hardest tip':>14} {'reach':>11}")
+    for hammer in hammers:
+        soft = f"{hammer.softest:10.3g} N/m" if hammer.softest else "none"
+        hard = f"{hammer.hardest:10.3g} N/m" if hammer.hardest else "none"
+        reach = f"{hammer.reach:8.4g} Hz" if hammer.reach else "-"
+        print(f"{1e3 * hammer.mass:7.4g} g {soft:>14} {hard:>14} {reach:>11}")
+    if options.out is not None:
+        print(_wrapped(f"Files: {options.out}"))
 
 
 def _modes(options: argparse.Namespace) -> None:
@@ -222,6 +302,30 @@ def _progress(stage: str) -> Iterator[None]:
     with Progress(*columns, console=console, transient=True) as progress:
         progress.add_task(stage, total=None)
         yield
+
+
+@contextmanager
+def _counted(what: str) -> Iterator[Any]:
+    """Show on a terminal how many of many things are done, how many a second, and the time left."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"), TimeRemainingColumn(),
+    )  # fmt: skip
+    with Progress(*columns, console=console, transient=True) as progress:
+        task, began = progress.add_task(what, total=None, rate=""), time.perf_counter()
+        known: list[int] = []
+
+        def watch(done: int, total: int) -> None:
+            if not known:
+                known.append(done)
+            rate = (done - known[0]) / max(1e-9, time.perf_counter() - began)
+            progress.update(task, completed=done, total=total, rate=f"{rate:.3g}/s" if rate else "")
+
+        yield watch
 
 
 if __name__ == "__main__":

@@ -228,7 +228,7 @@ def sweep(
     base = Case(modes, striker, contact, modes.points("at", at)[0], _check.positive("speed", speed, "m/s"))
     band = None if max_frequency is None else _check.positive("max_frequency", max_frequency, "Hz")
     workers = None if workers is None else _check.count("workers", workers)
-    grid = Grid(base, _axes(base, over), tolerance, residual, band, dict(layers or {}))
+    grid = Grid(base, checked_axes(base, over), tolerance, residual, band, dict(layers or {}))
     fewer = grid.without_speed()
     numbers, failures = _solve_all(fewer or grid, workers, client, store, watch)
     if fewer is not None:
@@ -323,7 +323,7 @@ def solve(
     return numbers, failures
 
 
-def _axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Checked values of every axis under its proper name."""
     if not isinstance(over, Mapping) or not over:
         raise ValueError(f"over must name at least one axis, such as {{'mass': [...]}}, got {over!r:.80}")
@@ -366,6 +366,9 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray) -> xarray.Da
     table.attrs |= {"tolerance": grid.tolerance, "residual": int(grid.residual)}
     for name, values in grid.axes.items():
         attributes = {"units": AXES[name][0] or "1", "long_name": AXES[name][1]}
+        if name == "stiffness" and "exponent" not in grid.axes:
+            power = grid.base.contact.exponent
+            attributes["units"] = "N/m" if power == 1.0 else f"N/m**{power:g}"
         if name != "at":
             table[name] = (name, values, attributes)
         elif values.shape[1] == 1:

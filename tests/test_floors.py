@@ -24,6 +24,8 @@ FLOORS = [
     {"tables"},
     {"scene", "charts", "bounces"},
     {"doctor", "report", "maps"},
+    {"hammers"},
+    {"atlas"},
     {"cli"},
 ]
 FLOOR = {name: level for level, names in enumerate(FLOORS) for name in names}

@@ -1,0 +1,285 @@
+"""Maps of whole scenes: the modes they need, contact resonance and threshold beside them, pictures and files."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray
+
+from . import _check, accuracy, charts, figures, hammers, maps, threshold
+from .contact import Contact
+from .scene import SHARE, Scene
+from .tables import MAKERS, Part
+
+FIRST_LOOK = 40  # [-] modes found first, from which those a map needs are estimated
+FORMATS = ("nc", "zarr")
+PICTURED = {  # layers drawn where there are two axes, and what they are called there
+    "n_impacts": "number of impacts",
+    "contact_time": "time in contact",
+    "restitution": "restitution",
+    "peak_force": "peak force",
+    "centroid": "spectral centroid",
+}
+RESONANCES = tuple(m * 10.0**e for e in range(6) for m in (1, 2, 5))  # [Hz] contours drawn
+
+
+def map_scene(
+    scene: Scene,
+    *,
+    over: Mapping[str, Any] | None = None,
+    max_frequency: float | None = None,
+    tolerance: float | None = None,
+    **wanted: Any,
+) -> xarray.Dataset:
+    """Strike a scene for every combination of parameters.
+
+    Parameters
+    ----------
+    scene : Scene
+    over : mapping of key to values, optional
+        Axes as in `sweep`, or any other number of the scene by its place, such as ``section.thickness``; those of the
+        scene's table [map] without. The body is built anew for each value of such a one.
+    max_frequency : float [Hz], optional
+        Band of the spectral centroid.
+    tolerance : float [-], optional
+        Instead of the scene's.
+    **wanted
+        ``workers``, ``client``, ``store`` and ``watch`` of `sweep`.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of `sweep`, with ``contact_resonance`` [Hz], half the reciprocal of the time the striker, if rigid, would
+        touch a rigid wall, and ``threshold`` [Hz], the contact resonance above which the body, by the kinetic-energy
+        criterion, stops it (not a number where nothing rebounds or nothing stops it).
+    """
+    table = {} if scene.map is None else scene._make("map", scene.map)
+    over = dict(table.get("over", {}) if over is None else over)
+    band = table.get("max_frequency") if max_frequency is None else max_frequency
+    limit = scene.blow.values.get("tolerance", maps.TOLERANCE) if tolerance is None else tolerance
+    limit = _check.between("tolerance", limit, 1e-12, 1.0)
+    if not over:
+        raise ValueError(f"{scene.path}: [map] is missing; it names the axes of the map")
+    quick = {name: values for name, values in over.items() if maps.ALIASES.get(name, name) in maps.AXES}
+    slow = {name: list(values) for name, values in over.items() if name not in quick}
+    for name in slow:
+        _check_key(scene, name)
+    if not quick:
+        quick = {"strike.speed": [scene.blow.values["speed"]]}
+    pieces = []
+    for number, chosen in enumerate(product(*slow.values())):
+        changed = scene
+        for name, value in zip(slow, chosen):
+            changed = changed_scene(changed, name, value)
+        if slow and wanted.get("store") is not None:
+            wanted = {**wanted, "store": Path(wanted["store"]).parent / f"{Path(wanted['store']).name}-{number}"}
+        pieces.append(_quick_map(changed, quick, band, limit, wanted))
+    result = _joined(pieces, slow)
+    result.attrs["scene"] = json.dumps(
+        {**scene.data(), "map": {name: list(map(_plain, v)) for name, v in over.items()}}
+    )
+    result.attrs["title"] = scene.title or str(scene.path.name)
+    return result
+
+
+def changed_scene(scene: Scene, key: str, value: Any) -> Scene:
+    """The scene with one number replaced, named as table.key."""
+    table, name = key.split(".", 1)
+    field = "blow" if table == "strike" else table
+    part = getattr(scene, field) or Part()
+    change: dict[str, Any] = {field: Part(part.kind, {**part.values, name: _plain(value)})}
+    return replace(scene, **change)
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+
+
+def _check_key(scene: Scene, key: str) -> None:
+    known = [f"{t}.{k}" for t in MAKERS for k in getattr(getattr(scene, t, None), "values", {})]
+    if key not in known:
+        names = [*maps.AXES, *maps.ALIASES, *known]
+        raise ValueError(f"{scene.path}: [map] over: {key} is no axis{_check.nearest(key, names)}")
+
+
+def _quick_map(
+    scene: Scene, over: Mapping[str, Any], band: float | None, tolerance: float, wanted: Mapping[str, Any]
+) -> xarray.Dataset:
+    """A map whose axes leave the body's form alone."""
+    law, striker, blow = scene._contact(), scene._striker(), scene.blow.values
+    case = maps.Case(scene.modes(FIRST_LOOK), striker, law, np.atleast_1d(np.asarray(blow["at"], float)), blow["speed"])
+    axes = maps.checked_axes(case, over)
+    needed = max(
+        _needed(corner, tolerance) * case.modes.frequencies[-1] / corner.modes.frequencies[-1]
+        for corner in _corners(case, axes)
+    )
+    modes = case.modes
+    if needed > modes.frequencies[-1]:
+        modes = scene.modes(_number(modes, needed))
+    case = replace(case, modes=modes)
+    table = maps.sweep(
+        modes, striker, law, at=blow["at"], speed=blow["speed"], over=over, tolerance=tolerance, max_frequency=band,
+        residual=blow.get("residual", True), **wanted,
+    )  # fmt: skip
+    return with_theory(table, case, axes)
+
+
+def _corners(case: maps.Case, axes: Mapping[str, np.ndarray]) -> Iterator[maps.Case]:
+    """The blows at the ends of all axes."""
+    ends = [values if name == "at" else np.unique([values.min(), values.max()]) for name, values in axes.items()]
+    for chosen in product(*ends):
+        corner = case
+        for name, value in zip(axes, chosen):
+            corner = corner.changed(name, value)
+        yield corner
+
+
+def _needed(case: maps.Case, tolerance: float) -> float:
+    """Frequency [Hz] up to which a blow needs modes."""
+    return accuracy.cutoff_frequency(
+        case.modes, case.at, contact=case.contact, mass=case.striker.felt_mass, speed=case.speed,
+        tolerance=SHARE * tolerance,
+    )  # fmt: skip
+
+
+def _number(first: Any, frequency: float) -> int:
+    """About how many modes a body has up to a frequency [Hz], by Weyl's law from its first ones."""
+    growth = (frequency / first.frequencies[-1]) ** (0.5 * first.dimension)
+    return math.ceil(1.1 * first.n_modes * growth)
+
+
+def with_theory(table: xarray.Dataset, case: maps.Case, axes: Mapping[str, np.ndarray]) -> xarray.Dataset:
+    """Add ``contact_resonance`` and ``threshold`` [Hz] to a map, over the axes each depends on."""
+    for name, needs, find, meaning in (
+        (
+            "contact_resonance",
+            ("mass", "striker_frequency", "stiffness", "exponent", "speed"),
+            _resonance,
+            "half the reciprocal of the contact time on a rigid wall",
+        ),
+        (
+            "threshold",
+            ("mass", "striker_frequency", "at", "target_mass", "target_frequency"),
+            _threshold,
+            "contact resonance above which the struck body stops the striker",
+        ),
+    ):
+        mine = {axis: values for axis, values in axes.items() if axis in needs}
+        found = np.empty([len(values) for values in mine.values()])
+        for place in np.ndindex(*found.shape):
+            cell = case
+            for (axis, values), i in zip(mine.items(), place):
+                cell = cell.changed(axis, values[i])
+            found[place] = find(cell)
+        table[name] = (tuple(mine), found, {"units": "Hz", "long_name": meaning})
+    return table
+
+
+def _resonance(case: maps.Case) -> float:
+    law = Contact(case.contact.stiffness, case.contact.exponent)
+    return 0.5 / accuracy.contact_duration(law, case.striker.felt_mass, case.speed)
+
+
+def _threshold(case: maps.Case) -> float:
+    found = threshold.threshold_frequency(case.modes, case.at, case.striker.felt_mass)
+    return math.nan if found is None or math.isinf(found) else found
+
+
+def _joined(pieces: Sequence[xarray.Dataset], slow: Mapping[str, Sequence[Any]]) -> xarray.Dataset:
+    """Pieces along the axes for which the body was built anew, the last of them running first."""
+    rows = list(pieces)
+    for name, values in reversed(list(slow.items())):
+        numeric = all(isinstance(value, (int, float, np.number)) for value in values)
+        index = xarray.IndexVariable(name, np.asarray(values, float) if numeric else np.arange(len(values)))
+        count = len(values)
+        rows = [
+            xarray.concat(
+                rows[i : i + count], index, data_vars="all", coords="minimal", join="override", combine_attrs="override"
+            )
+            for i in range(0, len(rows), count)
+        ]
+    return rows[0]
+
+
+def draw(table: xarray.Dataset, layer: str, marks: Sequence[charts.Mark] = ()) -> Any:
+    """One layer of a map with two axes in colour, with contours of contact resonance and threshold.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    values = table[layer]
+    if values.ndim != 2:
+        raise ValueError(f"layer must have two axes to be drawn, got {', '.join(map(str, values.dims))}; select some")
+    across, up = _axis(table, values.dims[1]), _axis(table, values.dims[0])
+    size = np.asarray(values, float)
+    size = size[np.isfinite(size) & (size > 0.0)]
+    log = layer != "n_impacts" and size.size == values.size and size.max() > 5.0 * size.min()
+    resonance = table.contact_resonance.broadcast_like(values).transpose(*values.dims)
+    contours: list[Any] = []
+    if np.ptp(resonance.values) > 0.0:
+        shown = [f for f in RESONANCES if resonance.min() < f < resonance.max()]
+        contours.append((resonance, shown, "Hz", "contact resonance"))
+        limit = (resonance / table.threshold).transpose(*values.dims)
+        if float(limit.min()) < 1.0 < float(limit.max()):
+            contours.append((limit, [1.0], "", "threshold: the body stops the striker"))
+    return charts.colour_map(
+        _in_grams(values.where(table.n_impacts >= 0)),
+        x=across,
+        y=up,
+        colour=charts.Axis(PICTURED.get(layer, layer), _unit(values), log=bool(log)),
+        contours=contours,
+        marks=marks,
+        title=str(table.attrs.get("title", "")),
+    )
+
+
+def _axis(table: xarray.Dataset, name: Any) -> charts.Axis:
+    """An axis as its coordinate asks to be drawn: logarithmic where its values are spaced so."""
+    place = table[name] if name in table.coords else xarray.DataArray(np.arange(table.sizes[name]))
+    values = np.asarray(place, float)
+    steps = np.diff(np.log(values)) if (values > 0.0).all() else np.zeros(0)
+    log = len(steps) > 1 and np.allclose(steps, steps[0], rtol=1e-3)
+    return charts.Axis(str(place.attrs.get("long_name", name)), _unit(place), log=bool(log))
+
+
+def _in_grams(values: xarray.DataArray) -> xarray.DataArray:
+    """Masses along axes in grams, which take prefixes as kilograms do not."""
+    heavy = {name: 1e3 * values[name] for name in values.dims if name in values.coords and _unit(values[name]) == "g"}
+    return values.assign_coords(heavy)
+
+
+def _unit(values: xarray.DataArray) -> str:
+    unit = str(values.attrs.get("units", ""))
+    power = unit.partition("**")[2]
+    return {"1": "", "kg": "g"}.get(unit, unit.replace(f"**{power}", f"$^{{{power}}}$") if power else unit)
+
+
+def write(folder: Path, table: xarray.Dataset, form: str = "nc") -> list[str]:
+    """Write map.nc or map.zarr, map.csv and, where there are two axes, a picture of each layer; return the names."""
+    form = _check.one_of("format", form, FORMATS)
+    names = [f"map.{form}", "map.csv"]
+    if form == "nc":
+        table.to_netcdf(folder / names[0], engine="scipy")
+    else:
+        table.drop_vars("failure").to_zarr(folder / names[0])
+    table.to_dataframe().to_csv(folder / names[1])
+    if len(table.n_impacts.dims) == 2:
+        for layer in PICTURED:
+            if layer in table and bool((table.n_impacts >= 0).any()):
+                figures.save(folder / f"{layer}.png", draw(table, layer))
+                names.append(f"{layer}.png")
+    return names
+
+
+def hammers_for(scene: Scene, bandwidth: float, masses: Any, *, drop: float = 10.0) -> tuple[hammers.Hammer, ...]:
+    """What each hammer can do at the strike point of a scene's body, whatever strikes it in the scene."""
+    at, first = scene.blow.values["at"], scene.modes(FIRST_LOOK)
+    needed = hammers.highest_frequency(first, at, bandwidth, masses, drop=drop)
+    modes = scene.modes(_number(first, needed)) if needed > first.frequencies[-1] else first
+    return hammers.choose(modes, at, bandwidth, masses, drop=drop)

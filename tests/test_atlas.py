@@ -1,0 +1,99 @@
+"""Maps of scenes, their pictures and files, the choice of a hammer, and both at the prompt."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact import atlas, cli, hammers
+
+SCENES = Path(__file__).parents[1] / "studies" / "scenes"
+OVER = {"contact.stiffness": [2e4, 1e5, 4e5], "striker.mass": [0.02, 0.1]}
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return fi.load_scene(SCENES / "drumstick_map.toml")
+
+
+@pytest.fixture(scope="module")
+def table(scene):
+    return atlas.map_scene(scene, over=OVER, max_frequency=3e3)
+
+
+def test_cells_of_a_scene_map_are_struck_scenes(scene, table):
+    changed = atlas.changed_scene(atlas.changed_scene(scene, "contact.stiffness", 1e5), "striker.mass", 0.02)
+    hit, cell = changed.strike(), table.sel(stiffness=1e5, mass=0.02)
+    assert int(cell.n_impacts) == hit.n_impacts
+    assert_allclose(float(cell.restitution), hit.restitution, atol=2e-3)  # 1e-3 each
+    assert_allclose(float(cell.contact_time), hit.contact_time, rtol=2e-3)
+
+
+def test_theory_stands_beside_the_blows(table):
+    felt = table.mass.values / 3.0
+    expected = np.sqrt(table.stiffness.values[:, None] / felt) / (2.0 * np.pi)
+    assert_allclose(table.contact_resonance, expected, rtol=1e-6)  # the stick's felt mass by finite elements
+    assert table.threshold.dims == ("mass",)
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    wanted = [fi.threshold_frequency(plate, (0.465, 0.3), m) for m in felt]
+    assert_allclose(table.threshold, wanted, rtol=0.01)  # other numbers of modes, the rest by their tail
+    assert json.loads(table.attrs["scene"])["map"]["striker.mass"] == [0.02, 0.1]
+
+
+def test_any_number_of_a_scene_is_an_axis(scene):
+    over = {"target.damping_ratio": [0.0, 0.01], "mesh.width": [1.0, 0.8], "strike.speed": [1.0, 2.0]}
+    table = atlas.map_scene(scene, over=over)
+    assert dict(table.sizes) == {"mesh.width": 2, "damping_ratio": 2, "speed": 2}
+    assert float(abs(table.contact_time.diff("mesh.width")).min()) > 0.0
+    with pytest.raises(ValueError, match=r"mesh.widht is no axis; did you mean 'mesh.width'"):
+        atlas.map_scene(scene, over={"mesh.widht": [1.0]})
+
+
+def test_files_say_what_the_map_holds(table, tmp_path):
+    names = atlas.write(tmp_path, table)
+    assert {"map.nc", "map.csv", "n_impacts.png", "centroid.png"} <= set(names)
+    with xarray.open_dataset(tmp_path / "map.nc", engine="scipy") as read:
+        assert_allclose(read.contact_time, table.contact_time)
+        assert read.contact_time.attrs["units"] == "s"
+        assert read.attrs["scene"] == table.attrs["scene"]
+    assert len((tmp_path / "map.csv").read_text().splitlines()) == 7
+    assert (tmp_path / "restitution.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_map_at_the_prompt(tmp_path, capsys):
+    text = (SCENES / "drumstick_map.toml").read_text().replace("count = 20", "count = 3")
+    (tmp_path / "few.toml").write_text(text)
+    assert cli.main(["map", str(tmp_path / "few.toml"), "--out", str(tmp_path / "out"), "--workers", "1"]) == 0
+    assert "9 blows over stiffness (3), mass (3)" in capsys.readouterr().out
+    assert (tmp_path / "out" / "map.nc").exists()
+    assert cli.main(["map", str(SCENES / "marked_linear.toml"), "--out", str(tmp_path / "none")]) == 2
+    assert "[map] is missing" in capsys.readouterr().err
+
+
+def test_a_chosen_hammer_does_what_was_asked():
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=200)
+    light, heavy = hammers.choose(plate, (0.465, 0.3), 500.0, [2e-3, 0.2])
+    assert light.works
+    assert not heavy.works
+    for tip in (light.softest, light.hardest):
+        hit = fi.strike(plate, fi.Striker.rigid(2e-3), fi.Contact.linear(tip), at=(0.465, 0.3), speed=1.0)
+        assert hit.n_impacts == 1
+        assert hammers.bandwidth_of(hit, 10.0) > 0.98 * 500.0  # blows behind the choice are good to a percent
+
+
+def test_on_an_unyielding_body_the_softest_tip_is_the_half_sines():
+    heavy = fi.analytic.rectangle(1.55, 1.0, mass=5e5, first_frequency=100.0, n_modes=30)
+    (hammer,) = hammers.choose(heavy, (0.465, 0.3), 500.0, [0.02])
+    centre = 500.0 / 2.039  # Hz; a half sine is 10 dB down at 2.039 times its frequency
+    assert_allclose(hammer.softest, 0.02 * (2.0 * np.pi * centre) ** 2, rtol=0.06)  # the last halving is 4 %
+
+
+def test_hammer_at_the_prompt(capsys):
+    arguments = ["hammer", str(SCENES / "drumstick_map.toml"), "--bandwidth", "400", "--masses", "0.002", "0.2"]
+    assert cli.main([*arguments, "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert [hammer["softest"] is not None for hammer in data["hammers"]] == [True, False]
