@@ -157,6 +157,8 @@ def _strike(options: argparse.Namespace) -> None:
         print(json.dumps(data, indent=2, allow_nan=False))
         return
     print(_wrapped(scene.title or str(scene.path)))
+    for note in run.notes:
+        print(_wrapped(f"mesh: {note}"))
     print(_wrapped(run.response.summary()))
     print(_wrapped("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())))
     print(_wrapped(f"Files in {folder}{os.sep}: {', '.join(data['files'])}"))
@@ -175,6 +177,7 @@ def _write(folder: Path, scene: Any, run: Any, changes: Mapping[str, Any]) -> di
             "sound": {"at": scene.points[0], "full_scale": heard.full_scale, "peak_level": heard.peak_level},
             "scene": scene.data(**changes),
             "seconds": dict(run.seconds),
+            "notes": list(run.notes),
             "versions": fi.export.versions(),
             "files": ["response.json", "force.csv", "force.png", "modes.pvd", "strike.wav"],
         }

@@ -38,6 +38,7 @@ class Run:
 
     response: Response
     seconds: Mapping[str, float]  # [s] wall time of each stage, by its name
+    notes: tuple[str, ...] = ()  # what was mended or assumed of the mesh
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ class Scene:
                 response = replace(response, tolerance=tolerance)
             if response.error.truncation <= SHARE * tolerance or not blow.get("residual", True):
                 break
-        return Run(response, MappingProxyType(stages.seconds))
+        return Run(response, MappingProxyType(stages.seconds), stages.notes)
 
     @property
     def points(self) -> list[Any]:
@@ -153,6 +154,7 @@ class Scene:
     def _finite_elements(self, stages: "_Stages", tolerance: float) -> Finder:
         with stages("mesh"), self._blame("mesh"):
             body = self._make("mesh", self.mesh)
+        stages.notes = body.notes
         with stages("assembly"):
             section = self._section("beam" if body.dimension == 1 else "plate")
             with self._blame("supports"), np.errstate(all="ignore"):
@@ -244,6 +246,7 @@ class _Stages:
     def __init__(self, watch: Watch | None) -> None:
         self.watch = watch or (lambda name: nullcontext())
         self.seconds: dict[str, float] = {}
+        self.notes: tuple[str, ...] = ()
 
     @contextmanager
     def __call__(self, name: str) -> Iterator[None]:
