@@ -1,5 +1,7 @@
 """Compiled loops: exact modal propagation, energy-exact contact steps and free flight; the only file with numba."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
@@ -21,9 +23,10 @@ CONTACT, FLIGHT = 0, 1  # what the run does next
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = 0, 1, 2, 3, 4, 5  # why a run ended
 
 
-def inner(**options):
+def inner(**options: Any) -> Any:
     """Compile for use by other kernels only; part of them when they are cached, and cheaper to compile."""
-    return njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
+    bare: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return njit(**bare, **options)
 
 
 @njit(cache=True, error_model="numpy")
