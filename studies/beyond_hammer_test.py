@@ -1,0 +1,25 @@
+"""Beyond the source: an impact-hammer test of the plate of 200 g; which masses and tips reach 500 Hz hitting once."""
+
+import numpy as np
+import source_scenes as source
+
+from fem_impact import hammers
+
+BANDWIDTH = 500.0  # [Hz] at 10 dB below the spectrum's start
+MASSES = np.geomspace(1e-3, 1.0, 19)  # [kg]
+
+
+def compute(masses=MASSES):
+    """What each hammer can do at 0.3 of both sides."""
+    return hammers.choose(source.plate(0.2), source.AT, BANDWIDTH, masses)
+
+
+def draw(found):
+    """Tips that work, over the hammer's mass."""
+    names = ("mass", "softest", "hardest", "reach")
+    columns = {name: [getattr(hammer, name) or np.nan for hammer in found] for name in names}
+    return hammers.draw(found, BANDWIDTH), columns
+
+
+if __name__ == "__main__":
+    source.run("beyond_hammer_test", compute, draw)

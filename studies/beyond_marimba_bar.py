@@ -1,0 +1,41 @@
+"""Beyond the source: which mallets strike the free bar of figure 16 twice, at its four points."""
+
+import fig16
+import numpy as np
+import source_scenes as source
+
+import fem_impact as fi
+from fem_impact import charts
+
+MASSES = np.geomspace(2e-3, 0.1, 30)  # [kg]
+STIFFNESSES = np.geomspace(1e3, 1e7, 41)  # [N/m]
+
+
+def compute(masses=MASSES, stiffnesses=STIFFNESSES):
+    """Rigid mallets on the bar of 200 g, 100 Hz: the hardest head up to which all softer ones hit once [N/m]."""
+    bar = fi.analytic.beam(1.0, ends=("free", "free"), mass=0.2, first_frequency=100.0, n_modes=60)
+    over = {"at": [[place] for place in fig16.PLACES], "mass": masses, "stiffness": stiffnesses}
+    law = fi.Contact.linear(1.0)
+    table = fi.sweep(bar, fi.Striker.rigid(0.01), law, at=0.0, speed=1.0, over=over)
+    twice = (table.n_impacts != 1).values
+    first = np.where(twice.any(axis=2), twice.argmax(axis=2), len(stiffnesses))
+    hardest = np.append(np.nan, stiffnesses)[first]  # below the first that hits twice; nan where all do
+    return dict(zip(fig16.PLACES, hardest))
+
+
+def draw(result):
+    """The hardest clean head over the mallet's mass."""
+    drawn = [
+        charts.Curve(1e3 * MASSES, values, f"at {place:g}", fig16.PLACES[place]) for place, values in result.items()
+    ]
+    figure = charts.curves(
+        drawn,
+        x=charts.Axis("mass of the mallet", "g", log=True),
+        y=charts.Axis("hardest head that hits once", "N/m", log=True),
+        title="Free bar of 200 g, 100 Hz",
+    )
+    return figure, {"mass [kg]": MASSES} | {f"at {place:g} [N/m]": values for place, values in result.items()}
+
+
+if __name__ == "__main__":
+    source.run("beyond_marimba_bar", compute, draw)

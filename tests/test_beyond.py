@@ -1,0 +1,51 @@
+"""What the studies beyond the source show."""
+
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+STUDIES = Path(__file__).parents[1] / "studies"
+
+
+@pytest.fixture(autouse=True)
+def studies_importable(monkeypatch):
+    monkeypatch.syspath_prepend(str(STUDIES))
+
+
+def test_a_stick_that_bends_strikes_twice():
+    table = import_module("beyond_flexible_stick").compute(np.geomspace(100.0, 10e3, 9))
+    once = table.n_impacts.values == 1
+    assert once[table.striker_frequency.values > 500.0].all()
+    assert not once[:2].any()  # 100 and 178 Hz, below the contact resonance of 260 Hz
+    assert_allclose(float(table.restitution[-1]), 1.0, atol=2e-3)  # rigid stick, unyielding plate: nothing is lost
+
+
+@pytest.mark.slow
+def test_the_end_of_a_free_bar_forgives_least():
+    result = import_module("beyond_marimba_bar").compute(np.array([0.01, 0.05]), np.geomspace(1e3, 1e7, 21))
+    assert (result[0.0] < np.minimum(result[0.1], result[0.4])).all()
+    assert result[0.0][1] < result[0.0][0]  # a heavier mallet needs a softer head
+
+
+@pytest.mark.slow
+def test_light_or_soft_clappers_hit_a_bell_once():
+    bell = import_module("beyond_bell")
+    table = bell.compute(np.array([0.02, 1.0]), np.array([1e7, 1e10]), max_frequency=8e3)
+    assert table.n_impacts.values[0].tolist() == [1, 1]  # soft
+    assert table.n_impacts.values[1, 0] == 1  # light
+    assert table.n_impacts.values[1, 1] > 1  # hard and heavy
+
+
+def test_light_hammers_reach_the_bandwidth_and_heavy_ones_cannot():
+    found = import_module("beyond_hammer_test").compute(np.array([2e-3, 0.1]))
+    assert [hammer.works for hammer in found] == [True, False]
+
+
+def test_the_page_shows_every_study():
+    page = (STUDIES / "README.md").read_text()
+    for script in [*STUDIES.glob("fig*.py"), *STUDIES.glob("beyond_*.py")]:
+        assert f"(pictures/{script.stem}.png)" in page
+        assert (STUDIES / "pictures" / f"{script.stem}.png").stat().st_size < 100_000
