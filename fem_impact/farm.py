@@ -151,7 +151,9 @@ def by_cluster(
             start = futures[future] * block
             stop = min(start + block, grid.n_cases)
             if result is not None:
-                numbers[:, start:stop], failures[start:stop] = result
+                numbers[:, start:stop], texts = result
+                for i, text in texts.items():
+                    failures[start + i] = text
             done += stop - start
             if watch is not None:
                 watch(done, grid.n_cases)
@@ -159,10 +161,11 @@ def by_cluster(
         return (numbers, failures) if store is None else Store(store.path).read()
 
 
-def _work(grid: Any, block: int, size: int, solve: Solve, path: str | None) -> tuple[np.ndarray, np.ndarray] | None:
-    """One block, on a worker; nothing where the store has it already or takes it."""
+def _work(grid: Any, block: int, size: int, solve: Solve, path: str | None) -> tuple[np.ndarray, dict[int, str]] | None:
+    """One block, on a worker: numbers, and texts where there are any; nothing where a store has it or takes it."""
     if path is None:
-        return solve(grid, block * size, min((block + 1) * size, grid.n_cases))
+        numbers, failures = solve(grid, block * size, min((block + 1) * size, grid.n_cases))
+        return numbers, {int(i): failures[i] for i in np.flatnonzero(failures != "")}
     store = Store(Path(path))
     if store.group["done"][block]:  # a worker died between keeping it and saying so
         return None
