@@ -19,7 +19,12 @@ WAVE_PER_ELEMENT = {
 ERROR_OF_WAVE = {
     "argyris": (1e-7, 8.0),
     "hermite": (7e-4, 4.0),
+    "morley": (0.2, 2.0),
 }  # relative error of a frequency: factor and power of kh
+UNEVEN = (
+    50.0  # [-] times that: clamped corners on coarse meshes need half of it, smooth modes a fiftieth; test_modal.py
+)
+HELD = {"argyris": 2e-5, "hermite": 1e-12, "morley": 0.0}  # [-] what supports, curves and corners add at most
 MORLEY = 0.2574578  # [-] error of the Morley interpolation, over h**2 (Carstensen and Gallistl 2014)
 MORLEY_UNKNOWNS = 20_000  # [-] spent on a second opinion
 ALGEBRA = 1e-9  # [-] margin for rounding and the eigensolver on either side of an enclosure
@@ -49,7 +54,7 @@ class Spectrum:
     flexibility: Flexibility
     omega: np.ndarray  # (n_modes,) [rad/s]
     vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
-    error: np.ndarray | None = None  # (n_modes,) [-] estimated relative error of omega
+    error: np.ndarray  # (n_modes,) [-] estimated relative error of omega
 
     @property
     def n_rigid(self) -> int:
@@ -86,8 +91,20 @@ def solve(system: System, n_modes: int | None, max_frequency: float | None) -> S
         values, vectors = _counted(system, flexibility, n_modes - n_rigid, limit)
         values, vectors = sharpened(system, values, vectors)
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
-    error = np.where(omega > 0.0, system.unresolved, 0.0) if system.unresolved > SAY else None
-    return Spectrum(system, flexibility, omega, np.column_stack([system.rigid, vectors])[:, :n_modes], error)
+    vectors = np.column_stack([system.rigid, vectors])[:, :n_modes]
+    return Spectrum(system, flexibility, omega, vectors, _expected(system, omega))
+
+
+def _expected(system: System, omega: np.ndarray) -> np.ndarray:
+    """Relative error (n_modes,) to expect of frequencies on a mesh of this size, where none was asked for."""
+    mesh, frame = system.mesh, system.frame
+    size = mesh.area / len(mesh.cells) if mesh.dimension == 1 else np.sqrt(2.0 * mesh.area / len(mesh.cells))
+    wave = (system.softness * frame.inertia / frame.stiffness * omega**2) ** 0.25
+    factor, power = ERROR_OF_WAVE[system.element]
+    error = UNEVEN * factor * (wave * size) ** power + HELD[system.element]
+    if system.unresolved > SAY:
+        error = np.maximum(error, system.unresolved)
+    return np.where(omega > 0.0, error, 0.0)
 
 
 def _counted(system: System, flexibility: Flexibility, n: int, limit: float | None) -> tuple[np.ndarray, np.ndarray]:

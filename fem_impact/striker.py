@@ -11,6 +11,8 @@ from .assembly import assemble
 from .modal import Modes, find_modes
 from .section import Beam, Material
 
+LARGEST_SPHERE = 1e9  # [m] beyond, the mass of a sphere leaves the range of floating point in what follows
+
 
 @dataclass(frozen=True, eq=False)
 class Striker:
@@ -46,7 +48,7 @@ class Striker:
     @classmethod
     def sphere(cls, material: Material, radius: float) -> "Striker":
         """A rigid solid sphere of a material, radius in m; `Contact.between` gives its Hertz stiffness."""
-        radius = _check.positive("radius", radius, "m")
+        radius = _check.between("radius", _check.positive("radius", radius, "m"), 0.0, LARGEST_SPHERE, "m")
         rho = material.rho
         if not isinstance(rho, (int, float)):
             raise ValueError(f"material must have one density, got {rho!r:.60}")

@@ -50,3 +50,8 @@ def test_free_bar_arrives_straight_whatever_point_strikes():
 def test_errors_name_argument_rule_and_value(make, text):
     with pytest.raises(ValueError, match=text):
         make()
+
+
+def test_a_sphere_larger_than_any_is_refused():
+    with pytest.raises(ValueError, match="radius must lie between 0 and 1e\\+09 m, got 1e\\+300 m"):
+        fi.Striker.sphere(fi.Material(E=1e9, nu=0.3, rho=1e3), 1e300)
