@@ -17,6 +17,7 @@ from .scene import SHARE, Scene
 from .tables import MAKERS, Part
 
 FIRST_LOOK = 40  # [-] modes found first, from which those a map needs are estimated
+MOST_MODES = 300  # [-] a hammer is chosen on at most so many; the residual compliance stands for the rest
 FORMATS = ("nc", "zarr")
 PICTURED = {  # layers drawn where there are two axes, and what they are called there
     "n_impacts": "number of impacts",
@@ -281,5 +282,6 @@ def hammers_for(scene: Scene, bandwidth: float, masses: Any, *, drop: float = 10
     """What each hammer can do at the strike point of a scene's body, whatever strikes it in the scene."""
     at, first = scene.blow.values["at"], scene.modes(FIRST_LOOK)
     needed = hammers.highest_frequency(first, at, bandwidth, masses, drop=drop)
-    modes = scene.modes(_number(first, needed)) if needed > first.frequencies[-1] else first
+    number = min(_number(first, needed), MOST_MODES)
+    modes = scene.modes(number) if number > first.n_modes else first
     return hammers.choose(modes, at, bandwidth, masses, drop=drop)
