@@ -47,7 +47,8 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
     path : path ending in .vtu (one file) or .pvd (a collection, its parts in a folder of the same name)
         Modes in one .vtu: a point array ``mode_001`` ... each, all frequencies as field data. Modes in a .pvd: one
         part per mode, its frequency as time value and field data, ``shape`` [kg**-0.5] and a ready-made ``warp``
-        vector. Motion: one part per time (a .vtu takes one time only), ``displacement`` [m], ``velocity`` [m/s].
+        vector. Motion: one part per time (a .vtu takes one time only), ``displacement`` [m], ``velocity`` [m/s]
+        of the kept modes.
     modes : Modes
     response : Response, optional
         Write its motion instead of mode shapes; modes is then the body it happened on.
@@ -202,7 +203,11 @@ def _mode_parts(modes: Modes, points: np.ndarray) -> list[tuple[dict, dict]]:
 
 def _motion_parts(response: Response, points: np.ndarray, times: np.ndarray) -> list[tuple[dict, dict]]:
     moves = []
-    for history in (response.displacement(points, times), response.velocity(points, times)):
+    # of the modes kept: the dip of the others would cost a static solution for every point of the grid
+    for history in (
+        response.displacement(points, times, residual=False),
+        response.velocity(points, times, residual=False),
+    ):
         vector = np.zeros((len(times), len(points), 3))
         vector[:, :, 2] = history  # (n_times, n_points)
         moves.append(vector)

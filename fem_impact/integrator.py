@@ -12,7 +12,7 @@ from . import _check, _kernels
 from ._check import SimulationError
 from .contact import Contact
 from .modal import Modes
-from .response import Error, History, Response
+from .response import Dip, Error, History, Response
 from .striker import Striker
 
 TOLERANCE = 1e-4  # [-] the default promise
@@ -102,6 +102,7 @@ class _Part:
     p: np.ndarray
     bias: np.ndarray
     force: float  # [N] constant, at its first contact
+    points: np.ndarray  # (n_ends, dimension) [m] of its contacts
 
 
 def strike(
@@ -165,9 +166,10 @@ def strike(
     options = _Options.checked(tolerance, duration, max_impacts, scheme, dt)
     touch = Touch(contact, 0, 1, striker.at[None] if striker.modes.dimension else None, point)
     whole = striker.compliance if residual and striker.modes.dimension else None
-    arriving = _part(striker.modes, ((0, 1.0),), striker.shape[None], whole, forces[0])
+    end = striker.at[None] if striker.modes.dimension else np.zeros((1, 0))
+    arriving = _part(striker.modes, ((0, 1.0),), end, striker.shape[None], whole, forces[0])
     whole = modes.shapes.compliance(point) if residual and modes.dimension else None
-    struck = _part(modes, ((0, -1.0),), modes.shapes.at(point), whole, forces[1])
+    struck = _part(modes, ((0, -1.0),), point, modes.shapes.at(point), whole, forces[1])
     arriving = replace(arriving, p=speed * striker.motion)
     response = _follow((striker.modes, modes), [touch], [arriving, struck], speed, options)
     return replace(response, striker=striker, at=point[0])
@@ -229,7 +231,16 @@ def _follow(bodies, contacts, parts, speed, options) -> Response:
     truncation, resolvable = _truncation(parts, contacts, system, coarse, ran, size, pace, *last)
     error = Error(step_error, truncation, _mesh_error(bodies, history), resolvable)
     laws = tuple(touch.law for touch in contacts)
-    return Response(tuple(bodies), laws, history, speed, options.tolerance, ran, error)
+    dips = tuple(_dip(part, system) for part in parts)
+    return Response(tuple(bodies), laws, history, speed, options.tolerance, ran, error, dips=dips)
+
+
+def _dip(part: _Part, system: _System) -> Dip | None:
+    """Where the compliance left out of a body's modes yields; a constant force only bends it as a spring in series."""
+    if not part.rest.any():
+        return None
+    series = len(part.touched) == 1 and system.law[part.touched[0][0], 2] == 0.0
+    return Dip(part.points, part.touched, part.force if series else 0.0)
 
 
 def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Part], float]:
@@ -251,7 +262,7 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Pa
         points = np.vstack([point for _, _, point in ends[body]] or [np.zeros((0, modes.dimension))])
         rows = np.atleast_2d(modes.shapes.at(points)) if ends[body] else np.zeros((0, modes.n_modes))
         whole = modes.shapes.compliance(points) if residual and modes.dimension and ends[body] else None
-        part = _part(modes, tuple((i, sign) for i, sign, _ in ends[body]), rows, whole, float(forces[body]))
+        part = _part(modes, tuple((i, sign) for i, sign, _ in ends[body]), points, rows, whole, float(forces[body]))
         if states is not None:
             q, p = (_check.array("states", value, (modes.n_modes,)) for value in states[body])
             part = replace(part, q=q, p=p)
@@ -265,7 +276,9 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Pa
     return parts, arriving
 
 
-def _part(modes: Modes, touched: tuple, rows: np.ndarray, whole: np.ndarray | None, force: float) -> _Part:
+def _part(
+    modes: Modes, touched: tuple, points: np.ndarray, rows: np.ndarray, whole: np.ndarray | None, force: float
+) -> _Part:
     """One body at rest: its modes, their shapes at its contacts, and what they leave out of its compliance there."""
     rest = np.zeros((len(touched), len(touched)))
     if whole is not None:
@@ -278,7 +291,7 @@ def _part(modes: Modes, touched: tuple, rows: np.ndarray, whole: np.ndarray | No
     still = np.zeros(modes.n_modes)
     bias = force * rows[0] if force else still
     above = REST_ABOVE[min(modes.dimension, 2)] if modes.dimension else 1.0
-    return _Part(modes.omega, modes.damping_ratio, rows, touched, rest, above, still, still, bias, force)
+    return _Part(modes.omega, modes.damping_ratio, rows, touched, rest, above, still, still, bias, force, points)
 
 
 def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:

@@ -13,6 +13,7 @@ from .striker import Striker
 
 TOUCH = 1e-12  # [-] of the fastest approach: bodies that touch and hardly move press from the first push on
 PEAK_LOOKS = 16  # [-] looks per step for the peak force before a parabola refines it: (pi/11/16)**2/8 of it at worst
+DIP_BLOCK = 8  # [-] points whose static compliance is asked for at once: each is a load, and pairs are its cost
 
 
 @dataclass(frozen=True)
@@ -126,6 +127,35 @@ class History:
             pressed = _kernels.compressions(pressed.ravel(), k, exponent, c).reshape(pressed.shape)
         return np.maximum(k * pressed**exponent * (1.0 + loss * rate), 0.0)
 
+    def force_at(self, times: np.ndarray, contact: int) -> tuple[np.ndarray, np.ndarray]:
+        """Contact force [N] and its rate [N/s] at any times, (n_times,) each; zero after the end."""
+        if not len(self.steps):
+            return np.zeros(len(times)), np.zeros(len(times))
+        rows = np.clip(np.searchsorted(self.steps[:, 0], times, side="right") - 1, 0, None)
+        h = self.steps[rows, 1]
+        part = np.clip((times - self.steps[rows, 0]) / h, 0.0, 1.0)
+        if self.n_coefficients > 2:
+            first = 6 + contact * (3 + self.n_coefficients)
+            terms = self.steps[rows, first : first + self.n_coefficients]  # (n_times, n_coefficients)
+            order = np.arange(self.n_coefficients)
+            force = (terms * part[:, None] ** order).sum(axis=1)
+            rate = (terms[:, 1:] * order[1:] * part[:, None] ** order[:-1]).sum(axis=1) / h
+        else:
+            approach, speed = (x[:, 0] for x in self.approach(rows, contact, part[:, None]))
+            d0, v0, d1, v1 = (end[rows, contact] for end in self.ends)
+            turn = (
+                6.0 * (d1 - d0) * (1.0 - 2.0 * part) - h * (v0 * (4.0 - 6.0 * part) + v1 * (2.0 - 6.0 * part))
+            ) / h**2
+            k, exponent, loss, c = self.law[contact]
+            x = np.maximum(approach, 1e-300)
+            x = _kernels.compressions(x, k, exponent, c) if c else x
+            tangent = exponent * k * x ** (exponent - 1.0)
+            force = k * x**exponent * (1.0 + loss * speed)
+            rate = tangent / (1.0 + c * tangent) * speed * (1.0 + loss * speed) + k * x**exponent * loss * turn
+            force = np.where(approach > 0.0, force, 0.0)
+        acts = self.pressed[rows, contact] & (force > 0.0) & (times <= self.end_time)
+        return np.where(acts, force, 0.0), np.where(acts, rate, 0.0)
+
     @cached_property
     def contacts(self) -> np.ndarray:
         """Every unbroken contact, (n_impacts, 5): start, end, peak force, impulse, contact; contact by contact."""
@@ -141,6 +171,18 @@ class History:
 
 
 @dataclass(frozen=True, eq=False)
+class Dip:
+    """Where forces act on a body whose modes leave out part of its compliance there."""
+
+    points: np.ndarray  # (n_ends, dimension) [m]
+    touched: tuple[tuple[int, float], ...]  # contact at each, and whether the body is its first, 1, or second, -1
+    force: float  # [N] constant, at the first of them
+
+    def __post_init__(self) -> None:
+        _check.lock_arrays(self)
+
+
+@dataclass(frozen=True, eq=False)
 class Response:
     """Everything about a blow; `strike` and `collide` make it. Histories are exact between steps and after the end."""
 
@@ -153,6 +195,7 @@ class Response:
     error: Error
     striker: Striker | None = None
     at: np.ndarray | None = None  # (dimension,) [m] where the target was struck
+    dips: tuple[Dip | None, ...] = ()  # of each body; None where its modes are all there is
 
     def __post_init__(self) -> None:
         _check.lock_arrays(self)
@@ -301,15 +344,49 @@ class Response:
         n_modes = self.bodies[body].n_modes
         return q[back, part][:, :n_modes], p[back, part][:, :n_modes]
 
-    def displacement(self, points: Any, times: Any, *, body: int = -1) -> np.ndarray:
-        """Displacement [m] of the target at points and times, (n_times, n_points); positive along the blow."""
-        q, _ = self.modal_state(times, body=body)
-        return q @ self.bodies[body].shape_at(points).T  # (n_times, n_modes) @ (n_modes, n_points)
+    def displacement(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
+        """Displacement [m] of the target at points and times, (n_times, n_points); positive along the blow.
 
-    def velocity(self, points: Any, times: Any, *, body: int = -1) -> np.ndarray:
-        """Velocity [m/s] of the target at points and times, (n_times, n_points)."""
+        Parameters
+        ----------
+        points : array_like, shape (n_points, dimension) [m]
+        times : array_like, shape (n_times,) [s]
+        body : int
+            Which body; the target is the last.
+        residual : bool
+            Whether the static dip that the modes left out give under the forces is added where the blow had it;
+            it lives within about a wavelength of the last mode about a contact, and costs a static solution for
+            each point.
+        """
+        q, _ = self.modal_state(times, body=body)
+        motion = q @ self.bodies[body].shape_at(points).T  # (n_times, n_modes) @ (n_modes, n_points)
+        return motion + self._dip(points, times, body)[0] if residual else motion
+
+    def velocity(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
+        """Velocity [m/s] of the target at points and times, (n_times, n_points); parameters as in `displacement`."""
         _, p = self.modal_state(times, body=body)
-        return p @ self.bodies[body].shape_at(points).T
+        motion = p @ self.bodies[body].shape_at(points).T
+        return motion + self._dip(points, times, body)[1] if residual else motion
+
+    def _dip(self, points: Any, times: Any, body: int) -> tuple[Any, Any]:
+        """Static dip [m] of the modes left out, and its rate [m/s], (n_times, n_points); 0 where they are all."""
+        dip = self.dips[body] if self.dips else None
+        if dip is None:
+            return 0.0, 0.0
+        modes, n_ends = self.bodies[body], len(dip.points)
+        times = _check.array("times", np.atleast_1d(times), (None,), "s")
+        found = [self.history.force_at(times, i) for i, _ in dip.touched]
+        sign = np.array([sign for _, sign in dip.touched])
+        force, rate = (-sign * np.stack([pair[k] for pair in found], axis=1) for k in (0, 1))  # (n_times, n_ends)
+        force[:, 0] += dip.force
+        asked = modes.points("points", points)
+        if not force.any() or not len(asked):
+            return 0.0, 0.0
+        blocks = [asked[i : i + DIP_BLOCK] for i in range(0, len(asked), DIP_BLOCK)]
+        rest = np.vstack(
+            [modes.residual_compliance(np.vstack([dip.points, block]))[n_ends:, :n_ends] for block in blocks]
+        )  # (n_points, n_ends)
+        return force @ rest.T, rate @ rest.T
 
     @property
     def speeds(self) -> tuple[float, ...]:
