@@ -3,8 +3,9 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import config, njit
 
+COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # else a hundred times slower, as plain Python
 LOOSE = {"reassoc", "contract"}  # sums may be reordered to run in parallel lanes; NaN and infinity keep their meaning
 SERIES_LIMIT = 1.0  # [-] below this omega*h the moment recursion cancels and a power series takes over
 LIGHT = 0.9  # [-] damping ratio up to which a mode takes the fast lanes

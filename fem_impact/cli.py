@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import signal
+import subprocess
 import sys
 import textwrap
 import threading
@@ -35,7 +36,7 @@ SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` w
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; the exit status is 0, 2 for bad input, 1 for a run that failed, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
-    _prepare(os.environ, once=options.run in (_strike, _modes))
+    plain = _prepare(os.environ, once=options.run in (_strike, _modes))
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that temporary files go away
     try:
@@ -53,28 +54,33 @@ def main(arguments: list[str] | None = None) -> int:
     except RuntimeError as error:
         if not isinstance(error, fi.SimulationError):
             raise
+        if plain:  # too much for plain Python, perhaps: once more, compiled
+            again = [sys.executable, "-m", "fem_impact.cli", *(sys.argv[1:] if arguments is None else arguments)]
+            return subprocess.run(again, env={**os.environ, "NUMBA_DISABLE_JIT": "0"}, check=False).returncode
         return _complain(error, FAILED)
     except KeyboardInterrupt:
         return _complain("interrupted; nothing was written", INTERRUPTED)
     return 0
 
 
-def _prepare(environment: MutableMapping[str, str], once: bool) -> None:
+def _prepare(environment: MutableMapping[str, str], once: bool) -> bool:
     """Set what numpy and numba read when they are loaded; whatever the user has set stays.
 
-    A command that strikes once runs in plain Python until the kernels are compiled.
+    A command that strikes once runs in plain Python until the kernels are compiled; returns whether this one will.
     """
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         # The dense algebra is small: on two busy cores two threads took 18 s where one took 4 s.
         environment.setdefault(name, "1")
-    if not once or "numba" in sys.modules:
-        return
+    if not once or "numba" in sys.modules or "NUMBA_DISABLE_JIT" in environment:
+        return False
     package = Path(str(fi.__file__)).parent
     source = (package / "_kernels.py").stat().st_mtime
     compiled = (package / "__pycache__").glob("_kernels.run_energy-*.nbi")
-    if not any(file.stat().st_mtime >= source for file in compiled):
-        # A single strike takes some 0.3 to 1 s in plain Python, compiling it 30 s: `doctor` does that once.
-        environment.setdefault("NUMBA_DISABLE_JIT", "1")
+    if any(file.stat().st_mtime >= source for file in compiled):
+        return False
+    # A single strike takes some 0.3 to 1 s in plain Python, compiling it 15 to 30 s: `doctor` does that once.
+    environment["NUMBA_DISABLE_JIT"] = "1"
+    return True
 
 
 def _complain(error: object, status: int) -> int:

@@ -18,6 +18,7 @@ from .striker import Striker
 TOLERANCE = 1e-4  # [-] the default promise
 SCHEMES = ("A", "A4", "collocation", "secular")
 MAX_STEPS = 500_000  # [-] of one run, some seconds
+PLAIN_WORK = 300_000  # [-] modes times steps of one run where the kernels are not compiled, likewise
 FIRST_STEPS = 12.0  # [-] steps per contact at which A4 errs by about FIRST_ERROR: measured 9e-6 linear, 1e-4 Hertz
 FIRST_ERROR = 1e-4  # [-]
 DOUBLINGS = 7  # [-] how often the step is halved before the run gives up
@@ -437,10 +438,11 @@ def _run(system: _System, scheme: str, size: float, pace: tuple[float, float], h
         system.omega, system.zeta, system.shape, system.offset, system.bias, system.law, system.start_q, system.start_p
     )  # fmt: skip
     noise = NOISE * pace[0] * pace[1], STILL * pace[1]
+    most = MAX_STEPS if _kernels.COMPILED else max(100, PLAIN_WORK // len(system.omega))
     if scheme == "collocation":
         nodes, powers = _gauss(NODES)
         result = _kernels.run_collocation(
-            *parts, nodes, powers, pace[0] / 2.0, pace[1], float(size), *noise, float(horizon), n_max, MAX_STEPS
+            *parts, nodes, powers, pace[0] / 2.0, pace[1], float(size), *noise, float(horizon), n_max, most
         )
     elif scheme == "secular":
         result = _kernels.run_secular(
@@ -452,14 +454,14 @@ def _run(system: _System, scheme: str, size: float, pace: tuple[float, float], h
             *noise,
             float(horizon),
             n_max,
-            MAX_STEPS,
+            most,
         )
     else:
-        result = _kernels.run_energy(*parts, int(scheme == "A4"), float(size), *noise, float(horizon), n_max, MAX_STEPS)
+        result = _kernels.run_energy(*parts, int(scheme == "A4"), float(size), *noise, float(horizon), n_max, most)
     time, status = result[5], result[6]
     if status == _kernels.EXHAUSTED:
         raise SimulationError(
-            f"no final separation was reached in {MAX_STEPS} steps, up to {time:.4g} s; give duration or max_impacts"
+            f"no final separation was reached in {most} steps, up to {time:.4g} s; give duration or max_impacts"
         )
     if status == _kernels.FAILED:
         raise SimulationError(

@@ -249,10 +249,10 @@ def test_uncompiled_kernels_run_as_plain_python(monkeypatch, tmp_path):
     monkeypatch.setattr(fi, "__file__", str(tmp_path / "__init__.py"))
     monkeypatch.delitem(sys.modules, "numba", raising=False)
     fresh: dict[str, str] = {}
-    cli._prepare(fresh, once=True)
+    assert cli._prepare(fresh, once=True)
     assert fresh["NUMBA_DISABLE_JIT"] == "1" and fresh["OMP_NUM_THREADS"] == "1"
     chosen = {"NUMBA_DISABLE_JIT": "0", "OMP_NUM_THREADS": "7"}
-    cli._prepare(chosen, once=True)
+    assert not cli._prepare(chosen, once=True)
     assert chosen["NUMBA_DISABLE_JIT"] == "0" and chosen["OMP_NUM_THREADS"] == "7"
     many: dict[str, str] = {}
     cli._prepare(many, once=False)
@@ -260,5 +260,5 @@ def test_uncompiled_kernels_run_as_plain_python(monkeypatch, tmp_path):
     (tmp_path / "__pycache__").mkdir()
     (tmp_path / "__pycache__" / "_kernels.run_energy-1.py311.nbi").write_text("")
     compiled: dict[str, str] = {}
-    cli._prepare(compiled, once=True)
+    assert not cli._prepare(compiled, once=True)
     assert "NUMBA_DISABLE_JIT" not in compiled
