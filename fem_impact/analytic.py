@@ -58,9 +58,6 @@ def _unit_omega(physical: tuple[float, float] | None, first_frequency: float | N
     return convert
 
 
-# ---- hinged rectangle
-
-
 @dataclass(frozen=True, eq=False)
 class RectangleShapes:
     """Sine shapes of a hinged rectangle of unit mass and rigidity, its corner at the origin."""
@@ -195,9 +192,6 @@ def _plate_scale(section: Any, area: float) -> tuple[float, float] | None:
     mass = material.rho * thickness * area
     rigidity = material.E * thickness**3 / (12.0 * (1.0 - material.nu**2))
     return mass, float(np.sqrt(rigidity / mass))
-
-
-# ---- beams
 
 
 def _beam_roots(ends: tuple[str, str], n: int) -> np.ndarray:
@@ -394,9 +388,6 @@ def _beam_scale(section: Any, length: float) -> tuple[float, float] | None:
     return mass, float(np.sqrt(section.stiffness(middle)[0] / (mass * length**3)))
 
 
-# ---- disks
-
-
 def _bessel(n: int, z: Any) -> tuple[Any, ...]:
     """J, J', I exp(-z), I' exp(-z) of order n at z."""
     j, dj = special.jv(n, z), special.jvp(n, z)
@@ -527,8 +518,7 @@ def _disk_green(edge: str, nu: float, place: np.ndarray, load: np.ndarray) -> fl
     # Take out the rigid motion: projections of `bent` on 1 and on r cos, the clamped parts by reciprocity.
     mean = q**2 / 64.0 + uniform * 2.0 * np.pi / (64.0 * 6.0) + b[0] * 2.0 * np.pi / 4.0
     turn = (rho**5 - 2.0 * rho**3 + rho) / 192.0 + linear * np.pi / (192.0 * 8.0)
-    along = b[1] / cosine if abs(cosine) > 1e-3 else _first_order(nu, rho)
-    turn += along * np.pi / 6.0
+    turn += _first_order(nu, rho) * np.pi / 6.0
     return bent - mean / np.pi - 4.0 * turn * r * cosine / np.pi
 
 

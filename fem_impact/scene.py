@@ -152,7 +152,7 @@ class Scene:
             )
 
     def _finite_elements(self, stages: "_Stages", tolerance: float) -> Finder:
-        with stages("mesh"), self._blame("mesh"):
+        with stages("mesh"):
             body = self._make("mesh", self.mesh)
         stages.notes = body.notes
         with stages("assembly"):

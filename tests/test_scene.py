@@ -334,3 +334,11 @@ def test_ten_thousand_mutated_scenes_load_or_say_why_in_one_line(tmp_path):
         except ValueError as error:
             assert str(error).startswith(f"{path}: ") and str(error).isprintable()
     assert 500 < loaded < 9500  # else the mutations are too wild, or do nothing
+
+
+def test_file_and_table_are_named_once(tmp_path):
+    text = (SCENES / "drumstick.toml").read_text(encoding="utf-8").replace("length = 0.465", "length = true")
+    path = write(tmp_path, text)
+    with pytest.raises(ValueError, match="length must be a number in m, got True") as caught:
+        scene.load_scene(path).modes(2)
+    assert str(caught.value).count("[mesh]") == 1 and str(caught.value).count(str(path)) == 1
