@@ -24,6 +24,7 @@ __all__ = [
     "staged",
     "versions",
     "vtk_ending",
+    "write_animation",
     "write_force",
     "write_json",
     "write_uff",
@@ -80,6 +81,37 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
         _write_vtu(path, points, cells, *parts[0])
     else:
         raise ValueError(f"times must be one time for a .vtu, got {len(parts)}; write a .pvd")
+
+
+def write_animation(path: str | Path, modes: Modes, mode: int, *, frames: int = 24) -> None:
+    """Write one period of a mode's vibration for ParaView and pyvista to play.
+
+    Parameters
+    ----------
+    path : path ending in .pvd; its parts go to a folder of the same name
+        One part per frame, its time [s] as time value: the vector ``warp``, a tenth of the body's extent at most.
+    modes : Modes
+    mode : int, the mode's number from 1 on
+    frames : int, how many, evenly over the period
+
+    Raises
+    ------
+    ValueError
+        Where the path has another ending, or the mode does not exist or is a rigid motion.
+    """
+    path = Path(path)
+    if vtk_ending(path) != ".pvd":
+        raise ValueError(f"path must end in .pvd to hold several times, got {str(path)!r}")
+    if _check.count("mode", mode) > modes.n_modes:
+        raise ValueError(f"mode must be at most {modes.n_modes}, got {mode}")
+    frequency = float(modes.frequencies[mode - 1])
+    if frequency == 0.0:
+        raise ValueError(f"mode must vibrate; mode {mode} is a rigid motion")
+    turns = np.arange(_check.count("frames", frames, low=2)) / frames
+    points, cells = drawing.grid(modes)
+    arrays, fields = _mode_parts(modes, points)[mode - 1]
+    parts = [({"warp": np.cos(2.0 * np.pi * turn) * arrays["warp"]}, fields) for turn in turns]
+    _write_collection(path, points, cells, parts, turns / frequency)
 
 
 def vtk_ending(path: str | Path) -> str:

@@ -151,3 +151,32 @@ def test_versions_name_the_package_itself():
 def test_mode_of_a_rigid_mass_is_one_point(tmp_path):
     export.write_vtk(tmp_path / "rigid.vtu", Modes.rigid(1.0))
     assert pyvista.read(tmp_path / "rigid.vtu").n_points == 1
+
+
+def test_animation_swings_a_mode_through_one_period(tmp_path, modes):
+    export.write_animation(tmp_path / "swing.pvd", modes, 3, frames=8)
+    reader = pyvista.get_reader(tmp_path / "swing.pvd")
+    period = 1.0 / modes.frequencies[2]
+    assert_allclose(reader.time_values, period * np.arange(8) / 8, rtol=1e-15)  # written with every digit
+    heights = []
+    for i in range(8):
+        reader.set_active_time_point(i)
+        heights.append(reader.read()[0].point_data["warp"][:, 2])
+    shape = modes.shape_at(drawing.grid(modes)[0])[:, 2]
+    lifted = 0.1 * 0.465 * shape / np.abs(shape).max()  # a tenth of the plate's length
+    assert_allclose(heights, np.outer(np.cos(np.pi * np.arange(8) / 4), lifted), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "name, mode, text",
+    [("a.vtu", 1, "must end in .pvd"), ("a.pvd", 31, "mode must be at most 30, got 31"), ("a.pvd", 0, "at least 1")],
+)
+def test_animation_that_cannot_be_written_says_why(tmp_path, modes, name, mode, text):
+    with pytest.raises(ValueError, match=text):
+        export.write_animation(tmp_path / name, modes, mode)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_rigid_motion_is_no_animation(tmp_path):
+    with pytest.raises(ValueError, match="mode 1 is a rigid motion"):
+        export.write_animation(tmp_path / "a.pvd", Modes.rigid(1.0), 1)
