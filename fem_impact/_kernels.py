@@ -24,13 +24,18 @@ CONTACT, FLIGHT = 0, 1  # what the run does next
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = 0, 1, 2, 3, 4, 5  # why a run ended
 
 
+def outer(**options: Any) -> Any:
+    """Compile for use from Python; other threads run meanwhile."""
+    return njit(cache=True, error_model="numpy", nogil=True, **options)
+
+
 def inner(**options: Any) -> Any:
     """Compile for use by other kernels only; part of them when they are cached, and cheaper to compile."""
     bare: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return njit(**bare, **options)
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def mode_matrix(w, z, h):
     """Exact free motion of one flexible mode: a11, a12, a22 of the state's step, then slow and fast rate and half gap.
 
@@ -85,7 +90,7 @@ def exponential_sums(z, out_sums):
             inverse *= k
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def mode_moments(w, z, h, out_moments, work):
     """Exact step of one mode: a11, a12, a22, and in out_moments the moments of its impulse response g.
 
@@ -147,7 +152,7 @@ def mode_moments(w, z, h, out_moments, work):
     return a11, a12, a22
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@outer(fastmath={"contract"})
 def waves(angle, out_sin, out_cos):
     """Sine and cosine of many angles from 0 to ANGLE_LIMIT, within 1.5 units in the last place, in parallel lanes.
 
@@ -178,7 +183,7 @@ def waves(angle, out_sin, out_cos):
         out_cos[n] = -c if (quarter == 1.0) or (quarter == 2.0) else c
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@outer(fastmath={"contract"})
 def decays(exponent, out_decay):
     """exp(-x) of many x >= 0 within two units in the last place, in parallel lanes; zero beyond 700."""
     bits = np.empty(exponent.size, np.int64)
@@ -302,7 +307,7 @@ def near_moments(omega, h, double, out_moments):
         factor = after
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@outer(fastmath={"contract"})
 def step_table(omega, zeta, h, out_table):
     """Coefficients of one exact step of length h for every mode, (12, n_modes).
 
@@ -420,7 +425,7 @@ def compression(d, k, a, c):
     return x
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def law_at(d, law, i):
     """Spring compression, elastic force and stored energy of contact i at approach d."""
     if d <= 0.0:
@@ -431,7 +436,7 @@ def law_at(d, law, i):
     return x, f, f * x / (a + 1.0) + 0.5 * c * f * f
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def law_pair(d0, x0, f0, v0, d1, x1, f1, v1, law, i):
     """Average slopes between two approaches: energy over approach (G) and force over approach (D); no cancellation."""
     if d0 <= 0.0 or d1 <= 0.0:
@@ -470,7 +475,7 @@ def law_pair(d0, x0, f0, v0, d1, x1, f1, v1, law, i):
     return (g + 0.5 * c * (f0 + f1) * d) / (1.0 + c * d), d / (1.0 + c * d)
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def solve_constant(d0, x0, f0, v0, e, b, loss, law, i):
     """Root y of y - e + b F(d0, y) = 0 and the constant force F >= 0 of the step (scheme A); always exists, unique.
 
@@ -664,7 +669,7 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
             break
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def solve_ramp(h, d0, x0, f0, v0, rate0, e, ea, vf, sums, law):
     """Scheme A4 for one contact: (settled, y, mean force, slope) by Newton's method, the loss by secants.
 
@@ -1058,7 +1063,7 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
     return elapsed, -1, 4
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def hermite_extreme(d0, v0, d1, v1, h):
     """Smallest and largest value inside the step of the cubic through both ends' positions and rates."""
     a = 2.0 * (d0 - d1) + h * (v0 + v1)
@@ -1081,7 +1086,7 @@ def hermite_extreme(d0, v0, d1, v1, h):
     return low, high
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def hermite_root(d0, v0, d1, v1, h):
     """First zero in (0, h] of the cubic through both ends, where d0 and d1 differ in sign; by bisection and secant."""
     a = 2.0 * (d0 - d1) + h * (v0 + v1)
@@ -1166,7 +1171,7 @@ def crossed(pressed, d0, v0, y, depth, still):
     return y > depth and (d0 < 0.0 or v0 < -still)
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def run_energy(
     omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, base, depth, still, horizon, max_impacts, max_steps
 ):
@@ -1624,7 +1629,7 @@ def collocate(
     return worst
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def run_collocation(
     omega, zeta, shape, offset, bias, law, start_q, start_p, nodes, powers, base, speed, tolerance, depth, still,
     horizon, max_impacts, max_steps,
@@ -1938,7 +1943,7 @@ def run_collocation(
     return resized(steps, n_steps, n_steps), q, p, now, done, time, status, 0, 0
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def secular_modes(omega, shape, stiffness):
     """Eigenpairs of diag(omega**2) + stiffness u u^T for ascending, distinct omega and non-zero u.
 
@@ -2039,7 +2044,7 @@ def secular_approach(rate, weight, x, v, rest, t):
     return d, r
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def run_secular(
     omega, group, amplitude, shape, offset, bias, law, start_q, start_p, nodes, powers, base, depth, still,
     horizon, max_impacts, max_steps,
@@ -2273,7 +2278,7 @@ def push(omega, zeta, shape, bias, row, n_coefficients, length, q, p, out_q, out
         out_p[n] = -omega[n] * omega[n] * a12 * q0 + a22 * p[n] + length * v
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def replay(omega, zeta, shape, bias, start_q, start_p, steps, n_coefficients, times, out_q, out_p):
     """States (n_times, n_modes) at ascending times, from the start state and the recorded forces; exact in between."""
     n_steps = steps.shape[0]
@@ -2295,7 +2300,7 @@ def replay(omega, zeta, shape, bias, start_q, start_p, steps, n_coefficients, ti
         begin = steps[j + 1, 0] if j + 1 < n_steps else begin + row[1]
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def compressions(approach, k, a, c):
     """Spring compression at many approaches, (n,), zero where apart."""
     result = np.zeros(approach.size)
@@ -2330,7 +2335,7 @@ def force_within(steps, now, law, n_coefficients, row, i, part):
     return max(f * (1.0 + law[i, 2] * rate), 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@outer()
 def find_impacts(steps, now, law, n_coefficients, looks, touch):
     """Every unbroken contact, (n_impacts, 5): start, end, peak force, impulse, contact; contact by contact.
 

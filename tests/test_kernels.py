@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+import threading
+import time
 from types import SimpleNamespace
 
 import mpmath as mp
@@ -659,3 +661,18 @@ def test_plain_python_form_agrees():
     ]  # fmt: skip
     compiled, plain = (np.array(eval(text)) for text in answers)
     assert_allclose(plain, compiled, rtol=0, atol=1e-13)  # fused multiply-adds and reordered sums
+
+
+@pytest.mark.skipif(not _kernels.COMPILED, reason="plain Python holds the interpreter lock by nature")
+def test_a_run_leaves_other_threads_free():
+    def press(count):
+        run([0.0, *np.linspace(1e3, 1e5, 300)], [1.0, *np.full(300, -0.05)], k=1e4, h=1e-7, max_steps=count)
+
+    press(10)  # compiled or loaded
+    thread = threading.Thread(target=press, args=(100_000,))  # some 0.1 s
+    thread.start()
+    ticks = 0
+    while thread.is_alive():
+        time.sleep(1e-3)
+        ticks += 1
+    assert ticks > 10  # with the lock held the first sleep lasts as long as the run: 1 or 2
