@@ -357,8 +357,9 @@ def _thinned(part: _Part) -> tuple[_Part, float]:
 
 def _pace(system: _System) -> tuple[float, float]:
     """Shortest duration [s] to expect of an undisturbed contact, and the speed [m/s] that goes with it."""
-    order = np.argsort(system.omega, kind="stable")
-    omega = system.omega[order]
+    rate = system.omega * np.maximum(1.0, 2.0 * system.zeta)  # what is overdamped yields as a dashpot, not as a mass
+    order = np.argsort(rate, kind="stable")
+    omega = rate[order]
     last = np.append(omega[1:] > omega[:-1], True)  # of several modes with one frequency
     shortest, fastest = np.inf, 0.0
     for i, (k, exponent, _, compliance) in enumerate(system.law):
