@@ -4,8 +4,10 @@ from typing import Any
 
 import numpy as np
 from numba import config, njit
+from numba.core.options import DefaultOptions
 
 COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # else a hundred times slower, as plain Python
+UNCOUNTED = hasattr(DefaultOptions, "_nrt")  # whether the compiler can leave out the counting of references
 LOOSE = {"reassoc", "contract"}  # sums may be reordered to run in parallel lanes; NaN and infinity keep their meaning
 SERIES_LIMIT = 1.0  # [-] below this omega*h the moment recursion cancels and a power series takes over
 LIGHT = 0.9  # [-] damping ratio up to which a mode takes the fast lanes
@@ -14,10 +16,12 @@ ANGLE_LIMIT = 1e6  # [-] angle up to which the reduction in `waves` is exact
 OVERDAMPED = 1.2  # [-] damping ratio from which the two decay rates are far enough apart for partial fractions
 LEVELS = 40  # [-] halvings of the step that may be cached
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
+N_LANE = 7  # rows of what a run keeps of it, in the order of `lane_table`
 GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before
 LOOK_LIMIT = 20_000_000  # [-] looks ahead times modes in one free flight before the run gives up: some 0.1 s
 WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it
 SECULAR_MISFIT = 1e-12  # [-] of the peak force: what recorded polynomials may miss of the exact force
+LOCATED = 1e-12  # [-] of the approach about an event: a stored energy of 1e-24 of the step's is left out there
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
 EVENT_LIMIT = 64  # [-] events without one full step between them: chatter, passed with unlocated steps
 CONTACT, FLIGHT = 0, 1  # what the run does next
@@ -26,12 +30,19 @@ FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = 0, 1, 2, 3, 4, 5  # why
 
 def outer(**options: Any) -> Any:
     """Compile for use from Python; other threads run meanwhile."""
+    if UNCOUNTED:
+        options["_nrt"] = True
     return njit(cache=True, error_model="numpy", nogil=True, **options)
 
 
-def inner(**options: Any) -> Any:
-    """Compile for use by other kernels only; part of them when they are cached, and cheaper to compile."""
+def inner(allocates: bool = False, **options: Any) -> Any:
+    """Compile for use by other kernels only; part of them when they are cached, and cheaper to compile.
+
+    What allocates no array needs no count of references, half of the time of a step with few modes.
+    """
     bare: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    if UNCOUNTED:
+        bare["_nrt"] = allocates  # said in both cases, as it is inherited from the caller
     return njit(**bare, **options)
 
 
@@ -211,7 +222,7 @@ def decays(exponent, out_decay):
         out_decay[n] = out_decay[n] * scale[n] if exponent[n] < 700.0 else 0.0
 
 
-@inner(fastmath={"contract"})
+@inner(allocates=True, fastmath={"contract"})
 def free_table(omega, zeta, h, out_free, out_decayed):
     """Exact free motion of every mode over h: rows a11, a12, a22 of out_free (3, n_modes); a21 is -omega**2 a12.
 
@@ -248,7 +259,7 @@ def free_table(omega, zeta, h, out_free, out_decayed):
             out_free[2, n] = a22
 
 
-@inner(fastmath={"contract"})
+@inner(allocates=True, fastmath={"contract"})
 def near_moments(omega, h, double, out_moments):
     """Moments 2 and 3 (rows of out_moments) by power series, for every mode with omega h < SERIES_END."""
     n_modes = omega.size
@@ -307,13 +318,13 @@ def near_moments(omega, h, double, out_moments):
         factor = after
 
 
-@outer(fastmath={"contract"})
-def step_table(omega, zeta, h, out_table):
-    """Coefficients of one exact step of length h for every mode, (12, n_modes).
+@inner(allocates=True, fastmath={"contract"})
+def lane_table(omega, zeta, h, out_lanes):
+    """Coefficients of one exact step of length h for every mode, (N_LANE, n_modes), all that others follow from.
 
-    Rows: a11, a12, a21, a22; b1, b2 (constant force); c1, c2 (ramp t/h - 1/2); the step averages of the free motion
-    A1, A2 and of the two forces B0, B1. Lightly damped modes take parallel lanes: their moments (see `mode_moments`)
-    by a power series below SERIES_END, by recursion above; the others go one by one.
+    Rows: a11, a12, a21, a22 of the state's step; h times the moments 1 and 2 (see `mode_moments`) and times moment 3
+    less half of moment 2. Lightly damped modes take parallel lanes: their moments by a power series below SERIES_END,
+    by recursion above; the others go one by one.
     """
     n_modes = omega.size
     free = np.empty((3, n_modes))
@@ -321,15 +332,15 @@ def step_table(omega, zeta, h, out_table):
     m = np.empty((4, n_modes))
     free_table(omega, zeta, h, free, double)
     near_moments(omega, h, double, m)
+    part = 1.0 / h
     for n in range(n_modes):
         th = omega[n] * h
         near = th < SERIES_END
         inverse = 1.0 / (1.0 if near else th * th)
-        first = free[1, n] / h
+        first = free[1, n] * part
         m1 = (1.0 - double[n] * first - free[2, n]) * inverse
         m2 = (1.0 - double[n] * m1 - first) * inverse
         m3 = (0.5 - double[n] * m2 - m1) * inverse
-        m[0, n] = first
         m[1, n] = 0.5 - double[n] * m[2, n] - th * th * m[3, n] if near else m1
         m[2, n] = m[2, n] if near else m2
         m[3, n] = m[3, n] if near else m3
@@ -338,52 +349,62 @@ def step_table(omega, zeta, h, out_table):
     for n in range(n_modes):
         if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT:
             mode_moments(omega[n], zeta[n], h, single, work)
-            double[n] = 2.0 * zeta[n] * omega[n] * h
-            for k in range(4):
+            for k in range(1, 4):
                 m[k, n] = single[k]
     for n in range(n_modes):
-        out_table[0, n] = free[0, n]
-        out_table[1, n] = free[1, n]
-        out_table[2, n] = -omega[n] * omega[n] * free[1, n]
-        out_table[3, n] = free[2, n]
-    for n in range(n_modes):
-        out_table[4, n] = h * h * m[1, n]
-        out_table[5, n] = free[1, n]
-        out_table[6, n] = h * h * (m[2, n] - 0.5 * m[1, n])
-        out_table[7, n] = h * (m[1, n] - 0.5 * m[0, n])
-    for n in range(n_modes):
-        out_table[8, n] = m[0, n] + double[n] * m[1, n]
-        out_table[9, n] = h * m[1, n]
-        out_table[10, n] = h * h * m[2, n]
-        out_table[11, n] = h * h * (m[3, n] - 0.5 * m[2, n])
+        out_lanes[0, n] = free[0, n]
+        out_lanes[1, n] = free[1, n]
+        out_lanes[2, n] = -omega[n] * omega[n] * free[1, n]
+        out_lanes[3, n] = free[2, n]
+        out_lanes[4, n] = h * m[1, n]
+        out_lanes[5, n] = h * m[2, n]
+        out_lanes[6, n] = h * (m[3, n] - 0.5 * m[2, n])
+
+
+@outer()
+def step_table(omega, zeta, h, out_table):
+    """Coefficients of one exact step of length h for every mode, (12, n_modes).
+
+    Rows: a11, a12, a21, a22; b1, b2 (constant force); c1, c2 (ramp t/h - 1/2); the step averages of the free motion
+    A1, A2 and of the two forces B0, B1.
+    """
+    lanes = np.empty((N_LANE, omega.size))
+    lane_table(omega, zeta, h, lanes)
+    for n in range(omega.size):
+        for k in range(4):
+            out_table[k, n] = lanes[k, n]
+        out_table[4, n] = h * lanes[4, n]
+        out_table[5, n] = lanes[1, n]
+        out_table[6, n] = h * (lanes[5, n] - 0.5 * lanes[4, n])
+        out_table[7, n] = lanes[4, n] - 0.5 * lanes[1, n]
+        out_table[8, n] = lanes[1, n] / h + 2.0 * zeta[n] * omega[n] * lanes[4, n]
+        out_table[9, n] = lanes[4, n]
+        out_table[10, n] = h * lanes[5, n]
+        out_table[11, n] = h * lanes[6, n]
 
 
 @inner(fastmath=LOOSE)
-def contact_sums(shape, table, out_sums):
+def contact_sums(shape, lanes, h, out_sums):
     """Sums over the modes of u_i u_j times b1, c1, B0, B1, b2, c2: (6, n_contacts, n_contacts)."""
     n_contacts, n_modes = shape.shape
     for i in range(n_contacts):
         for j in range(i + 1):
-            s0 = 0.0
             s1 = 0.0
-            s2 = 0.0
-            s3 = 0.0
             s4 = 0.0
             s5 = 0.0
+            s6 = 0.0
             for n in range(n_modes):
                 uu = shape[i, n] * shape[j, n]
-                s0 += uu * table[4, n]
-                s1 += uu * table[6, n]
-                s2 += uu * table[10, n]
-                s3 += uu * table[11, n]
-                s4 += uu * table[5, n]
-                s5 += uu * table[7, n]
-            out_sums[0, i, j] = s0
-            out_sums[1, i, j] = s1
-            out_sums[2, i, j] = s2
-            out_sums[3, i, j] = s3
-            out_sums[4, i, j] = s4
-            out_sums[5, i, j] = s5
+                s1 += uu * lanes[1, n]
+                s4 += uu * lanes[4, n]
+                s5 += uu * lanes[5, n]
+                s6 += uu * lanes[6, n]
+            out_sums[0, i, j] = h * s4
+            out_sums[1, i, j] = h * (s5 - 0.5 * s4)
+            out_sums[2, i, j] = h * s5
+            out_sums[3, i, j] = h * s6
+            out_sums[4, i, j] = s1
+            out_sums[5, i, j] = s4 - 0.5 * s1
             for r in range(6):
                 out_sums[r, j, i] = out_sums[r, i, j]
 
@@ -689,6 +710,8 @@ def solve_ramp(h, d0, x0, f0, v0, rate0, e, ea, vf, sums, law):
     y = (e - b0 * f0 + 0.5 * b0 * tangent * d0) / (1.0 + 0.5 * b0 * tangent)
     limit = 1e-2 * max(abs(e), abs(d0))
     settled = False
+    close = False
+    last = False
     old_y = 0.0
     old_r = 0.0
     f = 0.0
@@ -711,8 +734,8 @@ def solve_ramp(h, d0, x0, f0, v0, rate0, e, ea, vf, sums, law):
             f = (right * m22 - m12 * top) / det
             s = (scale * top - m21 * right) / det
         r = y - e + b0 * f + b1 * s
-        if settled or r == 0.0:
-            settled = True
+        settled = last or r == 0.0 or (close and abs(r) <= 1e-15 * max(abs(e), abs(d0), abs(y)))
+        if settled:
             break
         if loss == 0.0 or iteration == 0:
             tangent = 0.0
@@ -736,8 +759,8 @@ def solve_ramp(h, d0, x0, f0, v0, rate0, e, ea, vf, sums, law):
         old_y = y
         old_r = r
         y += step
-        if abs(step) <= 2e-15 * max(abs(y), limit) or y == old_y:
-            settled = True
+        close = abs(step) <= 1e-7 * max(abs(y), limit) or y == old_y
+        last = y == old_y or abs(step) <= 2e-15 * max(abs(y), limit)
     if not settled or not f >= 0.0:
         return False, y, f, s
     _, _, v1 = law_at(y, law, i)
@@ -839,12 +862,17 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
 
 
 @inner(fastmath=LOOSE)
-def predict(shape, table, offset, bias, q, p, out_q, out_p, out_end):
-    """Free motion over one step: the new state and, per contact, end approach, mean approach and end rate (3, m)."""
+def predict(shape, tables, slot, h, twice, offset, bias, q, p, out_q, out_p, out_end):
+    """Free motion over one step: the new state and, per contact, end approach, mean approach and end rate (3, m).
+
+    ``twice`` is 2 zeta omega of every mode, ``tables[slot]`` the step's `lane_table`.
+    """
     n_contacts, n_modes = shape.shape
+    lanes = tables[slot]
+    part = 1.0 / h
     for n in range(n_modes):
-        out_q[n] = table[0, n] * q[n] + table[1, n] * p[n] + table[4, n] * bias[n]
-        out_p[n] = table[2, n] * q[n] + table[3, n] * p[n] + table[5, n] * bias[n]
+        out_q[n] = lanes[0, n] * q[n] + lanes[1, n] * p[n] + h * lanes[4, n] * bias[n]
+        out_p[n] = lanes[2, n] * q[n] + lanes[3, n] * p[n] + lanes[1, n] * bias[n]
     for i in range(n_contacts):
         end = 0.0
         mean = 0.0
@@ -852,36 +880,65 @@ def predict(shape, table, offset, bias, q, p, out_q, out_p, out_end):
         for n in range(n_modes):
             u = shape[i, n]
             end += u * out_q[n]
-            mean += u * (table[8, n] * q[n] + table[9, n] * p[n] + table[10, n] * bias[n])
             rate += u * out_p[n]
+            drift = lanes[4, n] * (p[n] + twice[n] * q[n]) + h * lanes[5, n] * bias[n]
+            mean += u * (part * lanes[1, n] * q[n] + drift)
         out_end[0, i] = offset[i] + end
         out_end[1, i] = offset[i] + mean
         out_end[2, i] = rate
 
 
 @inner(fastmath=LOOSE)
-def commit(shape, table, force, slope, free_q, free_p, out_q, out_p):
+def commit(shape, tables, slot, h, force, slope, free_q, free_p, out_q, out_p):
     """Add the motion the step's forces (mean, slope) cause to the free motion."""
     n_contacts, n_modes = shape.shape
-    if n_contacts == 1:
-        f = force[0]
-        s = slope[0]
-        for n in range(n_modes):
-            u = shape[0, n]
-            out_q[n] = free_q[n] - u * (f * table[4, n] + s * table[6, n])
-            out_p[n] = free_p[n] - u * (f * table[5, n] + s * table[7, n])
-        return
+    lanes = tables[slot]
     for n in range(n_modes):
-        f = 0.0
-        s = 0.0
-        for i in range(n_contacts):
-            f += shape[i, n] * force[i]
-            s += shape[i, n] * slope[i]
-        out_q[n] = free_q[n] - f * table[4, n] - s * table[6, n]
-        out_p[n] = free_p[n] - f * table[5, n] - s * table[7, n]
+        out_q[n] = free_q[n]
+        out_p[n] = free_p[n]
+    for i in range(n_contacts):
+        f = force[i] - 0.5 * slope[i]
+        s = slope[i]
+        if force[i] != 0.0 or s != 0.0:
+            for n in range(n_modes):
+                u = shape[i, n]
+                out_q[n] -= u * h * (f * lanes[4, n] + s * lanes[5, n])
+                out_p[n] -= u * (f * lanes[1, n] + s * lanes[4, n])
 
 
-@inner()
+@inner(fastmath=LOOSE)
+def advance(shape, tables, slot, h, twice, offset, bias, force, slope, q, p, free_q, free_p, out_end):
+    """`commit` into q and p, then `predict` the next step of the same length, for one contact in one pass."""
+    lanes = tables[slot]
+    part = 1.0 / h
+    f = force[0] - 0.5 * slope[0]
+    s = slope[0]
+    end = 0.0
+    mean = 0.0
+    rate = 0.0
+    for n in range(q.size):
+        u = shape[0, n]
+        a12 = lanes[1, n]
+        first = lanes[4, n]
+        second = lanes[5, n]
+        x = free_q[n] - u * h * (f * first + s * second)
+        v = free_p[n] - u * (f * a12 + s * first)
+        q[n] = x
+        p[n] = v
+        g = bias[n]
+        new_x = lanes[0, n] * x + a12 * v + h * first * g
+        new_v = lanes[2, n] * x + lanes[3, n] * v + a12 * g
+        free_q[n] = new_x
+        free_p[n] = new_v
+        end += u * new_x
+        rate += u * new_v
+        mean += u * (part * a12 * x + first * (v + twice[n] * x) + h * second * g)
+    out_end[0, 0] = offset[0] + end
+    out_end[1, 0] = offset[0] + mean
+    out_end[2, 0] = rate
+
+
+@inner(allocates=True)
 def free_flight(omega, zeta, bias, time, q, p):
     """Advance a state in place by the exact motion without contact."""
     n_modes = omega.size
@@ -963,7 +1020,7 @@ def glide(table, q, p):
         p[n] = table[2, n] * q0 + table[3, n] * p0 + table[5, n]
 
 
-@inner()
+@inner(allocates=True)
 def glide_table(omega, zeta, bias, h, out_table):
     """Table for `glide` over h."""
     n_modes = omega.size
@@ -982,7 +1039,7 @@ def glide_table(omega, zeta, bias, h, out_table):
             out_table[5, n] = bias[n] * a12
 
 
-@inner()
+@inner(allocates=True)
 def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, still, tables, known, q, p):
     """Advance a state without contact in place to the next onset, never passing one (conservative advancement).
 
@@ -1106,11 +1163,10 @@ def hermite_root(d0, v0, d1, v1, h):
 
 
 @inner()
-def try_step(ramp, h, table, sums, shape, offset, bias, law, q, p, now, free_q, free_p, end, work, y, f, s, rate):
-    """Solve one step of length h from the state; return 1 for A4, 0 for A (asked for, or fallen back to)."""
+def solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate):
+    """Solve one step of length h from its prediction; return 1 for A4, 0 for A (asked for, or fallen back to)."""
     m = y.size
-    predict(shape, table, offset, bias, q, p, free_q, free_p, end)
-    fine = 0
+    sums = all_sums[slot]
     if m == 1 and ramp and (now[0, 0] > 0.0 or end[0, 0] > 0.0):
         settled, y[0], f[0], s[0] = solve_ramp(
             h, now[0, 0], now[1, 0], now[2, 0], now[3, 0], now[4, 0], end[0, 0], end[1, 0], end[2, 0], sums, law
@@ -1124,6 +1180,7 @@ def try_step(ramp, h, table, sums, shape, offset, bias, law, q, p, now, free_q, 
         s[i] = 0.0
         if f[i] > 0.0:
             pressed = True
+    fine = 0
     if ramp and pressed and m > 1:
         keep = work[4, 1]
         for i in range(m):
@@ -1144,7 +1201,7 @@ def try_step(ramp, h, table, sums, shape, offset, bias, law, q, p, now, free_q, 
     return fine
 
 
-@inner()
+@inner(allocates=True)
 def resized(array, n, length):
     """The first n rows of an array in a new one of another length."""
     result = np.empty((length, array.shape[1]))
@@ -1155,11 +1212,14 @@ def resized(array, n, length):
 
 
 @inner()
-def modal_energy(omega, bias, q, p):
-    """Kinetic and strain energy less the work of the bias force."""
+def total_energy(omega, bias, law, q, p, now):
+    """Kinetic and strain energy less the work of the bias force, and what the contacts store."""
     total = 0.0
     for n in range(q.size):
         total += 0.5 * (p[n] * p[n] + (omega[n] * q[n]) ** 2) - bias[n] * q[n]
+    for i in range(law.shape[0]):
+        _, _, stored = law_at(now[0, i], law, i)
+        total += stored
     return total
 
 
@@ -1169,6 +1229,149 @@ def crossed(pressed, d0, v0, y, depth, still):
     if pressed:
         return y < -depth
     return y > depth and (d0 < 0.0 or v0 < -still)
+
+
+@inner()
+def first_crossing(now, pressed, y, rate, h, depth, still):
+    """The contact that opened or closed first within a step, and when by the cubic; -1 and h where none did."""
+    target = -1
+    at = h
+    for i in range(y.size):
+        if crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
+            root = hermite_root(now[0, i], now[4, i], y[i], rate[i], h)
+            if root <= at:
+                at = root
+                target = i
+    return target, at
+
+
+@inner()
+def dipped(now, pressed, y, rate, h, i):
+    """Whether contact i opened and closed again, or the other way round, within a step, by its cubic."""
+    d0 = now[0, i]
+    v0 = now[4, i]
+    if pressed[i]:
+        if y[i] > 0.0 and v0 < 0.0 < rate[i]:
+            low, _ = hermite_extreme(d0, v0, y[i], rate[i], h)
+            return low < -1e-9 * max(d0, y[i])
+    elif y[i] <= 0.0 and v0 > 0.0 > rate[i]:
+        _, high = hermite_extreme(d0, v0, y[i], rate[i], h)
+        return high > 1e-9 * max(-d0, -y[i])
+    return False
+
+
+@inner()
+def narrow(now, pressed, y, rate, h, depth, still, target, bracket):
+    """Next length of a step that is to end where a contact opens or closes, from a try of length h.
+
+    Returns (target, length), the length zero where the try was good; the target is an earlier crossing if the try
+    showed one. ``bracket`` holds the lengths between which the crossing lies and the size of the approach.
+    """
+    for i in range(y.size):
+        if i != target and crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
+            bracket[0] = 0.0
+            bracket[1] = h
+            bracket[2] = abs(now[0, i]) + abs(y[i])
+            guess = hermite_root(now[0, i], now[4, i], y[i], rate[i], h)
+            return i, guess if guess < h else 0.5 * h
+    miss = y[target]
+    if abs(miss) <= LOCATED * bracket[2] or bracket[1] - bracket[0] <= 4e-16 * bracket[1]:
+        return target, 0.0
+    if (miss > 0.0) != pressed[target]:
+        bracket[1] = h
+    else:
+        bracket[0] = h
+    guess = bracket[0]
+    v = rate[target]
+    if v != 0.0:
+        turn = (6.0 * (now[0, target] - miss) / h + 2.0 * now[4, target] + 4.0 * v) / h
+        wait = -miss / v
+        guess = h + wait - 0.5 * turn * wait * wait / v
+    if abs(guess - h) <= 4e-16 * h:
+        return target, 0.0
+    if not bracket[0] < guess < bracket[1]:
+        guess = 0.5 * (bracket[0] + bracket[1])
+    return target, guess
+
+
+@inner()
+def settle(now, pressed, y, rate, target, depth, still):
+    """Take over approaches and rates at a step's end; the number of contacts that opened."""
+    opened = 0
+    for i in range(y.size):
+        was = pressed[i]
+        now[0, i] = y[i]
+        now[4, i] = rate[i]
+        if i == target:
+            now[0, i] = 0.0
+            pressed[i] = not was
+        elif abs(y[i]) <= depth:
+            now[0, i] = 0.0
+            pressed[i] = rate[i] > still or (was and rate[i] >= -still)
+        else:
+            pressed[i] = y[i] > 0.0
+        if was and not pressed[i]:
+            opened += 1
+    return opened
+
+
+@inner()
+def begin(shape, offset, q, p, now, pressed):
+    """Approach and rate of every contact at the start, and whether it is pressed."""
+    for i in range(offset.size):
+        now[0, i], now[4, i] = approach(shape, offset, i, q, p)
+        pressed[i] = now[0, i] > 0.0 or (now[0, i] == 0.0 and now[4, i] > 0.0)
+
+
+@inner(allocates=True)
+def fly(
+    omega, zeta, shape, offset, bias, time, horizon, base, shortest, depth, still, flights, flown, row, stride, now,
+    pressed, q, p,
+):  # fmt: skip
+    """Free flight to the next onset, written to a row of the steps; status as in `find_onset`.
+
+    A state from which nothing touches again is left as it was.
+    """
+    old_q = q.copy()
+    old_p = p.copy()
+    row[:] = 0.0
+    for i in range(offset.size):
+        row[3 + stride * i] = now[0, i]
+        row[4 + stride * i] = now[4, i]
+    elapsed, first, found = find_onset(
+        omega, zeta, shape, offset, bias, horizon - time, base, shortest, depth, still, flights, flown, q, p
+    )
+    if found == 1:
+        q[:] = old_q
+        p[:] = old_p
+        return 0.0, found
+    row[0] = time
+    row[1] = elapsed
+    for i in range(offset.size):
+        now[0, i], now[4, i] = approach(shape, offset, i, q, p)
+        now[0, i] = min(0.0, now[0, i])
+    if found == 0:
+        now[0, first] = 0.0
+        pressed[first] = True
+    return elapsed, found
+
+
+@inner()
+def record(row, time, h, blind, sums, now, end, y, f, s, done):
+    """Write a step of the energy-exact schemes to a row of the steps, and add up its work."""
+    row[0] = time
+    row[1] = h
+    row[2] = 1.0 if blind else 0.0
+    for i in range(y.size):
+        row[3 + 5 * i] = now[0, i]
+        row[4 + 5 * i] = now[4, i]
+        row[5 + 5 * i] = 1.0 if f[i] > 0.0 else 0.0
+        row[6 + 5 * i] = f[i] - 0.5 * s[i]
+        row[7 + 5 * i] = s[i]
+        mean = end[1, i]
+        for j in range(y.size):
+            mean -= sums[2, i, j] * f[j] + sums[3, i, j] * s[j]
+        done[i] += f[i] * (y[i] - now[0, i]) + s[i] * (0.5 * (now[0, i] + y[i]) - mean)
 
 
 @outer()
@@ -1192,11 +1395,10 @@ def run_energy(
     p = start_p.copy()
     free_q = np.empty(n_modes)
     free_p = np.empty(n_modes)
-    tables = np.empty((LEVELS, N_TABLE, n_modes))
-    all_sums = np.empty((LEVELS, 6, m, m))
-    known = np.zeros(LEVELS)
-    odd_table = np.empty((N_TABLE, n_modes))
-    odd_sums = np.empty((6, m, m))
+    twice = 2.0 * zeta * omega
+    tables = np.empty((LEVELS + 1, N_LANE, n_modes))
+    all_sums = np.empty((LEVELS + 1, 6, m, m))
+    known = np.zeros(LEVELS + 1)
     now = np.zeros((5, m))
     end = np.empty((3, m))
     work = np.zeros((5, max(4, 2 * m), max(4, 2 * m)))
@@ -1205,6 +1407,7 @@ def run_energy(
     s = np.empty(m)
     rate = np.empty(m)
     pressed = np.zeros(m, np.bool_)
+    bracket = np.empty(3)
     flights = np.empty((GLIDES, 6, n_modes))
     flown = np.zeros(GLIDES)
     done = np.zeros(m)
@@ -1216,21 +1419,14 @@ def run_energy(
     n_looks = 0
     level = 0
     events = 0
+    ready = -1  # slot of the table with which the coming step is predicted already
     reset = 0.0
     time = 0.0
     stalled = False
     status = EXHAUSTED
-    start_energy = 0.0
-    quiet = True
-    for n in range(n_modes):
-        if bias[n] != 0.0:
-            quiet = False
-    for i in range(m):
-        now[0, i], now[4, i] = approach(shape, offset, i, q, p)
-        pressed[i] = now[0, i] > 0.0 or (now[0, i] == 0.0 and now[4, i] > 0.0)
-        _, _, stored = law_at(now[0, i], law, i)
-        start_energy += stored
-    start_energy += modal_energy(omega, bias, q, p)
+    quiet = not bias.any()
+    begin(shape, offset, q, p, now, pressed)
+    start_energy = total_energy(omega, bias, law, q, p, now)
     while n_steps < max_steps:
         if time >= horizon:
             status = HORIZON
@@ -1240,43 +1436,20 @@ def run_energy(
             break
         if n_steps + 1 >= steps.shape[0]:
             steps = resized(steps, n_steps, 2 * steps.shape[0])
-        idle = True
-        for i in range(m):
-            if pressed[i]:
-                idle = False
-        if idle and not stalled:
-            for n in range(n_modes):
-                free_q[n] = q[n]
-                free_p[n] = p[n]
-            for i in range(m):
-                steps[n_steps, 3 + 5 * i] = now[0, i]
-                steps[n_steps, 4 + 5 * i] = now[4, i]
-                steps[n_steps, 5 + 5 * i] = 0.0
-                steps[n_steps, 6 + 5 * i] = 0.0
-                steps[n_steps, 7 + 5 * i] = 0.0
-            elapsed, first, found = find_onset(
-                omega, zeta, shape, offset, bias, horizon - time, base, 1e-3 * base, depth, still, flights, flown, q, p
-            )
+        if not stalled and not pressed.any():
+            elapsed, found = fly(
+                omega, zeta, shape, offset, bias, time, horizon, base, 1e-3 * base, depth, still, flights, flown,
+                steps[n_steps], 5, now, pressed, q, p,
+            )  # fmt: skip
+            ready = -1
             if found == 1:
-                for n in range(n_modes):
-                    q[n] = free_q[n]
-                    p[n] = free_p[n]
                 status = FINISHED
-                break
-            if found == 4:
+            if found == 1 or found == 4:
                 break
             if elapsed > 0.0:
-                steps[n_steps, 0] = time
-                steps[n_steps, 1] = elapsed
-                steps[n_steps, 2] = 0.0
                 n_steps += 1
                 time += elapsed
-            for i in range(m):
-                now[0, i], now[4, i] = approach(shape, offset, i, q, p)
-                now[0, i] = min(0.0, now[0, i])
             if found == 0:
-                now[0, first] = 0.0
-                pressed[first] = True
                 events += 1
             stalled = found == 3
             continue
@@ -1284,91 +1457,51 @@ def run_energy(
         if blind:
             level = 0
         h = base * 0.5**level
-        if h <= horizon - time:
-            if known[level] == 0.0:
-                step_table(omega, zeta, h, tables[level])
-                contact_sums(shape, tables[level], all_sums[level])
-                known[level] = 1.0
-            table = tables[level]
-            sums = all_sums[level]
-        else:
+        slot = level
+        if h > horizon - time:
             h = horizon - time
-            step_table(omega, zeta, h, odd_table)
-            contact_sums(shape, odd_table, odd_sums)
-            table = odd_table
-            sums = odd_sums
+            slot = LEVELS
+        if slot == LEVELS or known[slot] == 0.0:
+            lane_table(omega, zeta, h, tables[slot])
+            contact_sums(shape, tables[slot], h, all_sums[slot])
+            known[slot] = 1.0
+        if ready != slot:
+            predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, end)
+        ready = -1
         for i in range(m):
             now[1, i], now[2, i], now[3, i] = law_at(now[0, i], law, i)
-        fine = try_step(
-            ramp, h, table, sums, shape, offset, bias, law, q, p, now, free_q, free_p, end, work, y, f, s, rate
-        )
+        fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
         target = -1
         if not blind:
             shorter = 0
             for i in range(m):
-                d0 = now[0, i]
-                low, high = hermite_extreme(d0, now[4, i], y[i], rate[i], h)
-                if pressed[i]:
-                    if y[i] <= 0.0 and d0 == 0.0:
-                        if now[4, i] > still:
-                            shorter = max(shorter, 3 if level == 0 else 1)
-                    elif y[i] > 0.0 and now[4, i] < 0.0 < rate[i] and low < -1e-9 * max(d0, y[i]):
-                        shorter = max(shorter, 1)
-                elif y[i] <= 0.0 and now[4, i] > 0.0 > rate[i] and high > 1e-9 * max(-d0, -y[i]):
+                if pressed[i] and y[i] <= 0.0 and now[0, i] == 0.0:
+                    if now[4, i] > still:
+                        shorter = max(shorter, 3 if level == 0 else 1)
+                elif dipped(now, pressed, y, rate, h, i):
                     shorter = max(shorter, 1)
-                if crossed(pressed[i], d0, now[4, i], y[i], depth, still):
-                    target = i
             if shorter > 0 and level + shorter < LEVELS:
                 level += shorter
                 continue
             if shorter > 0:
                 blind = True
-                target = -1
+            else:
+                target, guess = first_crossing(now, pressed, y, rate, h, depth, still)
         if target >= 0:
-            low = 0.0
-            high = h
-            guess = h
-            for i in range(m):
-                if crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
-                    root = hermite_root(now[0, i], now[4, i], y[i], rate[i], h)
-                    if root <= guess:
-                        guess = root
-                        target = i
-            scale = abs(now[0, target]) + abs(y[target])
-            table = odd_table
-            sums = odd_sums
+            bracket[0] = 0.0
+            bracket[1] = h
+            bracket[2] = abs(now[0, target]) + abs(y[target])
+            slot = LEVELS
             for _ in range(LOCATE_LIMIT):
                 h = guess
-                step_table(omega, zeta, h, odd_table)
-                contact_sums(shape, odd_table, odd_sums)
-                fine = try_step(
-                    ramp, h, table, sums, shape, offset, bias, law, q, p, now, free_q, free_p, end, work, y, f, s, rate
-                )
-                early = -1
-                for i in range(m):
-                    if i != target and crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
-                        early = i
-                if early >= 0:
-                    target = early
-                    high = h
-                    low = 0.0
-                    scale = abs(now[0, target]) + abs(y[target])
-                    guess = hermite_root(now[0, target], now[4, target], y[target], rate[target], h)
-                    if guess >= high:
-                        guess = 0.5 * high
-                    continue
-                if abs(y[target]) <= 1e-13 * scale or high - low <= 4e-16 * high:
+                lane_table(omega, zeta, h, tables[slot])
+                contact_sums(shape, tables[slot], h, all_sums[slot])
+                predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, end)
+                fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
+                target, guess = narrow(now, pressed, y, rate, h, depth, still, target, bracket)
+                if guess == 0.0:
                     break
-                if (y[target] > 0.0) != pressed[target]:
-                    high = h
-                else:
-                    low = h
-                guess = h - y[target] / rate[target] if rate[target] != 0.0 else low
-                if abs(guess - h) <= 4e-16 * h:
-                    break
-                if not low < guess < high:
-                    guess = 0.5 * (low + high)
-            if not abs(y[target]) <= 1e-9 * scale:
+            if not abs(y[target]) <= 1e-9 * bracket[2]:
                 target = -1
                 blind = True
         total = 0.0
@@ -1377,63 +1510,35 @@ def run_energy(
         if not total < 1e300:
             status = FAILED
             break
-        steps[n_steps, 0] = time
-        steps[n_steps, 1] = h
-        steps[n_steps, 2] = 1.0 if blind else 0.0
-        for i in range(m):
-            steps[n_steps, 3 + 5 * i] = now[0, i]
-            steps[n_steps, 4 + 5 * i] = now[4, i]
-            steps[n_steps, 5 + 5 * i] = 1.0 if f[i] > 0.0 else 0.0
-            steps[n_steps, 6 + 5 * i] = f[i] - 0.5 * s[i]
-            steps[n_steps, 7 + 5 * i] = s[i]
-            mean = end[1, i]
-            for j in range(m):
-                mean -= sums[2, i, j] * f[j] + sums[3, i, j] * s[j]
-            done[i] += f[i] * (y[i] - now[0, i]) + s[i] * (0.5 * (now[0, i] + y[i]) - mean)
+        record(steps[n_steps], time, h, blind, all_sums[slot], now, end, y, f, s, done)
         n_steps += 1
-        if ramp and fine == 0:
-            for i in range(m):
-                if f[i] > 0.0:
-                    n_fallback += 1
-                    break
+        if ramp and fine == 0 and f.any():
+            n_fallback += 1
         if blind:
             n_blind += 1
-        commit(shape, table, f, s, free_q, free_p, q, p)
         time += h
-        for i in range(m):
-            was = pressed[i]
-            now[0, i] = y[i]
-            now[4, i] = rate[i]
-            if i == target:
-                now[0, i] = 0.0
-                pressed[i] = not was
-                events += 1
-            elif abs(y[i]) <= depth:
-                now[0, i] = 0.0
-                pressed[i] = rate[i] > still or (was and rate[i] >= -still)
-            else:
-                pressed[i] = y[i] > 0.0
-            if was and not pressed[i]:
-                n_released += 1
-        if target < 0 and level > 0:
+        n_released += settle(now, pressed, y, rate, target, depth, still)
+        if target >= 0:
+            events += 1
+        elif level > 0:
             level -= 1
+        if m == 1 and slot == level and pressed[0] and time + h <= horizon:
+            advance(shape, tables, slot, h, twice, offset, bias, f, s, q, p, free_q, free_p, end)
+            ready = slot
+        else:
+            commit(shape, tables, slot, h, f, s, free_q, free_p, q, p)
         if time - reset > base:
             reset = time
             events = 0
         stalled = False
         n_looks += 1
-        if quiet and n_looks % 512 == 0:
-            energy = modal_energy(omega, bias, q, p)
-            for i in range(m):
-                _, _, stored = law_at(now[0, i], law, i)
-                energy += stored
-            if energy <= 1e-24 * start_energy:
-                status = SETTLED
-                break
+        if quiet and n_looks % 512 == 0 and total_energy(omega, bias, law, q, p, now) <= 1e-24 * start_energy:
+            status = SETTLED
+            break
     return resized(steps, n_steps, n_steps), q, p, now, done, time, status, n_fallback, n_blind
 
 
-@inner()
+@inner(allocates=True)
 def collocation_table(omega, zeta, shape, h, nodes, powers, out_free, out_end, out_inner):
     """Coefficients of one collocation step of length h.
 
@@ -1518,7 +1623,7 @@ def smooth_force(x, v, law, i):
     return f * factor, slope * factor, f * loss
 
 
-@inner()
+@inner(allocates=True)
 def solve_collocation(inner, law, pressed, free_d, free_v, matrix, vector, out_f):
     """Forces at the nodes (s, n_contacts) by Newton's method from those in out_f; False where it does not settle."""
     s, m = out_f.shape
@@ -1647,6 +1752,7 @@ def run_collocation(
     p = start_p.copy()
     new_q = np.empty(n_modes)
     new_p = np.empty(n_modes)
+    bracket = np.empty(3)
     table_free = np.empty((LEVELS, s + 1, 5, n_modes))
     table_last = np.empty((LEVELS, 2 * s, n_modes))
     table_inner = np.empty((LEVELS, 2, s, s, m, m))
@@ -1690,16 +1796,9 @@ def run_collocation(
     time = 0.0
     status = EXHAUSTED
     limit = tolerance * speed
-    quiet = True
-    for n in range(n_modes):
-        if bias[n] != 0.0:
-            quiet = False
-    start_energy = modal_energy(omega, bias, q, p)
-    for i in range(m):
-        now[0, i], now[4, i] = approach(shape, offset, i, q, p)
-        pressed[i] = now[0, i] > 0.0 or (now[0, i] == 0.0 and now[4, i] > 0.0)
-        _, _, stored = law_at(now[0, i], law, i)
-        start_energy += stored
+    quiet = not bias.any()
+    begin(shape, offset, q, p, now, pressed)
+    start_energy = total_energy(omega, bias, law, q, p, now)
     while n_steps < max_steps:
         if time >= horizon:
             status = HORIZON
@@ -1709,47 +1808,24 @@ def run_collocation(
             break
         if n_steps + 1 >= steps.shape[0]:
             steps = resized(steps, n_steps, 2 * steps.shape[0])
-        for j in range(steps.shape[1]):
-            steps[n_steps, j] = 0.0
-        for i in range(m):
-            steps[n_steps, 3 + stride * i] = now[0, i]
-            steps[n_steps, 4 + stride * i] = now[4, i]
-        idle = True
-        for i in range(m):
-            if pressed[i]:
-                idle = False
-        if idle:
-            for n in range(n_modes):
-                new_q[n] = q[n]
-                new_p[n] = p[n]
-            elapsed, first, found = find_onset(
-                omega, zeta, shape, offset, bias, horizon - time, base, 1e-6 * base, depth, still, flights, flown, q, p
-            )
+        if not pressed.any():
+            elapsed, found = fly(
+                omega, zeta, shape, offset, bias, time, horizon, base, 1e-6 * base, depth, still, flights, flown,
+                steps[n_steps], stride, now, pressed, q, p,
+            )  # fmt: skip
             if found == 1:
-                for n in range(n_modes):
-                    q[n] = new_q[n]
-                    p[n] = new_p[n]
                 status = FINISHED
                 break
             if elapsed > 0.0:
-                steps[n_steps, 0] = time
-                steps[n_steps, 1] = elapsed
                 n_steps += 1
                 time += elapsed
             if found >= 3:
                 status = FAILED if found == 3 else EXHAUSTED
                 break
-            for i in range(m):
-                now[0, i], now[4, i] = approach(shape, offset, i, q, p)
-                now[0, i] = min(0.0, now[0, i])
             if found == 0:
-                now[0, first] = 0.0
-                pressed[first] = True
                 events += 1
                 level = min(LEVELS - 2, level + 4)
-                for a in range(s):
-                    for i in range(m):
-                        guess[a, i] = 0.0
+                guess[:] = 0.0
             continue
         n_tries += 1
         if n_tries > 64 * LEVELS or events > 64 * EVENT_LIMIT:
@@ -1782,23 +1858,18 @@ def run_collocation(
         else:
             for i in range(m):
                 d0 = now[0, i]
-                low, high = hermite_extreme(d0, now[4, i], y[i], rate[i], h)
-                if pressed[i]:
-                    if y[i] <= 0.0 and d0 == 0.0:
-                        if now[4, i] > still and level < LEVELS - 2:
-                            shorter = max(shorter, 1)
-                        else:
-                            pressed[i] = False
-                            again = True
-                    elif y[i] > 0.0 and now[4, i] < 0.0 < rate[i] and low < -1e-9 * max(d0, y[i]):
-                        shorter = max(shorter, 1)
-                elif d0 == 0.0 and now[4, i] >= -still and y[i] > depth:
+                if pressed[i] and y[i] <= 0.0 and d0 == 0.0:
+                    if now[4, i] > still and level < LEVELS - 2:
+                        shorter = 1
+                    else:
+                        pressed[i] = False
+                        again = True
+                elif not pressed[i] and d0 == 0.0 and now[4, i] >= -still and y[i] > depth:
                     pressed[i] = True
                     again = True
-                elif y[i] <= 0.0 and now[4, i] > 0.0 > rate[i] and high > 1e-9 * max(-d0, -y[i]) and level < LEVELS - 2:
-                    shorter = max(shorter, 1)
-                if crossed(pressed[i], d0, now[4, i], y[i], depth, still):
-                    target = i
+                elif dipped(now, pressed, y, rate, h, i) and (pressed[i] or level < LEVELS - 2):
+                    shorter = 1
+            target, root = first_crossing(now, pressed, y, rate, h, depth, still)
         if again:
             continue
         if shorter > 0:
@@ -1806,27 +1877,18 @@ def run_collocation(
                 status = FAILED
                 break
             level += shorter
-            for a in range(s):
-                for i in range(m):
-                    guess[a, i] = 0.0
+            guess[:] = 0.0
             continue
         if target >= 0:
-            low = 0.0
-            high = h
-            root = h
-            for i in range(m):
-                if crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
-                    at = hermite_root(now[0, i], now[4, i], y[i], rate[i], h)
-                    if at <= root:
-                        root = at
-                        target = i
             if misfit > limit and root > 0.25 * h and root < 0.9 * h:
                 level += 1
                 if level >= LEVELS:
                     status = FAILED
                     break
                 continue
-            scale = abs(now[0, target]) + abs(y[target])
+            bracket[0] = 0.0
+            bracket[1] = h
+            bracket[2] = abs(now[0, target]) + abs(y[target])
             free = odd_free
             last = odd_last
             inner = odd_inner
@@ -1843,31 +1905,10 @@ def run_collocation(
                 )  # fmt: skip
                 if misfit == np.inf:
                     break
-                early = -1
-                for i in range(m):
-                    if i != target and crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
-                        early = i
-                if early >= 0:
-                    target = early
-                    high = h
-                    low = 0.0
-                    scale = abs(now[0, target]) + abs(y[target])
-                    root = hermite_root(now[0, target], now[4, target], y[target], rate[target], h)
-                    if root >= high:
-                        root = 0.5 * high
-                    continue
-                if abs(y[target]) <= 4e-16 * scale or high - low <= 4e-16 * high:
+                target, root = narrow(now, pressed, y, rate, h, depth, still, target, bracket)
+                if root == 0.0:
                     break
-                if (y[target] > 0.0) != pressed[target]:
-                    high = h
-                else:
-                    low = h
-                root = h - y[target] / rate[target] if rate[target] != 0.0 else low
-                if abs(root - h) <= 2e-16 * h:
-                    break
-                if not low < root < high:
-                    root = 0.5 * (low + high)
-            if misfit == np.inf or not abs(y[target]) <= 1e-9 * scale:
+            if misfit == np.inf or not abs(y[target]) <= 1e-9 * bracket[2]:
                 level += 1
                 if level >= LEVELS:
                     status = FAILED
@@ -1879,9 +1920,12 @@ def run_collocation(
                 level += 1
             continue
         n_tries = 0
+        steps[n_steps] = 0.0
         steps[n_steps, 0] = time
         steps[n_steps, 1] = h
         for i in range(m):
+            steps[n_steps, 3 + stride * i] = now[0, i]
+            steps[n_steps, 4 + stride * i] = now[4, i]
             if pressed[i]:
                 steps[n_steps, 5 + stride * i] = 1.0
                 for k in range(s):
@@ -1900,9 +1944,8 @@ def run_collocation(
                 done[i] += weight * h * f[a, i] * v
         n_steps += 1
         time += h
-        for n in range(n_modes):
-            q[n] = new_q[n]
-            p[n] = new_p[n]
+        q[:] = new_q
+        p[:] = new_p
         for i in range(m):
             for a in range(s):
                 ahead = 0.0
@@ -1911,35 +1954,18 @@ def run_collocation(
                     for k in range(s - 1, -1, -1):
                         ahead = ahead * position + coefficients[k] if m == 1 else f[s - 1, i]
                 guess[a, i] = max(0.0, ahead)
-        for i in range(m):
-            was = pressed[i]
-            now[0, i] = y[i]
-            now[4, i] = rate[i]
-            if i == target:
-                now[0, i] = 0.0
-                pressed[i] = not was
-                events += 1
-            elif abs(y[i]) <= depth:
-                now[0, i] = 0.0
-                pressed[i] = rate[i] > still or (was and rate[i] >= -still)
-            elif was and y[i] <= 0.0:
-                pressed[i] = False
-            if was and not pressed[i]:
-                n_released += 1
+        n_released += settle(now, pressed, y, rate, target, depth, still)
+        if target >= 0:
+            events += 1
         if target < 0 and level > 0 and misfit < limit * 0.25 * 0.5**s:
             level -= 1
         if time - reset > base:
             reset = time
             events = 0
         n_looks += 1
-        if quiet and n_looks % 512 == 0:
-            energy = modal_energy(omega, bias, q, p)
-            for i in range(m):
-                _, _, stored = law_at(now[0, i], law, i)
-                energy += stored
-            if energy <= 1e-24 * start_energy:
-                status = SETTLED
-                break
+        if quiet and n_looks % 512 == 0 and total_energy(omega, bias, law, q, p, now) <= 1e-24 * start_energy:
+            status = SETTLED
+            break
     return resized(steps, n_steps, n_steps), q, p, now, done, time, status, 0, 0
 
 
@@ -2080,8 +2106,6 @@ def run_secular(
         rest += weight[j] * settled[j]
     q = start_q.copy()
     p = start_p.copy()
-    old_q = np.empty(n_modes)
-    old_p = np.empty(n_modes)
     a = np.empty(n_groups)
     b = np.empty(n_groups)
     x = np.empty(n_groups)
@@ -2097,8 +2121,8 @@ def run_secular(
     n_released = 0
     time = 0.0
     status = EXHAUSTED
-    d, r = approach(shape, offset, 0, q, p)
-    pressed = d > 0.0 or (d == 0.0 and r > 0.0)
+    pressed = np.zeros(1, np.bool_)
+    begin(shape, offset, q, p, now, pressed)
     while n_steps < max_steps:
         if time >= horizon:
             status = HORIZON
@@ -2108,36 +2132,20 @@ def run_secular(
             break
         if n_steps + 1 >= steps.shape[0]:
             steps = resized(steps, n_steps, 2 * steps.shape[0])
-        for n in range(n_modes):
-            old_q[n] = q[n]
-            old_p[n] = p[n]
-        if not pressed:
-            elapsed, _, found = find_onset(
-                omega, zeta, shape, offset, bias, horizon - time, base, 1e-6 * base, depth, still, flights, flown, q, p
-            )
+        if not pressed[0]:
+            elapsed, found = fly(
+                omega, zeta, shape, offset, bias, time, horizon, base, 1e-6 * base, depth, still, flights, flown,
+                steps[n_steps], stride, now, pressed, q, p,
+            )  # fmt: skip
             if found == 1:
-                for n in range(n_modes):
-                    q[n] = old_q[n]
-                    p[n] = old_p[n]
                 status = FINISHED
                 break
             if elapsed > 0.0:
-                for j in range(steps.shape[1]):
-                    steps[n_steps, j] = 0.0
-                steps[n_steps, 0] = time
-                steps[n_steps, 1] = elapsed
-                steps[n_steps, 3] = d
-                steps[n_steps, 4] = r
                 n_steps += 1
                 time += elapsed
             if found >= 3:
                 status = FAILED if found == 3 else EXHAUSTED
                 break
-            d, r = approach(shape, offset, 0, q, p)
-            d = min(d, 0.0)
-            if found == 0:
-                d = 0.0
-                pressed = True
             continue
         for i in range(n_groups):
             a[i] = 0.0
@@ -2156,7 +2164,8 @@ def run_secular(
             hardest += abs(weight[j]) * square[j] * np.sqrt(x[j] * x[j] + v[j] * v[j] / square[j])
         elapsed = 0.0
         left = horizon - time
-        dt, rt = d, r
+        dt = now[0, 0]
+        rt = now[4, 0]
         released = False
         for _ in range(LOOK_LIMIT // (n_groups + 50)):
             wait = quadratic_wait(-dt, -rt, hardest)
@@ -2196,7 +2205,7 @@ def run_secular(
             steps[n_steps, 1] = h
             steps[n_steps, 3], steps[n_steps, 4] = secular_approach(rate, weight, x, v, rest, part * h)
             if part == 0:
-                steps[n_steps, 3] = d
+                steps[n_steps, 3] = now[0, 0]
             steps[n_steps, 5] = 1.0
             for c in range(s):
                 value, speed = secular_approach(rate, weight, x, v, rest, (part + nodes[c]) * h)
@@ -2233,17 +2242,15 @@ def run_secular(
                 q[n] += shape[0, n] / amplitude[group[n]] * a[group[n]]
                 p[n] += shape[0, n] / amplitude[group[n]] * b[group[n]]
         time += elapsed
-        d, r = approach(shape, offset, 0, q, p)
+        now[0, 0], now[4, 0] = approach(shape, offset, 0, q, p)
         if released:
-            d = 0.0
-            pressed = False
+            now[0, 0] = 0.0
+            pressed[0] = False
             n_released += 1
-    now[0, 0] = d
-    now[4, 0] = r
     return resized(steps, n_steps, n_steps), q, p, now, done, time, status, 0, 0
 
 
-@inner()
+@inner(allocates=True)
 def push(omega, zeta, shape, bias, row, n_coefficients, length, q, p, out_q, out_p):
     """State after a part of a step, (n_modes,), from the step's start; exact for its polynomial forces."""
     if length <= 0.0:
