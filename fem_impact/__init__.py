@@ -28,7 +28,7 @@ _HOME = {
 }
 _MODULES = (
     "mesh", "analytic", "spectra", "threshold", "accuracy", "export", "figures", "charts", "sound", "section",
-    "contact", "doctor", "maps", "atlas", "hammers",
+    "contact", "doctor", "maps", "atlas", "hammers", "report",
 )  # fmt: skip
 
 __all__ = [*_HOME, *_MODULES, "__version__"]

@@ -1,6 +1,7 @@
 """One wording for every input error, one place that decides what a valid number is."""
 
 import difflib
+import importlib
 import math
 from collections.abc import Iterable
 from dataclasses import fields
@@ -111,3 +112,12 @@ def lock_arrays(instance: Any) -> None:
         value = getattr(instance, field.name)
         if isinstance(value, np.ndarray):
             value.setflags(write=False)
+
+
+def extra(module: str, name: str, purpose: str) -> Any:
+    """The module of an optional extra; ValueError says how to install it."""
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        package = module.partition(".")[0]
+        raise ValueError(f"{purpose} needs {package}: pip install 'fem-impact[{name}]'") from None

@@ -36,7 +36,7 @@ SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` w
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; the exit status is 0, 2 for bad input, 1 for a run that failed, 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
-    plain = _prepare(os.environ, once=options.run in (_strike, _modes))
+    plain = _prepare(os.environ, once=options.run in (_strike, _modes, _report))
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that temporary files go away
     try:
@@ -133,6 +133,14 @@ def _parser() -> argparse.ArgumentParser:
     hammer.add_argument("--masses", metavar="KG", type=float, nargs="+", help="of the hammers (default: 1 g to 1 kg)")
     hammer.add_argument("--out", metavar="FILE", type=Path, help="write the picture there")
     hammer.add_argument("--json", action="store_true", help="print the numbers as JSON")
+
+    report = verbs.add_parser("report", help="strike a scene; write one page that holds everything about the blow")
+    report.set_defaults(run=_report)
+    report.add_argument(
+        "scene", metavar="SCENE|RESULT", type=Path, help="a TOML file, or the folder that `strike` wrote"
+    )
+    report.add_argument("--out", metavar="FILE", type=Path, help="where the page goes (default: out/NAME/report.html)")
+    report.add_argument("--tolerance", metavar="T", type=float, help="largest error accepted, instead of the scene's")
 
     doctor = verbs.add_parser("doctor", help="check this installation; say what to do about what fails")
     doctor.set_defaults(run=_doctor)
@@ -233,6 +241,19 @@ def _hammer(options: argparse.Namespace) -> None:
         print(f"{1e3 * hammer.mass:7.4g} g {soft:>14} {hard:>14} {reach:>11}")
     if options.out is not None:
         print(_wrapped(f"Files: {options.out}"))
+
+
+def _report(options: argparse.Namespace) -> None:
+    scene = fi.report.read(options.scene)
+    path = options.out if options.out is not None else Path("out") / options.scene.stem / "report.html"
+    changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
+    with fi.export.staged(path.parent) as staging:
+        run = scene.run(_progress, **changes)
+        with _progress("page"):
+            fi.report.write(staging / path.name, scene, run)
+    print(_wrapped(scene.title or str(scene.path)))
+    print(_wrapped(run.response.summary()))
+    print(_wrapped(f"Files: {path}"))
 
 
 def _modes(options: argparse.Namespace) -> None:

@@ -12,7 +12,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from . import _check, drawing, spectra
+from . import _check, drawing, spectra, svg
 from ._files import replacing
 from .modal import Modes
 from .response import Response
@@ -208,7 +208,7 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
     points, cells = drawing.grid(modes)
     shapes = modes.shapes.at(points)[:, :count]
     shapes = shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300)
-    rim = _rim(cells) if modes.dimension == 2 else None
+    rim = svg.rim(cells) if modes.dimension == 2 else None
     with _styled(2.2 * columns, 1.9 * rows) as figure:
         grid = figure.subplots(rows, columns, squeeze=False)
         for i, axes in enumerate(grid.flat):
@@ -233,12 +233,6 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
 
 def _frequency(value: float) -> str:
     return f"{value:.4g} Hz" if value < 1e4 else f"{value * 1e-3:.4g} kHz"
-
-
-def _rim(cells: np.ndarray) -> np.ndarray:
-    """Sides (n_sides, 2) that belong to one triangle only: the edge of the plate."""
-    sides, counts = np.unique(np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0, return_counts=True)
-    return sides[counts == 1]
 
 
 def _unflattened(shape: np.ndarray, cells: np.ndarray) -> np.ndarray:

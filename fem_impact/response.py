@@ -496,7 +496,7 @@ class Response:
 
     def summary(self) -> str:
         """The blow in a few lines a person can read."""
-        lines = [f"{self.n_impacts} impact{'s' if self.n_impacts != 1 else ''}, {self._outcome}"]
+        lines = [f"{self.n_impacts} impact{'s' if self.n_impacts != 1 else ''}, {self.outcome}"]
         lines += [
             f"  {impact.start * 1e3:9.4f} to {impact.end * 1e3:9.4f} ms: peak {impact.peak_force:.5g} N, "
             f"impulse {impact.impulse:.5g} N s"
@@ -520,7 +520,8 @@ class Response:
         return "\n".join(lines)
 
     @property
-    def _outcome(self) -> str:
+    def outcome(self) -> str:
+        """How it ended, in words."""
         words = {
             _kernels.FINISHED: "then separation for good (proved)",
             _kernels.HORIZON: "stopped at the duration asked for",

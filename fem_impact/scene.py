@@ -12,6 +12,7 @@ import numpy as np
 
 from . import _check, accuracy, analytic, assembly, integrator, modal
 from .contact import Contact
+from .mesh import Mesh
 from .modal import Modes
 from .response import Response
 from .section import Beam, Material, Plate
@@ -96,6 +97,10 @@ class Scene:
                 break
         return Run(response, MappingProxyType(stages.seconds), stages.notes)
 
+    def body(self) -> Mesh:
+        """The struck body's outline with its named edges."""
+        return self._make("mesh", self.mesh)
+
     @property
     def points(self) -> list[Any]:
         """Where one looks and listens, (n_points, dimension) [m]: those of [observe], else the strike point."""
@@ -153,7 +158,7 @@ class Scene:
 
     def _finite_elements(self, stages: "_Stages", tolerance: float) -> Finder:
         with stages("mesh"):
-            body = self._make("mesh", self.mesh)
+            body = self.body()
         stages.notes = body.notes
         with stages("assembly"):
             section = self._section("beam" if body.dimension == 1 else "plate")
@@ -279,7 +284,12 @@ def load_scene(path: str | Path) -> Scene:
         Where the file cannot be read.
     """
     path = Path(path)
-    tables = read_tables(path)
+    return scene_of(read_tables(path), path, folder=path.parent)
+
+
+def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
+    """The scene that tables describe, checked; ``path`` is named in errors, file names are relative to ``folder``."""
+    tables = dict(tables)
     title = tables.pop("title", "")
     if not isinstance(title, str):
         raise fault(path, f"title must be text, got {title!r:.80}")
@@ -291,7 +301,7 @@ def load_scene(path: str | Path) -> Scene:
     for name in REQUIRED:
         if name not in tables:
             raise fault(path, f"[{name}] is missing")
-    parts = {name: read_part(path, name, table) for name, table in tables.items()}
+    parts = {name: read_part(path, name, table, folder) for name, table in tables.items()}
     scene = Scene(path, title, blow=parts.pop("strike"), **parts)
     _check_whole(scene)
     return scene

@@ -141,8 +141,11 @@ def read_tables(path: Path) -> dict[str, Any]:
         raise fault(path, f"not valid TOML: {error}") from None
 
 
-def read_part(path: Path, table: str, values: dict[str, Any]) -> Part:
-    """One table with its keys checked against what its function takes; ValueError names file, table and key."""
+def read_part(path: Path, table: str, values: dict[str, Any], folder: Path) -> Part:
+    """One table with its keys checked against what its function takes; ValueError names file, table and key.
+
+    File names in it are relative to ``folder``.
+    """
 
     def wrong(text: str) -> ValueError:
         return fault(path, f"[{table}] {text}")
@@ -166,7 +169,7 @@ def read_part(path: Path, table: str, values: dict[str, Any]) -> Part:
     except ValueError as error:
         raise wrong(str(error)) from None
     if table == "mesh":
-        values.update({key: str(path.parent / values[key]) for key in PATHS if key in values})
+        values.update({key: str(folder / values[key]) for key in PATHS if key in values})
     return Part(kind, MappingProxyType(values))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "fem_impact"
 FLOORS = [
-    {"_check", "_files", "_kernels", "_batch", "farm"},
+    {"_check", "_files", "_kernels", "_batch", "farm", "svg"},
     {"outline", "curves", "boundary", "meshfile"},
     {"triangulation", "cad"},
     {"mesh", "section", "contact", "elements", "supports", "eigen"},
@@ -23,6 +23,7 @@ FLOORS = [
     {"integrator"},
     {"tables"},
     {"scene", "charts", "bounces"},
+    {"prose"},
     {"doctor", "report", "maps"},
     {"hammers"},
     {"atlas"},

@@ -1,0 +1,356 @@
+"""One self-contained HTML page from a strike: the scene, how far to trust it, what happened, how it sounds."""
+
+import base64
+import csv
+import io
+import json
+import math
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.io import wavfile
+
+from . import _check, drawing, export, sound, svg
+from ._files import replacing
+from .prose import place, power, si, words
+from .response import Response
+from .scene import Run, Scene, load_scene, scene_of
+from .tables import LARGEST_FILE
+
+BAND = (10.0, 20e3)  # [Hz] of the spectrum shown: about what is heard
+SPECTRUM_POINTS = 1000  # [-] one for each pixel
+ENERGY_TIMES = 400  # [-] instants of the energies
+FRAMES = 72  # [-] of the wave: three seconds at 24 a second
+SHAPES = 12  # [-] modes shown
+AFTER = 1.35  # [-] the wave and the energies are followed so far beyond the last contact
+RIBBON = 0.06  # [-] width over length of the ribbon a beam is drawn as
+DIGITS = 6  # [-] of the numbers in the plots; the downloads keep all
+QUIET = -20.0  # [dB] re full scale: a sound below is offered a second time, raised
+DISTANCE = 1.0  # [m] from the plate at which its radiated sound is heard
+PLAYED = 3.0  # [s] of sound at most: the page stays small
+MOST_POINTS = 4  # [-] observation points that get a player
+WEB = Path(__file__).parent / "web"
+
+
+def read(path: str | Path) -> Scene:
+    """The scene of a TOML file, or of what `fem-impact strike` wrote: response.json or the folder that holds it.
+
+    File names in a result are taken as they stand, relative to where the strike was run.
+    """
+    path = Path(path)
+    if path.is_dir():
+        path = path / "response.json"
+    if path.suffix.lower() != ".json":
+        return load_scene(path)
+    with open(path, "rb") as file:
+        raw = file.read(LARGEST_FILE + 1)
+    try:
+        data = json.loads(raw) if len(raw) <= LARGEST_FILE else None
+    except (ValueError, RecursionError):
+        data = None
+    if not isinstance(data, dict) or not isinstance(data.get("scene"), dict):
+        raise ValueError(
+            f"{path}: not a result of `fem-impact strike`; give its response.json, or the scene's TOML file"
+        )
+    return scene_of(data["scene"], path, folder=Path())
+
+
+def write(path: str | Path, scene: Scene, run: Run, *, command: str = "") -> None:
+    """Write the page of a strike.
+
+    Parameters
+    ----------
+    path : path of the HTML file
+    scene : Scene
+    run : Run, what `Scene.run` returned
+    command : str, what reproduces the result; by default the strike of the scene at the prompt
+
+    Raises
+    ------
+    ValueError
+        Where the extra ``web`` is not installed.
+    """
+    jinja2, plotly = (_check.extra(module, "web", "a report") for module in ("jinja2", "plotly.offline"))
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(WEB), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
+    )
+    response = run.response
+    page = environment.get_template("report.html").render(
+        title=scene.title or scene.path.stem,
+        words=words(scene, response),
+        picture=picture(scene),
+        verdict=response.outcome,
+        tiles=_tiles(response),
+        error=_errors(response),
+        modelled=_modelled(response, run),
+        notes=run.notes,
+        impacts=response.impacts,
+        energies=_shares(response),
+        sounds=_sounds(scene, response),
+        files=_downloads(scene, run),
+        versions=export.versions(),
+        command=command or f"fem-impact strike {shlex.quote(str(scene.path))} --tolerance {response.tolerance:g}",
+        force_picture=_force_picture(response),
+        data=_script_text(_plots(response)),
+        plotly=plotly.get_plotlyjs(),
+        style=(WEB / "report.css").read_text(encoding="utf-8"),
+        script=(WEB / "report.js").read_text(encoding="utf-8"),
+        si=si,
+        power=power,
+    )
+    with replacing(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def picture(scene: Scene) -> str:
+    """The struck body with its supports, strike point and points of observation, as SVG."""
+    at = np.atleast_1d(np.asarray(scene.blow.values["at"], float))
+    points = [] if scene.observe is None else [np.atleast_1d(np.asarray(p, float)) for p in scene.points]
+    listens = f", observed at {len(points)} point{'s' * (len(points) > 1)}" if points else ""
+    title = f"Outline of the struck body, struck at {place(at)}{listens}"
+    return svg.body(scene.body(), supports=scene.supports.values, at=at, points=points, title=title)
+
+
+def _tiles(response: Response) -> list[tuple[str, str]]:
+    met = response.error.total <= response.tolerance
+    total = power(response.error.total) if response.error.resolvable else "not resolvable"
+    return [
+        ("impacts", str(response.n_impacts)),
+        ("peak force", si(response.peak_force, "N")),
+        ("time in contact", si(response.contact_time, "s")),
+        ("impulse", si(response.impulse, "N s")),
+        ("restitution", f"{response.restitution:.4f}"),
+        ("estimated error" if met else "estimated error, above tolerance", total),
+    ]
+
+
+def _errors(response: Response) -> dict[str, Any]:
+    error = response.error
+    shares = [
+        ("time step", error.step, "by a second run of the same blow"),
+        ("modes left out", error.truncation, "by leaving out more of them"),
+        ("finite elements", error.mesh, "from the errors of the frequencies, weighed by energy"),
+    ]
+    scale = max(response.tolerance, *(value for _, value, _ in shares))
+    return {
+        "rows": [
+            {"name": name, "value": value, "how": how, "part": max(0.0, min(1.0, value / scale))}
+            for name, value, how in shares
+        ],
+        "total": error.total,
+        "tolerance": response.tolerance,
+        "limit": response.tolerance / scale,
+        "met": error.total <= response.tolerance,
+        "resolvable": error.resolvable,
+        "energy": response.energy_error,
+    }
+
+
+def _modelled(response: Response, run: Run) -> list[tuple[str, str]]:
+    modes = response.target
+    return [
+        ("modes of the struck body", f"{modes.n_modes}, up to {si(modes.frequencies[-1], 'Hz')}"),
+        ("time steps", f"{len(response.history.steps)}, scheme {response.scheme}"),
+        ("computing time", ", ".join(f"{name} {si(value, 's', 3)}" for name, value in run.seconds.items())),
+    ]
+
+
+def _shares(response: Response) -> list[dict[str, Any]]:
+    energies = response.energies
+    total = sum(max(value, 0.0) for value in energies.values()) or 1.0
+    names = {"striker": "striker", "target": "struck body", "contact": "contact", "dissipated": "dissipated"}
+    return [
+        {"name": names.get(name, name), "key": name, "joule": value, "part": max(value, 0.0) / total}
+        for name, value in energies.items()
+    ]
+
+
+def _force_picture(response: Response) -> str:
+    said = f"Contact force over time: {response.n_impacts} impacts, peak {si(response.peak_force, 'N')}"
+    end = AFTER * (response.impacts[-1].end if response.impacts else float(response.time[-1]))
+    shown = response.time <= end
+    return svg.curve(response.time[shown], response.force[shown], label="force", unit="N", title=said)
+
+
+@dataclass(frozen=True)
+class Player:
+    """One sound on the page."""
+
+    name: str
+    note: str
+    uri: str
+
+
+def _sounds(scene: Scene, response: Response) -> list[Player]:
+    """The sound at every point of observation and, of a plate, one metre in front of the strike point."""
+    heard = [
+        (f"Motion at {place(point)}", sound.synthesise(response, point, duration=_duration(response)))
+        for point in scene.points[:MOST_POINTS]
+    ]
+    if response.target.dimension == 2:
+        listener = np.append(np.asarray(response.at), DISTANCE)
+        pressure = sound.radiate(response, listener, duration=_duration(response))
+        heard.append((f"Sound radiated, {DISTANCE:g} m in front of the strike point", pressure))
+    players = []
+    for name, samples in heard:
+        level = samples.peak_level
+        stated = f"full scale is {samples.full_scale:g} {samples.unit} in every report; peak {level:.1f} dB".replace(
+            "-", "−"
+        )
+        players.append(Player(name, stated, _audio(samples.samples, samples.rate)))
+        if -math.inf < level < QUIET:
+            raised = samples.samples * 10.0 ** (-level / 20.0)
+            players.append(
+                Player(name, f"the same raised by {-level:.1f} dB to full scale", _audio(raised, samples.rate))
+            )
+    return players
+
+
+def _duration(response: Response) -> float:
+    decay = response.target.damping_ratio * response.target.omega
+    slowest = float(decay[response.target.omega > 0.0].min(initial=np.inf))
+    return float(np.clip(sound.DECAY / slowest, sound.SHORTEST, PLAYED)) if slowest > 0.0 else PLAYED
+
+
+def _audio(samples: np.ndarray, rate: int) -> str:
+    file = io.BytesIO()
+    wavfile.write(file, rate, np.round(32767.0 * np.clip(samples, -1.0, 1.0)).astype(np.int16))
+    return _uri("audio/wav", file.getvalue())
+
+
+def _downloads(scene: Scene, run: Run) -> list[dict[str, str]]:
+    response = run.response
+    frequencies = np.geomspace(*BAND, SPECTRUM_POINTS)
+    spectrum = response.spectrum(frequencies)
+    changes = {"tolerance": response.tolerance}
+    data = {**export.numbers(response), "scene": scene.data(**changes), "seconds": dict(run.seconds)}
+    data |= {"notes": list(run.notes), "versions": export.versions()}
+    texts = {
+        "response.json": ("application/json", json.dumps(export.plain(data), indent=2, allow_nan=False)),
+        "force.csv": ("text/csv", _csv(("time [s]", response.time), ("force [N]", response.force))),
+        "spectrum.csv": (
+            "text/csv",
+            _csv(("frequency [Hz]", frequencies), ("real [N s]", spectrum.real), ("imaginary [N s]", spectrum.imag)),
+        ),
+        "modes.csv": (
+            "text/csv",
+            _csv(("frequency [Hz]", response.target.frequencies), ("damping ratio [-]", response.target.damping_ratio)),
+        ),
+    }
+    return [
+        {"name": name, "size": si(len(text.encode()), "B", 3), "uri": _uri(kind, text.encode())}
+        for name, (kind, text) in texts.items()
+    ]
+
+
+def _csv(*columns: tuple[str, np.ndarray]) -> str:
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow([name for name, _ in columns])
+    writer.writerows(zip(*(values.tolist() for _, values in columns)))
+    return file.getvalue()
+
+
+def _uri(kind: str, raw: bytes) -> str:
+    return f"data:{kind};base64,{base64.b64encode(raw).decode('ascii')}"
+
+
+def _script_text(data: Mapping[str, Any]) -> str:
+    """JSON that cannot end the script element it stands in."""
+    return json.dumps(export.plain(data), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _plots(response: Response) -> dict[str, Any]:
+    """What the page's script draws: histories, spectrum, energies, and the shapes as packed integers."""
+    modes = response.target
+    end = AFTER * (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
+    shown = response.time <= end
+    frequencies = np.geomspace(*BAND, SPECTRUM_POINTS)
+    times = np.linspace(0.0, end, ENERGY_TIMES)
+    energy = [_energy(response, times, body) for body in (0, -1)]
+    moving = (modes.omega > 0.0) & (modes.frequencies < 2.0 * BAND[1])
+    last = response.impacts[-1].end if response.impacts else 0.0
+    return {
+        "force": {"x": _short(response.time[shown]), "y": _short(response.force[shown])},
+        "impacts": [[impact.start, impact.end] for impact in response.impacts],
+        "spectrum": {"x": _short(frequencies), "y": _short(np.abs(response.spectrum(frequencies)))},
+        "natural": _short(modes.frequencies[(modes.omega > 0.0) & (modes.frequencies < BAND[1])]),
+        "energy": {
+            "x": _short(times),
+            "striker": _short(energy[0].sum(axis=1)),
+            "body": _short(energy[1].sum(axis=1)),
+            "rest": _short(energy[0][0].sum() - energy[0].sum(axis=1) - energy[1].sum(axis=1)),
+        },
+        "modal": {
+            "x": _short(modes.frequencies[moving]),
+            "y": _short(_energy(response, np.array([last]), -1)[0, moving]),
+        },
+        "view": _view(response, end),
+    }
+
+
+def _energy(response: Response, times: np.ndarray, body: int) -> np.ndarray:
+    """Energy [J] of each mode of a body, (n_times, n_modes)."""
+    q, p = response.modal_state(times, body=body)
+    return 0.5 * (p**2 + (response.bodies[body].omega * q) ** 2)
+
+
+def _view(response: Response, end: float) -> dict[str, Any]:
+    """The body as a surface, its motion over time and its first shapes, for the views that turn with the mouse."""
+    modes = response.target
+    points, cells = drawing.grid(modes)
+    surface = points
+    if modes.dimension == 1:
+        points, cells, surface = _ribbon(points)
+    rows = modes.shapes.at(points)  # (n_points, n_modes), found once: looking up the elements is the dear part
+    times = np.linspace(0.0, end, FRAMES)
+    wave = response.modal_state(times)[0] @ rows.T  # (n_times, n_points)
+    assert response.striker is not None and response.at is not None
+    tip = response.displacement(response.striker.at[None] if response.striker.modes.dimension else None, times, body=0)
+    struck = response.displacement(response.at[None], times)
+    count = min(SHAPES, modes.n_modes)
+    shapes = rows[:, :count].T / np.maximum(np.abs(rows[:, :count]).max(axis=0), 1e-300)[:, None]
+    edge = surface[svg.rim(cells)]  # (n_sides, 2, 2)
+    return {
+        "x": _short(surface[:, 0]),
+        "y": _short(surface[:, 1]),
+        "cells": cells.T.tolist(),
+        "rim": [[x for a, b in edge[:, :, i].tolist() for x in (a, b, None)] for i in (0, 1)],
+        "at": [float(response.at[0]), float(response.at[1]) if modes.dimension == 2 else 0.0],
+        "times": _short(times),
+        "first": int(np.searchsorted(times, response.time[np.argmax(response.force)])),
+        "surface": _short(struck[:, 0]),
+        "gap": _short(np.maximum(struck - tip, 0.0)[:, 0]),
+        "wave": _packed(wave),
+        "shapes": _packed(shapes),
+        "frequencies": _short(modes.frequencies[:count]),
+        "damping": _short(modes.damping_ratio[:count]),
+    }
+
+
+def _ribbon(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A beam as a ribbon: its points twice, triangles between them, and their places in the plane."""
+    x = np.sort(points[:, 0])
+    n, half = len(x), 0.5 * RIBBON * float(np.ptp(x))
+    here = np.arange(n - 1)
+    cells = np.vstack(
+        [np.column_stack([here, here + 1, here + n]), np.column_stack([here + 1, here + n + 1, here + n])]
+    )
+    surface = np.column_stack([np.tile(x, 2), np.repeat([-half, half], n)])
+    return np.tile(x, 2)[:, None], cells, surface
+
+
+def _packed(rows: np.ndarray) -> dict[str, Any]:
+    """Rows as 16-bit integers, little-endian, and the size of one step: a tenth of their size as text."""
+    step = float(np.abs(rows).max(initial=0.0)) / 32767.0 or 1.0
+    raw = np.ascontiguousarray(np.round(rows / step).astype("<i2")).tobytes()
+    return {"step": step, "rows": len(rows), "data": base64.b64encode(raw).decode("ascii")}
+
+
+def _short(values: np.ndarray) -> list[float]:
+    """Numbers with as many digits as a screen can show."""
+    return [float(f"{value:.{DIGITS}g}") for value in np.asarray(values, float).tolist()]

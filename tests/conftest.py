@@ -1,0 +1,81 @@
+"""What several tests share: a real browser."""
+
+import shutil
+import time
+
+import pytest
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+FLAGS = (
+    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync",
+)  # fmt: skip
+
+
+class Page:
+    """A page in the browser, and what it complained about or asked for."""
+
+    def __init__(self, browser, *, width=1280, height=900, **options):
+        self.context = browser.new_context(viewport={"width": width, "height": height}, **options)
+        self.tab = self.context.new_page()
+        self.errors, self.requests = [], []
+        self.tab.on("console", lambda message: self.errors.append(message.text) if message.type == "error" else None)
+        self.tab.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.tab.on("request", lambda request: self.requests.append(request.url))
+        self.tab.on("websocket", lambda socket: self.requests.append(socket.url))
+
+    def until(self, expression, seconds=10.0):
+        """Wait until a JavaScript expression holds; Playwright's own way needs eval, which pages may forbid."""
+        end = time.monotonic() + seconds
+        while not self.tab.evaluate(expression):
+            assert time.monotonic() < end, f"not within {seconds} s: {expression}"
+            self.tab.wait_for_timeout(20)
+
+    def tabbed_to(self, most=200):
+        """Press Tab until the focus comes round; what it stopped at, and whether each could be seen to have it."""
+        stops = []
+        for _ in range(most):
+            self.tab.keyboard.press("Tab")
+            stop = self.tab.evaluate(
+                """() => {
+                    let e = document.activeElement;
+                    while (e.shadowRoot?.activeElement) e = e.shadowRoot.activeElement;
+                    const style = getComputedStyle(e);
+                    const shown = style.outlineStyle !== 'none' || style.boxShadow !== 'none' || e.tagName === 'AUDIO';
+                    const name = e.id || e.getAttribute('aria-label') || e.textContent.trim().slice(0, 30);
+                    return [e.tagName, name, shown];
+                }"""
+            )
+            if stop[0] == "BODY" or (stops and stop == stops[0]):
+                break
+            stops.append(stop)
+        return stops
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    """A headless Chromium, driven by Playwright."""
+    if CHROMIUM is None:
+        pytest.skip("no chromium here: apt-get install chromium")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def visit(chromium):
+    """Open pages of given size and colours; all are closed at the end."""
+    pages = []
+
+    def visit(address, **options):
+        page = Page(chromium, **options)
+        pages.append(page)
+        page.tab.goto(address)
+        return page
+
+    yield visit
+    for page in pages:
+        page.context.close()
