@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+LONGEST = 300  # [-] characters of a foreign text quoted in a message
+
 
 class SimulationError(RuntimeError):
     """A run could not keep its promise; the text says what failed and what to change."""
@@ -90,6 +92,12 @@ def ascending(name: str, value: Any, unit: str = "") -> np.ndarray:
         i = int(np.argmax(np.diff(result) < 0.0))
         raise ValueError(f"{name} must ascend, got {result[i]:g} before {result[i + 1]:g}{_suffix(unit)}")
     return result
+
+
+def line(text: str) -> str:
+    """Text that others chose, fit for a message: one printable line, not long."""
+    safe = "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
+    return safe if len(safe) <= LONGEST else safe[:LONGEST] + " ..."
 
 
 def one_of(name: str, value: Any, allowed: Iterable[str]) -> str:

@@ -5,20 +5,22 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import meshio
 import numpy as np
 import shapely
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from . import _check
+from . import _check, _meshread
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "km": 1e3}
+FARTHEST = 1e12  # [-] coordinates beyond this leave no digits, or no range, for products of them
 LARGEST = 20.0  # [m] a plate larger than this was most likely drawn in millimetres
 SAME = 1e-9  # [-] of the extent: nodes nearer than this are one
+CROWD = 16  # [-] nodes at one place, on the average, that are joined at most
 THIN = 1e-9  # [-] height over length below which a triangle is a line
 PLANE = ("triangle", "triangle6", "quad")
+NODES = {"line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4}  # of the cells that are taken
 
 
 def read(path: Any, unit: str | None) -> tuple[np.ndarray, np.ndarray, dict, dict, list[str]]:
@@ -32,10 +34,11 @@ def read(path: Any, unit: str | None) -> tuple[np.ndarray, np.ndarray, dict, dic
     names : dict, edge name -> set of sorted pairs of vertices
     notes : list of str, what was mended
     """
-    data = _open(Path(path))
+    path = Path(path)
+    data = _meshread.read(path)
     raw, notes = _plane_points(path, data, unit)
     cells, nodes = _triangles(path, data)
-    names = _named_pairs(data)
+    names = _named_pairs(path, data)
     points, cells, number = _mend(path, raw, cells, notes)
     middles = {_pair(number[a], number[b]): raw[node] for (a, b), node in nodes.items()}
     pairs = {name: {_pair(number[a], number[b]) for a, b in found} for name, found in names.items()}
@@ -48,34 +51,25 @@ def _pair(a: int, b: int) -> tuple[int, int]:
     return (int(a), int(b)) if a < b else (int(b), int(a))
 
 
-def _open(path: Path) -> meshio.Mesh:
-    if not path.is_file():
-        raise ValueError(f"path must name a mesh file, got {str(path)!r}; there is no such file")
-    said = StringIO()
-    try:
-        with redirect_stdout(said), redirect_stderr(said), np.errstate(all="ignore"):
-            return meshio.read(path)
-    except (meshio.ReadError, SystemExit, ValueError, LookupError, AssertionError, OSError, TypeError) as error:
-        known = ", ".join(sorted(meshio.extension_to_filetypes))
-        reason = " ".join(said.getvalue().split()) or str(error) or type(error).__name__
-        raise ValueError(f"{path.name} cannot be read as a mesh ({reason}); meshio reads {known}") from None
-
-
-def _plane_points(path: Any, data: meshio.Mesh, unit: str | None) -> tuple[np.ndarray, list[str]]:
+def _plane_points(path: Path, data: _meshread.Raw, unit: str | None) -> tuple[np.ndarray, list[str]]:
     """Coordinates in the plane [m]."""
-    name, notes = Path(path).name, []
-    points = np.asarray(data.points, float)
+    name, notes = path.name, []
+    points = data.points
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise ValueError(f"{name} must hold points of two or three coordinates, got shape {points.shape}")
-    used = np.unique(np.concatenate([block.data.ravel() for block in data.cells])) if data.cells else np.zeros(0, int)
-    if used.size and (used.min() < 0 or used.max() >= len(points)):
-        raise ValueError(
-            f"{name} names node {used.max()} in a cell but holds {len(points)} nodes; write the file again"
-        )
+    used = np.unique(np.concatenate([np.zeros(0, int), *(nodes.ravel() for _, nodes, _ in data.blocks)]))
+    lost = used[(used < 0) | (used >= len(points))]
+    if lost.size:
+        raise ValueError(f"{name} names node {lost[0]} in a cell but holds {len(points)} nodes; write the file again")
     bad = used[~np.isfinite(points[used]).all(axis=1)]
     if bad.size:
         raise ValueError(
             f"{name} has a coordinate that is not a number at node {bad[0]}: {points[bad[0]]}; mend that node"
+        )
+    far = used[np.abs(points[used]).max(axis=1, initial=0.0) > FARTHEST]
+    if far.size:
+        raise ValueError(
+            f"{name} has a coordinate beyond {FARTHEST:g} at node {far[0]}: {points[far[0]]}; mend that node"
         )
     if points.shape[1] == 3:
         spread = np.ptp(points[used], axis=0) if used.size else np.zeros(3)
@@ -99,10 +93,10 @@ def _plane_points(path: Any, data: meshio.Mesh, unit: str | None) -> tuple[np.nd
     return points, notes
 
 
-def _triangles(path: Any, data: meshio.Mesh) -> tuple[np.ndarray, dict]:
+def _triangles(path: Path, data: _meshread.Raw) -> tuple[np.ndarray, dict]:
     """Triangles (n_cells, 3) and the middle nodes of quadratic ones (pair -> node)."""
-    name = Path(path).name
-    kinds = sorted({block.type for block in data.cells})
+    name = path.name
+    kinds = sorted({kind for kind, nodes, _ in data.blocks if len(nodes)})
     solid = [kind for kind in kinds if kind.startswith(("tetra", "hexahedron", "wedge", "pyramid"))]
     if not set(kinds) & set(PLANE):
         found = ", ".join(kinds) or "no cells"
@@ -113,52 +107,55 @@ def _triangles(path: Any, data: meshio.Mesh) -> tuple[np.ndarray, dict]:
     if solid:
         raise ValueError(f"{name} holds volume cells ({', '.join(solid)}); export the flat surface alone")
     cells, middles = [], {}
-    for block in data.cells:
-        if block.type == "triangle":
-            cells.append(block.data)
-        elif block.type == "quad":
-            cells += [block.data[:, [0, 1, 2]], block.data[:, [0, 2, 3]]]
-        elif block.type == "triangle6":
-            cells.append(block.data[:, :3])
-            for row in block.data.tolist():
+    for kind, nodes, _ in data.blocks:
+        if kind in NODES and nodes.shape[1:] != (NODES[kind],):
+            raise ValueError(f"{name} has a {kind} whose number of nodes is not {NODES[kind]}; write the file again")
+        if kind == "triangle":
+            cells.append(nodes)
+        elif kind == "quad":
+            cells += [nodes[:, [0, 1, 2]], nodes[:, [0, 2, 3]]]
+        elif kind == "triangle6":
+            cells.append(nodes[:, :3])
+            for row in nodes.tolist():
                 for k, (a, b) in enumerate(((0, 1), (1, 2), (2, 0))):
                     middles[row[a], row[b]] = row[3 + k]
-    return np.concatenate(cells).astype(int), middles
+    return np.concatenate(cells), middles
 
 
-def _named_pairs(data: meshio.Mesh) -> dict[str, set[tuple[int, int]]]:
+def _named_pairs(path: Path, data: _meshread.Raw) -> dict[str, set[tuple[int, int]]]:
     """Sides named in the file: physical groups, cell sets, or numbers on line cells."""
-    label = {int(v[0]): name for name, v in data.field_data.items() if len(v) == 2 and int(v[1]) == 1}
     names: dict[str, set[tuple[int, int]]] = {}
 
     def add(name: str, row: np.ndarray) -> None:
         names.setdefault(name, set()).add((int(row[0]), int(row[1])))
 
-    tags = next((key for key in ("gmsh:physical", "medit:ref", "edge", "cell_tags") if key in data.cell_data), None)
-    for i, block in enumerate(data.cells):
-        if not block.type.startswith("line"):
+    for i, (kind, nodes, tags) in enumerate(data.blocks):
+        if kind not in ("line", "line3"):
             continue
-        if tags is not None:
-            for row, tag in zip(block.data, np.asarray(data.cell_data[tags][i]).ravel()):
-                if int(tag) in label or int(tag) != 0:
-                    add(label.get(int(tag), f"edge{int(tag)}"), row)
-        for name, members in data.cell_sets.items():
-            if name.startswith("gmsh:") or members[i] is None:
-                continue
-            for number in np.asarray(members[i]).ravel():
-                add(name, block.data[int(number)])
+        for row, tag in zip(nodes, () if tags is None else tags.tolist()):
+            if tag in data.labels or tag != 0:
+                add(data.labels.get(tag, f"edge{tag}"), row)
+        for name, members in data.sets.items():
+            chosen = members[i]
+            for number in () if chosen is None else chosen.tolist():
+                if not 0 <= number < len(nodes):
+                    raise ValueError(f"{path.name} has line {number} in its set {_check.line(name)}, and no such line")
+                add(name, nodes[number])
     return names
 
 
-def _mend(path: Any, points: np.ndarray, cells: np.ndarray, notes: list[str]):
+def _mend(path: Path, points: np.ndarray, cells: np.ndarray, notes: list[str]):
     """Join duplicate nodes, drop triangles that are none, turn the inverted; and number the nodes in use anew."""
-    name = Path(path).name
+    name = path.name
     used = np.unique(cells)
     span = float(np.ptp(points[used], axis=0).max())
     if span == 0.0:
         raise ValueError(f"{name} has all its nodes at one place; export it again")
     leader = np.arange(len(points))
-    for a, b in sorted(map(tuple, cKDTree(points[used]).query_pairs(SAME * span))):
+    tree = cKDTree(points[used])
+    if tree.count_neighbors(tree, SAME * span) > CROWD * len(used):  # each node is its own neighbour
+        raise ValueError(f"{name} has most of its nodes at a few places; export it again")
+    for a, b in sorted(map(tuple, tree.query_pairs(SAME * span))):
         leader[used[b]] = min(leader[used[b]], leader[used[a]])
     doubles = int((leader != np.arange(len(points))).sum())
     if doubles:
@@ -240,9 +237,9 @@ def _hanging(points: np.ndarray, cells: np.ndarray, names: dict, notes: list[str
     return cells
 
 
-def _refuse_overlap(path: Any, points: np.ndarray, cells: np.ndarray) -> None:
+def _refuse_overlap(path: Path, points: np.ndarray, cells: np.ndarray) -> None:
     """Raise ValueError where triangles overlap, branch, or make several pieces."""
-    name = Path(path).name
+    name = path.name
     sides = np.sort(np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]]), axis=1)
     unique, inverse, counts = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
     if (counts > 2).any():
@@ -292,7 +289,7 @@ def loops_of(rim: np.ndarray) -> list[list[int]]:
     return loops
 
 
-def write(path: Any, points, cells, facets, middles, curved, edges: dict[str, np.ndarray]) -> None:
+def write(path: Path, points, cells, facets, middles, curved, edges: dict[str, np.ndarray]) -> None:
     """Write triangles and named edges as binary Gmsh 2.2, the rim quadratic where it is curved.
 
     Parameters
@@ -324,6 +321,8 @@ def write(path: Any, points, cells, facets, middles, curved, edges: dict[str, np
             ("line3", np.column_stack([facets, len(points) + on_rim])),
             ("triangle6", np.column_stack([cells, len(points) + inverse.reshape(-1, 3)])),
         ]
+    import meshio  # 0.1 s that no other command needs
+
     flat = np.concatenate(place)
     number = [tag, np.full(len(cells), len(own) + 1)]
     data = {"gmsh:physical": number, "gmsh:geometrical": number}

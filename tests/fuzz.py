@@ -1,0 +1,509 @@
+"""Mutated inputs for everything that comes from outside, and the judge of what becomes of them.
+
+    python tests/fuzz.py mesh --inputs 10000 --workers 2     # a category of `CATEGORIES`; prints what failed
+    python tests/fuzz.py mesh --only 4711                    # one input again, with its traceback
+
+An input passes where it gives a result or one clear error: ValueError, SimulationError or OSError raised by the
+package itself, in one printable line that names the file, within the time and the memory below, leaving no file.
+"""
+
+import argparse
+import contextlib
+import importlib.util
+import io
+import json
+import os
+import re
+import resource
+import select
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+import numpy as np
+
+import fem_impact as fi
+from fem_impact import _meshread
+
+PATIENCE = 10.0  # [s] per input
+MEMORY = 2 << 30  # [byte] more than the process has when it begins
+SHORT_PATIENCE = 0.5  # [s] of the process that reads a mesh; the files here are read in a hundredth of it
+PACKAGE = str(Path(fi.__file__).parent)
+SCENES = Path(__file__).parents[1] / "studies" / "scenes"
+
+NUMBER = re.compile(rb"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
+NUMBERS = [b"nan", b"inf", b"-inf", b"1e308", b"-1e308", b"5e-324", b"1e999", b"-1", b"0", b"-0.0", b"1", b"2", b"7"]
+NUMBERS += [b"1000000000000", b"2147483647", b"-2147483648", b"18446744073709551616", b"9" * 400, b"0x10", b"1_0", b""]
+PACKED = [struct.pack(f"<{kind}", value) for kind in "iqQ" for value in (0, 1, 3, 2**31 - 1)]
+PACKED += [struct.pack("<i", -1), struct.pack("<q", -1), struct.pack("<q", 10**12), struct.pack("<q", 2**62)]
+PACKED += [struct.pack("<d", value) for value in (float("nan"), float("inf"), 1e308, -1e308, 5e-324, 0.0)]
+ODD = ["é", "\u202e", "\0", "\ufeff", "😀", "\x1b[31m", "\ud7ff", "﷽", "%s%n", "../../../etc/passwd", "\t", "'", '"']
+NESTS = [b"[", b"{a=", b"<g>", b"(", b"<!--", b"\n*INCLUDE, INPUT=", b"a.", b"0\nSECTION\n"]
+
+
+def mutated(raw: bytes, random: Random, others: list[bytes]) -> bytes:
+    """One to four mutations of a file."""
+    for _ in range(random.choice((1, 1, 1, 2, 4))):
+        raw = random.choice(MUTATIONS)(raw, random, others)
+    return raw
+
+
+def _flip(raw: bytes, random: Random, _: list[bytes]) -> bytes:
+    data = bytearray(raw)
+    for _ in range(random.choice((1, 1, 4, 32)) if data else 0):
+        data[random.randrange(len(data))] ^= 1 << random.randrange(8)
+    return bytes(data)
+
+
+def _cut(raw: bytes, random: Random, _: list[bytes]) -> bytes:
+    a, b = _span(raw, random)
+    return random.choice((raw[:a], raw[a:], raw[:a] + raw[b:], b""))
+
+
+def _double(raw: bytes, random: Random, _: list[bytes]) -> bytes:
+    a, b = _span(raw, random)
+    return raw[:b] + raw[a:b] * random.choice((1, 1, 2, 50)) + raw[b:]
+
+
+def _insert(raw: bytes, random: Random, _: list[bytes]) -> bytes:
+    a, _b = _span(raw, random)
+    odd = random.choice(ODD).encode("utf-8", "surrogatepass")
+    return raw[:a] + random.choice((odd, random.randbytes(8), b"\xff\xfe", odd * 40)) + raw[a:]
+
+
+def _renumber(raw: bytes, random: Random, _: list[bytes]) -> bytes:
+    found = list(NUMBER.finditer(raw))
+    if not found:
+        return raw
+    hit = random.choice(found[: random.choice((12, len(found)))])  # counts stand at the beginning
+    return raw[: hit.start()] + random.choice(NUMBERS) + raw[hit.end() :]
+
+
+def _pack(raw: bytes, random: Random, _: list[bytes]) -> bytes:
+    value = random.choice(PACKED)
+    place = random.randrange(max(1, len(raw) // 4)) * random.choice((1, 4))
+    return raw[:place] + value + raw[place + len(value) :]
+
+
+def _swap(raw: bytes, random: Random, _: list[bytes]) -> bytes:
+    mark = random.choice((b" ", b"\n", b",", b"="))
+    parts = raw.split(mark)
+    i, j = random.randrange(len(parts)), random.randrange(len(parts))
+    parts[i], parts[j] = parts[j], parts[i]
+    return mark.join(parts)
+
+
+def _drop(raw: bytes, random: Random, _: list[bytes]) -> bytes:
+    lines = raw.split(b"\n")
+    i = random.randrange(len(lines))
+    return b"\n".join(lines[:i] + lines[i + random.choice((1, 1, 3)) :])
+
+
+def _splice(raw: bytes, random: Random, others: list[bytes]) -> bytes:
+    other = random.choice(others)
+    return raw[: random.randrange(len(raw) + 1)] + other[random.randrange(len(other) + 1) :]
+
+
+def _nest(raw: bytes, random: Random, _: list[bytes]) -> bytes:
+    a, _b = _span(raw, random)
+    return raw[:a] + random.choice(NESTS) * random.choice((10, 3000)) + raw[a:]
+
+
+def _crlf(raw: bytes, random: Random, _: list[bytes]) -> bytes:
+    return random.choice((raw.replace(b"\n", b"\r\n"), raw.replace(b"\n", b"\r"), b"\xef\xbb\xbf" + raw, raw.upper()))
+
+
+def _span(raw: bytes, random: Random) -> tuple[int, int]:
+    a = random.randrange(len(raw) + 1)
+    return a, min(len(raw), a + random.choice((1, 2, 8, 64, 4096)))
+
+
+MUTATIONS = (_flip, _cut, _double, _insert, _renumber, _renumber, _pack, _swap, _drop, _splice, _nest, _crlf)
+
+
+@dataclass(frozen=True)
+class Category:
+    """Files of one kind, and what reads them."""
+
+    samples: Callable[[], list[tuple[str, bytes]]]  # file name and content
+    read: Callable[[Path], object]
+
+
+def mesh_samples() -> list[tuple[str, bytes]]:
+    """One small plate in every format that meshio writes and `fi.mesh.load` reads."""
+    import meshio
+
+    plate = fi.mesh.rectangle(1.0, 1.0, size=0.5)
+    flat = np.column_stack([plate.points, np.zeros(len(plate.points))])
+    cells = [("triangle", plate.cells)]
+    made = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        fi.mesh.save(folder / "saved.msh", fi.mesh.disk(1.0, size=1.0))
+        for file, options in MESH_FORMATS.items():
+            with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                meshio.Mesh(flat, cells).write(folder / file, **options)
+        if importlib.util.find_spec("h5py"):  # an optional part of meshio
+            for file in ("plate.med", "plate.hmf"):
+                meshio.Mesh(flat, cells).write(folder / file)
+        made = [(path.name, path.read_bytes()) for path in sorted(folder.iterdir()) if path.is_file()]
+    return made
+
+
+MESH_FORMATS: dict[str, dict] = {
+    "ascii22.msh": {"file_format": "gmsh22", "binary": False},
+    "binary41.msh": {"file_format": "gmsh"},
+    "ascii41.msh": {"file_format": "gmsh", "binary": False},
+    "plate.vtu": {},
+    "ascii.vtu": {"binary": False},
+    "plate.vtk": {},
+    "ascii.vtk": {"binary": False},
+    "plate.inp": {},
+    "plate.bdf": {},
+    "plate.stl": {},
+    "binary.stl": {"binary": True},
+    "plate.obj": {},
+    "plate.off": {},
+    "plate.ply": {},
+    "ascii.ply": {"binary": False},
+    "plate.mesh": {},
+    "plate.meshb": {},
+    "plate.vol": {},
+    "plate.xml": {},
+    "plate.xdmf": {"data_format": "XML"},
+    "plate.post": {},
+    "plate.avs": {},
+    "plate.mdpa": {},
+    "plate.dat": {},
+    "plate.wkt": {},
+    "plate.nas": {},
+    "plate.tec": {},
+    "plate.dato": {},
+}
+
+
+def read_mesh(path: Path) -> object:
+    """Load a mesh."""
+    return finite(fi.mesh.load(path))
+
+
+def forked(path: Path, patience: float) -> tuple[int, bytes, bytes]:
+    """What `_meshread._run` gives, from a fork of this process: one that starts afresh would take 0.2 s an input."""
+    import meshio  # noqa: F401  before the fork, for the same reason
+
+    read, write = os.pipe()
+    pid = os.fork()
+    if not pid:
+        os.close(read)
+        status, answer = _meshread.main(path)
+        with os.fdopen(write, "wb") as out:
+            out.write(answer)
+        os._exit(status)
+    os.close(write)
+    answer, end = b"", time.monotonic() + SHORT_PATIENCE
+    try:
+        while select.select([read], [], [], max(0.0, end - time.monotonic()))[0]:
+            data = os.read(read, 1 << 20)
+            if not data:
+                break
+            answer += data
+        else:
+            os.kill(pid, signal.SIGKILL)
+            raise subprocess.TimeoutExpired("a fork", patience)
+    finally:
+        os.close(read)
+        status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    return status, *((b"", answer) if status else (answer, b""))
+
+
+SVGS = [
+    """<?xml version="1.0"?>
+<svg xmlns="http://www.w3.org/2000/svg" width="300mm" height="200mm" viewBox="0 0 300 200">
+<style>path { stroke-width: 2 }</style>
+<g transform="translate(5,5) scale(0.9)"><path id="rim" d="M0 0 H300 V200 H0 Z"/></g>
+<circle id="hole" cx="80" cy="50" r="20"/></svg>""",
+    """<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 2 2">
+<defs><ellipse id="e" cx="1" cy="1" rx="1" ry=".5"/></defs>
+<use xlink:href="#e" transform="rotate(30 1 1)"/></svg>""",
+    """<svg xmlns="http://www.w3.org/2000/svg" width="40cm" height="40cm" viewBox="0 0 400 400">
+<path d="M 100 100 C 150 50 250 50 300 100 S 350 250 300 300 Q 200 350 100 300 T 50 200 A 60 60 0 0 1 100 100 Z"/>
+</svg>""",
+    """<svg xmlns="http://www.w3.org/2000/svg"><polygon points="0,0 300,0 300,200 150,260 0,200"/>
+<rect id="r" x="50" y="50" width="40" height="30" rx="5"/></svg>""",
+]
+DXF = "0 SECTION 2 HEADER 9 $ACADVER 1 AC1009 9 $INSUNITS 70 4 0 ENDSEC 0 SECTION 2 ENTITIES {} 0 ENDSEC 0 EOF "
+LINE = "0 LINE 8 {} 10 {} 20 {} 30 0 11 {} 21 {} 31 0 "
+ARC = "0 ARC 8 0 10 {} 20 500 30 0 40 500 50 {} 51 {} "
+VERTEX = "0 VERTEX 8 rim 10 {} 20 {} 30 0 42 {} "
+BULGED = ((0, 0, 0), (900, 0, 1), (900, 500, 0), (0, 500, 0))
+DXFS = [
+    LINE.format("low", 0, 0, 1000, 0)
+    + LINE.format("0", 0, 1000, 1000, 1000)
+    + ARC.format(1000, 270, 90)
+    + ARC.format(0, 90, 270)
+    + "0 CIRCLE 8 hole 10 500 20 500 30 0 40 100 ",
+    "0 POLYLINE 8 rim 66 1 10 0 20 0 30 0 70 1 " + "".join(VERTEX.format(*v) for v in BULGED) + "0 SEQEND 8 rim ",
+]
+
+
+def outline_samples() -> list[tuple[str, bytes]]:
+    """Drawings as SVG and as DXF."""
+    import ezdxf
+
+    document = ezdxf.new("R2000")
+    document.modelspace().add_ellipse((0, 0), (2, 0), 0.5)
+    document.modelspace().add_spline([(0.0, 0.0), (0.3, 0.0), (0.4, 0.3), (0.0, 0.4), (0.0, 0.0)])
+    text = io.StringIO()
+    document.write(text)
+    lines = [DXF.format(body).replace(" ", "\n") for body in DXFS]
+    drawn = [(f"plate{i}.svg", text.encode()) for i, text in enumerate(SVGS)]
+    drawn += [(f"plate{i}.dxf", text.encode()) for i, text in enumerate([*lines, *lines, text.getvalue()])]
+    return drawn
+
+
+def read_outline(path: Path) -> object:
+    """Mesh a drawing."""
+    return finite(fi.mesh.outline(path, unit="mm"))
+
+
+def finite(mesh: object) -> object:
+    """The mesh, none of whose numbers may be other than finite."""
+    for name in ("points", "middles", "tangents", "curvatures"):
+        assert np.isfinite(getattr(mesh, name)).all(), name
+    return mesh
+
+
+def uff_samples() -> list[tuple[str, bytes]]:
+    """A plate's modes as a universal file, and a beam's."""
+    plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), 3e-3)
+    modes = fi.find_modes(fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.2), plate), n_modes=4)
+    beam = fi.analytic.beam(1.0, ends=("free", "free"), mass=1.0, first_frequency=100.0, n_modes=3)
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "modes.uff"
+        fi.export.write_uff(path, modes)
+        raw = path.read_bytes()
+        fi.export.write_uff(path, beam)
+        return [("plate.uff", raw), ("beam.unv", path.read_bytes())]
+
+
+def read_uff(path: Path) -> object:
+    """Measured modes, and their shapes at a measured point."""
+    modes = fi.Modes.from_uff(path, mass=0.2)
+    assert np.isfinite(modes.frequencies).all() and np.isfinite(modes.shapes.values).all()
+    return modes
+
+
+def scene_samples() -> list[tuple[str, bytes]]:
+    """The scenes of the studies."""
+    return [(path.name, path.read_bytes()) for path in sorted(SCENES.glob("*.toml"))]
+
+
+def read_scene(path: Path) -> object:
+    """Load a scene."""
+    return fi.load_scene(path)
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """Raise Hang after some seconds."""
+
+    def ring(*_: object) -> None:
+        raise Hang(f"longer than {seconds:g} s")
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+class Hang(BaseException):
+    """An input that took too long."""
+
+
+def judged(read: Callable[[Path], object], path: Path) -> str:
+    """'' where reading gives a result, 'refused' for a clear error, else what is wrong."""
+    try:
+        with limited(PATIENCE), warnings.catch_warnings():
+            warnings.simplefilter("error")
+            read(path)
+    except (ValueError, fi.SimulationError, OSError) as error:
+        text = str(error)
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        if not frame.filename.startswith(PACKAGE):
+            return f"{type(error).__name__} from {Path(frame.filename).name}:{frame.lineno}: {text:.200}"
+        if path.name not in text or not text.isprintable() or len(text) > 1000:
+            return f"unclear: {type(error).__name__}: {text!r:.300}"
+        return "refused"
+    except (Exception, Hang) as error:
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        return f"{type(error).__name__} from {Path(frame.filename).name}:{frame.lineno}: {error!s:.200}"
+    return ""
+
+
+def one(category: str, number: int, folder: Path, samples: list[tuple[str, bytes]]) -> tuple[str, Path]:
+    """Make input ``number`` of a category and judge it."""
+    random = Random(f"{category} {number}")
+    name, raw = samples[number % len(samples)]
+    raws = [other for _, other in samples]
+    if random.random() < 0.02:  # a wrong ending
+        name = random.choice(samples)[0]
+    path = folder / f"{number}-{name}"
+    path.write_bytes(mutated(raw, random, raws))
+    return judged(CATEGORIES[category].read, path), path
+
+
+def work(category: str, numbers: range, pipe: int, keep: Path | None) -> None:
+    """Judge inputs and write a line of JSON for each; runs in a process of its own, which an input may end."""
+    samples = CATEGORIES[category].samples()
+    own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY, resource.RLIM_INFINITY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    _meshread._run = forked
+    with tempfile.TemporaryDirectory() as name, open(os.devnull, "w") as null, os.fdopen(pipe, "w") as out:
+        os.dup2(null.fileno(), 1)
+        os.dup2(null.fileno(), 2)
+        folder = Path(name)
+        for number in numbers:
+            out.write(json.dumps([number]) + "\n")
+            out.flush()
+            began = time.monotonic()
+            verdict, path = one(category, number, folder, samples)
+            left = sorted(file.name for file in folder.iterdir() if file != path)
+            if left and verdict in ("", "refused"):
+                verdict = f"left {left}"
+            if keep is not None and verdict not in ("", "refused"):
+                shutil.copy(path, keep)
+            for file in folder.iterdir():
+                shutil.rmtree(file) if file.is_dir() else file.unlink()
+            out.write(json.dumps([number, verdict, path.name, round(time.monotonic() - began, 3)]) + "\n")
+            out.flush()
+
+
+class Worker:
+    """A process that judges every ``step``-th input from ``start`` on."""
+
+    def __init__(self, category: str, numbers: range, keep: Path | None) -> None:
+        self.category, self.numbers, self.keep, self.rest = category, numbers, keep, b""
+        read, write = os.pipe()
+        self.pid = os.fork()
+        if not self.pid:
+            try:
+                os.close(read)
+                work(category, numbers, write, keep)
+            except BaseException:
+                traceback.print_exc()
+                os._exit(1)
+            os._exit(0)
+        os.close(write)
+        self.pipe, self.current, self.last = read, numbers.start, time.monotonic()
+
+    def lines(self) -> list[list]:
+        """What has arrived; raises EOFError at the end."""
+        data = os.read(self.pipe, 1 << 16)
+        if not data:
+            raise EOFError
+        self.last = time.monotonic()
+        *whole, self.rest = (self.rest + data).split(b"\n")
+        return [json.loads(line) for line in whole]
+
+    def end(self) -> int:
+        os.kill(self.pid, signal.SIGKILL)
+        os.close(self.pipe)
+        return os.waitpid(self.pid, 0)[1]
+
+
+def fuzz(category: str, inputs: int, workers: int, keep: Path | None = None) -> tuple[Counter, list[list]]:
+    """Judge many inputs.
+
+    Returns
+    -------
+    tally : Counter of verdicts '', 'refused' and 'failed'
+    failures : list of [number, verdict, file name, seconds]
+    """
+    tally, failures = Counter(), []
+    running = [Worker(category, range(i, inputs, workers), keep) for i in range(workers)]
+    while running:
+        ready, _, _ = select.select([worker.pipe for worker in running], [], [], 1.0)
+        for worker in list(running):
+            again, why = None, ""
+            if worker.pipe in ready:
+                try:
+                    for number, *rest in worker.lines():
+                        worker.current = number
+                        if rest:
+                            tally[rest[0] if rest[0] in ("", "refused") else "failed"] += 1
+                            worker.current = number + worker.numbers.step
+                            if rest[0] not in ("", "refused"):
+                                failures.append([number, *rest])
+                    continue
+                except EOFError:
+                    again, why = worker.current, "died"
+            elif time.monotonic() - worker.last > 2.0 * PATIENCE:
+                again, why = worker.current, "hangs where no signal is heard"
+            if again is None:
+                continue
+            status = worker.end()
+            running.remove(worker)
+            if again < inputs:
+                tally["failed"] += 1
+                failures.append([again, f"{why} ({status})", "", 0.0])
+                rest = range(again + worker.numbers.step, inputs, worker.numbers.step)
+                if rest:
+                    running.append(Worker(category, rest, keep))
+    return tally, failures
+
+
+CATEGORIES = {
+    # "scene": Category(scene_samples, read_scene),
+    "mesh": Category(mesh_samples, read_mesh),
+    # "outline": Category(outline_samples, read_outline),
+    # "uff": Category(uff_samples, read_uff),
+}
+
+
+def main() -> int:
+    """Fuzz one category from the prompt."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("category", choices=CATEGORIES)
+    parser.add_argument("--inputs", type=int, default=10_000)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--only", type=int)
+    parser.add_argument("--keep", type=Path)
+    options = parser.parse_args()
+    if options.only is not None:
+        samples = CATEGORIES[options.category].samples()
+        with tempfile.TemporaryDirectory() as name:
+            verdict, path = one(options.category, options.only, Path(name), samples)
+            print(path.name, verdict or "a result")
+            print(path.read_bytes()[:2000])
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                CATEGORIES[options.category].read(path)
+        return 0
+    if options.keep:
+        options.keep.mkdir(exist_ok=True)
+    began = time.monotonic()
+    tally, failures = fuzz(options.category, options.inputs, options.workers, options.keep)
+    print(json.dumps({"category": options.category, "results": tally[""], "refused": tally["refused"],
+                      "failed": failures, "seconds": round(time.monotonic() - began, 1)}))  # fmt: skip
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,88 @@
+"""What comes from outside, mutated: a result or one clear error; the judge and the mutations are in fuzz.py."""
+
+import json
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import fuzz
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+FUZZ = Path(fuzz.__file__)
+INPUTS = 10_000
+FEW = {"mesh": 4}  # [-] examples of a category in the normal run: a mesh starts a process
+MANY = 60  # [-] of the others
+
+
+@cache
+def samples(category):
+    pytest.importorskip("svgelements", reason="the cad extra is not installed")
+    pytest.importorskip("ezdxf", reason="the cad extra is not installed")
+    pytest.importorskip("pyuff", reason="the uff extra is not installed")
+    return fuzz.CATEGORIES[category].samples()
+
+
+@pytest.mark.parametrize("category", fuzz.CATEGORIES)
+def test_samples_are_read_before_they_are_mutated(category, tmp_path):
+    for name, raw in samples(category):
+        (tmp_path / name).write_bytes(raw)
+        if category != "mesh" or name in ("binary41.msh", "plate.vtu"):  # the others in test_meshfile, test_meshread
+            assert fuzz.judged(fuzz.CATEGORIES[category].read, tmp_path / name) == ""
+
+
+@pytest.mark.parametrize("category", fuzz.CATEGORIES)
+def test_mutated_inputs_give_a_result_or_one_clear_error(category, tmp_path):
+    known = samples(category)
+    raws = [raw for _, raw in known]
+
+    @settings(max_examples=FEW.get(category, MANY), deadline=None, suppress_health_check=list(HealthCheck))
+    @given(sample=st.sampled_from(known), random=st.randoms(use_true_random=False))
+    def check(sample, random):
+        name, raw = sample
+        (tmp_path / name).write_bytes(fuzz.mutated(raw, random, raws))
+        assert fuzz.judged(fuzz.CATEGORIES[category].read, tmp_path / name) in ("", "refused")
+
+    check()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("category", fuzz.CATEGORIES)
+def test_ten_thousand_mutated_inputs_give_a_result_or_one_clear_error(category):
+    samples(category)  # skips where something is not installed
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "OMP_NUM_THREADS": "1"}
+    command = [sys.executable, str(FUZZ), category, "--inputs", str(INPUTS)]
+    run = subprocess.run(command, capture_output=True, text=True, env=environment)
+    found = json.loads(run.stdout.splitlines()[-1])
+    assert found["failed"] == []
+    assert found["results"] + found["refused"] == INPUTS
+    # else the mutations are too wild, or do nothing
+    assert found["results"] > INPUTS / 100 and found["refused"] > INPUTS / 10
+
+
+def test_the_judge_tells_traces_hangs_litter_and_murmurs_apart(tmp_path, monkeypatch):
+    def verdict(act):
+        path = tmp_path / "input.txt"
+        path.write_text("")
+        return fuzz.judged(act, path)
+
+    def foreign(path):
+        json.loads("{")
+
+    def vague(path):
+        fuzz.fi.mesh.rectangle(-1.0, 1.0)  # one of ours, but it does not name the file
+
+    def endless(path):
+        while True:
+            pass
+
+    assert verdict(fuzz.fi.mesh.load) == "refused"
+    monkeypatch.setattr(fuzz, "PATIENCE", 0.05)
+    assert verdict(lambda path: None) == ""
+    assert verdict(lambda path: 1 / 0).startswith("ZeroDivisionError")
+    assert verdict(foreign).startswith("JSONDecodeError from decoder.py")
+    assert verdict(vague).startswith("unclear")
+    assert verdict(endless).startswith("Hang")
