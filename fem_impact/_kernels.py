@@ -14,17 +14,20 @@ LIGHT = 0.9  # [-] damping ratio up to which a mode takes the fast lanes
 SERIES_END = 3.0  # [-] omega*h below which the fast lanes sum a power series: 13 terms leave 3e-17
 ANGLE_LIMIT = 1e6  # [-] angle up to which the reduction in `waves` is exact
 OVERDAMPED = 1.2  # [-] damping ratio from which the two decay rates are far enough apart for partial fractions
+ZERO, WHOLE = np.int64(0), np.bool_(True)  # no literals: what is called with one is compiled for it and then again
 LEVELS = 40  # [-] halvings of the step that may be cached
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
 N_LANE = 7  # rows of what a run keeps of it, in the order of `lane_table`
+PATIENT = (
+    64  # [-] looks of a flight after which a table for a longer step pays, a step or two of half the length before
+)
 GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before
 LOOK_LIMIT = 20_000_000  # [-] looks ahead times modes in one free flight before the run gives up: some 0.1 s
 WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it
 SECULAR_MISFIT = 1e-12  # [-] of the peak force: what recorded polynomials may miss of the exact force
-LOCATED = 1e-12  # [-] of the approach about an event: a stored energy of 1e-24 of the step's is left out there
+LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
 EVENT_LIMIT = 64  # [-] events without one full step between them: chatter, passed with unlocated steps
-CONTACT, FLIGHT = 0, 1  # what the run does next
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = 0, 1, 2, 3, 4, 5  # why a run ended
 
 
@@ -32,7 +35,8 @@ def outer(**options: Any) -> Any:
     """Compile for use from Python; other threads run meanwhile."""
     if UNCOUNTED:
         options["_nrt"] = True
-    return njit(cache=True, error_model="numpy", nogil=True, no_cfunc_wrapper=True, **options)
+    wrapped: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
+    return njit(**wrapped, **options)
 
 
 def inner(allocates: bool = False, **options: Any) -> Any:
@@ -319,18 +323,27 @@ def near_moments(omega, h, double, out_moments):
 
 
 @inner(allocates=True, fastmath={"contract"})
-def lane_table(omega, zeta, h, out_lanes):
+def lane_table(omega, zeta, h, whole, out_lanes):
     """Coefficients of one exact step of length h for every mode, (N_LANE, n_modes), all that others follow from.
 
     Rows: a11, a12, a21, a22 of the state's step; h times the moments 1 and 2 (see `mode_moments`) and times moment 3
     less half of moment 2. Lightly damped modes take parallel lanes: their moments by a power series below SERIES_END,
-    by recursion above; the others go one by one.
+    by recursion above; the others go one by one. Where it is not asked for the whole, free motion without a constant
+    force is all that is made.
     """
     n_modes = omega.size
     free = np.empty((3, n_modes))
     double = np.empty(n_modes)
     m = np.empty((4, n_modes))
     free_table(omega, zeta, h, free, double)
+    for n in range(n_modes):
+        out_lanes[0, n] = free[0, n]
+        out_lanes[1, n] = free[1, n]
+        out_lanes[2, n] = -omega[n] * omega[n] * free[1, n]
+        out_lanes[3, n] = free[2, n]
+        out_lanes[4, n] = 0.0
+    if not whole:
+        return
     near_moments(omega, h, double, m)
     part = 1.0 / h
     for n in range(n_modes):
@@ -352,10 +365,6 @@ def lane_table(omega, zeta, h, out_lanes):
             for k in range(1, 4):
                 m[k, n] = single[k]
     for n in range(n_modes):
-        out_lanes[0, n] = free[0, n]
-        out_lanes[1, n] = free[1, n]
-        out_lanes[2, n] = -omega[n] * omega[n] * free[1, n]
-        out_lanes[3, n] = free[2, n]
         out_lanes[4, n] = h * m[1, n]
         out_lanes[5, n] = h * m[2, n]
         out_lanes[6, n] = h * (m[3, n] - 0.5 * m[2, n])
@@ -369,7 +378,7 @@ def step_table(omega, zeta, h, out_table):
     A1, A2 and of the two forces B0, B1.
     """
     lanes = np.empty((N_LANE, omega.size))
-    lane_table(omega, zeta, h, lanes)
+    lane_table(omega, zeta, h, WHOLE, lanes)
     for n in range(omega.size):
         for k in range(4):
             out_table[k, n] = lanes[k, n]
@@ -1019,6 +1028,7 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
     m = shape.shape[0]
     elapsed = 0.0
     slow = 0
+    pushed = any_of(bias)
     bounds = np.empty((m, 6))
     old_q = q.copy()
     old_p = p.copy()
@@ -1075,11 +1085,13 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
                 if slow > 4000:
                     return elapsed, first, 3
             power_of_two = int(np.floor(np.log2(wait / base))) + GLIDES // 2
-            if not close and bounds[first, 5] != 0.0 and 0 <= power_of_two < GLIDES:
-                wait = base * 2.0 ** (power_of_two - GLIDES // 2)
+            if not close and bounds[first, 5] != 0.0 and 2 <= power_of_two < GLIDES:
                 slot = power_of_two
+                if look < PATIENT and known[slot] == 0.0:
+                    slot -= 1 if known[slot - 1] != 0.0 else (2 if known[slot - 2] != 0.0 else 0)
+                wait = base * 2.0 ** (slot - GLIDES // 2)
         if slot == GLIDES or known[slot] == 0.0:
-            lane_table(omega, zeta, wait, tables[slot])
+            lane_table(omega, zeta, wait, pushed, tables[slot])
             known[slot] = 1.0
         glide(tables[slot], wait, bias, q, p)
         if over:
@@ -1123,7 +1135,7 @@ def hermite_root(d0, v0, d1, v1, h):
 
 @inner()
 def solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate):
-    """Solve one step of length h from its prediction; return 1 for A4, 0 for A (asked for, or fallen back to)."""
+    """Solve one step of length h from its prediction; 0 where a contact pushes by A (asked for or fallen to)."""
     m = y.size
     sums = all_sums[slot]
     if m == 1 and ramp and (now[0, 0] > 0.0 or end[0, 0] > 0.0):
@@ -1139,7 +1151,7 @@ def solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate):
         s[i] = 0.0
         if f[i] > 0.0:
             pressed = True
-    fine = 0
+    fine = 0 if pressed else 1
     if ramp and pressed and m > 1:
         keep = work[4, 1]
         for i in range(m):
@@ -1230,13 +1242,13 @@ def narrow(now, pressed, y, rate, h, depth, still, target, bracket):
     """Next length of a step that is to end where a contact opens or closes, from a try of length h.
 
     Returns (target, length), the length zero where the try was good; the target is an earlier crossing if the try
-    showed one. ``bracket`` holds the lengths between which the crossing lies and the size of the approach.
+    showed one. ``bracket`` holds the lengths between which the crossing lies, the size of the approach, and length,
+    approach and rate of the last try: what the length changes in the approach is not quite the rate, as the force's
+    polynomial changes too.
     """
     for i in range(y.size):
         if i != target and crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
-            bracket[0] = 0.0
-            bracket[1] = h
-            bracket[2] = abs(now[0, i]) + abs(y[i])
+            enclose(now, y, rate, h, i, bracket)
             guess = hermite_root(now[0, i], now[4, i], y[i], rate[i], h)
             return i, guess if guess < h else 0.5 * h
     miss = y[target]
@@ -1246,10 +1258,15 @@ def narrow(now, pressed, y, rate, h, depth, still, target, bracket):
         bracket[1] = h
     else:
         bracket[0] = h
-    guess = bracket[0]
     v = rate[target]
+    turn = (6.0 * (now[0, target] - miss) / h + 2.0 * now[4, target] + 4.0 * v) / h
+    if bracket[3] != h:
+        v += (miss - bracket[4]) / (h - bracket[3]) - 0.5 * (rate[target] + bracket[5])
+    bracket[3] = h
+    bracket[4] = miss
+    bracket[5] = rate[target]
+    guess = bracket[0]
     if v != 0.0:
-        turn = (6.0 * (now[0, target] - miss) / h + 2.0 * now[4, target] + 4.0 * v) / h
         wait = -miss / v
         guess = h + wait - 0.5 * turn * wait * wait / v
     if abs(guess - h) <= 4e-16 * h:
@@ -1257,6 +1274,17 @@ def narrow(now, pressed, y, rate, h, depth, still, target, bracket):
     if not bracket[0] < guess < bracket[1]:
         guess = 0.5 * (bracket[0] + bracket[1])
     return target, guess
+
+
+@inner()
+def enclose(now, y, rate, h, target, bracket):
+    """Set the bracket of `narrow` to a whole step."""
+    bracket[0] = 0.0
+    bracket[1] = h
+    bracket[2] = abs(now[0, target]) + abs(y[target])
+    bracket[3] = h
+    bracket[4] = y[target]
+    bracket[5] = rate[target]
 
 
 @inner()
@@ -1358,12 +1386,12 @@ def run_energy(
     s = np.empty(m)
     rate = np.empty(m)
     pressed = np.zeros(m, np.bool_)
-    bracket = np.empty(3)
+    bracket = np.empty(6)
     flights = np.empty((GLIDES + 1, N_LANE, n_modes))
     flown = np.zeros(GLIDES)
     done = np.zeros(m)
     steps = np.zeros((64, 3 + 5 * m))
-    n_steps = np.int64(0)
+    n_steps = ZERO
     n_fallback = 0
     n_blind = 0
     n_released = 0
@@ -1413,7 +1441,7 @@ def run_energy(
             h = horizon - time
             slot = odd
         if slot == odd or known[slot] == 0.0:
-            lane_table(omega, zeta, h, tables[slot])
+            lane_table(omega, zeta, h, WHOLE, tables[slot])
             contact_sums(shape, tables[slot], h, all_sums[slot])
             known[slot] = 1.0
         if ready != slot:
@@ -1439,13 +1467,11 @@ def run_energy(
             else:
                 target, guess = first_crossing(now, pressed, y, rate, h, depth, still)
         if target >= 0:
-            bracket[0] = 0.0
-            bracket[1] = h
-            bracket[2] = abs(now[0, target]) + abs(y[target])
+            enclose(now, y, rate, h, target, bracket)
             slot = odd
             for _ in range(LOCATE_LIMIT):
                 h = guess
-                lane_table(omega, zeta, h, tables[slot])
+                lane_table(omega, zeta, h, WHOLE, tables[slot])
                 contact_sums(shape, tables[slot], h, all_sums[slot])
                 predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, end)
                 fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
@@ -1463,7 +1489,7 @@ def run_energy(
             break
         record(steps[n_steps], time, h, blind, all_sums[slot], now, end, y, f, s, done)
         n_steps += 1
-        if ramp and fine == 0 and any_of(f):
+        if ramp and fine == 0:
             n_fallback += 1
         if blind:
             n_blind += 1
@@ -1703,7 +1729,7 @@ def run_collocation(
     p = start_p.copy()
     new_q = np.empty(n_modes)
     new_p = np.empty(n_modes)
-    bracket = np.empty(3)
+    bracket = np.empty(6)
     table_free = np.empty((LEVELS, s + 1, 5, n_modes))
     table_last = np.empty((LEVELS, 2 * s, n_modes))
     table_inner = np.empty((LEVELS, 2, s, s, m, m))
@@ -1737,7 +1763,7 @@ def run_collocation(
     coefficients = np.empty(s)
     stride = 3 + s
     steps = np.zeros((64, 3 + stride * m))
-    n_steps = np.int64(0)
+    n_steps = ZERO
     n_released = 0
     n_tries = 0
     n_looks = 0
@@ -1837,9 +1863,7 @@ def run_collocation(
                     status = FAILED
                     break
                 continue
-            bracket[0] = 0.0
-            bracket[1] = h
-            bracket[2] = abs(now[0, target]) + abs(y[target])
+            enclose(now, y, rate, h, target, bracket)
             free = odd_free
             last = odd_last
             inner = odd_inner
@@ -2067,7 +2091,7 @@ def run_secular(
     now = np.zeros((5, 1))
     done = np.zeros(1)
     values = np.empty(s)
-    n_steps = np.int64(0)
+    n_steps = ZERO
     n_released = 0
     time = 0.0
     status = EXHAUSTED
@@ -2165,7 +2189,7 @@ def run_secular(
                     share += powers[c, m] / (m + 1.0)
                 done[0] += share * h * k * value * speed
             n_steps += 1
-        lane_table(omega, zeta, elapsed, flights[GLIDES])
+        lane_table(omega, zeta, elapsed, WHOLE, flights[GLIDES])
         glide(flights[GLIDES], elapsed, bias, q, p)
         for j in range(n_groups):
             sine = np.sin(rate[j] * elapsed)
@@ -2304,10 +2328,10 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
     m = law.shape[0]
     width = 3 + n_coefficients
     result = np.empty((8, 5))
-    count = np.int64(0)
+    count = ZERO
     for i in range(m):
         first = 3 + width * i
-        row = np.int64(0)
+        row: Any = ZERO
         while row < n_steps:
             if steps[row, first + 2] == 0.0:
                 row += 1
