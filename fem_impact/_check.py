@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-LONGEST = 300  # [-] characters of a foreign text quoted in a message
+LONGEST = 500  # [-] characters of a foreign text quoted in a message
 
 
 class SimulationError(RuntimeError):
@@ -24,7 +24,7 @@ def number(name: str, value: Any, unit: str = "") -> float:
     """Return ``value`` as a finite float, or raise ValueError naming argument, rule and value."""
     scalar = isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "iuf"
     if isinstance(value, bool) or not (scalar or isinstance(value, (int, float, np.integer, np.floating))):
-        raise ValueError(f"{name} must be a number{f' in {unit}' if unit else ''}, got {value!r}")
+        raise ValueError(f"{name} must be a number{f' in {unit}' if unit else ''}, got {value!r:.80}")
     try:
         result = float(value)
     except OverflowError:
@@ -61,7 +61,7 @@ def between(name: str, value: Any, low: float, high: float, unit: str = "") -> f
 def count(name: str, value: Any, low: int = 1) -> int:
     """Return ``value`` as an int of at least ``low``."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise ValueError(f"{name} must be a whole number, got {value!r}")
+        raise ValueError(f"{name} must be a whole number, got {value!r:.80}")
     if value < low:
         raise ValueError(f"{name} must be at least {low}, got {value}")
     return int(value)
@@ -105,7 +105,7 @@ def one_of(name: str, value: Any, allowed: Iterable[str]) -> str:
     words = list(allowed)
     if isinstance(value, str) and value in words:
         return value
-    raise ValueError(f"{name} must be one of {', '.join(words)}, got {value!r}{nearest(value, words)}")
+    raise ValueError(f"{name} must be one of {', '.join(words)}, got {value!r:.80}{nearest(value, words)}")
 
 
 def nearest(word: Any, known: Iterable[str]) -> str:

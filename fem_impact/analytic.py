@@ -332,7 +332,7 @@ def beam(
     """
     length = _check.positive("length", length, "m")
     if isinstance(ends, str) or len(ends) != 2:
-        raise ValueError(f"ends must be two words, one for each end, got {ends!r}")
+        raise ValueError(f"ends must be two words, one for each end, got {ends!r:.80}")
     pair = (_check.one_of("ends", ends[0], ENDS), _check.one_of("ends", ends[1], ENDS))
     rigid = _beam_rigid(pair)
     physical = _beam_scale(section, length)

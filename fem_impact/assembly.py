@@ -208,7 +208,7 @@ def _support_of_facets(mesh: Mesh, supports: dict) -> list[str | Elastic]:
     for name, kind in supports.items():
         if name not in mesh.edges:
             raise ValueError(
-                f"supports names edge {name!r}, but the mesh has {', '.join(sorted(mesh.edges))}"
+                f"supports names edge {name!r}, but the mesh has {', '.join(sorted(mesh.edges)):.300}"
                 + _check.nearest(name, mesh.edges)
             )
         if not isinstance(kind, Elastic):

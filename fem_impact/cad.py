@@ -5,18 +5,33 @@ import re
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
+from xml.parsers import expat
 
 import numpy as np
 
-from . import _check
+from . import _apart, _check
 from .boundary import smooth_runs
-from .meshfile import LARGEST, UNITS
-from .outline import Arc, Bezier, Loop, Outline, Piece, crossed, extent, polyline, segment, signed_area, tangent
+from .meshfile import FARTHEST, LARGEST, UNITS
+from .outline import (
+    MOST_PIECES,
+    Arc,
+    Bezier,
+    Loop,
+    Outline,
+    Piece,
+    crossed,
+    extent,
+    polyline,
+    segment,
+    signed_area,
+    tangent,
+)
 
 PIXEL = 0.0254 / 96.0  # [m] what SVG calls px
 DXF_UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 13: 1e-6, 14: 0.1}  # $INSUNITS -> m
 CLOSED = 1e-9  # [-] of the extent: gaps below this are rounding
 BRIDGED = 1e-3  # [-] gaps below this are closed and said
+LONGEST_NAME = 100  # [-] characters kept of an edge's name
 SHORT = 1e-7  # [-] pieces below this are dropped
 CORNER = 0.1  # [rad] turn at which an edge ends and the next begins, where the drawing gives no names
 
@@ -48,8 +63,8 @@ def _smoothed(points: np.ndarray, notes: list[str]) -> Loop:
     points = _check.array("source", points, (None, 2), "m")
     if len(points) > 1 and np.array_equal(points[0], points[-1]):
         points = points[:-1]
-    if len(points) < 3:
-        raise ValueError(f"source must have at least three points, got {len(points)}")
+    if not 3 <= len(points) <= MOST_PIECES:
+        raise ValueError(f"source must have 3 to {MOST_PIECES} points, got {len(points)}")
     if np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).min() == 0.0:
         raise ValueError("source has the same point twice in a row; leave one out")
     if signed_area(points) < 0.0:
@@ -88,35 +103,55 @@ def _quintics(place: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -
     return pieces
 
 
-def _svg(path: Path, unit: str | None, notes: list[str]) -> list[Loop]:
-    """Closed loops [m] of every shape in an SVG file, y upward."""
-    try:
-        import svgelements
-    except ImportError:
-        raise ValueError("reading SVG needs svgelements: pip install 'fem-impact[cad]'") from None
-    try:
-        drawing = svgelements.SVG.parse(str(path))
-    except (SyntaxError, ValueError, OSError) as error:
-        raise ValueError(f"{path.name} cannot be read as SVG: {error}") from None
-    scale = PIXEL
-    width = re.fullmatch(r"\s*([\d.eE+-]+)\s*(mm|cm|in)\s*", str(drawing.values.get("width", "")))
-    if unit is not None:
-        box = drawing.viewbox.width if drawing.viewbox is not None and drawing.viewbox.width else drawing.width
-        scale = UNITS[_check.one_of("unit", unit, UNITS)] * float(box) / float(drawing.width)
-    elif width is not None:  # taken from here, because svgelements keeps seven digits of a millimetre
-        scale = float(width[1]) * UNITS[width[2]] / float(drawing.width)
-    else:
-        notes.append(f"{path.name} states no unit; px were taken at 96 to the inch, pass unit= for another")
-    flip = np.diag([scale, -scale])
+def svg_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Pieces and size of an SVG file, in the other process (see `_apart`)."""
+    import svgelements
+
+    _refuse_entities(path)
+    _apart.confine(path)
+    drawing = svgelements.SVG.parse(str(path))
+    if not isinstance(drawing, svgelements.SVG):
+        raise ValueError("it holds no <svg>")
     found: list[Piece] = []
     for shape in drawing.elements():
-        if not isinstance(shape, svgelements.Shape):
-            continue
-        whole = svgelements.Path(shape)
-        whole.reify()
-        name = str(shape.id) if shape.id else ""
-        found += [piece.moved(flip, np.zeros(2)) for piece in _svg_pieces(whole, svgelements, name)]
-    return _chained(path.name, found, notes)
+        if isinstance(shape, svgelements.Shape):
+            whole = svgelements.Path(shape)
+            whole.reify()
+            found += _svg_pieces(whole, svgelements, str(shape.id) if shape.id else "")
+            _check_number(path.name, found)
+    box = drawing.viewbox.width if drawing.viewbox is not None and drawing.viewbox.width else drawing.width
+    stated = re.fullmatch(r"\s*([\d.eE+-]+)\s*(mm|cm|in)\s*", str(drawing.values.get("width", "")))
+    # the width is taken from here, because svgelements keeps seven digits of a millimetre
+    width = float(stated[1]) * UNITS[stated[2]] if stated else np.nan
+    return {**_packed(found), "size": np.array([float(box), float(drawing.width), width])}
+
+
+def _refuse_entities(path: Path) -> None:
+    """Raise ValueError where an XML file declares entities: a few of them expand to gigabytes, or to other files."""
+
+    def refuse(*_: Any) -> None:
+        raise ValueError("it declares XML entities; save it as plain SVG")
+
+    parser = expat.ParserCreate()
+    parser.EntityDeclHandler = refuse
+    with open(path, "rb") as file:
+        parser.ParseFile(file)
+
+
+def _svg(path: Path, unit: str | None, notes: list[str]) -> list[Loop]:
+    """Closed loops [m] of every shape in an SVG file, y upward."""
+    drawn = _apart.read(path, "SVG", "cad:svg_arrays")
+    box, pixels, width = drawn["size"].tolist()
+    scale = PIXEL
+    if unit is not None:
+        scale = UNITS[_check.one_of("unit", unit, UNITS)] * box / pixels if pixels else math.nan
+    elif not math.isnan(width):
+        scale = width / pixels if pixels else math.nan
+    else:
+        notes.append(f"{path.name} states no unit; px were taken at 96 to the inch, pass unit= for another")
+    if not (math.isfinite(scale) and scale > 0.0):
+        raise ValueError(f"{path.name} has no width and viewBox to take its size from; give both positive numbers")
+    return _chained(path.name, _unpacked(path.name, drawn, np.diag([scale, -scale])), notes)
 
 
 def _svg_pieces(whole: Any, svgelements: Any, name: str) -> list[Piece]:
@@ -138,28 +173,30 @@ def _svg_pieces(whole: Any, svgelements: Any, name: str) -> list[Piece]:
     return pieces
 
 
-def _dxf(path: Path, unit: str | None, notes: list[str]) -> list[Loop]:
-    """Closed loops [m] of the lines, arcs, ellipses, polylines and splines in a DXF file's model space."""
-    try:
-        import ezdxf
-    except ImportError:
-        raise ValueError("reading DXF needs ezdxf: pip install 'fem-impact[cad]'") from None
-    try:
-        drawing = ezdxf.readfile(path)
-    except (OSError, ezdxf.DXFError) as error:
-        raise ValueError(f"{path.name} cannot be read as DXF: {error}") from None
-    if unit is not None:
-        scale = UNITS[_check.one_of("unit", unit, UNITS)]
-    else:
-        scale = DXF_UNITS.get(int(drawing.header.get("$INSUNITS", 0)), 0.0)
-        if not scale:
-            scale = 1.0
-            notes.append(f"{path.name} states no unit; its numbers were taken as metres, pass unit= for another")
+def dxf_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Pieces and unit of a DXF file, in the other process (see `_apart`)."""
+    import ezdxf
+
+    _apart.confine(path)
+    drawing = ezdxf.readfile(path)
     found: list[Piece] = []
     for entity in drawing.modelspace():
         found += _dxf_pieces(entity)
-    found = [piece.moved(scale * np.eye(2), np.zeros(2)) for piece in found]
-    loops = _chained(path.name, found, notes)
+        _check_number(path.name, found)
+    return {**_packed(found), "unit": np.array(int(drawing.header.get("$INSUNITS", 0)))}
+
+
+def _dxf(path: Path, unit: str | None, notes: list[str]) -> list[Loop]:
+    """Closed loops [m] of the lines, arcs, ellipses, polylines and splines in a DXF file's model space."""
+    drawn = _apart.read(path, "DXF", "cad:dxf_arrays")
+    if unit is not None:
+        scale = UNITS[_check.one_of("unit", unit, UNITS)]
+    else:
+        scale = DXF_UNITS.get(int(drawn["unit"]), 0.0)
+        if not scale:
+            scale = 1.0
+            notes.append(f"{path.name} states no unit; its numbers were taken as metres, pass unit= for another")
+    loops = _chained(path.name, _unpacked(path.name, drawn, scale * np.eye(2)), notes)
     size = max(extent(loop) for loop in loops)
     if unit is None and size > LARGEST:
         raise ValueError(
@@ -202,25 +239,63 @@ def _dxf_pieces(entity: Any) -> list[Piece]:
     return []
 
 
+def _check_number(name: str, pieces: list[Piece]) -> None:
+    if len(pieces) > MOST_PIECES:
+        raise ValueError(f"{name} has more than {MOST_PIECES} lines and curves; simplify the drawing")
+
+
+def _packed(pieces: list[Piece]) -> dict[str, np.ndarray]:
+    """Pieces as arrays: the numbers of all in a row, how many each has, which are arcs, and their names."""
+    rows = [
+        np.concatenate([p.centre, p.a, p.b, [p.start, p.sweep]]) if isinstance(p, Arc) else p.control.ravel()
+        for p in pieces
+    ]
+    return {
+        "numbers": np.concatenate([np.zeros(0), *rows]),
+        "lengths": np.array([len(row) for row in rows], int),
+        "arcs": np.array([isinstance(piece, Arc) for piece in pieces], bool),
+        "names": np.array([piece.name[:LONGEST_NAME] for piece in pieces], str),
+    }
+
+
+def _unpacked(name: str, drawn: dict[str, np.ndarray], matrix: np.ndarray) -> list[Piece]:
+    """Pieces from their arrays, multiplied by a matrix (2, 2)."""
+    if not np.isfinite(drawn["numbers"]).all():
+        raise ValueError(f"{name} has coordinates that are not finite numbers; mend the drawing")
+    rows = np.split(drawn["numbers"], np.cumsum(drawn["lengths"])[:-1])
+    pieces: list[Piece] = []
+    for row, arc, edge in zip(rows, drawn["arcs"], drawn["names"].tolist()):
+        if arc:
+            pieces.append(Arc(row[:2], row[2:4], row[4:6], float(row[6]), float(row[7]), edge))
+        else:
+            pieces.append(Bezier(row.reshape(-1, 2), edge))
+    return [piece.moved(matrix, np.zeros(2)) for piece in pieces]
+
+
 def _chained(name: str, pieces: list[Piece], notes: list[str]) -> list[Loop]:
     """Join pieces end to end into closed loops."""
-    if not pieces:
-        raise ValueError(f"{name} has no outline: no path, line, arc or spline was found in it")
-    span = extent(tuple(pieces))
+    corners = np.array([piece.at(np.linspace(0.0, 1.0, 5)) for piece in pieces]).reshape(-1, 2)
+    if not (np.abs(corners) < FARTHEST).all():
+        raise ValueError(f"{name} has coordinates beyond {FARTHEST:g} m; mend the drawing")
+    span = float(np.ptp(corners, axis=0).max(initial=0.0)) if pieces else 0.0
     left = [piece for piece in pieces if extent((piece,)) > SHORT * span]
+    if not left:
+        raise ValueError(f"{name} has no outline: no path, line, arc or spline was found in it")
+    starts, stops = (np.array([end(piece) for piece in left]) for end in (_start, _stop))
+    free = np.ones(len(left), bool)
     loops: list[Loop] = []
-    while left:
-        chain = [left.pop(0)]
-        while True:
-            start, stop = _start(chain[0]), _stop(chain[-1])
-            if np.linalg.norm(stop - start) <= CLOSED * span:
-                break
-            gaps = [min(np.linalg.norm(_start(p) - stop), np.linalg.norm(_stop(p) - stop)) for p in left]
-            best = int(np.argmin(gaps)) if gaps else -1
-            home = float(np.linalg.norm(start - stop))
-            if best >= 0 and gaps[best] <= min(BRIDGED * span, home):
-                piece = left.pop(best)
-                chain.append(piece if np.linalg.norm(_start(piece) - stop) <= gaps[best] else piece.reversed())
+    while free.any():
+        last = int(free.argmax())
+        chain, start, stop = [left[last]], starts[last], stops[last]
+        free[last] = False
+        while np.linalg.norm(stop - start) > CLOSED * span:
+            onward, back = (np.where(free, np.hypot(*(ends - stop).T), np.inf) for ends in (starts, stops))
+            gaps = np.minimum(onward, back)
+            best, home = int(gaps.argmin()), float(np.linalg.norm(start - stop))
+            if gaps[best] <= min(BRIDGED * span, home):
+                ahead = onward[best] <= gaps[best]
+                chain.append(left[best] if ahead else left[best].reversed())
+                stop, free[best] = stops[best] if ahead else starts[best], False
             elif home <= BRIDGED * span:
                 notes.append(f"{name}: a gap of {home:g} m was closed")
                 break

@@ -1,14 +1,17 @@
 """The true curve around a plate: arcs and Bezier pieces joined to loops, each piece part of a named edge."""
 
+import math
 from dataclasses import dataclass, replace
-from math import comb
 
 import numpy as np
 import shapely
 
 from . import _check
 
+SLENDER = 1e4  # [-] area over square of the half width: the mesher is quick up to 4e3 and never ends from 4e4 on
+FINEST = 16  # [-] widths looked at, each a quarter of the one before: down to rounding
 TURN = 0.25  # [rad] most that an edge turns within one facet: 26 facets on a circle
+MOST_PIECES = 10_000  # [-] of an outline: ten times what tracing programs write; each takes 0.1 ms here and again there
 SAMPLES = 256  # [-] points per piece on which its length and turning are integrated
 
 
@@ -58,7 +61,7 @@ class Bezier:
                 return np.zeros((*np.shape(t), 2))
         t, degree = np.asarray(t)[..., None], len(control) - 1
         k = np.arange(degree + 1)
-        return np.array([comb(degree, int(i)) for i in k]) * t**k * (1.0 - t) ** (degree - k) @ control
+        return np.array([math.comb(degree, int(i)) for i in k]) * t**k * (1.0 - t) ** (degree - k) @ control
 
     def reversed(self) -> "Bezier":
         """The same piece run backwards."""
@@ -122,6 +125,9 @@ def curvature(piece: Piece, t: np.ndarray) -> np.ndarray:
 
 def divide(piece: Piece, size: float) -> np.ndarray:
     """Parameters (n + 1,) from 0 to 1 that cut a piece into facets no longer than a size [m] and turning little."""
+    if isinstance(piece, Bezier) and len(piece.control) == 2:
+        length = float(np.linalg.norm(piece.control[1] - piece.control[0]))
+        return np.linspace(0.0, 1.0, max(1, math.ceil(length / size * (1.0 - 1e-6))) + 1)
     t = np.linspace(0.0, 1.0, SAMPLES + 1)
     points = piece.at(t)
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -194,8 +200,8 @@ def straight_loop(name: str, corners, label: str) -> Loop:
     points = _check.array(name, corners, (None, 2), "m")
     if len(points) > 1 and np.array_equal(points[0], points[-1]):
         points = points[:-1]
-    if len(points) < 3:
-        raise ValueError(f"{name} must have at least three corners, got {len(points)}")
+    if not 3 <= len(points) <= MOST_PIECES:
+        raise ValueError(f"{name} must have 3 to {MOST_PIECES} corners, got {len(points)}")
     after = np.roll(points, -1, axis=0)
     gap = np.linalg.norm(after - points, axis=1)
     if gap.min() <= 1e-12 * gap.max():
@@ -221,4 +227,16 @@ def crossed(outline: Outline) -> str:
             if hole.intersects(other):
                 return f"holes[{i}] must not overlap or touch holes[{j}]"
         holes.append(hole)
+    return _slender(outer.difference(shapely.union_all(holes)) if holes else outer)
+
+
+def _slender(body: shapely.Polygon) -> str:
+    """Where a body is much longer than it is wide, as at a needle; triangles as small as that would be countless."""
+    span = max(np.ptp(np.reshape(body.bounds, (2, 2)), axis=0))
+    for k in range(1, FINEST):
+        width = span * 4.0**-k
+        rest = body.difference(body.buffer(-width, quad_segs=1).buffer(1.001 * width, quad_segs=2))
+        if rest.area > SLENDER * width**2:  # a strip of this half width and `SLENDER` / 2 times as long
+            x, y = max(getattr(rest, "geoms", [rest]), key=lambda part: part.area).representative_point().coords[0]
+            return f"outline must not be a thousand times longer than wide, as it is near ({x:g}, {y:g}) m; widen it"
     return ""

@@ -124,7 +124,7 @@ PATHS = ("source", "path")  # keys that name a file, relative to the scene
 
 def fault(path: Path, text: str) -> ValueError:
     """One line naming the file, whatever a key or a value holds: a scene may come from anyone."""
-    return ValueError(f"{path}: " + "".join(c if c.isprintable() else repr(c)[1:-1] for c in text))
+    return ValueError(f"{path}: {_check.line(text)}")
 
 
 def read_tables(path: Path) -> dict[str, Any]:

@@ -5,12 +5,14 @@ from typing import Any
 
 import numpy as np
 from netgen.geom2d import SplineGeometry
+from netgen.meshing import NgException
 
 from . import _check
 from .boundary import join
 from .outline import Outline, Piece, crossing, curvature, divide, extent, is_straight, tangent
 
 SPREAD = 1.3  # [-] how much longer than asked for a side inside may get before the mesher divides it
+REMEDY = "look for very thin necks or spikes, or state another size"
 GRADING = 0.35  # [-] how fast the mesher lets elements grow away from small ones
 
 
@@ -43,13 +45,16 @@ def triangulate(outline: Outline, size: float) -> dict[str, Any]:
         for i, number in enumerate(numbers):
             line = ["line", number, numbers[(i + 1) % len(numbers)]]
             geometry.Append(line, leftdomain=1, rightdomain=0, bc=start + i + 1)
-    made = geometry.GenerateMesh(maxh=SPREAD * size / span, grading=GRADING, quad_dominated=False)
+    try:
+        made = geometry.GenerateMesh(maxh=SPREAD * size / span, grading=GRADING, quad_dominated=False)
+    except NgException as error:
+        raise _check.SimulationError(f"the mesher could not fill the outline ({error}); {REMEDY}") from None
     points = np.array([p.p for p in made.Points()])[:, :2] * span + centre
     cells = made.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
     facets = np.array([[e.points[0].nr - 1, e.points[1].nr - 1] for e in made.Elements1D()])
     owner = np.array([e.index - 1 for e in made.Elements1D()])
     if not len(cells) or set(owner.tolist()) != set(range(len(chords))):
-        raise _check.SimulationError("the mesher could not fill the outline; check it for very thin necks")
+        raise _check.SimulationError(f"the mesher could not fill the outline; {REMEDY}")
     return _follow(points, cells, facets, owner, chords, outline.outer)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _check
+from . import _apart, _check
 
 NORMAL_MODE, DISPLACEMENT, STRUCTURAL, REAL = 2, 8, 1, 2  # codes of data set 55
 CELL_CODE = {2: 11, 3: 91, 4: 94}  # nodes of a cell -> rod, thin shell triangle, thin shell quadrilateral
@@ -100,16 +100,17 @@ def read(path: Any, direction: str) -> dict[str, np.ndarray]:
     dict
         frequencies (n_modes,), damping_ratio (n_modes,), shapes (n_points, n_modes), points (n_points, 1 or 2)
     """
-    component = DIRECTIONS[_check.one_of("direction", direction, DIRECTIONS)]
-    pyuff, path = _pyuff(), Path(path)
-    if not path.is_file():
-        raise ValueError(f"path must name a universal file, got {str(path)!r}; there is no such file")
-    try:
-        file = pyuff.UFF(str(path))
-        kinds = [int(kind) for kind in file.get_set_types()]
-        sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in WANTED]
-    except Exception as error:  # pyuff raises bare Exception for files it does not know
-        raise ValueError(f"{path.name} cannot be read as a universal file: {error}") from None
+    return _apart.read(Path(path), "a universal file", "uff:arrays", _check.one_of("direction", direction, DIRECTIONS))
+
+
+def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:
+    """What `read` returns, in the other process (see `_apart`)."""
+    import pyuff
+
+    component = DIRECTIONS[direction]
+    file = pyuff.UFF(str(path))
+    kinds = [int(kind) for kind in file.get_set_types()]
+    sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in WANTED]
     nodes = [s for s in sets if s["type"] == 2411] or [s for s in sets if s["type"] == 15]
     modes = [s for s in sets if s["type"] == 55 and s.get("analysis_type") in (2, 3)]
     if not nodes or not modes:
@@ -128,12 +129,16 @@ def read(path: Any, direction: str) -> dict[str, np.ndarray]:
     keep = [i for i, wide in zip(others, spread) if wide > 1e-9 * max(spread.max(), 1e-300)] or others[:1]
     table = [_mode(path.name, i, mode, component, measured) for i, mode in enumerate(modes)]
     order = np.argsort([entry[0] for entry in table], kind="stable")
-    return {
+    result = {
         "frequencies": np.array([table[i][0] for i in order]),
         "damping_ratio": np.array([table[i][1] for i in order]),
         "shapes": np.column_stack([table[i][2] for i in order]),
         "points": points[:, keep],
     }
+    for what, values in result.items():
+        if not np.isfinite(values).all() or (what == "frequencies" and values.min() < 0.0):
+            raise ValueError(f"{path.name} has {what} that are negative or no numbers; export it again")
+    return result
 
 
 def _mode(name: str, i: int, mode: dict, component: str, measured: np.ndarray) -> tuple[float, float, np.ndarray]:

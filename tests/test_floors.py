@@ -8,6 +8,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "fem_impact"
 FLOORS = [
     {"_check", "_files", "_kernels", "_batch", "farm", "svg"},
+    {"_apart"},
     {"_meshread"},
     {"outline", "curves", "boundary", "meshfile"},
     {"triangulation", "cad"},

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 FUZZ = Path(fuzz.__file__)
 INPUTS = 10_000
-FEW = {"mesh": 4}  # [-] examples of a category in the normal run: a mesh starts a process
+FEW = {"mesh": 4, "outline": 4, "uff": 4}  # [-] examples of a category in the normal run: each starts a process
 MANY = 60  # [-] of the others
 
 
@@ -30,7 +30,7 @@ def samples(category):
 def test_samples_are_read_before_they_are_mutated(category, tmp_path):
     for name, raw in samples(category):
         (tmp_path / name).write_bytes(raw)
-        if category != "mesh" or name in ("binary41.msh", "plate.vtu"):  # the others in test_meshfile, test_meshread
+        if category != "mesh" or name in ("binary41.msh", "plate.vtu"):  # the others in test_meshfile
             assert fuzz.judged(fuzz.CATEGORIES[category].read, tmp_path / name) == ""
 
 

@@ -61,7 +61,7 @@ def test_mesh_far_from_the_origin_is_the_same_one_moved():
         (lambda: mesh.rectangle(1.0, 1.0, size=0.0), "size must be positive, got 0 m"),
         (lambda: mesh.disk(1.0, 1.0), "hole must be smaller than radius = 1 m, got 1 m"),
         (lambda: mesh.polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), "must not cross or touch itself.*Self-intersection"),
-        (lambda: mesh.polygon([(0, 0), (1, 1)]), "corners must have at least three corners, got 2"),
+        (lambda: mesh.polygon([(0, 0), (1, 1)]), "corners must have 3 to 10000 corners, got 2"),
         (lambda: mesh.polygon([(0, 0), (1, 0), (1, 0), (0, 1)]), "corners 1 and 2 at the same place"),
         (lambda: mesh.polygon([(0, 0), (1, 0), (0, 1)], [[(2, 2), (3, 2), (3, 3)]]), "must lie inside the outline"),
         (lambda: mesh.line(float("nan")), "length must be finite"),

@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 import pytest
 
-from fem_impact import _meshread, mesh
+from fem_impact import _apart, mesh
 
 PLATE = mesh.rectangle(1.0, 1.0, size=0.5)
 
@@ -21,7 +21,7 @@ def written(path, **options):
 
 
 def test_reader_that_never_ends_is_stopped(tmp_path, monkeypatch):
-    monkeypatch.setattr(_meshread, "PATIENCE", 1.0)
+    monkeypatch.setattr(_apart, "PATIENCE", 1.0)
     path = tmp_path / "plate.mdpa"  # meshio looks for the end of a block beyond the end of the file
     path.write_text("Begin Nodes\n 1 0 0 0\n")
     began = time.monotonic()
@@ -43,14 +43,14 @@ def test_header_that_claims_more_than_the_memory_is_refused(tmp_path):
 
 @pytest.mark.parametrize("status", [2, -6, -11])
 def test_reader_that_dies_or_fills_the_memory_is_a_sentence(tmp_path, monkeypatch, status):
-    monkeypatch.setattr(_meshread, "_run", lambda path, patience: (status, b"", b""))
+    monkeypatch.setattr(_apart, "run", lambda path, reader, arguments, patience: (status, b"", b""))
     (tmp_path / "plate.msh").write_text("")
     with pytest.raises(ValueError, match=r"plate\.msh cannot be read as a mesh \(its reader died or took 2 GB\)"):
         mesh.load(tmp_path / "plate.msh")
 
 
 def test_memory_of_the_reader_is_limited():
-    script = "from fem_impact import _meshread; _meshread.limit_memory(); bytearray(3 << 30)"
+    script = "from fem_impact import _apart; _apart.limit_memory(); bytearray(3 << 30)"
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert run.returncode == 1 and "MemoryError" in run.stderr
 
@@ -122,8 +122,11 @@ def test_every_format_that_hdf5_holds_is_read(tmp_path):
 def test_missing_hdf5_is_named(tmp_path, monkeypatch):
     (tmp_path / "plate.med").write_bytes(b"\x89HDF\r\n\x1a\n")
     monkeypatch.setitem(sys.modules, "h5py", None)
-    monkeypatch.setattr(_meshread, "_confine", lambda path: None)  # it would bind this process for good
-    assert _meshread.main(tmp_path / "plate.med") == (1, b"this format needs h5py: pip install 'fem-impact[hdf5]'")
+    monkeypatch.setattr(_apart, "confine", lambda path: None)  # it would bind this process for good
+    assert _apart.main(tmp_path / "plate.med", "_meshread:arrays", []) == (
+        1,
+        b"this needs h5py: pip install 'fem-impact[hdf5]'",
+    )
 
 
 def test_unknown_ending_is_told_with_those_that_are_known(tmp_path):
