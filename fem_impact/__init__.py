@@ -24,11 +24,13 @@ _HOME = {
     "collide": "integrator",
     "Scene": "scene",
     "load_scene": "scene",
+    "plan": "scene",
+    "Plan": "plans",
     "sweep": "maps",
 }
 _MODULES = (
     "mesh", "analytic", "spectra", "threshold", "accuracy", "export", "figures", "charts", "sound", "section",
-    "contact", "doctor", "maps", "atlas", "hammers", "report",
+    "contact", "doctor", "maps", "plans", "planner", "atlas", "hammers", "report",
 )  # fmt: skip
 
 __all__ = [*_HOME, *_MODULES, "__version__"]

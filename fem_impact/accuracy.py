@@ -50,15 +50,25 @@ def cutoff_frequency(modes: Modes, at: Any, *, contact: Contact, mass: float, sp
     k = mass omega_0**2; and the residual compliance must stay a small part of the contact's.
     """
     tolerance = _check.positive("tolerance", tolerance)
-    omega_0 = np.pi / contact_duration(contact, mass, speed)
-    stiffness = mass * omega_0**2
-    point = modes.points("at", at)[:1]
-    rest = float(modes.residual_compliance(point)[0, 0])
-    lowest = BAND * omega_0
-    if rest <= 0.0:
-        return lowest / (2.0 * np.pi)
-    s = 0.5 if modes.dimension == 1 else 0.0
-    density = (1.0 + s) * rest * modes.omega[-1] ** (1.0 + s)
+    omega_0, stiffness, density, s = _density(modes, at, contact, mass, speed)
     by_error = (STATIC_CORRECTION * stiffness * omega_0 * density / ((2.0 + s) * tolerance)) ** (1.0 / (2.0 + s))
     by_share = (stiffness * density / ((1.0 + s) * SERIES_SHARE)) ** (1.0 / (1.0 + s))
-    return float(max(lowest, by_error, by_share)) / (2.0 * np.pi)
+    return float(max(BAND * omega_0, by_error, by_share)) / (2.0 * np.pi)
+
+
+def truncation_error(
+    modes: Modes, at: Any, max_frequency: float, *, contact: Contact, mass: float, speed: float
+) -> float:
+    """Error [-] to expect of leaving out the modes above a frequency [Hz]: `cutoff_frequency` the other way round."""
+    omega_0, stiffness, density, s = _density(modes, at, contact, mass, speed)
+    omega_c = 2.0 * np.pi * _check.positive("max_frequency", max_frequency, "Hz")
+    return float(STATIC_CORRECTION * stiffness * omega_0 * density / ((2.0 + s) * omega_c ** (2.0 + s)))
+
+
+def _density(modes: Modes, at: Any, contact: Contact, mass: float, speed: float) -> tuple[float, float, float, float]:
+    """Contact frequency [rad/s], stiffness [N/m], factor A and exponent s of the squared shapes per omega left out."""
+    omega_0 = np.pi / contact_duration(contact, mass, speed)
+    point = modes.points("at", at)[:1]
+    rest = max(0.0, float(modes.residual_compliance(point)[0, 0]))
+    s = 0.5 if modes.dimension == 1 else 0.0
+    return omega_0, mass * omega_0**2, (1.0 + s) * rest * modes.omega[-1] ** (1.0 + s), s

@@ -12,6 +12,7 @@ from .modal import Damping, Modes, damping_ratios
 
 LEVY_TERMS = 4000  # [-] sum over sines across a hinged plate: with its tail corrected, 1e-11 of the compliance
 DISK_TERMS = 100_000  # [-] cap for points at the very edge of a disk, where terms fall as n**-3 only: 5e-11
+MOST_PAIRS = 30_000_000  # [-] half-wave numbers of a plate looked at: about 2 GB
 ENDS = ("clamped", "hinged", "free")
 
 
@@ -161,9 +162,9 @@ def rectangle(
     count, reach = _enough(n_modes, max_frequency, _unit_omega(physical, first_frequency, float(omega(1, 1))))
     if not np.isfinite(reach):  # Weyl's count with its edge term, rounded up until enough are found
         reach = 4.0 * np.pi * (count + 2.0) / root_area
-        while _lattice(length, width, reach / root_area)[0].size < count:
+        while _lattice(length, width, reach / root_area, count)[0].size < count:
             reach *= 1.3
-    m, n = _lattice(length, width, reach / root_area)
+    m, n = _lattice(length, width, reach / root_area, count)
     order = np.lexsort((n, m, omega(m, n)))[:count]
     if not order.size:
         raise ValueError(f"max_frequency must reach the first mode, got {max_frequency:g} Hz")
@@ -172,12 +173,15 @@ def rectangle(
     return _finished(RectangleShapes(length, width, numbers), values, mass, first_frequency, physical, damping_ratio)
 
 
-def _lattice(length: float, width: float, wavenumber_squared: float) -> tuple[np.ndarray, np.ndarray]:
-    """Half-wave numbers (m, n) with pi**2 (m**2 / length**2 + n**2 / width**2) up to a limit, rounding included."""
+def _lattice(length: float, width: float, wavenumber_squared: float, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """Half-wave numbers (m, n), at most ``most``, with pi**2 (m**2 / length**2 + n**2 / width**2) up to a limit."""
     limit = wavenumber_squared * (1.0 + 1e-12)
-    m = np.arange(1, int(length * np.sqrt(limit) / np.pi) + 2)
-    n = np.arange(1, int(width * np.sqrt(limit) / np.pi) + 2)
-    m, n = (grid.ravel() for grid in np.meshgrid(m, n, indexing="ij"))
+    size = [int(min(most, side * np.sqrt(limit) / np.pi + 1.0)) for side in (length, width)]
+    if size[0] * size[1] > MOST_PAIRS:
+        raise ValueError(
+            f"max_frequency must leave fewer than {MOST_PAIRS:g} modes to look at, got {size[0] * size[1]:g}"
+        )
+    m, n = (grid.ravel() for grid in np.meshgrid(*(np.arange(1, k + 1) for k in size), indexing="ij"))
     keep = np.pi**2 * ((m / length) ** 2 + (n / width) ** 2) <= limit
     return m[keep], n[keep]
 

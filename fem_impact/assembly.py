@@ -179,7 +179,7 @@ def assemble(
     elif isinstance(section, Plate) and element == "morley":
         made = _assemble_morley(mesh, section, supports)
     elif mesh.dimension == 2 and isinstance(section, Plate):
-        order, unresolved, fine = around_corners(mesh, _kinds(_support_of_facets(mesh, supports)), section.material.nu)
+        order, unresolved, fine = around_corners(mesh, _kinds(support_of_facets(mesh, supports)), section.material.nu)
         fine = fine if graded else mesh
         if near is not None:
             near = _check.array("near", np.atleast_2d(near), (None, 2), "m")
@@ -201,7 +201,7 @@ def reassemble(system: System, mesh: Mesh) -> System:
     )
 
 
-def _support_of_facets(mesh: Mesh, supports: dict) -> list[str | Elastic]:
+def support_of_facets(mesh: Mesh, supports: dict) -> list[str | Elastic]:
     """The support of each facet."""
     if not isinstance(supports, dict):
         raise ValueError(f"supports must be a dict of edge name -> support, got {supports!r:.80}")
@@ -387,7 +387,7 @@ def _assemble_beam(mesh: Mesh, section: Beam, supports: dict) -> _Raw:
     fixed: list[int] = []
     ends: list[tuple[int, int]] = []
     held: list[Elastic] = []
-    for vertex, kind in zip(mesh.facets[:, 0], _support_of_facets(mesh, supports)):
+    for vertex, kind in zip(mesh.facets[:, 0], support_of_facets(mesh, supports)):
         cell, end = np.argwhere(vertex == line.t.T)[0]
         deflection, slope = dofs[2 * end : 2 * end + 2, cell].tolist()
         if isinstance(kind, Elastic):
@@ -493,7 +493,7 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
         shape = (len(cells), 3 * x.shape[1], 21)
         K[cells] = bend.reshape(shape).transpose(0, 2, 1) @ moment.reshape(shape)
         M[cells] = (value * (inertia * dx)[cells, :, None]).transpose(0, 2, 1) @ value
-    held = _support_of_facets(mesh, supports)
+    held = support_of_facets(mesh, supports)
     rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, _kinds(held))
     expand, project, dofs = constrain(rim, space.vertices, *numbering(plane, element))
     n_all = expand.shape[0]
@@ -521,7 +521,7 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
 def _assemble_morley(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
     if mesh.curved.any():
         raise ValueError("element 'morley' needs straight edges; use 'argyris', or a polygon")
-    held = _support_of_facets(mesh, supports)
+    held = support_of_facets(mesh, supports)
     if section.tension or not all(isinstance(kind, str) for kind in held):
         raise ValueError("element 'morley' knows no tension and no elastic supports; use 'argyris'")
     centre, length, points = _centred(mesh)

@@ -13,7 +13,8 @@ import xarray
 
 from . import _check, accuracy, charts, figures, hammers, maps, threshold
 from .contact import Contact
-from .scene import SHARE, Scene
+from .planner import SHARE
+from .scene import Scene
 from .tables import MAKERS, Part
 
 FIRST_LOOK = 40  # [-] modes found first, from which those a map needs are estimated
@@ -112,7 +113,7 @@ def _quick_map(
     scene: Scene, over: Mapping[str, Any], band: float | None, tolerance: float, wanted: Mapping[str, Any]
 ) -> xarray.Dataset:
     """A map whose axes leave the body's form alone."""
-    law, striker, blow = scene._contact(), scene._striker(), scene.blow.values
+    law, striker, blow = scene.make_contact(), scene.make_striker(), scene.blow.values
     case = maps.Case(scene.modes(FIRST_LOOK), striker, law, np.atleast_1d(np.asarray(blow["at"], float)), blow["speed"])
     axes = maps.checked_axes(case, over)
     needed = max(

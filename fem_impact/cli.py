@@ -10,7 +10,7 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Iterator, MutableMapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -99,8 +99,15 @@ def _parser() -> argparse.ArgumentParser:
     strike.set_defaults(run=_strike)
     strike.add_argument("scene", metavar="SCENE", type=Path, help="a TOML file, such as studies/scenes/drumstick.toml")
     strike.add_argument("--out", metavar="DIR", type=Path, help="where the files go (default: out/NAME-OF-SCENE)")
-    strike.add_argument("--tolerance", metavar="T", type=float, help="largest error accepted, instead of the scene's")
+    _add_choices(strike)
+    strike.add_argument("--verify", action="store_true", help="strike again, finer, and print the true differences")
     strike.add_argument("--json", action="store_true", help="print what response.json holds instead of the summary")
+
+    plan = verbs.add_parser("plan", help="say what would be modelled, why, how well and at which cost; strike nothing")
+    plan.set_defaults(run=_plan)
+    plan.add_argument("scene", metavar="SCENE", type=Path, help="a TOML file")
+    _add_choices(plan)
+    plan.add_argument("--json", action="store_true", help="print the plan as JSON")
 
     modes = verbs.add_parser("modes", help="list the modes of the struck body; write their shapes")
     modes.set_defaults(run=_modes)
@@ -150,6 +157,25 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _add_choices(verb: argparse.ArgumentParser) -> None:
+    """The options that decide what is modelled."""
+    verb.add_argument("--tolerance", metavar="T", type=float, help="largest error accepted, instead of the scene's")
+    verb.add_argument(
+        "--quantity", metavar="Q", action="append",
+        help="what the tolerance is for, once or more: restitution, contact_time, force ..., spectrum=5000 (to 5 kHz)",
+    )  # fmt: skip
+    verb.add_argument(
+        "--target", metavar="KIND", help="hold the struck body for rigid, infinite or modal, come what may"
+    )
+    verb.add_argument("--n-modes", metavar="N", type=int, help="keep so many modes of the struck body")
+    verb.add_argument("--size", metavar="H", type=float, help="size of the elements [m]")
+
+
+def _choices(options: argparse.Namespace) -> dict[str, Any]:
+    names = ("tolerance", "quantity", "target", "n_modes", "size")
+    return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+
+
 class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
         print(f"fem-impact {fi.__version__}")
@@ -160,12 +186,11 @@ def _strike(options: argparse.Namespace) -> None:
     began = time.perf_counter()
     scene = fi.load_scene(options.scene)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
-    changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
     with fi.export.staged(folder) as staging:
-        run = scene.run(_progress, **changes)
+        run = scene.run(_progress, before=_warn, verify=options.verify, **_choices(options))
         start = time.perf_counter()
         with _progress("files"):
-            data = _write(staging, scene, run, changes)
+            data = _write(staging, scene, run)
     seconds = {**run.seconds, "files": time.perf_counter() - start, "total": time.perf_counter() - began}
     if options.json:
         print(json.dumps(data, indent=2, allow_nan=False))
@@ -174,30 +199,59 @@ def _strike(options: argparse.Namespace) -> None:
     for note in run.notes:
         print(_wrapped(f"mesh: {note}"))
     print(_wrapped(run.response.summary()))
+    if run.plan.target != "modal":
+        print(
+            _wrapped(f"Model: {run.plan.reasons[0]}; no modes and no sound (--target modal, or --quantity sound=5000)")
+        )
+    if run.verified is not None:
+        print(_wrapped("Verified by a finer run: " + ", ".join(f"{x} {y:.1e}" for x, y in run.verified.items())))
     print(_wrapped("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())))
     print(_wrapped(f"Files in {folder}{os.sep}: {', '.join(data['files'])}"))
 
 
-def _write(folder: Path, scene: Any, run: Any, changes: Mapping[str, Any]) -> dict[str, Any]:
+def _warn(plan: Any) -> None:
+    """Say beforehand what would surprise."""
+    if plan.costly:
+        print(_wrapped(f"fem-impact: {plan.cost}; Ctrl-C stops it, `fem-impact plan` says why"), file=sys.stderr)
+
+
+def _write(folder: Path, scene: Any, run: Any) -> dict[str, Any]:
     """Write every file of a strike; return what response.json holds."""
-    response = run.response
+    response, extra, files = run.response, {}, ["response.json", "force.csv", "force.png"]
     fi.export.write_force(folder / "force.csv", response)
     fi.figures.save(folder / "force.png", fi.figures.force(response))
-    fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=SHAPES_WRITTEN))
-    heard = fi.export.write_wav(folder / "strike.wav", response, scene.points[0])
+    if run.plan.target == "modal":
+        fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=SHAPES_WRITTEN))
+        heard = fi.export.write_wav(folder / "strike.wav", response, scene.points[0])
+        extra["sound"] = {"at": scene.points[0], "full_scale": heard.full_scale, "peak_level": heard.peak_level}
+        files += ["modes.pvd", "strike.wav"]
+    if run.verified is not None:
+        extra["verified"] = run.verified
+    changes = {name: value for name, value in run.plan.changes.items() if name in ("tolerance", "quantity")}
     data = fi.export.plain(
         {
             **fi.export.numbers(response),
-            "sound": {"at": scene.points[0], "full_scale": heard.full_scale, "peak_level": heard.peak_level},
+            **extra,
+            "plan": run.plan.data(),
             "scene": scene.data(**changes),
             "seconds": dict(run.seconds),
             "notes": list(run.notes),
             "versions": fi.export.versions(),
-            "files": ["response.json", "force.csv", "force.png", "modes.pvd", "strike.wav"],
+            "files": files,
         }
     )
     fi.export.write_json(folder / "response.json", data)
     return data
+
+
+def _plan(options: argparse.Namespace) -> None:
+    scene = fi.load_scene(options.scene)
+    plan = scene.plan(watch=_progress, **_choices(options))
+    if options.json:
+        print(json.dumps(fi.export.plain({**plan.data(), "versions": fi.export.versions()}), indent=2, allow_nan=False))
+        return
+    print(_wrapped(scene.title or str(scene.path)))
+    print(_wrapped(str(plan)))
 
 
 def _map(options: argparse.Namespace) -> None:

@@ -163,6 +163,9 @@ def write_json(path: str | Path, data: dict[str, Any]) -> None:
         temporary.write_text(json.dumps(plain(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
+ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "total", "resolvable")
+
+
 def numbers(response: Response) -> dict[str, Any]:
     """Every scalar of a response, by name, in SI units, and its impacts."""
     error = response.error
@@ -182,7 +185,7 @@ def numbers(response: Response) -> dict[str, Any]:
             "dissipated": response.dissipated,
             "energy_error": response.energy_error,
             "momentum_error": response.momentum_error,
-            "error": {name: getattr(error, name) for name in ("step", "truncation", "mesh", "total", "resolvable")},
+            "error": {name: getattr(error, name) for name in ERROR_PARTS},
             "tolerance": response.tolerance,
             "finished": response.finished,
             "scheme": response.scheme,

@@ -1,7 +1,8 @@
 """Strike and collide: from bodies, contact laws and a tolerance to a response that keeps its promise."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -12,6 +13,7 @@ from . import _check, _kernels
 from ._check import SimulationError
 from .contact import Contact
 from .modal import Modes
+from .plans import asked_for
 from .response import Dip, Error, History, Response
 from .striker import Striker
 
@@ -27,6 +29,7 @@ DOUBLINGS = 7  # [-] how often the step is halved before the run gives up
 RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 2.0), "collocation": (1.0, 1.0), "secular": (1.0, 1.0)}
 LOSSY = 0.25  # [-] the second of them where a contact loses energy: its force jumps when it begins, and peaks early
 COLLOCATION_BELOW = 1e-7  # [-] tolerance from which collocation needs less work than A4
+BAND_POINTS = 257  # [-] frequencies at which two spectra are compared
 NODES = 5  # [-] of collocation; more gain nothing where onset and release limit the smoothness
 RESOLVABLE = 0.3  # [-] contact stiffness times residual compliance up to which the estimate of its error holds
 THINNED = 1.4  # [-] highest frequency kept over that of the run that tells what the modes left out do
@@ -78,15 +81,17 @@ class _Options:
     n_max: int
     scheme: str | None
     dt: float | None
+    quantities: Mapping[str, float | None]  # the tolerance is for, each with its band [Hz]
 
     @classmethod
-    def checked(cls, tolerance, duration, max_impacts, scheme, dt) -> "_Options":
+    def checked(cls, tolerance, duration, max_impacts, scheme, dt, quantity) -> "_Options":
         return cls(
             _check.between("tolerance", tolerance, 1e-12, 1.0),
             np.inf if duration is None else _check.positive("duration", duration, "s"),
             0 if max_impacts is None else _check.count("max_impacts", max_impacts),
             None if scheme is None else _check.one_of("scheme", scheme, SCHEMES),
             None if dt is None else _check.positive("dt", dt, "s"),
+            asked_for(quantity),
         )
 
 
@@ -115,6 +120,7 @@ def strike(
     at: Any,
     speed: float,
     tolerance: float = TOLERANCE,
+    quantity: Any = None,
     residual: bool = True,
     duration: float | None = None,
     max_impacts: int | None = None,
@@ -136,6 +142,9 @@ def strike(
     speed : float [m/s] of the striker's contact point towards the body
     tolerance : float [-]
         Largest error accepted: absolute in the restitution, relative in impulse, contact time and peak force.
+    quantity : str, sequence of str or mapping of str to frequency [Hz], optional
+        What the tolerance is for, where that is less, or more, than these: "restitution", "impulse", "contact_time",
+        "force", "n_impacts"; "spectrum=5000" (of the force, up to 5 kHz, relative to its largest value), "sound=5000".
     residual : bool
         Whether the residual compliance acts; False strikes the bare set of modes.
     duration : float [s], optional
@@ -165,7 +174,7 @@ def strike(
         _check.number(name, x, "N") for name, x in (("striker_force", striker_force), ("target_force", target_force))
     ]
     point = modes.points("at", at)[:1]
-    options = _Options.checked(tolerance, duration, max_impacts, scheme, dt)
+    options = _Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
     touch = Touch(contact, 0, 1, striker.at[None] if striker.modes.dimension else None, point)
     whole = striker.compliance if residual and striker.modes.dimension else None
     end = striker.at[None] if striker.modes.dimension else np.zeros((1, 0))
@@ -184,6 +193,7 @@ def collide(
     speeds: Sequence[float] | None = None,
     states: Sequence[tuple[Any, Any]] | None = None,
     tolerance: float = TOLERANCE,
+    quantity: Any = None,
     residual: bool = True,
     duration: float | None = None,
     max_impacts: int | None = None,
@@ -204,14 +214,14 @@ def collide(
         Modal displacements and velocities of each body at the start, instead of or on top of ``speeds``.
     forces : sequence of float [N], (n_bodies,)
         Constant forces at each body's first contact point, positive like the speeds.
-    tolerance, residual, duration, max_impacts, scheme, dt
+    tolerance, quantity, residual, duration, max_impacts, scheme, dt
         As in `strike`.
 
     Returns
     -------
     Response
     """
-    options = _Options.checked(tolerance, duration, max_impacts, scheme, dt)
+    options = _Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
     bodies, contacts = tuple(bodies), tuple(contacts)
     parts, arriving = _parts(bodies, contacts, speeds, states, forces, residual)
     return _follow(bodies, contacts, parts, arriving, options)
@@ -227,10 +237,11 @@ def _follow(bodies, contacts, parts, speed, options) -> Response:
         )
     pace = _pace(system)
     last = options.horizon, options.n_max
+    differ = partial(_difference, options.quantities)
     history, step_error, ran, coarse, size = _controlled(
-        system, options.scheme, options.dt, options.tolerance, pace, *last
+        system, options.scheme, options.dt, options.tolerance, differ, pace, *last
     )
-    truncation, resolvable = _truncation(parts, contacts, system, coarse, ran, size, pace, *last)
+    truncation, resolvable = _truncation(parts, contacts, system, coarse, ran, size, differ, pace, *last)
     error = Error(step_error, truncation, _mesh_error(bodies, history), resolvable)
     laws = tuple(touch.law for touch in contacts)
     dips = tuple(_dip(part, system) for part in parts)
@@ -395,14 +406,34 @@ def _wall_duration(k: float, exponent: float, mobility: np.ndarray, speed: float
     return 2.0 * np.sqrt(np.pi) * gamma(1.0 + q) / gamma(0.5 + q) * deepest / speed
 
 
-def _controlled(system, scheme, dt, tolerance, pace, horizon, n_max) -> tuple[History, float, str, History, float]:
+def _scheme_for(tolerance: float, exponent: float) -> str:
+    """The scheme that meets a tolerance with least work."""
+    return "collocation" if tolerance < COLLOCATION_BELOW and exponent >= 1.0 else "A4"
+
+
+def _first_count(scheme: str, tolerance: float) -> float:
+    """Steps per contact to begin with."""
+    return max(6.0, FIRST_STEPS * (FIRST_ERROR / tolerance) ** (0.5 if scheme == "A" else 0.25))
+
+
+def steps_for(
+    contact: Contact, duration: float, tolerance: float, scheme: str | None = None, dt: float | None = None
+) -> tuple[str, float]:
+    """Scheme and first step [s] that `strike` takes for a contact of a duration [s] on a rigid wall."""
+    scheme = scheme or _scheme_for(tolerance, contact.exponent)
+    if scheme in ("A", "A4"):
+        return scheme, dt or duration / _first_count(scheme, tolerance)
+    return scheme, dt or duration / (2.0 if scheme == "collocation" else 1.0)
+
+
+def _controlled(
+    system, scheme, dt, tolerance, differ, pace, horizon, n_max
+) -> tuple[History, float, str, History, float]:
     """Run so that the tolerance is met, judged by a second, finer run.
 
     Returns the history, its estimated error, the scheme, and the coarser history with its size.
     """
-    if scheme is None:
-        smooth = bool((system.law[:, 1] >= 1.0).all())
-        scheme = "collocation" if tolerance < COLLOCATION_BELOW and smooth else "A4"
+    scheme = scheme or _scheme_for(tolerance, float(system.law[:, 1].min()))
     if scheme == "collocation" and (system.law[:, 1] < 1.0).any():
         raise ValueError(f"scheme collocation needs exponents of at least 1, got {system.law[:, 1].min():g}; take A4")
     over = RICHARDSON[scheme]
@@ -416,17 +447,16 @@ def _controlled(system, scheme, dt, tolerance, pace, horizon, n_max) -> tuple[Hi
     if dt is not None:
         fine = _run(system, scheme, dt, pace, horizon, n_max)
         coarse = _run(system, scheme, 2.0 * dt, pace, horizon, n_max)
-        return fine, _difference(coarse, fine, over), scheme, coarse, 2.0 * dt
+        return fine, differ(coarse, fine, over), scheme, coarse, 2.0 * dt
     if scheme == "collocation":
         sizes = [max(1e-15, tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)]
     else:
-        count = max(6.0, FIRST_STEPS * (FIRST_ERROR / tolerance) ** (0.5 if scheme == "A" else 0.25))
-        sizes = [shortest / count * 2.0 ** (1 - n) for n in range(DOUBLINGS + 1)]
+        sizes = [shortest / _first_count(scheme, tolerance) * 2.0 ** (1 - n) for n in range(DOUBLINGS + 1)]
     coarse = _run(system, scheme, sizes[0], pace, horizon, n_max)
     best = np.inf
     for before, size in pairwise(sizes):
         fine = _run(system, scheme, size, pace, horizon, n_max)
-        estimate = _difference(coarse, fine, over)
+        estimate = differ(coarse, fine, over)
         if estimate <= tolerance:
             return fine, estimate, scheme, coarse, before
         best = min(best, estimate)
@@ -503,30 +533,39 @@ def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.append(nodes, 1.0), np.ascontiguousarray(powers)
 
 
-def _scalars(history: History, scale: float) -> np.ndarray:
-    """Rigid speeds over the largest speed there is, impulse, contact time and peak force."""
-    start, end, peak, impulse, _ = history.contacts.T
-    speed = history.end_p[history.omega == 0.0] / scale
-    return np.array([*speed, impulse.sum(), (end - start).sum(), peak.max(initial=0.0)])
+def _difference(
+    quantities: Mapping[str, float | None], coarse: History, fine: History, over: tuple[float, float] = (1.0, 1.0)
+) -> float:
+    """Largest difference of two runs in what is asked for; 1 where they count impacts differently.
 
-
-def _difference(coarse: History, fine: History, over: tuple[float, float] = (1.0, 1.0)) -> float:
-    """Largest difference of two runs in what the tolerance speaks of; 1 where they count impacts differently.
-
-    ``over`` divides the differences of speeds and impulse, and those of contact time and peak force.
+    ``over`` divides the differences of speeds, impulse and spectrum, and those of contact time and peak force.
     """
     if len(coarse.contacts) != len(fine.contacts) or coarse.status != fine.status:
         return 1.0
-    momentum = np.linalg.norm(fine.start_p) or np.linalg.norm(fine.end_p) or 1.0
-    one, two = _scalars(coarse, float(momentum)), _scalars(fine, float(momentum))
-    scale = np.ones_like(two)
-    scale[-3:] = np.where(two[-3:] > 0.0, two[-3:], 1.0)
-    scale[:-2] *= over[0]
-    scale[-2:] *= over[1]
-    return max(float(np.max(np.abs(one - two) / scale)), ROUNDING)
+    momentum = float(np.linalg.norm(fine.start_p) or np.linalg.norm(fine.end_p) or 1.0)
+    speed = coarse.end_p[coarse.omega == 0.0] - fine.end_p[fine.omega == 0.0]
+    found = {"restitution": float(np.abs(speed).max(initial=0.0)) / momentum / over[0]}
+    one, two = coarse.contacts, fine.contacts
+    if len(two):
+        pairs = {
+            "impulse": (one[:, 3].sum(), two[:, 3].sum(), over[0]),
+            "contact_time": ((one[:, 1] - one[:, 0]).sum(), (two[:, 1] - two[:, 0]).sum(), over[1]),
+            "force": (one[:, 2].max(), two[:, 2].max(), over[1]),
+        }
+        found |= {name: abs(x - y) / (y or 1.0) / share for name, (x, y, share) in pairs.items()}
+    for name, band in quantities.items():
+        if band is not None:
+            frequencies = np.linspace(0.0, band, BAND_POINTS)
+            first, second = (_force_spectrum(history, frequencies) for history in (coarse, fine))
+            found[name] = float(np.abs(first - second).max() / (np.abs(second).max() or 1.0)) / over[0]
+    return max(ROUNDING, *(float(found.get(name, 0.0)) for name in quantities))
 
 
-def _truncation(parts, contacts, system: _System, whole: History, scheme, size, pace, horizon, n_max):
+def _force_spectrum(history: History, frequencies: np.ndarray) -> np.ndarray:
+    return Response((), (), history, 1.0, 1.0, "", Error(0.0, 0.0, 0.0)).spectrum(frequencies)
+
+
+def _truncation(parts, contacts, system: _System, whole: History, scheme, size, differ, pace, horizon, n_max):
     """Estimated error [-] of leaving out modes, and whether the estimate can be trusted.
 
     The run is repeated with the upper modes left out as well, their compliance in their place; as the error falls
@@ -546,7 +585,7 @@ def _truncation(parts, contacts, system: _System, whole: History, scheme, size, 
     if not 1.0 < least < np.inf:
         return float((stiffness * rest).max()), resolvable
     less = _run(_joined([part for part, _ in thin], contacts), scheme, size, pace, horizon, n_max)
-    return _difference(less, whole) / (least**2 - 1.0), resolvable
+    return differ(less, whole) / (least**2 - 1.0), resolvable
 
 
 def _mesh_error(bodies: tuple[Modes, ...], history: History) -> float:

@@ -41,11 +41,12 @@ class Error:
     truncation: float  # [-] of the modes left out
     mesh: float  # [-] of the finite elements
     resolvable: bool = True  # False: the modes left out are the contact's own dynamics; no estimate holds
+    idealisation: float = 0.0  # [-] of holding the target for rigid or infinite
 
     @property
     def total(self) -> float:
         """The sum [-]; infinite where the modes cannot resolve the contact."""
-        return self.step + self.truncation + self.mesh if self.resolvable else float("inf")
+        return self.step + self.truncation + self.mesh + self.idealisation if self.resolvable else float("inf")
 
     def __float__(self) -> float:
         return self.total
@@ -513,7 +514,7 @@ class Response:
             f"restitution {self.restitution:.5f} at {self.speed:g} m/s",
             f"energy {total:.5g} J: {shares}",
             f"estimated error {error.total:.1e} (step {error.step:.1e}, truncation {error.truncation:.1e}, "
-            f"mesh {error.mesh:.1e}); energy kept to {self.energy_error:.1e}",
+            f"mesh {error.mesh:.1e}, idealisation {error.idealisation:.1e}); energy kept to {self.energy_error:.1e}",
         ]
         if not error.resolvable:
             lines.append("not resolvable: the modes left out matter to this contact; keep more modes")

@@ -1,45 +1,30 @@
 """A strike as a text file: a TOML scene is checked as a whole, then built with the public functions and struck."""
 
-import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from . import _check, accuracy, analytic, assembly, integrator, modal
+from . import _check, analytic, assembly, modal, planner
 from .contact import Contact
 from .mesh import Mesh
 from .modal import Modes
+from .planner import SHORT_WAVES, Run, Stages, Watch
+from .plans import Plan
 from .response import Response
 from .section import Beam, Material, Plate
 from .striker import Striker
 from .tables import MAKERS, REQUIRED, TABLES, Part, fault, read_part, read_tables, target_values
 
-SHARE = 0.45  # [-] of the tolerance each for the modes left out and for the time steps; the rest is the mesh's
-MARGINS = (1.0, 4.0, 16.0)  # [-] stricter choices of modes, taken one after another while those left out matter
-FIRST_LOOK = 20  # [-] modes found first: enough to set the scale and to tell how densely the others follow
-
-MOST_MODES = {"fe": 2000, "analytic": 50_000}  # [-] about 2 GB, and minutes
 WORST_FREQUENCY = 0.1  # [-] error of a frequency that `find_modes` accepts at most
-SHORT_WAVES = 1e-5  # [-] error of the frequencies that `find_modes` sets the size of its elements for
 NOTHING = Part()  # a table left out
 ANALYTIC = {"rectangle": ("left", "right", "bottom", "top"), "line": ("left", "right"), "disk": ("outer",)}
 
-Watch = Callable[[str], AbstractContextManager[Any]]
-Finder = Callable[..., Modes]  # from a number of modes, or a frequency [Hz] and the modes found first
-
-
-@dataclass(frozen=True)
-class Run:
-    """One strike of a scene with what it took."""
-
-    response: Response
-    seconds: Mapping[str, float]  # [s] wall time of each stage, by its name
-    notes: tuple[str, ...] = ()  # what was mended or assumed of the mesh
+Finder = Callable[..., Modes]  # from a number of modes, or a frequency [Hz], and the modes found first
 
 
 @dataclass(frozen=True)
@@ -59,47 +44,68 @@ class Scene:
     observe: Part | None = None
     map: Part | None = None
 
-    def strike(self) -> Response:
-        """Build everything and strike; ValueError names file, table and key of what cannot be."""
-        return self.run().response
+    def strike(self, **changes: Any) -> Response:
+        """Build everything and strike; ``changes`` as in `plan`. ValueError names file, table and key at fault."""
+        return self.run(**changes).response
 
     def modes(self, count: int | None = None) -> Modes:
         """Modes of the struck body: the first ``count``, or as many as the blow and its tolerance need."""
-        return self._modes(_Stages(None), None if count is None else _check.count("count", count))
+        if count is None:
+            return planner.target(self.plan(target="modal"), Stages())
+        found = self.finder(Stages(), planner.tolerance_of(self))(_check.count("count", count))
+        return found.scaled(**self.scale).damped(self.damping_ratio)
 
-    def run(self, watch: Watch | None = None, **changes: Any) -> Run:
-        """Strike, timing every stage.
+    def plan(self, *, watch: Watch | None = None, **changes: Any) -> Plan:
+        """Decide how to model the blow, without striking.
 
         Parameters
         ----------
         watch : callable, optional
             Called with the name of each stage; returns a context manager that is held while the stage lasts.
         **changes
-            Arguments of `strike` that replace those of the scene, such as ``tolerance``.
+            Arguments of `strike` that replace those of the scene, such as ``tolerance`` and ``quantity``; and pieces of
+            the plan set by hand: ``target`` ("rigid", "infinite" or "modal"), ``size`` [m] of the elements,
+            ``n_modes`` or ``max_frequency`` [Hz] of the target, ``n_striker_modes``.
+
+        Returns
+        -------
+        Plan
+            Where the target needs modes, its first twenty are found to tell how many.
+        """
+        return planner.make(self, changes, Stages(watch))
+
+    def run(
+        self,
+        watch: Watch | None = None,
+        *,
+        plan: Plan | None = None,
+        before: Callable[[Plan], object] | None = None,
+        verify: bool = False,
+        **changes: Any,
+    ) -> Run:
+        """Strike, timing every stage.
+
+        Parameters
+        ----------
+        watch : as in `plan`
+        plan : Plan, optional
+            To carry out instead of the one made now.
+        before : callable, optional
+            Called with the plan before it is carried out.
+        verify : bool
+            Whether to strike again with everything one notch finer and note the true differences.
+        **changes : as in `plan`
 
         Returns
         -------
         Run
         """
-        stages = _Stages(watch)
-        blow = {**self.blow.values, **changes}
-        for margin in MARGINS:
-            modes = self._modes(stages, None, blow, margin)
-            with self._blame("observe"):
-                for point in self.points:
-                    modes.points("points", [point])
-            with stages("strike"), self._blame("strike"):
-                tolerance = _check.positive("tolerance", blow.get("tolerance", integrator.TOLERANCE))
-                asked = {**blow, "tolerance": SHARE * tolerance}
-                response = integrator.strike(modes, self._striker(), self._contact(), **asked)
-                response = replace(response, tolerance=tolerance)
-            if response.error.truncation <= SHARE * tolerance or not blow.get("residual", True):
-                break
-        return Run(response, MappingProxyType(stages.seconds), stages.notes)
-
-    def body(self) -> Mesh:
-        """The struck body's outline with its named edges."""
-        return self._make("mesh", self.mesh)
+        stages = Stages(watch)
+        plan = planner.make(self, changes, stages) if plan is None else plan
+        if before is not None:
+            before(plan)
+        run = planner.carry_out(plan, stages)
+        return planner.verify(run, watch) if verify else run
 
     @property
     def points(self) -> list[Any]:
@@ -117,71 +123,85 @@ class Scene:
         tables["strike"] |= changes
         return tables
 
-    def _modes(
-        self, stages: "_Stages", count: int | None, blow: Mapping[str, Any] | None = None, margin: float = 1.0
-    ) -> Modes:
-        blow = self.blow.values if blow is None else blow
-        with self._blame("strike"):
-            tolerance = _check.between("tolerance", blow.get("tolerance", integrator.TOLERANCE), 1e-12, 1.0)
-            speed = _check.positive("speed", blow["speed"], "m/s")
-        with self._blame("target"):
-            target = target_values(**self.target.values)
-        find = self._analytic(stages) if target["source"] == "analytic" else self._finite_elements(stages, tolerance)
-        with stages("modes"):
-            modes = find(count or FIRST_LOOK)
-            scaled = modes.scaled(**target["scale"])
-            with self._blame("strike"):
-                scaled.points("at", blow["at"])
-                if count is None:
-                    limit = accuracy.cutoff_frequency(
-                        scaled,
-                        blow["at"],
-                        contact=self._contact(),
-                        mass=self._striker().felt_mass,
-                        speed=speed,
-                        tolerance=SHARE * tolerance / margin,
-                    )
-                    self._check_affordable(scaled, limit, target["source"])
-                    if limit > scaled.frequencies[-1]:
-                        modes = find(FIRST_LOOK, limit * modes.frequencies[-1] / scaled.frequencies[-1], modes)
-            return modes.scaled(**target["scale"]).damped(target["damping_ratio"])
+    @property
+    def source(self) -> str:
+        """Where the target's modes come from, "fe" or "analytic"."""
+        return self._target["source"]
 
-    def _check_affordable(self, first: Modes, limit: float, source: str) -> None:
-        """Raise SimulationError where the modes up to a frequency [Hz] would fill the memory."""
-        growth = max(1.0, limit / first.frequencies[-1]) ** (0.5 * first.dimension)  # Weyl's law
-        number = first.n_modes * growth
-        if number > MOST_MODES[source]:
-            raise _check.SimulationError(
-                f"{self.path}: this blow needs some {number:.2g} modes, up to {limit:.2g} Hz, more than "
-                f"{MOST_MODES[source]}; allow a larger tolerance, a softer contact or a lower speed"
-            )
+    @property
+    def scale(self) -> Mapping[str, float]:
+        """Mass [kg] and first frequency [Hz] of the target, where they are given."""
+        return self._target["scale"]
 
-    def _finite_elements(self, stages: "_Stages", tolerance: float) -> Finder:
-        with stages("mesh"):
-            body = self.body()
-        stages.notes = body.notes
-        with stages("assembly"):
-            section = self._section("beam" if body.dimension == 1 else "plate")
-            with self._blame("supports"), np.errstate(all="ignore"):
-                system = assembly.assemble(body, section, supports=dict(self.supports.values))
+    @property
+    def damping_ratio(self) -> float:
+        """Damping ratio [-] of the target's modes."""
+        return self._target["damping_ratio"]
 
+    @property
+    def _target(self) -> dict[str, Any]:
+        with self.blame("target"):
+            return target_values(**self.target.values)
+
+    def finder(self, stages: Stages, tolerance: float, size: float | None = None) -> Finder:
+        """What finds the target's modes, before mass, first frequency and damping are set (see `Finder`)."""
+        return self._analytic() if self.source == "analytic" else self._finite_elements(stages, tolerance, size)
+
+    def closed_form(self) -> Finder | None:
+        """The same by closed formulas, whatever the source; None where there are none."""
+        try:
+            return self._analytic()
+        except ValueError:
+            return None
+
+    def body(self, size: float | None = None) -> Mesh:
+        """The mesh of the target, its elements of a size [m] or as the scene has it."""
+        if size is None:
+            return self._body
+        if self.mesh.kind == "file":
+            raise fault(self.path, "[mesh] size cannot be chosen for a mesh from a file")
+        return self._make("mesh", Part(self.mesh.kind, {**self.mesh.values, "size": size}))
+
+    @cached_property
+    def _body(self) -> Mesh:
+        return self._make("mesh", self.mesh)
+
+    @property
+    def size_stated(self) -> bool:
+        """Whether the scene insists on a size of the elements."""
+        return "size" in self.mesh.values
+
+    def _finite_elements(self, stages: Stages, tolerance: float, size: float | None) -> Finder:
         def find(n_modes: int, max_frequency: float | None = None, first: Any = None) -> Modes:
-            with self._blame("mesh"), np.errstate(all="ignore"):
-                if max_frequency is None:
-                    return modal.find_modes(system, n_modes=n_modes, tolerance=min(tolerance, WORST_FREQUENCY))
+            whole = self._system(stages, size) if first is None else None
+            insisted = size is not None or self.size_stated
+            with self.blame("mesh"), np.errstate(all="ignore"):
+                if whole is not None:
+                    wanted = None if insisted else min(tolerance, WORST_FREQUENCY)
+                    return modal.find_modes(whole, n_modes=n_modes, tolerance=wanted)
                 # The mesh that was fine enough for the first modes, finer still where the shortest wave asks for it.
-                mesh = replace(first.shapes.system.mesh, size_stated=body.size_stated)
-                modes = modal.find_modes(replace(first.shapes.system, mesh=mesh), max_frequency=max_frequency)
+                system = first.shapes.system
+                system = replace(system, mesh=replace(system.mesh, size_stated=insisted))
+                reach = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}
+                modes = modal.find_modes(system, **reach)
                 error = np.full(modes.n_modes, max(first.frequency_error.max(), SHORT_WAVES))
                 error[: first.n_modes] = first.frequency_error[: modes.n_modes]
                 return replace(modes, frequency_error=error)
 
         return find
 
-    def _analytic(self, stages: "_Stages") -> Finder:
+    def _system(self, stages: Stages, size: float | None) -> assembly.System:
+        with stages("mesh"):
+            body = self.body(size)
+        with stages("assembly"):
+            section = self.make_section("beam" if body.dimension == 1 else "plate")
+            with self.blame("supports"), np.errstate(all="ignore"):
+                return assembly.assemble(body, section, supports=dict(self.supports.values))
+
+    def _analytic(self) -> Finder:
         edges = dict(self.supports.values)
         values = {key: value for key, value in self.mesh.values.items() if key != "size"}
-        with stages("mesh"), self._blame("supports"):
+        with self.blame("supports"):
             held = {name: edges.pop(name, edges.get("boundary", "free")) for name in ANALYTIC.get(self.mesh.kind, ())}
             edges.pop("boundary", None)
             if edges:
@@ -201,19 +221,19 @@ class Scene:
                     f"source = 'analytic' knows rectangles hinged all round, beams and disks without hole, "
                     f"not this {self.mesh.kind}; use source = 'fe'"
                 )
-        section = self._section("beam" if self.mesh.kind == "line" else "plate")
+        section = self.make_section("beam" if self.mesh.kind == "line" else "plate")
 
         def find(n_modes: int, max_frequency: float | None = None, first: Any = None) -> Modes:
             wanted = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}
-            with self._blame("mesh"):
+            with self.blame("mesh"), np.errstate(all="ignore"):
                 return make(**values, section=section, **wanted)
 
         return find
 
-    def _section(self, kind: str) -> Plate | Beam:
+    def make_section(self, kind: str) -> Plate | Beam:
         """The section, or any of the right kind where mass and first frequency set the scale."""
         if self.section is None or self.material is None:
-            with self._blame("target"):
+            with self.blame("target"):
                 material = Material(E=1.0, nu=target_values(**self.target.values)["nu"], rho=1.0)
                 return Plate(material, 1.0) if kind == "plate" else Beam.rectangular(material, width=1.0, height=1.0)
         material = self._make("material", self.material)
@@ -222,20 +242,24 @@ class Scene:
             raise fault(self.path, f"[section] kind must be '{kind}' for this mesh, got {self.section.kind!r}")
         return section
 
-    def _striker(self) -> Striker:
+    def make_striker(self) -> Striker:
         return self._make("striker", self.striker)
 
-    def _contact(self) -> Contact:
+    def make_contact(self) -> Contact:
         if self.contact.kind != "between":
             return self._make("contact", self.contact)
-        return self._make("contact", self.contact, sphere=self._striker(), plate=self._section("plate"))
+        return self._make("contact", self.contact, sphere=self.make_striker(), plate=self.make_section("plate"))
 
     def _make(self, table: str, part: Part, **supplied: Any) -> Any:
-        with self._blame(table), np.errstate(all="ignore"):  # what overflows is not finite, and refused as such
+        with self.blame(table), np.errstate(all="ignore"):  # what overflows is not finite, and refused as such
             return MAKERS[table][1][part.kind](**supplied, **part.values)
 
+    def fault(self, text: str) -> ValueError:
+        """An error that names the file."""
+        return fault(self.path, text)
+
     @contextmanager
-    def _blame(self, table: str) -> Iterator[None]:
+    def blame(self, table: str) -> Iterator[None]:
         """Put file and table in front of an error in the numbers of one table."""
         try:
             yield
@@ -243,24 +267,6 @@ class Scene:
             raise fault(self.path, f"[{table}] {error}") from None
         except (OverflowError, ZeroDivisionError):
             raise fault(self.path, f"[{table}] has numbers too large or too small to reckon with") from None
-
-
-class _Stages:
-    """Wall time of each stage, and whoever watches."""
-
-    def __init__(self, watch: Watch | None) -> None:
-        self.watch = watch or (lambda name: nullcontext())
-        self.seconds: dict[str, float] = {}
-        self.notes: tuple[str, ...] = ()
-
-    @contextmanager
-    def __call__(self, name: str) -> Iterator[None]:
-        start = time.perf_counter()
-        try:
-            with self.watch(name):
-                yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -307,10 +313,15 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
     return scene
 
 
+def plan(scene: Scene | str | Path, **changes: Any) -> Plan:
+    """Decide how a scene, or the file it is in, will be modelled, without striking (see `Scene.plan`)."""
+    return (scene if isinstance(scene, Scene) else load_scene(scene)).plan(**changes)
+
+
 def _check_whole(scene: Scene) -> None:
     """Build what is cheap to build, so that a wrong number is told at once, and check what two tables share."""
     target = {} if scene.target is None else scene.target.values
-    with scene._blame("target"):
+    with scene.blame("target"):
         target_values(**target)
     if (scene.material is None) != (scene.section is None):
         missing, there = ("material", "section") if scene.material is None else ("section", "material")
@@ -322,8 +333,8 @@ def _check_whole(scene: Scene) -> None:
         if part is not None:
             scene._make(table, part)
     if scene.section is not None:
-        scene._section(scene.section.kind)
+        scene.make_section(scene.section.kind)
     if scene.contact.kind == "between" and (scene.striker.kind != "sphere" or scene.section is None):
         raise fault(scene.path, "[contact] kind 'between' needs a striker of kind 'sphere' and a [section]")
-    scene._striker()
-    scene._contact()
+    scene.make_striker()
+    scene.make_contact()

@@ -149,6 +149,14 @@ def sharpened(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[
 
 def fine_enough(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> System:
     """The system on a mesh that resolves the shortest wave asked for, where the user left the size open."""
+    size = size_for(system, n_modes, max_frequency, tolerance)
+    if system.mesh.size_stated or size >= system.mesh.size:
+        return system
+    return reassemble(system, system.mesh.refined(system.mesh.size / size))
+
+
+def size_for(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> float:
+    """Size [m] of elements that resolve the shortest wave asked for."""
     wave = _wave(system, n_modes, max_frequency)
     size = WAVE_PER_ELEMENT[system.element] / wave
     if tolerance is not None:
@@ -160,9 +168,7 @@ def fine_enough(system: System, n_modes: int | None, max_frequency: float | None
     if isinstance(system.section, Plate) and system.section.tension:  # the edge of a drumhead bends within its layer
         layer = (system.frame.stiffness / system.section.tension) ** 0.5
         size = min(size, max(LAYERS * layer, system.frame.length / FINEST_LAYER))
-    if system.mesh.size_stated or size >= system.mesh.size:
-        return system
-    return reassemble(system, system.mesh.refined(system.mesh.size / size))
+    return size
 
 
 def refine(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> Spectrum:

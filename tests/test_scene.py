@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from fem_impact import _check, analytic, assembly, integrator, mesh, modal, scene
+from fem_impact import _check, analytic, assembly, integrator, mesh, modal, planner, scene
 from fem_impact.contact import Contact
 from fem_impact.section import Material, Plate
 from fem_impact.striker import Striker
@@ -71,7 +71,7 @@ def test_scene_strikes_what_the_public_functions_strike(tmp_path):
         Contact.hertz(695e3),
         at=[0.1395, 0.09],
         speed=2.0,
-        tolerance=scene.SHARE * 1e-2,
+        tolerance=planner.SHARE * 1e-2,
     )
     # the same calls with the same numbers, up to rounding of the scale: 1e-9 of the peak after some 1e3 rad
     assert_allclose(hit.force, again.force, rtol=0, atol=1e-9 * again.peak_force)
@@ -134,7 +134,7 @@ def test_stages_are_timed_and_watched(tmp_path):
             pass
 
     run = scene.load_scene(edited(tmp_path, '"analytic"', '"fe"')).run(Watch)
-    assert seen == list(run.seconds) == ["mesh", "assembly", "modes", "strike"]
+    assert list(dict.fromkeys(seen)) == list(run.seconds) == ["modes", "mesh", "assembly", "strike"]
     assert all(value > 0.0 for value in run.seconds.values())
 
 
