@@ -14,17 +14,20 @@ LIGHT = 0.9  # [-] damping ratio up to which a mode takes the fast lanes
 SERIES_END = 3.0  # [-] omega*h below which the fast lanes sum a power series: 13 terms leave 3e-17
 ANGLE_LIMIT = 1e6  # [-] angle up to which the reduction in `waves` is exact
 OVERDAMPED = 1.2  # [-] damping ratio from which the two decay rates are far enough apart for partial fractions
+ZERO, WHOLE = np.int64(0), np.bool_(True)  # no literals: what is called with one is compiled for it and then again
 LEVELS = 40  # [-] halvings of the step that may be cached
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
 N_LANE = 7  # rows of what a run keeps of it, in the order of `lane_table`
+PATIENT = (
+    64  # [-] looks of a flight after which a table for a longer step pays, a step or two of half the length before
+)
 GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before
 LOOK_LIMIT = 20_000_000  # [-] looks ahead times modes in one free flight before the run gives up: some 0.1 s
 WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it
 SECULAR_MISFIT = 1e-12  # [-] of the peak force: what recorded polynomials may miss of the exact force
-LOCATED = 1e-12  # [-] of the approach about an event: a stored energy of 1e-24 of the step's is left out there
+LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
 EVENT_LIMIT = 64  # [-] events without one full step between them: chatter, passed with unlocated steps
-CONTACT, FLIGHT = 0, 1  # what the run does next
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = 0, 1, 2, 3, 4, 5  # why a run ended
 
 
@@ -32,7 +35,8 @@ def outer(**options: Any) -> Any:
     """Compile for use from Python; other threads run meanwhile."""
     if UNCOUNTED:
         options["_nrt"] = True
-    return njit(cache=True, error_model="numpy", nogil=True, **options)
+    wrapped: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
+    return njit(**wrapped, **options)
 
 
 def inner(allocates: bool = False, **options: Any) -> Any:
@@ -46,7 +50,7 @@ def inner(allocates: bool = False, **options: Any) -> Any:
     return njit(**bare, **options)
 
 
-@outer()
+@inner()
 def mode_matrix(w, z, h):
     """Exact free motion of one flexible mode: a11, a12, a22 of the state's step, then slow and fast rate and half gap.
 
@@ -101,7 +105,7 @@ def exponential_sums(z, out_sums):
             inverse *= k
 
 
-@outer()
+@inner()
 def mode_moments(w, z, h, out_moments, work):
     """Exact step of one mode: a11, a12, a22, and in out_moments the moments of its impulse response g.
 
@@ -163,7 +167,7 @@ def mode_moments(w, z, h, out_moments, work):
     return a11, a12, a22
 
 
-@outer(fastmath={"contract"})
+@inner(fastmath={"contract"})
 def waves(angle, out_sin, out_cos):
     """Sine and cosine of many angles from 0 to ANGLE_LIMIT, within 1.5 units in the last place, in parallel lanes.
 
@@ -194,7 +198,7 @@ def waves(angle, out_sin, out_cos):
         out_cos[n] = -c if (quarter == 1.0) or (quarter == 2.0) else c
 
 
-@outer(fastmath={"contract"})
+@inner(allocates=True, fastmath={"contract"})
 def decays(exponent, out_decay):
     """exp(-x) of many x >= 0 within two units in the last place, in parallel lanes; zero beyond 700."""
     bits = np.empty(exponent.size, np.int64)
@@ -319,18 +323,27 @@ def near_moments(omega, h, double, out_moments):
 
 
 @inner(allocates=True, fastmath={"contract"})
-def lane_table(omega, zeta, h, out_lanes):
+def lane_table(omega, zeta, h, whole, out_lanes):
     """Coefficients of one exact step of length h for every mode, (N_LANE, n_modes), all that others follow from.
 
     Rows: a11, a12, a21, a22 of the state's step; h times the moments 1 and 2 (see `mode_moments`) and times moment 3
     less half of moment 2. Lightly damped modes take parallel lanes: their moments by a power series below SERIES_END,
-    by recursion above; the others go one by one.
+    by recursion above; the others go one by one. Where it is not asked for the whole, free motion without a constant
+    force is all that is made.
     """
     n_modes = omega.size
     free = np.empty((3, n_modes))
     double = np.empty(n_modes)
     m = np.empty((4, n_modes))
     free_table(omega, zeta, h, free, double)
+    for n in range(n_modes):
+        out_lanes[0, n] = free[0, n]
+        out_lanes[1, n] = free[1, n]
+        out_lanes[2, n] = -omega[n] * omega[n] * free[1, n]
+        out_lanes[3, n] = free[2, n]
+        out_lanes[4, n] = 0.0
+    if not whole:
+        return
     near_moments(omega, h, double, m)
     part = 1.0 / h
     for n in range(n_modes):
@@ -352,10 +365,6 @@ def lane_table(omega, zeta, h, out_lanes):
             for k in range(1, 4):
                 m[k, n] = single[k]
     for n in range(n_modes):
-        out_lanes[0, n] = free[0, n]
-        out_lanes[1, n] = free[1, n]
-        out_lanes[2, n] = -omega[n] * omega[n] * free[1, n]
-        out_lanes[3, n] = free[2, n]
         out_lanes[4, n] = h * m[1, n]
         out_lanes[5, n] = h * m[2, n]
         out_lanes[6, n] = h * (m[3, n] - 0.5 * m[2, n])
@@ -369,7 +378,7 @@ def step_table(omega, zeta, h, out_table):
     A1, A2 and of the two forces B0, B1.
     """
     lanes = np.empty((N_LANE, omega.size))
-    lane_table(omega, zeta, h, lanes)
+    lane_table(omega, zeta, h, WHOLE, lanes)
     for n in range(omega.size):
         for k in range(4):
             out_table[k, n] = lanes[k, n]
@@ -457,7 +466,7 @@ def law_at(d, law, i):
     return x, f, f * x / (a + 1.0) + 0.5 * c * f * f
 
 
-@outer()
+@inner()
 def law_pair(d0, x0, f0, v0, d1, x1, f1, v1, law, i):
     """Average slopes between two approaches: energy over approach (G) and force over approach (D); no cancellation."""
     if d0 <= 0.0 or d1 <= 0.0:
@@ -496,7 +505,7 @@ def law_pair(d0, x0, f0, v0, d1, x1, f1, v1, law, i):
     return (g + 0.5 * c * (f0 + f1) * d) / (1.0 + c * d), d / (1.0 + c * d)
 
 
-@outer()
+@inner()
 def solve_constant(d0, x0, f0, v0, e, b, loss, law, i):
     """Root y of y - e + b F(d0, y) = 0 and the constant force F >= 0 of the step (scheme A); always exists, unique.
 
@@ -626,15 +635,10 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
     compression, force, energy and rate of each contact, (5, n_contacts).
     """
     m = e.size
-    if m == 1:
-        out_y[0], out_f[0] = solve_constant(
-            now[0, 0], now[1, 0], now[2, 0], now[3, 0], e[0], sums[0, 0, 0], law[0, 2] / h, law, m - 1
-        )
-        return
     for i in range(m):
         out_f[i] = 0.0
     for _ in range(4):
-        if sweep_constants(h, now, law, e, sums, out_y, out_f) <= 1e-15:
+        if sweep_constants(h, now, law, e, sums, out_y, out_f) <= 1e-15 or m == 1:
             return
     matrix = work[0]
     step = work[2, 0]
@@ -690,7 +694,7 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
             break
 
 
-@outer()
+@inner()
 def solve_ramp(h, d0, x0, f0, v0, rate0, e, ea, vf, sums, law):
     """Scheme A4 for one contact: (settled, y, mean force, slope) by Newton's method, the loss by secants.
 
@@ -938,26 +942,6 @@ def advance(shape, tables, slot, h, twice, offset, bias, force, slope, q, p, fre
     out_end[2, 0] = rate
 
 
-@inner(allocates=True)
-def free_flight(omega, zeta, bias, time, q, p):
-    """Advance a state in place by the exact motion without contact."""
-    n_modes = omega.size
-    free = np.empty((3, n_modes))
-    double = np.empty(n_modes)
-    free_table(omega, zeta, time, free, double)
-    moments = np.empty(2)
-    work = np.empty((2, 1))
-    for n in range(n_modes):
-        q0 = q[n]
-        q[n] = free[0, n] * q0 + free[1, n] * p[n]
-        p[n] = -omega[n] * omega[n] * free[1, n] * q0 + free[2, n] * p[n]
-    for n in range(n_modes):
-        if bias[n] != 0.0:
-            _, a12, _ = mode_moments(omega[n], zeta[n], time, moments, work)
-            q[n] += bias[n] * time * time * moments[1]
-            p[n] += a12 * bias[n]
-
-
 @inner(fastmath=LOOSE)
 def approach(shape, offset, i, q, p):
     """Approach of contact i and its rate."""
@@ -1011,32 +995,21 @@ def quadratic_wait(d, v, a):
 
 
 @inner(fastmath=LOOSE)
-def glide(table, q, p):
-    """Advance a state in place by the free motion whose table (6, n_modes) is given: a11, a12, a21, a22, pushes."""
+def glide(lanes, h, bias, q, p):
+    """Advance a state in place by the free motion over h, whose `lane_table` is given."""
     for n in range(q.size):
         q0 = q[n]
         p0 = p[n]
-        q[n] = table[0, n] * q0 + table[1, n] * p0 + table[4, n]
-        p[n] = table[2, n] * q0 + table[3, n] * p0 + table[5, n]
+        q[n] = lanes[0, n] * q0 + lanes[1, n] * p0 + h * lanes[4, n] * bias[n]
+        p[n] = lanes[2, n] * q0 + lanes[3, n] * p0 + lanes[1, n] * bias[n]
 
 
-@inner(allocates=True)
-def glide_table(omega, zeta, bias, h, out_table):
-    """Table for `glide` over h."""
-    n_modes = omega.size
-    double = np.empty(n_modes)
-    free_table(omega, zeta, h, out_table, double)
-    moments = np.empty(2)
-    work = np.empty((2, 1))
-    for n in range(n_modes):
-        out_table[3, n] = out_table[2, n]
-        out_table[2, n] = -omega[n] * omega[n] * out_table[1, n]
-        out_table[4, n] = 0.0
-        out_table[5, n] = 0.0
-        if bias[n] != 0.0:
-            _, a12, _ = mode_moments(omega[n], zeta[n], h, moments, work)
-            out_table[4, n] = bias[n] * h * h * moments[1]
-            out_table[5, n] = bias[n] * a12
+@inner()
+def restore(q, p, out_q, out_p):
+    """Copy a state; for less compilation than assigning slices."""
+    for n in range(q.size):
+        out_q[n] = q[n]
+        out_p[n] = p[n]
 
 
 @inner(allocates=True)
@@ -1044,7 +1017,8 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
     """Advance a state without contact in place to the next onset, never passing one (conservative advancement).
 
     Each look ahead is no longer than bounds on the later motion allow. Long looks take steps base * 2**k, whose tables
-    (GLIDES, 6, n_modes) are kept from flight to flight; the last ones before an onset are exact.
+    (GLIDES + 1, N_LANE, n_modes) are kept from flight to flight; the last ones before an onset are exact. A state from
+    which nothing touches again is left as it was.
 
     Returns (elapsed, contact, status): status 0 an onset at `contact`, 1 no contact ever again (proved),
     2 the limit reached, 3 too slow an advance (shorter than `shortest` per look): hand over to a stepping scheme,
@@ -1054,7 +1028,10 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
     m = shape.shape[0]
     elapsed = 0.0
     slow = 0
+    pushed = any_of(bias)
     bounds = np.empty((m, 6))
+    old_q = q.copy()
+    old_p = p.copy()
     for look in range(LOOK_LIMIT // (q.size + 50)):
         wait = np.inf
         first = -1
@@ -1094,25 +1071,31 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
                 leading = v
                 close = v > 0.0 and -d < 2.0 * v * bound
         if final or wait == np.inf:
-            return elapsed, -1, 1
-        if elapsed + wait >= limit:
-            free_flight(omega, zeta, bias, limit - elapsed, q, p)
-            return limit, -1, 2
-        if wait <= 4e-16 * (elapsed + wait) or wait <= 1e-14 * shortest:
-            return elapsed, first, 0 if leading > 0.0 else 3
-        if wait < shortest:
-            slow += 1
-            if slow > 4000:
-                return elapsed, first, 3
-        power_of_two = int(np.floor(np.log2(wait / base))) + GLIDES // 2
-        if close or bounds[first, 5] == 0.0 or power_of_two < 0 or power_of_two >= GLIDES:
-            free_flight(omega, zeta, bias, wait, q, p)
+            restore(old_q, old_p, q, p)
+            return 0.0, -1, 1
+        slot = GLIDES
+        over = elapsed + wait >= limit
+        if over:
+            wait = limit - elapsed
         else:
-            wait = base * 2.0 ** (power_of_two - GLIDES // 2)
-            if known[power_of_two] == 0.0:
-                glide_table(omega, zeta, bias, wait, tables[power_of_two])
-                known[power_of_two] = 1.0
-            glide(tables[power_of_two], q, p)
+            if wait <= 4e-16 * (elapsed + wait) or wait <= 1e-14 * shortest:
+                return elapsed, first, 0 if leading > 0.0 else 3
+            if wait < shortest:
+                slow += 1
+                if slow > 4000:
+                    return elapsed, first, 3
+            power_of_two = int(np.floor(np.log2(wait / base))) + GLIDES // 2
+            if not close and bounds[first, 5] != 0.0 and 2 <= power_of_two < GLIDES:
+                slot = power_of_two
+                if look < PATIENT and known[slot] == 0.0:
+                    slot -= 1 if known[slot - 1] != 0.0 else (2 if known[slot - 2] != 0.0 else 0)
+                wait = base * 2.0 ** (slot - GLIDES // 2)
+        if slot == GLIDES or known[slot] == 0.0:
+            lane_table(omega, zeta, wait, pushed, tables[slot])
+            known[slot] = 1.0
+        glide(tables[slot], wait, bias, q, p)
+        if over:
+            return limit, -1, 2
         elapsed += wait
         for i in range(m):
             bounds[i, 0] += wait * (bounds[i, 1] + 0.5 * bounds[i, 2] * wait)
@@ -1120,30 +1103,18 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
     return elapsed, -1, 4
 
 
-@outer()
-def hermite_extreme(d0, v0, d1, v1, h):
-    """Smallest and largest value inside the step of the cubic through both ends' positions and rates."""
+@inner()
+def lowest(d0, v0, d1, v1, h):
+    """Smallest value of the cubic through both ends' positions and rates where it falls at first and rises at last."""
     a = 2.0 * (d0 - d1) + h * (v0 + v1)
     b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
     c = h * v0
-    low = min(d0, d1)
-    high = max(d0, d1)
-    disc = b * b - 3.0 * a * c
-    if disc > 0.0:
-        root = np.sqrt(disc)
-        for sign in (-1.0, 1.0):
-            if b * sign >= 0.0:
-                t = -c / (b + sign * root) if b + sign * root != 0.0 else -1.0
-            else:
-                t = (-b + sign * root) / (3.0 * a) if a != 0.0 else -1.0
-            if 0.0 < t < 1.0:
-                value = d0 + t * (c + t * (b + t * a))
-                low = min(low, value)
-                high = max(high, value)
-    return low, high
+    root = np.sqrt(max(0.0, b * b - 3.0 * a * c))
+    t = -c / (b + root) if b >= 0.0 else (root - b) / (3.0 * a)
+    return d0 + t * (c + t * (b + t * a))
 
 
-@outer()
+@inner()
 def hermite_root(d0, v0, d1, v1, h):
     """First zero in (0, h] of the cubic through both ends, where d0 and d1 differ in sign; by bisection and secant."""
     a = 2.0 * (d0 - d1) + h * (v0 + v1)
@@ -1164,7 +1135,7 @@ def hermite_root(d0, v0, d1, v1, h):
 
 @inner()
 def solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate):
-    """Solve one step of length h from its prediction; return 1 for A4, 0 for A (asked for, or fallen back to)."""
+    """Solve one step of length h from its prediction; 0 where a contact pushes by A (asked for or fallen to)."""
     m = y.size
     sums = all_sums[slot]
     if m == 1 and ramp and (now[0, 0] > 0.0 or end[0, 0] > 0.0):
@@ -1180,7 +1151,7 @@ def solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate):
         s[i] = 0.0
         if f[i] > 0.0:
             pressed = True
-    fine = 0
+    fine = 0 if pressed else 1
     if ramp and pressed and m > 1:
         keep = work[4, 1]
         for i in range(m):
@@ -1209,6 +1180,15 @@ def resized(array, n, length):
         for j in range(array.shape[1]):
             result[i, j] = array[i, j]
     return result
+
+
+@inner()
+def any_of(values):
+    """Whether any value is not zero; for less compilation than the general `any`."""
+    found = False
+    for n in range(values.size):
+        found = found or values[n] != 0
+    return found
 
 
 @inner()
@@ -1250,13 +1230,10 @@ def dipped(now, pressed, y, rate, h, i):
     """Whether contact i opened and closed again, or the other way round, within a step, by its cubic."""
     d0 = now[0, i]
     v0 = now[4, i]
-    if pressed[i]:
-        if y[i] > 0.0 and v0 < 0.0 < rate[i]:
-            low, _ = hermite_extreme(d0, v0, y[i], rate[i], h)
-            return low < -1e-9 * max(d0, y[i])
-    elif y[i] <= 0.0 and v0 > 0.0 > rate[i]:
-        _, high = hermite_extreme(d0, v0, y[i], rate[i], h)
-        return high > 1e-9 * max(-d0, -y[i])
+    side = 1.0 if pressed[i] else -1.0
+    if side * v0 < 0.0 < side * rate[i] and (y[i] > 0.0 if pressed[i] else y[i] <= 0.0):
+        low = lowest(side * d0, side * v0, side * y[i], side * rate[i], h)
+        return low < -1e-9 * max(side * d0, side * y[i])
     return False
 
 
@@ -1265,13 +1242,13 @@ def narrow(now, pressed, y, rate, h, depth, still, target, bracket):
     """Next length of a step that is to end where a contact opens or closes, from a try of length h.
 
     Returns (target, length), the length zero where the try was good; the target is an earlier crossing if the try
-    showed one. ``bracket`` holds the lengths between which the crossing lies and the size of the approach.
+    showed one. ``bracket`` holds the lengths between which the crossing lies, the size of the approach, and length,
+    approach and rate of the last try: what the length changes in the approach is not quite the rate, as the force's
+    polynomial changes too.
     """
     for i in range(y.size):
         if i != target and crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
-            bracket[0] = 0.0
-            bracket[1] = h
-            bracket[2] = abs(now[0, i]) + abs(y[i])
+            enclose(now, y, rate, h, i, bracket)
             guess = hermite_root(now[0, i], now[4, i], y[i], rate[i], h)
             return i, guess if guess < h else 0.5 * h
     miss = y[target]
@@ -1281,10 +1258,15 @@ def narrow(now, pressed, y, rate, h, depth, still, target, bracket):
         bracket[1] = h
     else:
         bracket[0] = h
-    guess = bracket[0]
     v = rate[target]
+    turn = (6.0 * (now[0, target] - miss) / h + 2.0 * now[4, target] + 4.0 * v) / h
+    if bracket[3] != h:
+        v += (miss - bracket[4]) / (h - bracket[3]) - 0.5 * (rate[target] + bracket[5])
+    bracket[3] = h
+    bracket[4] = miss
+    bracket[5] = rate[target]
+    guess = bracket[0]
     if v != 0.0:
-        turn = (6.0 * (now[0, target] - miss) / h + 2.0 * now[4, target] + 4.0 * v) / h
         wait = -miss / v
         guess = h + wait - 0.5 * turn * wait * wait / v
     if abs(guess - h) <= 4e-16 * h:
@@ -1292,6 +1274,17 @@ def narrow(now, pressed, y, rate, h, depth, still, target, bracket):
     if not bracket[0] < guess < bracket[1]:
         guess = 0.5 * (bracket[0] + bracket[1])
     return target, guess
+
+
+@inner()
+def enclose(now, y, rate, h, target, bracket):
+    """Set the bracket of `narrow` to a whole step."""
+    bracket[0] = 0.0
+    bracket[1] = h
+    bracket[2] = abs(now[0, target]) + abs(y[target])
+    bracket[3] = h
+    bracket[4] = y[target]
+    bracket[5] = rate[target]
 
 
 @inner()
@@ -1323,37 +1316,20 @@ def begin(shape, offset, q, p, now, pressed):
         pressed[i] = now[0, i] > 0.0 or (now[0, i] == 0.0 and now[4, i] > 0.0)
 
 
-@inner(allocates=True)
-def fly(
-    omega, zeta, shape, offset, bias, time, horizon, base, shortest, depth, still, flights, flown, row, stride, now,
-    pressed, q, p,
-):  # fmt: skip
-    """Free flight to the next onset, written to a row of the steps; status as in `find_onset`.
-
-    A state from which nothing touches again is left as it was.
-    """
-    old_q = q.copy()
-    old_p = p.copy()
+@inner()
+def land(shape, offset, time, elapsed, first, found, row, stride, now, pressed, q, p):
+    """Write a free flight to a row of the steps and take over the contacts' state at its end."""
     row[:] = 0.0
-    for i in range(offset.size):
-        row[3 + stride * i] = now[0, i]
-        row[4 + stride * i] = now[4, i]
-    elapsed, first, found = find_onset(
-        omega, zeta, shape, offset, bias, horizon - time, base, shortest, depth, still, flights, flown, q, p
-    )
-    if found == 1:
-        q[:] = old_q
-        p[:] = old_p
-        return 0.0, found
     row[0] = time
     row[1] = elapsed
     for i in range(offset.size):
+        row[3 + stride * i] = now[0, i]
+        row[4 + stride * i] = now[4, i]
         now[0, i], now[4, i] = approach(shape, offset, i, q, p)
         now[0, i] = min(0.0, now[0, i])
     if found == 0:
         now[0, first] = 0.0
         pressed[first] = True
-    return elapsed, found
 
 
 @inner()
@@ -1395,10 +1371,13 @@ def run_energy(
     p = start_p.copy()
     free_q = np.empty(n_modes)
     free_p = np.empty(n_modes)
-    twice = 2.0 * zeta * omega
+    twice = np.empty(n_modes)
+    for n in range(n_modes):
+        twice[n] = 2.0 * zeta[n] * omega[n]
     tables = np.empty((LEVELS + 1, N_LANE, n_modes))
     all_sums = np.empty((LEVELS + 1, 6, m, m))
     known = np.zeros(LEVELS + 1)
+    odd = known.size - 1  # where the table of a step of any other length is kept
     now = np.zeros((5, m))
     end = np.empty((3, m))
     work = np.zeros((5, max(4, 2 * m), max(4, 2 * m)))
@@ -1407,12 +1386,12 @@ def run_energy(
     s = np.empty(m)
     rate = np.empty(m)
     pressed = np.zeros(m, np.bool_)
-    bracket = np.empty(3)
-    flights = np.empty((GLIDES, 6, n_modes))
+    bracket = np.empty(6)
+    flights = np.empty((GLIDES + 1, N_LANE, n_modes))
     flown = np.zeros(GLIDES)
     done = np.zeros(m)
     steps = np.zeros((64, 3 + 5 * m))
-    n_steps = 0
+    n_steps = ZERO
     n_fallback = 0
     n_blind = 0
     n_released = 0
@@ -1424,7 +1403,7 @@ def run_energy(
     time = 0.0
     stalled = False
     status = EXHAUSTED
-    quiet = not bias.any()
+    quiet = not any_of(bias)
     begin(shape, offset, q, p, now, pressed)
     start_energy = total_energy(omega, bias, law, q, p, now)
     while n_steps < max_steps:
@@ -1436,16 +1415,16 @@ def run_energy(
             break
         if n_steps + 1 >= steps.shape[0]:
             steps = resized(steps, n_steps, 2 * steps.shape[0])
-        if not stalled and not pressed.any():
-            elapsed, found = fly(
-                omega, zeta, shape, offset, bias, time, horizon, base, 1e-3 * base, depth, still, flights, flown,
-                steps[n_steps], 5, now, pressed, q, p,
-            )  # fmt: skip
+        if not stalled and not any_of(pressed):
+            elapsed, first, found = find_onset(
+                omega, zeta, shape, offset, bias, horizon - time, base, 1e-3 * base, depth, still, flights, flown, q, p
+            )
             ready = -1
             if found == 1:
                 status = FINISHED
             if found == 1 or found == 4:
                 break
+            land(shape, offset, time, elapsed, first, found, steps[n_steps], 5, now, pressed, q, p)
             if elapsed > 0.0:
                 n_steps += 1
                 time += elapsed
@@ -1460,9 +1439,9 @@ def run_energy(
         slot = level
         if h > horizon - time:
             h = horizon - time
-            slot = LEVELS
-        if slot == LEVELS or known[slot] == 0.0:
-            lane_table(omega, zeta, h, tables[slot])
+            slot = odd
+        if slot == odd or known[slot] == 0.0:
+            lane_table(omega, zeta, h, WHOLE, tables[slot])
             contact_sums(shape, tables[slot], h, all_sums[slot])
             known[slot] = 1.0
         if ready != slot:
@@ -1488,13 +1467,11 @@ def run_energy(
             else:
                 target, guess = first_crossing(now, pressed, y, rate, h, depth, still)
         if target >= 0:
-            bracket[0] = 0.0
-            bracket[1] = h
-            bracket[2] = abs(now[0, target]) + abs(y[target])
-            slot = LEVELS
+            enclose(now, y, rate, h, target, bracket)
+            slot = odd
             for _ in range(LOCATE_LIMIT):
                 h = guess
-                lane_table(omega, zeta, h, tables[slot])
+                lane_table(omega, zeta, h, WHOLE, tables[slot])
                 contact_sums(shape, tables[slot], h, all_sums[slot])
                 predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, end)
                 fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
@@ -1512,7 +1489,7 @@ def run_energy(
             break
         record(steps[n_steps], time, h, blind, all_sums[slot], now, end, y, f, s, done)
         n_steps += 1
-        if ramp and fine == 0 and f.any():
+        if ramp and fine == 0:
             n_fallback += 1
         if blind:
             n_blind += 1
@@ -1752,7 +1729,7 @@ def run_collocation(
     p = start_p.copy()
     new_q = np.empty(n_modes)
     new_p = np.empty(n_modes)
-    bracket = np.empty(3)
+    bracket = np.empty(6)
     table_free = np.empty((LEVELS, s + 1, 5, n_modes))
     table_last = np.empty((LEVELS, 2 * s, n_modes))
     table_inner = np.empty((LEVELS, 2, s, s, m, m))
@@ -1780,13 +1757,13 @@ def run_collocation(
     matrix = np.empty((s * m, s * m))
     vector = np.empty(s * m)
     pressed = np.zeros(m, np.bool_)
-    flights = np.empty((GLIDES, 6, n_modes))
+    flights = np.empty((GLIDES + 1, N_LANE, n_modes))
     flown = np.zeros(GLIDES)
     done = np.zeros(m)
     coefficients = np.empty(s)
     stride = 3 + s
     steps = np.zeros((64, 3 + stride * m))
-    n_steps = 0
+    n_steps = ZERO
     n_released = 0
     n_tries = 0
     n_looks = 0
@@ -1796,7 +1773,7 @@ def run_collocation(
     time = 0.0
     status = EXHAUSTED
     limit = tolerance * speed
-    quiet = not bias.any()
+    quiet = not any_of(bias)
     begin(shape, offset, q, p, now, pressed)
     start_energy = total_energy(omega, bias, law, q, p, now)
     while n_steps < max_steps:
@@ -1808,14 +1785,14 @@ def run_collocation(
             break
         if n_steps + 1 >= steps.shape[0]:
             steps = resized(steps, n_steps, 2 * steps.shape[0])
-        if not pressed.any():
-            elapsed, found = fly(
-                omega, zeta, shape, offset, bias, time, horizon, base, 1e-6 * base, depth, still, flights, flown,
-                steps[n_steps], stride, now, pressed, q, p,
-            )  # fmt: skip
+        if not any_of(pressed):
+            elapsed, first, found = find_onset(
+                omega, zeta, shape, offset, bias, horizon - time, base, 1e-6 * base, depth, still, flights, flown, q, p
+            )
             if found == 1:
                 status = FINISHED
                 break
+            land(shape, offset, time, elapsed, first, found, steps[n_steps], stride, now, pressed, q, p)
             if elapsed > 0.0:
                 n_steps += 1
                 time += elapsed
@@ -1886,9 +1863,7 @@ def run_collocation(
                     status = FAILED
                     break
                 continue
-            bracket[0] = 0.0
-            bracket[1] = h
-            bracket[2] = abs(now[0, target]) + abs(y[target])
+            enclose(now, y, rate, h, target, bracket)
             free = odd_free
             last = odd_last
             inner = odd_inner
@@ -1944,8 +1919,7 @@ def run_collocation(
                 done[i] += weight * h * f[a, i] * v
         n_steps += 1
         time += h
-        q[:] = new_q
-        p[:] = new_p
+        restore(new_q, new_p, q, p)
         for i in range(m):
             for a in range(s):
                 ahead = 0.0
@@ -1969,7 +1943,7 @@ def run_collocation(
     return resized(steps, n_steps, n_steps), q, p, now, done, time, status, 0, 0
 
 
-@outer()
+@inner(allocates=True)
 def secular_modes(omega, shape, stiffness):
     """Eigenpairs of diag(omega**2) + stiffness u u^T for ascending, distinct omega and non-zero u.
 
@@ -2110,14 +2084,14 @@ def run_secular(
     b = np.empty(n_groups)
     x = np.empty(n_groups)
     v = np.empty(n_groups)
-    flights = np.empty((GLIDES, 6, n_modes))
+    flights = np.empty((GLIDES + 1, N_LANE, n_modes))
     flown = np.zeros(GLIDES)
     stride = 3 + s
     steps = np.zeros((64, 3 + stride))
     now = np.zeros((5, 1))
     done = np.zeros(1)
     values = np.empty(s)
-    n_steps = 0
+    n_steps = ZERO
     n_released = 0
     time = 0.0
     status = EXHAUSTED
@@ -2133,13 +2107,13 @@ def run_secular(
         if n_steps + 1 >= steps.shape[0]:
             steps = resized(steps, n_steps, 2 * steps.shape[0])
         if not pressed[0]:
-            elapsed, found = fly(
-                omega, zeta, shape, offset, bias, time, horizon, base, 1e-6 * base, depth, still, flights, flown,
-                steps[n_steps], stride, now, pressed, q, p,
-            )  # fmt: skip
+            elapsed, first, found = find_onset(
+                omega, zeta, shape, offset, bias, horizon - time, base, 1e-6 * base, depth, still, flights, flown, q, p
+            )
             if found == 1:
                 status = FINISHED
                 break
+            land(shape, offset, time, elapsed, first, found, steps[n_steps], stride, now, pressed, q, p)
             if elapsed > 0.0:
                 n_steps += 1
                 time += elapsed
@@ -2215,7 +2189,8 @@ def run_secular(
                     share += powers[c, m] / (m + 1.0)
                 done[0] += share * h * k * value * speed
             n_steps += 1
-        free_flight(omega, zeta, bias, elapsed, q, p)
+        lane_table(omega, zeta, elapsed, WHOLE, flights[GLIDES])
+        glide(flights[GLIDES], elapsed, bias, q, p)
         for j in range(n_groups):
             sine = np.sin(rate[j] * elapsed)
             cosine = np.cos(rate[j] * elapsed)
@@ -2353,10 +2328,10 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
     m = law.shape[0]
     width = 3 + n_coefficients
     result = np.empty((8, 5))
-    count = 0
+    count = ZERO
     for i in range(m):
         first = 3 + width * i
-        row = 0
+        row: Any = ZERO
         while row < n_steps:
             if steps[row, first + 2] == 0.0:
                 row += 1

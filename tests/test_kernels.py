@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import njit
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
@@ -19,6 +20,31 @@ from fem_impact import _kernels
 from fem_impact.integrator import _gauss
 
 EPS = np.finfo(float).eps
+
+
+@njit
+def mode_moments(w, z, h, out_moments, work):
+    return _kernels.mode_moments(w, z, h, out_moments, work)
+
+
+@njit
+def waves(angle, out_sin, out_cos):
+    _kernels.waves(angle, out_sin, out_cos)
+
+
+@njit
+def decays(exponent, out_decay):
+    _kernels.decays(exponent, out_decay)
+
+
+@njit
+def secular_modes(omega, shape, stiffness):
+    return _kernels.secular_modes(omega, shape, stiffness)
+
+
+@njit
+def solve_constant(d0, x0, f0, v0, e, b, loss, law, i):
+    return _kernels.solve_constant(d0, x0, f0, v0, e, b, loss, law, i)
 
 
 def run(
@@ -104,7 +130,7 @@ def exact_moments(w, z, h, count):
 def test_moments_are_exact_to_rounding(zeta, angle):
     w = 1000.0
     moments, work = np.empty(7), np.empty((2, 6))
-    state = _kernels.mode_moments(w, zeta, angle / w, moments, work)
+    state = mode_moments(w, zeta, angle / w, moments, work)
     wanted_state, wanted = exact_moments(w, zeta, angle / w, 6)
     # 16 eps; 6e-16 was measured. Near its zeros the first moment keeps the phase's rounding only
     assert_allclose(moments[1:], wanted[1:], rtol=4e-15, atol=4e-15 * moments[2])
@@ -121,7 +147,7 @@ def test_fast_lanes_agree_with_the_single_mode(zeta, h):
     _kernels.step_table(omega, damping, h, table)
     moments, work = np.empty(4), np.empty((2, 3))
     for n, (w, z) in enumerate(zip(omega, damping)):
-        a11, _, a22 = _kernels.mode_moments(w, z, h, moments, work)
+        a11, _, a22 = mode_moments(w, z, h, moments, work)
         slack = 8.0 * EPS * (1.0 + w * h)  # rounding of the phase
         assert_allclose(table[[0, 3], n], [a11, a22], rtol=0, atol=slack)
         assert_allclose(table[4, n] / h**2, moments[1], rtol=slack, atol=slack / max(1.0, w * h) ** 2)
@@ -133,12 +159,12 @@ def test_waves_and_decays_are_within_two_units_in_the_last_place():
     rng = np.random.default_rng(1)
     angle = np.concatenate([rng.uniform(0.0, 1e6, 50000), rng.uniform(0.0, 10.0, 50000), np.arange(999) * np.pi / 2])
     sine, cosine = np.empty_like(angle), np.empty_like(angle)
-    _kernels.waves(angle, sine, cosine)
+    waves(angle, sine, cosine)
     assert_allclose(sine, np.sin(angle), rtol=0, atol=1.5 * EPS)
     assert_allclose(cosine, np.cos(angle), rtol=0, atol=1.5 * EPS)
     exponent = np.append(rng.uniform(0.0, 700.0, 5000), [0.0, 800.0])
     decay = np.empty_like(exponent)
-    _kernels.decays(exponent, decay)
+    decays(exponent, decay)
     assert_allclose(decay, np.exp(-exponent) * (exponent < 700.0), rtol=2.0 * EPS)
 
 
@@ -148,7 +174,7 @@ def test_secular_modes_diagonalise(n_modes, stiffness):
     rng = np.random.default_rng(n_modes)
     omega = np.append(0.0, np.sort(rng.uniform(1.0, 1e5, n_modes - 1)))
     u = rng.normal(0.0, 3.0, n_modes)
-    square, vectors = _kernels.secular_modes(omega, u, stiffness)
+    square, vectors = secular_modes(omega, u, stiffness)
     matrix = np.diag(omega**2) + stiffness * np.outer(u, u)
     assert_allclose(vectors.T @ vectors, np.eye(n_modes), atol=2e-14)  # 3e-15 was measured
     assert_allclose(matrix @ vectors, vectors * square, atol=2e-15 * n_modes * np.abs(matrix).max())
@@ -321,8 +347,8 @@ def test_release_branch_meets_the_smooth_one():
     x0, f0, v0 = _kernels.law_at(d0, law, 0)
     b = 1e-9
     edge = b * v0 / d0  # free end approach at which the step ends with the contact just open
-    below = _kernels.solve_constant(d0, x0, f0, v0, edge * (1.0 - 1e-9), b, 0.0, law, 0)
-    above = _kernels.solve_constant(d0, x0, f0, v0, edge * (1.0 + 1e-9), b, 0.0, law, 0)
+    below = solve_constant(d0, x0, f0, v0, edge * (1.0 - 1e-9), b, 0.0, law, 0)
+    above = solve_constant(d0, x0, f0, v0, edge * (1.0 + 1e-9), b, 0.0, law, 0)
     assert_allclose(below[1], above[1], rtol=1e-7)
     assert below[0] <= 0.0 <= above[0]
 
