@@ -5,6 +5,7 @@ import importlib
 import math
 from collections.abc import Iterable
 from dataclasses import fields
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -116,10 +117,15 @@ def nearest(word: Any, known: Iterable[str]) -> str:
 
 def lock_arrays(instance: Any) -> None:
     """Make every array field of a frozen dataclass read-only; frozen alone leaves contents writable."""
-    for field in fields(instance):
-        value = getattr(instance, field.name)
+    for name in _names(type(instance)):
+        value = getattr(instance, name)
         if isinstance(value, np.ndarray):
             value.setflags(write=False)
+
+
+@cache
+def _names(kind: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind))
 
 
 def extra(module: str, name: str, purpose: str) -> Any:

@@ -18,9 +18,7 @@ ZERO, WHOLE = np.int64(0), np.bool_(True)  # no literals: what is called with on
 LEVELS = 40  # [-] halvings of the step that may be cached
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
 N_LANE = 7  # rows of what a run keeps of it, in the order of `lane_table`
-PATIENT = (
-    64  # [-] looks of a flight after which a table for a longer step pays, a step or two of half the length before
-)
+PATIENT = 4  # [-] looks of a flight that make do with the table of a step up to four times shorter than allowed
 GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before
 LOOK_LIMIT = 20_000_000  # [-] looks ahead times modes in one free flight before the run gives up: some 0.1 s
 WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -86,24 +87,30 @@ class RectangleShapes:
                 result[i, j] = result[j, i] = self._green(place, load)
         return result
 
+    @cached_property
+    def _levy(self) -> tuple[np.ndarray, np.ndarray, float]:
+        """Wave numbers along the length, what is the same for all points in the sum's terms, and the tail's share."""
+        beta = np.arange(1, LEVY_TERMS + 1) * np.pi / self.length
+        whole = -np.expm1(-2.0 * beta * self.width)
+        tail = 0.5 * (self.length / np.pi) ** 3 / 4.0 / (2.0 * LEVY_TERMS * (LEVY_TERMS + 1.0))  # mean sin**2 = 1/2
+        return beta, np.stack([whole, 1.0 / beta + self.width * (2.0 - whole) / whole]), tail
+
     def _green(self, place: np.ndarray, load: np.ndarray) -> float:
-        m = np.arange(1, LEVY_TERMS + 1)
-        beta = m * np.pi / self.length
+        beta, (whole, span), tail = self._levy
         low, high = min(place[1], load[1]), self.width - max(place[1], load[1])
         gap = self.width - low - high
-
-        def cothx(x):  # x coth(x beta) is 1 / beta at x = 0
-            return np.where(x * beta > 1e-8, x / np.tanh(np.maximum(x * beta, 1e-8)), 1.0 / beta)
-
-        decay = np.exp(-beta * gap) * -np.expm1(-2 * beta * low) * -np.expm1(-2 * beta * high)
-        second = decay / (2.0 * beta * -np.expm1(-2 * beta * self.width))  # of -d2/dy2 + beta2
-        fourth = second / (2.0 * beta) * (1.0 / beta + cothx(self.width) - cothx(low) - cothx(high))
-        sines = np.sin(beta * place[0]) * np.sin(beta * load[0])
-        total = float(sines @ fourth)
-        if gap < 1e-12 * self.width and abs(place[0] - load[0]) < 1e-12 * self.length and min(low, high) > 0.0:
-            total += (
-                0.5 * (self.length / np.pi) ** 3 / 4.0 / (2.0 * LEVY_TERMS * (LEVY_TERMS + 1.0))
-            )  # mean sin**2 = 1/2
+        if min(low, high) <= 0.0:
+            return 0.0
+        near, far = -np.expm1(-2.0 * low * beta), -np.expm1(-2.0 * high * beta)
+        # x coth(x beta) is x (2 - t) / t with t = 1 - exp(-2 x beta)
+        fourth = near * far / whole * (span - low * (2.0 - near) / near - high * (2.0 - far) / far) / beta**2
+        sines = np.sin(place[0] * beta)
+        sines *= sines if place[0] == load[0] else np.sin(load[0] * beta)
+        if gap > 0.0:
+            sines *= np.exp(-gap * beta)
+        total = float(sines @ fourth) / 4.0
+        if gap < 1e-12 * self.width and abs(place[0] - load[0]) < 1e-12 * self.length:
+            total += tail
         return 2.0 / self.length * total
 
     def take(self, n_modes: int) -> "RectangleShapes":
