@@ -4,8 +4,6 @@ import difflib
 import importlib
 import math
 from collections.abc import Iterable
-from dataclasses import fields
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -117,15 +115,10 @@ def nearest(word: Any, known: Iterable[str]) -> str:
 
 def lock_arrays(instance: Any) -> None:
     """Make every array field of a frozen dataclass read-only; frozen alone leaves contents writable."""
-    for name in _names(type(instance)):
+    for name in instance.__dataclass_fields__:
         value = getattr(instance, name)
         if isinstance(value, np.ndarray):
             value.setflags(write=False)
-
-
-@cache
-def _names(kind: type) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind))
 
 
 def extra(module: str, name: str, purpose: str) -> Any:
