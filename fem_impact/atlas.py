@@ -117,12 +117,12 @@ def _quick_map(
     case = maps.Case(scene.modes(FIRST_LOOK), striker, law, np.atleast_1d(np.asarray(blow["at"], float)), blow["speed"])
     axes = maps.checked_axes(case, over)
     needed = max(
-        _needed(corner, tolerance) * case.modes.frequencies[-1] / corner.modes.frequencies[-1]
+        needed_frequency(corner, tolerance) * case.modes.frequencies[-1] / corner.modes.frequencies[-1]
         for corner in _corners(case, axes)
     )
     modes = case.modes
     if needed > modes.frequencies[-1]:
-        modes = scene.modes(_number(modes, needed))
+        modes = scene.modes(number_of_modes(modes, needed))
     case = replace(case, modes=modes)
     table = maps.sweep(
         modes, striker, law, at=blow["at"], speed=blow["speed"], over=over, tolerance=tolerance, max_frequency=band,
@@ -141,7 +141,7 @@ def _corners(case: maps.Case, axes: Mapping[str, np.ndarray]) -> Iterator[maps.C
         yield corner
 
 
-def _needed(case: maps.Case, tolerance: float) -> float:
+def needed_frequency(case: maps.Case, tolerance: float) -> float:
     """Frequency [Hz] up to which a blow needs modes."""
     return accuracy.cutoff_frequency(
         case.modes, case.at, contact=case.contact, mass=case.striker.felt_mass, speed=case.speed,
@@ -149,7 +149,7 @@ def _needed(case: maps.Case, tolerance: float) -> float:
     )  # fmt: skip
 
 
-def _number(first: Any, frequency: float) -> int:
+def number_of_modes(first: Any, frequency: float) -> int:
     """About how many modes a body has up to a frequency [Hz], by Weyl's law from its first ones."""
     growth = (frequency / first.frequencies[-1]) ** (0.5 * first.dimension)
     return math.ceil(1.1 * first.n_modes * growth)
@@ -283,6 +283,6 @@ def hammers_for(scene: Scene, bandwidth: float, masses: Any, *, drop: float = 10
     """What each hammer can do at the strike point of a scene's body, whatever strikes it in the scene."""
     at, first = scene.blow.values["at"], scene.modes(FIRST_LOOK)
     needed = hammers.highest_frequency(first, at, bandwidth, masses, drop=drop)
-    number = min(_number(first, needed), MOST_MODES)
+    number = min(number_of_modes(first, needed), MOST_MODES)
     modes = scene.modes(number) if number > first.n_modes else first
     return hammers.choose(modes, at, bandwidth, masses, drop=drop)

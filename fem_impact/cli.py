@@ -10,8 +10,9 @@ import sys
 import textwrap
 import threading
 import time
+import webbrowser
 from collections.abc import Iterator, MutableMapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +149,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     report.add_argument("--out", metavar="FILE", type=Path, help="where the page goes (default: out/NAME/report.html)")
     report.add_argument("--tolerance", metavar="T", type=float, help="largest error accepted, instead of the scene's")
+
+    explore = verbs.add_parser("explore", help="serve a page on this machine: turn the hammer, click the strike point")
+    explore.set_defaults(run=_explore)
+    explore.add_argument("scene", metavar="SCENE", type=Path, help="a TOML file")
+    explore.add_argument("--port", metavar="N", type=int, default=0, help="of 127.0.0.1 (default: any that is free)")
+    explore.add_argument("--no-open", action="store_true", help="print the address, but do not open it in a browser")
 
     doctor = verbs.add_parser("doctor", help="check this installation; say what to do about what fails")
     doctor.set_defaults(run=_doctor)
@@ -302,12 +309,24 @@ def _report(options: argparse.Namespace) -> None:
     path = options.out if options.out is not None else Path("out") / options.scene.stem / "report.html"
     changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
     with fi.export.staged(path.parent) as staging:
-        run = scene.run(_progress, **changes)
+        run = scene.run(_progress, before=_warn, target="modal", **changes)
         with _progress("page"):
             fi.report.write(staging / path.name, scene, run)
     print(_wrapped(scene.title or str(scene.path)))
     print(_wrapped(run.response.summary()))
     print(_wrapped(f"Files: {path}"))
+
+
+def _explore(options: argparse.Namespace) -> None:
+    scene = fi.load_scene(options.scene)
+
+    def ready(address: str) -> None:
+        print(f"{address}   (Ctrl-C ends it)", flush=True)
+        if not options.no_open:
+            webbrowser.open(address)
+
+    with suppress(KeyboardInterrupt):
+        fi.explore.serve(scene, port=options.port, ready=ready)
 
 
 def _modes(options: argparse.Namespace) -> None:

@@ -79,6 +79,10 @@ def write(path: str | Path, scene: Scene, run: Run, *, command: str = "") -> Non
         loader=jinja2.FileSystemLoader(WEB), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
     )
     response = run.response
+    if run.plan.target != "modal":
+        raise ValueError(
+            f"a report shows the body's motion: run the scene with target='modal', not {run.plan.target!r}"
+        )
     page = environment.get_template("report.html").render(
         title=scene.title or scene.path.stem,
         words=words(scene, response),
@@ -87,7 +91,7 @@ def write(path: str | Path, scene: Scene, run: Run, *, command: str = "") -> Non
         tiles=_tiles(response),
         error=_errors(response),
         modelled=_modelled(response, run),
-        notes=run.notes,
+        reasons=(*run.plan.reasons, *run.notes),
         impacts=response.impacts,
         energies=_shares(response),
         sounds=_sounds(scene, response),
@@ -151,11 +155,11 @@ def _errors(response: Response) -> dict[str, Any]:
 
 
 def _modelled(response: Response, run: Run) -> list[tuple[str, str]]:
-    modes = response.target
+    modes, took = response.target, sum(run.seconds.values())
     return [
         ("modes of the struck body", f"{modes.n_modes}, up to {si(modes.frequencies[-1], 'Hz')}"),
         ("time steps", f"{len(response.history.steps)}, scheme {response.scheme}"),
-        ("computing time", ", ".join(f"{name} {si(value, 's', 3)}" for name, value in run.seconds.items())),
+        ("computing time", f"{si(took, 's', 3)}: " + ", ".join(f"{k} {si(x, 's', 3)}" for k, x in run.seconds.items())),
     ]
 
 
@@ -201,11 +205,11 @@ def _sounds(scene: Scene, response: Response) -> list[Player]:
         stated = f"full scale is {samples.full_scale:g} {samples.unit} in every report; peak {level:.1f} dB".replace(
             "-", "−"
         )
-        players.append(Player(name, stated, _audio(samples.samples, samples.rate)))
+        players.append(Player(name, stated, audio(samples.samples, samples.rate)))
         if -math.inf < level < QUIET:
             raised = samples.samples * 10.0 ** (-level / 20.0)
             players.append(
-                Player(name, f"the same raised by {-level:.1f} dB to full scale", _audio(raised, samples.rate))
+                Player(name, f"the same raised by {-level:.1f} dB to full scale", audio(raised, samples.rate))
             )
     return players
 
@@ -216,7 +220,8 @@ def _duration(response: Response) -> float:
     return float(np.clip(sound.DECAY / slowest, sound.SHORTEST, PLAYED)) if slowest > 0.0 else PLAYED
 
 
-def _audio(samples: np.ndarray, rate: int) -> str:
+def audio(samples: np.ndarray, rate: int) -> str:
+    """Samples as a WAV file of 16 bits in a data URI, for a page to play."""
     file = io.BytesIO()
     wavfile.write(file, rate, np.round(32767.0 * np.clip(samples, -1.0, 1.0)).astype(np.int16))
     return _uri("audio/wav", file.getvalue())
@@ -228,7 +233,7 @@ def _downloads(scene: Scene, run: Run) -> list[dict[str, str]]:
     spectrum = response.spectrum(frequencies)
     changes = {"tolerance": response.tolerance}
     data = {**export.numbers(response), "scene": scene.data(**changes), "seconds": dict(run.seconds)}
-    data |= {"notes": list(run.notes), "versions": export.versions()}
+    data |= {"plan": run.plan.data(), "notes": list(run.notes), "versions": export.versions()}
     texts = {
         "response.json": ("application/json", json.dumps(export.plain(data), indent=2, allow_nan=False)),
         "force.csv": ("text/csv", _csv(("time [s]", response.time), ("force [N]", response.force))),

@@ -29,6 +29,8 @@ FLOORS = [
     {"doctor", "report", "maps"},
     {"hammers"},
     {"atlas"},
+    {"bench"},
+    {"explore"},
     {"cli"},
 ]
 FLOOR = {name: level for level, names in enumerate(FLOORS) for name in names}

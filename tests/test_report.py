@@ -57,7 +57,7 @@ def test_texts_of_the_scene_are_escaped(page):
 def test_downloads_hold_every_number(page):
     text = page.read_text(encoding="utf-8")
     data = json.loads(download(text, "response.json"))
-    hit = report.read(page.parent.parent / "small.toml").strike()
+    hit = report.read(page.parent.parent / "small.toml").strike(target="modal")
     assert data["response"]["peak_force"] == hit.peak_force and len(data["impacts"]) == hit.n_impacts
     time, force = np.loadtxt(download(text, "force.csv").splitlines(), delimiter=",", skiprows=1).T
     assert (time == hit.time).all() and (force == hit.force).all()
@@ -96,7 +96,7 @@ def test_beams_and_balls_have_a_page_too(tmp_path):
     )
     (tmp_path / "bar.toml").write_text(text)
     scene = fi.load_scene(tmp_path / "bar.toml")
-    report.write(tmp_path / "bar.html", scene, scene.run())
+    report.write(tmp_path / "bar.html", scene, scene.run(target="modal"))
     page = (tmp_path / "bar.html").read_text(encoding="utf-8")
     assert "A beam of 350" in page and "by a ball of 32.88" in page
 

@@ -1,0 +1,199 @@
+"""The page that follows a hand: safe to serve, quick, and usable by anyone."""
+
+import contextlib
+import http.client
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from test_cli import TEXT
+
+from fem_impact import cli
+
+FOLLOWS = 0.1  # [s] within which the page follows
+# Turn a slider; how long until the new spectrum is there, in ms.
+TURN = """name => new Promise(done => {
+    const page = Bokeh.documents[0], source = page.get_model_by_name('spectrum-data');
+    const slider = page.get_model_by_name(name);
+    const began = performance.now(), signal = source.properties.data.change;
+    const then = () => { signal.disconnect(then); done(performance.now() - began); };
+    signal.connect(then);
+    slider.value += 0.005 * (slider.end - slider.start);
+})"""
+
+
+def served(scene, *options):
+    """A server of its own, and the address it printed."""
+    command = [sys.executable, "-m", "fem_impact.cli", "explore", str(scene), "--no-open", *options]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    line = server.stdout.readline()
+    assert line.startswith("http://127.0.0.1:"), server.communicate(timeout=10)[1]
+    return server, line.split()[0]
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    path = tmp_path_factory.mktemp("explore") / "small.toml"
+    stick = 'kind = "stick"\nmass = 0.1\nfirst_frequency = 10e3'
+    path.write_text(TEXT.replace("A small test", "<b>small</b>").replace('kind = "rigid"\nmass = 0.03', stick))
+    return path
+
+
+@pytest.fixture(scope="module")
+def address(scene):
+    server, address = served(scene)
+    yield address
+    server.send_signal(signal.SIGINT)
+    _, err = server.communicate(timeout=20)
+    assert (server.returncode, err) == (0, "")  # Ctrl-C ends quietly
+
+
+@pytest.fixture
+def opened(address, visit):
+    def opened(**options):
+        shown = visit(address, **options)
+        shown.until("document.documentElement.dataset.ready === 'true'", 20.0)
+        return shown
+
+    return opened
+
+
+def ask(address, host=None, path="/", method="GET", **headers):
+    port = int(address.rstrip("/").rpartition(":")[2])
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection.putrequest(method, path, skip_host=True)
+    for name, value in {"Host": f"127.0.0.1:{port}" if host is None else host, **headers}.items():
+        connection.putheader(name.replace("_", "-"), value)
+    with contextlib.closing(connection):
+        connection.endheaders()
+        with connection.getresponse() as answer:
+            return answer.status
+
+
+def test_other_hosts_are_refused(address):
+    assert ask(address) == 200
+    for host in ("evil.example", "evil.example:80", "127.0.0.1.evil.example", "", "127.0.0.1"):
+        for path in ("/", "/ws", "/static/js/bokeh.min.js", "/nowhere"):
+            assert ask(address, host, path) == 403
+
+
+def test_pages_elsewhere_cannot_speak_to_it(address):
+    upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec_WebSocket_Version": "13"}
+    upgrade |= {"Sec_WebSocket_Key": "dGhlIHNhbXBsZSBub25jZQ==", "Sec_WebSocket_Protocol": "bokeh, x"}
+    assert ask(address, None, "/ws", Origin="http://evil.example", **upgrade) == 403
+
+
+def test_large_requests_are_cut_off(address):
+    assert ask(address, None, "/", "POST", Content_Length="100000000") == 400
+    with contextlib.suppress(http.client.HTTPException, ConnectionError):  # or the line is simply cut
+        assert ask(address, None, "/", Cookie="x" * 100_000) in (400, 431)
+
+
+def test_only_this_machine_is_served(address):
+    port = int(address.rstrip("/").rpartition(":")[2])
+    with pytest.raises(OSError):  # another address of this machine: refused unless bound to all
+        socket.create_connection(("127.0.0.2", port), timeout=5).close()
+
+
+def test_port_that_is_taken_is_a_sentence(scene, address, capsys):
+    port = address.rstrip("/").rpartition(":")[2]
+    assert cli.main(["explore", str(scene), "--no-open", "--port", port]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+    assert cli.main(["explore", str(scene), "--no-open", "--port", "70000"]) == 2
+    assert "port must lie between 0 and 65535, got 70000" in capsys.readouterr().err
+
+
+def test_missing_extra_is_named(scene, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "bokeh.server.tornado", None)
+    assert cli.main(["explore", str(scene), "--no-open"]) == 2
+    assert "exploring needs bokeh: pip install 'fem-impact[web]'" in capsys.readouterr().err
+
+
+def test_nothing_fails_and_nothing_is_asked_for_elsewhere(opened, address):
+    shown = opened()
+    shown.until(
+        "document.querySelector('.readout') && Bokeh.documents[0].get_model_by_name('cells').data.left.length > 0"
+    )
+    assert shown.errors == []
+    own = (address, address.replace("http", "ws", 1), "data:", "blob:")
+    assert [url for url in shown.requests if not url.startswith(own)] == []
+    assert shown.tab.title() == "<b>small</b>" and shown.tab.locator("h1").inner_text() == "<b>small</b>"
+
+
+def test_sliders_change_the_pictures_in_time(opened):
+    shown = opened()
+    shown.tab.wait_for_timeout(1000)  # until the map is there
+    for name in ("mass", "stiffness", "exponent", "speed", "bending", "x", "y"):
+        before = {plot: shown.tab.locator(f"figure >> nth={i}").screenshot() for plot, i in (("map", 1), ("force", 2))}
+        times = [shown.tab.evaluate(TURN, name)]
+        while min(times) > 1e3 * FOLLOWS and len(times) < 30:  # the least: other programs run here too
+            times.append(shown.tab.evaluate(TURN, name))
+        assert min(times) < 1e3 * FOLLOWS, (name, times)
+        shown.tab.wait_for_timeout(100)
+        assert shown.tab.locator("figure >> nth=2").screenshot() != before["force"]
+        if name in ("mass", "stiffness"):
+            assert shown.tab.locator("figure >> nth=1").screenshot() != before["map"]
+    assert shown.errors == []
+
+
+def test_click_moves_the_strike_point(opened):
+    shown = opened()
+    place = "JSON.stringify(Bokeh.documents[0].get_model_by_name('at').data)"
+    before = shown.tab.evaluate(place)
+    box = shown.tab.locator("figure >> nth=0").bounding_box()
+    shown.tab.mouse.click(box["x"] + 0.6 * box["width"], box["y"] + 0.4 * box["height"])
+    shown.until(f"{place} !== '{before}'")
+    x = shown.tab.evaluate("Bokeh.documents[0].get_model_by_name('at').data.x[0]")
+    shown.until(f"Math.abs(Bokeh.documents[0].get_model_by_name('x').value - {x}) < 1e-9")  # the sliders follow
+    refined = "[...document.querySelectorAll('.readout *')].some(e => /10[⁻0-9]/.test(e.shadowRoot?.textContent ?? ''))"
+    shown.until(refined)  # and the exact blow takes the place of the quick one
+
+
+def test_button_plays_the_sound(opened):
+    shown = opened()
+    shown.tab.get_by_role("button", name="Strike and listen").click()
+    shown.until("document.getElementById('player').readyState >= 1")
+    assert shown.tab.evaluate("document.getElementById('player').duration") == pytest.approx(2.0, abs=0.01)
+    assert "Full scale is 10 m/s" in shown.tab.locator("#heard").inner_text()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_page_fits_a_phone(opened, scheme):
+    shown = opened(width=375, height=700, color_scheme=scheme)
+    assert shown.tab.evaluate("document.documentElement.scrollWidth") == 375
+    canvases = shown.tab.locator("figure").evaluate_all("all => all.map(f => f.getBoundingClientRect().right)")
+    assert len(canvases) == 4 and max(canvases) <= 375
+
+
+def test_keyboard_turns_every_slider(opened):
+    shown = opened()
+    stops = shown.tabbed_to()
+    names = [name for _, name, _ in stops]
+    for name in ("Mass", "Stiffness", "Exponent", "Speed", "First bending mode", "Strike point x", "Strike point y"):
+        assert name in names
+    assert "Strike and listen" in names and "player" in names
+    assert [stop for stop in stops if not stop[2]] == []
+    mass = "Bokeh.documents[0].get_model_by_name('mass').value"
+    before = shown.tab.evaluate(mass)
+    shown.tab.locator(".noUi-handle").first.focus()
+    shown.tab.keyboard.press("ArrowRight")
+    shown.until(f"{mass} > {before}")
+    spoken = (
+        "Bokeh.index.find_one(Bokeh.documents[0].get_model_by_name('mass')).shadow_el.querySelector('.noUi-handle')"
+    )
+    shown.until(f"/^[0-9.]+\\s*g$/.test({spoken}.getAttribute('aria-valuetext'))")  # the mass, not its logarithm
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_ctrl_c_before_it_serves_is_quiet_too(scene):
+    command = [sys.executable, "-m", "fem_impact.cli", "explore", str(Path(scene)), "--no-open"]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(1.5)
+    server.send_signal(signal.SIGINT)
+    err = server.communicate(timeout=20)[1]
+    assert "Traceback" not in err and server.returncode in (0, 130, -signal.SIGINT)
