@@ -11,6 +11,7 @@ from scipy.special import gamma
 
 from . import _check, _kernels
 from ._check import SimulationError
+from .accuracy import left_out_error
 from .contact import Contact
 from .modal import Modes
 from .plans import asked_for
@@ -32,6 +33,7 @@ COLLOCATION_BELOW = 1e-7  # [-] tolerance from which collocation needs less work
 BAND_POINTS = 257  # [-] frequencies at which two spectra are compared
 NODES = 5  # [-] of collocation; more gain nothing where onset and release limit the smoothness
 RESOLVABLE = 0.3  # [-] contact stiffness times residual compliance up to which the estimate of its error holds
+AT_LEAST = 0.3  # [-] share of the error to expect below which a difference is taken for luck; the median of blows
 THINNED = 1.4  # [-] highest frequency kept over that of the run that tells what the modes left out do
 REST_FLOOR = 1e-12  # [-] residual compliance below this share of the whole is rounding
 REST_ABOVE = {
@@ -571,23 +573,27 @@ def _truncation(parts, contacts, system: _System, whole: History, scheme, size, 
     """Estimated error [-] of leaving out modes, and whether the estimate can be trusted.
 
     The run is repeated with the upper modes left out as well, their compliance in their place; as the error falls
-    with the square of the highest frequency or faster, the change bounds what the modes left out already do.
+    with the square of the highest frequency or faster, the change bounds what the modes left out already do. Where the
+    change happens to be small, a share of the error to expect stands in for it.
     """
-    thin = [_thinned(part) for part in parts]
-    least = min(ratio for _, ratio in thin)  # of the body that loses least
     if not any(part.rest.any() for part in parts):
         return 0.0, True
-    mobility = np.maximum((system.shape**2) @ (system.omega <= np.pi / pace[0]), 1e-300)
-    stiffness = (np.pi / pace[0]) ** 2 / mobility
-    rest = np.zeros(len(contacts))
+    omega_0 = np.pi / pace[0]
+    mobility = np.maximum((system.shape**2) @ (system.omega <= omega_0), 1e-300)
+    softness, expected = np.zeros(len(contacts)), 0.0
     for part in parts:
-        for (i, _), value in zip(part.touched, np.diag(part.rest)):
-            rest[i] += value
-    resolvable = bool((stiffness * rest <= RESOLVABLE).all())
+        ratio = omega_0 / max(omega_0, part.omega[-1])
+        for (i, _), rest in zip(part.touched, np.diag(part.rest)):
+            soft = omega_0**2 / mobility[i] * rest
+            softness[i] += soft
+            expected += left_out_error(soft, ratio, contacts[i].law.exponent, part.points.shape[1])
+    resolvable = bool((softness <= RESOLVABLE).all())
+    thin = [_thinned(part) for part in parts]
+    least = min(ratio for _, ratio in thin)  # of the body that loses least
     if not 1.0 < least < np.inf:
-        return float((stiffness * rest).max()), resolvable
+        return expected, resolvable
     less = _run(_joined([part for part, _ in thin], contacts), scheme, size, pace, horizon, n_max)
-    return differ(less, whole) / (least**2 - 1.0), resolvable
+    return max(differ(less, whole) / (least**2 - 1.0), AT_LEAST * expected), resolvable
 
 
 def _mesh_error(bodies: tuple[Modes, ...], history: History) -> float:

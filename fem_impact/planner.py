@@ -21,6 +21,7 @@ SHARE = 0.45  # [-] of the tolerance each for what the model leaves out and for 
 MARGINS = (1.0, 4.0, 16.0)  # [-] stricter choices of modes, taken one after another while those left out matter
 NOTCH = 8.0  # [-] by which a verifying run is stricter
 FINEST = 1e-10  # [-] but never stricter than this
+LOSSY = 5.0  # [-] times the error of a lossless contact: what is left out then acts as one mode, not as a spring
 STRIKER_SHARE = 0.05  # [-] of the tolerance for the striker's modes left out: few modes, cheaply kept
 FIRST_LOOK = 20  # [-] modes found first: enough to set the scale and to tell how densely the others follow
 MOST_MODES = {"fe": 2000, "analytic": 50_000}  # [-] about 2 GB, and minutes
@@ -276,7 +277,7 @@ def _modal(
     modes = first.scaled(**scale)
     with scene.blame("strike"):
         modes.points("at", blow.values["at"])
-    allowed = SHARE * blow.tolerance / margin
+    allowed = SHARE * blow.tolerance / margin / (LOSSY if blow.contact.loss else 1.0)
     law = {"contact": blow.contact, "speed": blow.values["speed"]}
     needed = accuracy.cutoff_frequency(modes, blow.values["at"], mass=blow.striker.felt_mass, tolerance=allowed, **law)
     band = max((band for band in blow.quantities.values() if band), default=0.0)
@@ -312,7 +313,7 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
     """The plan with elements that resolve a frequency [Hz] of the body as assembled."""
     assert first.frequency_error is not None
     mesh = system.mesh
-    stated = plan.scene.size_stated or "size" in plan.changes
+    stated = plan.scene.size_stated or "size" in plan.changes or spectrum.resolves(system, limit)
     size = mesh.size if stated else min(mesh.size, spectrum.size_for(system, None, limit, None))
     n_dofs = round(DOFS_PER_AREA[system.element] * mesh.area / size**mesh.dimension)
     error = max(float(first.frequency_error.max()), SHORT_WAVES)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _check, analytic, assembly, modal, planner
+from . import _check, analytic, assembly, modal, planner, spectrum
 from .contact import Contact
 from .mesh import Mesh
 from .modal import Modes
@@ -181,7 +181,8 @@ class Scene:
                     return modal.find_modes(whole, n_modes=n_modes, tolerance=wanted)
                 # The mesh that was fine enough for the first modes, finer still where the shortest wave asks for it.
                 system = first.shapes.system
-                system = replace(system, mesh=replace(system.mesh, size_stated=insisted))
+                enough = insisted or (max_frequency is not None and spectrum.resolves(system, max_frequency))
+                system = replace(system, mesh=replace(system.mesh, size_stated=enough))
                 reach = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}
                 modes = modal.find_modes(system, **reach)
                 error = np.full(modes.n_modes, max(first.frequency_error.max(), SHORT_WAVES))

@@ -155,6 +155,11 @@ def fine_enough(system: System, n_modes: int | None, max_frequency: float | None
     return reassemble(system, system.mesh.refined(system.mesh.size / size))
 
 
+def resolves(system: System, max_frequency: float) -> bool:
+    """Whether the mesh is fine enough for the waves up to a frequency [Hz]."""
+    return system.mesh.size <= WAVE_PER_ELEMENT[system.element] / _wave(system, None, max_frequency)
+
+
 def size_for(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> float:
     """Size [m] of elements that resolve the shortest wave asked for."""
     wave = _wave(system, n_modes, max_frequency)
