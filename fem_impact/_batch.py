@@ -4,14 +4,18 @@ import numpy as np
 from numba import njit
 
 LOOSE = {"reassoc", "contract"}  # sums may be reordered to run in parallel lanes; NaN and infinity keep their meaning
-N_KERNELS = 4  # rows of a kernel, in the order of `kernel_rows`
-DONE, AWKWARD, LONG = 0, 1, 2  # how a blow ended: proved apart; an event inside a step; longer than the kernel
+N_KERNELS = 6  # rows of a kernel, in the order of `kernel_rows`
+LEVELS = 4  # [-] lengths of a look ahead in flight: 1, 2, 4 and 8 steps
+DONE, DOUBTFUL, AWKWARD, LONG = 0, 1, 2, 3  # how a blow ended: proved apart; with something that the steps may have
+# missed; with no contact at all after the first step; longer than the kernel
 SETTLED = 1e-12  # [-] of the approach: change at which the unknown of a step has converged
 SOLVES = 30  # [-] iterations of one step at most
-SAFETY = 4.0  # [-] in flight, times the fastest change seen: steps in which a gap cannot close are passed over
-NEAR = 0.05  # [-] of the gap at the step's ends: a gap closing to less than this within the step is looked at closer
-PARTS = 2.0  # [-] samples of the force per step, at least, from which a spectrum is taken
-SAMPLES = 6.0  # [-] and per period of its highest frequency: the trapezoidal rule errs by (2 pi / 6)**4 / 720 there
+SAMPLES = 6.0  # [-] of the force per period of a spectrum's highest frequency: the rule errs by (2 pi / 6)**4 / 720
+PARTS = 2.0  # [-] and per step, at least
+LOOKS = 8  # [-] parts of a look ahead judged apart where the whole leaves a doubt
+PIECES = 6  # [-] of the step in which a contact opens, integrated by themselves: order 4
+FEWEST = 3.0  # [-] steps of a contact at least; briefer ones are looked at closer
+DIP = 0.2  # [-] of the lesser approach at a step's ends: one that dips lower in between is looked at closer
 
 
 @njit(cache=True, error_model="numpy", fastmath=LOOSE, nogil=True)
@@ -19,49 +23,44 @@ def kernel_rows(table, squared, out_rows):
     """Approach caused by a unit force held for one step, at the ends of that step and of all later ones.
 
     Parameters: table (12, n_modes) of `_kernels.step_table`; squared (n_modes,) the squared shapes; out_rows
-    (4, n_steps): end value for a constant force and for the ramp t/h - 1/2; mean over the step for both.
+    (6, n_steps): end value for a constant force and for the ramp t/h - 1/2; mean over the step for both; rate at its
+    end for both.
     """
-    n_modes = squared.size
-    n_steps = out_rows.shape[1]
     q0 = table[4].copy()
     p0 = table[5].copy()
     q1 = table[6].copy()
     p1 = table[7].copy()
-    s0 = 0.0
-    s1 = 0.0
-    s2 = 0.0
-    s3 = 0.0
-    for n in range(n_modes):
-        u = squared[n]
-        s0 += u * q0[n]
-        s1 += u * q1[n]
-        s2 += u * table[10, n]
-        s3 += u * table[11, n]
-    out_rows[0, 0] = s0
-    out_rows[1, 0] = s1
-    out_rows[2, 0] = s2
-    out_rows[3, 0] = s3
-    for m in range(1, n_steps):
+    mean0 = table[10].copy()
+    mean1 = table[11].copy()
+    for m in range(out_rows.shape[1]):
         s0 = 0.0
         s1 = 0.0
         s2 = 0.0
         s3 = 0.0
-        for n in range(n_modes):
+        s4 = 0.0
+        s5 = 0.0
+        for n in range(squared.size):
             u = squared[n]
-            s2 += u * (table[8, n] * q0[n] + table[9, n] * p0[n])
-            s3 += u * (table[8, n] * q1[n] + table[9, n] * p1[n])
+            s0 += u * q0[n]
+            s1 += u * q1[n]
+            s2 += u * mean0[n]
+            s3 += u * mean1[n]
+            s4 += u * p0[n]
+            s5 += u * p1[n]
+            mean0[n] = table[8, n] * q0[n] + table[9, n] * p0[n]
+            mean1[n] = table[8, n] * q1[n] + table[9, n] * p1[n]
             x = table[0, n] * q0[n] + table[1, n] * p0[n]
             p0[n] = table[2, n] * q0[n] + table[3, n] * p0[n]
             q0[n] = x
             y = table[0, n] * q1[n] + table[1, n] * p1[n]
             p1[n] = table[2, n] * q1[n] + table[3, n] * p1[n]
             q1[n] = y
-            s0 += u * x
-            s1 += u * y
         out_rows[0, m] = s0
         out_rows[1, m] = s1
         out_rows[2, m] = s2
         out_rows[3, m] = s3
+        out_rows[4, m] = s4
+        out_rows[5, m] = s5
 
 
 @njit(cache=True, error_model="numpy")
@@ -133,11 +132,19 @@ def slopes(d0, x0, f0, v0, d1, x1, f1, v1, k, a, c):
 
 
 @njit(cache=True, error_model="numpy")
+def spring(d, k, a, c):
+    """Compression, elastic force and stored energy at approach d."""
+    if d <= 0.0:
+        return d, 0.0, 0.0
+    x = compression(d, k, a, c)
+    f = k * power(x, a)
+    return x, f, f * x / (a + 1.0) + 0.5 * c * f * f
+
+
+@njit(cache=True, error_model="numpy")
 def constant_force(d0, x0, f0, v0, e, b, k, a, c):
     """Scheme A: end approach y and force G(d0, y) >= 0 with y = e - b G; the root is unique and bracketed."""
-    x = compression(e, k, a, c)
-    f1 = k * power(x, a) if e > 0.0 else 0.0
-    v1 = f1 * x / (a + 1.0) + 0.5 * c * f1 * f1 if e > 0.0 else 0.0
+    x, f1, v1 = spring(e, k, a, c)
     g, _ = slopes(d0, x0, f0, v0, e, x, f1, v1, k, a, c)
     high = e
     low = e - b * g
@@ -145,9 +152,7 @@ def constant_force(d0, x0, f0, v0, e, b, k, a, c):
     f = 0.0
     for _ in range(200):
         y = 0.5 * (low + high)
-        x = compression(y, k, a, c)
-        f1 = k * power(x, a) if y > 0.0 else 0.0
-        v1 = f1 * x / (a + 1.0) + 0.5 * c * f1 * f1 if y > 0.0 else 0.0
+        x, f1, v1 = spring(y, k, a, c)
         f, _ = slopes(d0, x0, f0, v0, y, x, f1, v1, k, a, c)
         if y - e + b * f > 0.0:
             high = y
@@ -159,21 +164,70 @@ def constant_force(d0, x0, f0, v0, e, b, k, a, c):
 
 
 @njit(cache=True, error_model="numpy")
-def crossing(d0, d1, mean):
-    """Fraction of a step at which the parabola through both ends and the mean of the step passes zero."""
-    a = 3.0 * (d0 + d1) - 6.0 * mean
-    b = -4.0 * d0 - 2.0 * d1 + 6.0 * mean
+def press(guess, d0, x0, f0, v0, e, ea, own, k, a, c):
+    """One step of scheme A4, or of scheme A where that has no solution: end approach, mean force and its slope.
+
+    ``own`` holds what the step's own force does to it: end, mean and rate for a constant force and for a ramp; the
+    iteration starts from the compression ``guess``.
+    """
+    b0, c0, b1, c1, _, _ = own
+    scale = max(abs(e), abs(d0))
+    x = guess if guess > -scale else 0.5 * e
+    old_x = 0.0
+    old_r = 0.0
+    settled = False
+    for iteration in range(SOLVES):
+        if x > 0.0:
+            f1 = k * power(x, a)
+            y = x + c * f1
+            v1 = f1 * x / (a + 1.0) + 0.5 * c * f1 * f1
+        else:
+            f1 = 0.0
+            y = x
+            v1 = 0.0
+        g, d = slopes(d0, x0, f0, v0, y, x, f1, v1, k, a, c)
+        s = f1 - f0
+        f = (g + d * (ea - c1 * s - 0.5 * (d0 + y))) / (1.0 + d * b1)
+        r = y - e + b0 * f + c0 * s
+        if settled or r == 0.0:
+            if f >= 0.0:
+                return y, f, s
+            break
+        rate = 1.0 + 0.5 * b0 * d if iteration == 0 else (r - old_r) / (x - old_x)
+        old_x = x
+        old_r = r
+        if not abs(rate) > 0.0:
+            break
+        step = -r / rate
+        x = x + step
+        if not abs(step) < 1e3 * scale:
+            break
+        settled = abs(step) <= SETTLED * scale or x == old_x
+    y, f = constant_force(d0, x0, f0, v0, e, b0, k, a, c)
+    return y, f, 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def cubic(d0, v0, d1, v1, t):
+    """Value and slope at t of the cubic through both ends of a unit interval with the slopes there."""
+    a = 2.0 * (d0 - d1) + v0 + v1
+    b = 3.0 * (d1 - d0) - 2.0 * v0 - v1
+    return d0 + t * (v0 + t * (b + t * a)), v0 + t * (2.0 * b + t * 3.0 * a)
+
+
+@njit(cache=True, error_model="numpy")
+def crossing(d0, v0, d1, v1):
+    """Where that cubic passes zero, its ends differing in sign."""
     low = 0.0
     high = 1.0
     t = d0 / (d0 - d1)
     for _ in range(60):
-        value = d0 + t * (b + t * a)
+        value, slope = cubic(d0, v0, d1, v1, t)
         if (value > 0.0) == (d1 > 0.0):
             high = t
         else:
             low = t
-        turn = b + 2.0 * a * t
-        new = t - value / turn if turn != 0.0 else 0.5 * (low + high)
+        new = t - value / slope if slope != 0.0 else 0.5 * (low + high)
         if not low < new < high:
             new = 0.5 * (low + high)
         if abs(new - t) < 1e-13:
@@ -183,39 +237,158 @@ def crossing(d0, d1, mean):
 
 
 @njit(cache=True, error_model="numpy")
-def extreme(d0, d1, mean):
-    """Value of the same parabola where it turns within the step; the end value d1 where it does not."""
-    a = 3.0 * (d0 + d1) - 6.0 * mean
-    b = -4.0 * d0 - 2.0 * d1 + 6.0 * mean
-    if a == 0.0:
-        return d1
-    t = -0.5 * b / a
-    if 0.0 < t < 1.0:
-        return d0 + t * (b + t * a)
-    return d1
+def turning(d0, v0, d1, v1):
+    """Value where that cubic turns in between, its end slopes differing in sign."""
+    a = 3.0 * (2.0 * (d0 - d1) + v0 + v1)
+    b = 3.0 * (d1 - d0) - 2.0 * v0 - v1
+    root = np.sqrt(max(0.0, b * b - a * v0))
+    t = -v0 / (b + root) if v0 < 0.0 else v0 / (root - b)
+    return cubic(d0, v0, d1, v1, t)[0]
+
+
+@njit(cache=True, error_model="numpy")
+def opening(d0, e, ea, own, k, a, c):
+    """Part of a step after which a pressed contact opens.
+
+    The step's own force is integrated against the law, not held to one slope: the struck surface answers at once, so
+    that the way the force ends sets the moment to second order. Free motion and kernel within the step are parabolas
+    but for the fastest modes, whose static compliance joins that of the contact.
+    """
+    swift = own[0] + 12.0 * own[3]
+    c += swift
+    start = d0 + swift * spring(d0, k, a, c - swift)[1]
+    first = -4.0 * start - 2.0 * e + 6.0 * ea
+    second = 3.0 * (start + e) - 6.0 * ea
+    fast = 6.0 * (own[2] - swift) - 2.0 * (own[0] - swift)
+    slow = 3.0 * (own[0] - swift) - 6.0 * (own[2] - swift)
+    dt = 1.0 / PIECES
+    d = start
+    impulse = 0.0
+    for piece in range(PIECES):
+        change = 0.0
+        push = 0.0
+        rate0 = 0.0
+        rate = 0.0
+        f = 0.0
+        for stage in range(4):
+            part = 0.0 if stage == 0 else dt if stage == 3 else 0.5 * dt
+            pushed = impulse + part * f
+            f = spring(d + part * rate, k, a, c)[1]
+            rate = first + 2.0 * second * (piece * dt + part) - fast * f - 2.0 * slow * pushed
+            if stage == 0:
+                rate0 = rate
+            weight = dt / 6.0 if stage in (0, 3) else dt / 3.0
+            change += weight * rate
+            push += weight * f
+        after = d + change
+        if after <= 0.0:
+            return (piece + crossing(d, dt * rate0, after, dt * rate)) * dt
+        d = after
+        impulse += push
+    return 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def parted(d0, v0, d1, v1, error, rate_error):
+    """Whether an approach, known at both ends of a look ahead, surely has no touch in between but one that lasts.
+
+    The cubic through both ends errs by at most ``error``, its slope by ``rate_error``. Falling from the start, rising
+    to the end, or below zero: each part of the look must be one of these, in this order.
+    """
+    if d1 <= 0.0 and max(d0, d1) + 4.0 / 27.0 * (max(0.0, v0) + max(0.0, -v1)) + error < 0.0:
+        return True
+    a = 2.0 * (d0 - d1) + v0 + v1
+    b = 3.0 * (d1 - d0) - 2.0 * v0 - v1
+    falling = True
+    rising = False
+    dt = 1.0 / LOOKS
+    value, slope = d0, v0
+    for look in range(LOOKS):
+        after, steep = cubic(d0, v0, d1, v1, (look + 1.0) * dt)
+        low = min(slope, steep)
+        high = max(slope, steep)
+        if a != 0.0:
+            t = -b / (3.0 * a)
+            if look * dt < t < (look + 1.0) * dt:
+                turn = v0 + t * (2.0 * b + t * 3.0 * a)
+                low = min(low, turn)
+                high = max(high, turn)
+        falling = falling and high + rate_error < 0.0
+        rising = rising and low - rate_error > 0.0
+        if not falling and not rising:
+            top = max(value, after) + 4.0 / 27.0 * dt * (max(0.0, slope) + max(0.0, -steep))
+            if not top + error < 0.0:
+                rising = low - rate_error > 0.0
+                if not rising:
+                    return False
+        value, slope = after, steep
+    return d1 <= 0.0 or rising
 
 
 @njit(cache=True, error_model="numpy", fastmath=LOOSE)
-def convolve(rows, n, segments, n_segments, force, ramp, out_sums):
-    """Approach at the end of step n, and its mean over it, caused by all earlier forces; rows run backwards in time."""
-    s0 = 0.0
-    s1 = 0.0
-    last = rows.shape[1] - 1 - n
+def weighed(first, second, force, ramp):
+    """Sum of two arrays weighed by forces and ramps; slices, because only loops from zero run in parallel lanes."""
+    total = 0.0
+    for j in range(force.size):
+        total += first[j] * force[j] + second[j] * ramp[j]
+    return total
+
+
+@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+def weighed_all(a, b, c, d, e, f, force, ramp):
+    """Three such sums at once."""
+    one = 0.0
+    two = 0.0
+    three = 0.0
+    for j in range(force.size):
+        one += a[j] * force[j] + b[j] * ramp[j]
+        two += c[j] * force[j] + d[j] * ramp[j]
+        three += e[j] * force[j] + f[j] * ramp[j]
+    return one, two, three
+
+
+@njit(cache=True, error_model="numpy")
+def convolve(rows, n, segments, n_segments, force, ramp):
+    """Approach at the end of step n, mean and rate, caused by all earlier forces; rows run backwards in time."""
+    end = 0.0
+    mean = 0.0
+    rate = 0.0
+    shift = rows.shape[1] - 1 - n
     for i in range(n_segments):
-        for j in range(segments[i, 0], min(segments[i, 1], n)):
-            s0 += rows[0, last + j] * force[j] + rows[1, last + j] * ramp[j]
-            s1 += rows[2, last + j] * force[j] + rows[3, last + j] * ramp[j]
-    out_sums[0] = s0
-    out_sums[1] = s1
+        low, high = segments[i, 0], min(segments[i, 1], n)
+        if low < high:
+            first, last = shift + low, shift + high
+            one, two, three = weighed_all(
+                rows[0, first:last], rows[1, first:last], rows[2, first:last], rows[3, first:last],
+                rows[4, first:last], rows[5, first:last], force[low:high], ramp[low:high],
+            )  # fmt: skip
+            end += one
+            mean += two
+            rate += three
+    return end, mean, rate
+
+
+@njit(cache=True, error_model="numpy")
+def midway(kernel, row, n, segments, n_segments, force, ramp):
+    """One row of the same half way through step n, from a kernel of half steps and forces given by half steps."""
+    total = 0.0
+    for i in range(n_segments):
+        low, high = 2 * segments[i, 0], 2 * min(segments[i, 1], n)
+        first, last = 2 * n - high + 1, 2 * n - low + 1
+        even, odd = kernel[row, first:last], kernel[row + 1, first:last]
+        total += weighed(even[::-1], odd[::-1], force[low:high], ramp[low:high])
+    return total
 
 
 @njit(cache=True, error_model="numpy", fastmath=LOOSE)
-def combine(target, striker, target_share, striker_share, start, out_rows):
+def combine(target, striker, share, own, start, out_rows):
     """Kernel of both bodies, reversed in time, from delay ``start`` on."""
     n_steps = out_rows.shape[1]
     for r in range(N_KERNELS):
-        for m in range(start, n_steps):
-            out_rows[r, n_steps - 1 - m] = target_share * target[r, m] + striker_share * striker[r, m]
+        backwards = out_rows[r, : n_steps - start][::-1]
+        first, second = target[r, start:n_steps], striker[r, start:n_steps]
+        for m in range(backwards.size):
+            backwards[m] = share * first[m] + own * second[m]
 
 
 @njit(cache=True, error_model="numpy", fastmath=LOOSE)
@@ -240,18 +413,7 @@ def add_wave(amplitude, start, step, out_real, out_imag):
 
 
 @njit(cache=True, error_model="numpy")
-def rate_at(j, n_steps, h, ends, means):
-    """Rate of approach at the beginning of step j: mean of the parabolas of the steps before and after it."""
-    if j == n_steps:
-        return (2.0 * ends[j - 1] + 4.0 * ends[j] - 6.0 * means[j - 1]) / h
-    after = (-4.0 * ends[j] - 2.0 * ends[j + 1] + 6.0 * means[j]) / h
-    if j == 0:
-        return after
-    return 0.5 * (after + (2.0 * ends[j - 1] + 4.0 * ends[j] - 6.0 * means[j - 1]) / h)
-
-
-@njit(cache=True, error_model="numpy")
-def centroid(contacts, n_contacts, n_steps, h, ends, means, k, a, c, limit):
+def centroid(contacts, n_contacts, n_steps, h, ends, rates, k, a, c, limit):
     """Mean frequency of the magnitude of the force spectrum from zero to ``limit``.
 
     Trapezoidal sums over each contact, with the Euler-Maclaurin term for a force that starts with a slope. Approaches
@@ -271,14 +433,9 @@ def centroid(contacts, n_contacts, n_steps, h, ends, means, k, a, c, limit):
         for i in range(1, count):
             t = (start + i * dt) / h
             j = min(int(t), n_steps - 1)
-            t -= j
-            one = h * rate_at(j, n_steps, h, ends, means)
-            two = h * rate_at(j + 1, n_steps, h, ends, means)
-            cube = 2.0 * (ends[j] - ends[j + 1]) + one + two
-            square = 3.0 * (ends[j + 1] - ends[j]) - 2.0 * one - two
-            d = ends[j] + t * (one + t * (square + t * cube))
-            if d > 0.0:
-                f = k * power(compression(d, k, a, c), a)
+            d, _ = cubic(ends[j], h * rates[j], ends[j + 1], h * rates[j + 1], t - j)
+            f = spring(d, k, a, c)[1]
+            if f > 0.0:
                 add_wave(f * dt, start + i * dt, step, real, imag)
                 if i == 1:
                     first = f / dt
@@ -299,203 +456,187 @@ def centroid(contacts, n_contacts, n_steps, h, ends, means, k, a, c, limit):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def run(cells, h, target, striker, shares, law, rigid, static, band, out):
+def run(
+    cells, h, target, striker, target_bounds, striker_bounds, half_target, half_striker,
+    certify, shares, law, rigid, static, band, out,
+):  # fmt: skip
     """Follow the blows of some cells, all at unit speed, with one step length and kernel.
 
-    Parameters: cells (n,) rows of the other arrays; h: step; target, striker (4, n_steps) of `kernel_rows`; shares
-    (2, n_cells) [-] of both kernels; law (3, n_cells): stiffness, exponent, compliance in series; rigid (n_cells,)
-    [1/kg] squared shapes of all rigid motions; static (n_cells,) [m/N] static compliance of all flexible ones;
-    band: of the centroid, 0 for none. out (6, n_cells): impacts, time in contact, impulse, peak force, centroid, how
-    it ended.
+    Parameters: cells (n,) rows of the other arrays; h: step; target, striker (6, n_steps) of `kernel_rows`; bounds of
+    both (LEVELS + 1, 2, 2): what a unit of the force's jumps and of its bends adds at most to the errors of `parted`
+    for looks of 1, 2, 4, ... and finally half a step; half_target, half_striker: kernels of half the step, twice as
+    many, or none, where a doubt in flight ends a blow as if it were too long; certify: whether flights are to be proved
+    free of touches, or only sampled; shares (2, n_cells) [-] of both kernels; law (3, n_cells): stiffness, exponent,
+    compliance in series; rigid (n_cells,) [1/kg] squared shapes of all rigid motions; static (n_cells,)
+    [m/N] static compliance of all flexible ones; band: of the centroid, 0 for none. out (7, n_cells): impacts, time
+    in contact, impulse, peak force, centroid, how it ended, and how far the peak was mended (relative).
     """
     n_steps = target.shape[1]
     rows = np.empty((N_KERNELS, n_steps))
     force = np.zeros(n_steps)
     ramp = np.zeros(n_steps)
     ends = np.zeros(n_steps + 1)
-    means = np.zeros(n_steps)
-    sums = np.empty(2)
+    rates = np.zeros(n_steps + 1)
+    errors = np.empty((LEVELS + 1, 2))
+    n_halves = half_target.shape[1]
+    half_force = np.zeros(n_halves)
+    half_ramp = np.zeros(n_halves)
     segments = np.zeros((n_steps + 1, 2), np.int64)
     contacts = np.zeros((n_steps + 1, 2))
     for cell in cells:
         k, a, c = law[0, cell], law[1, cell], law[2, cell]
+        share, mine = shares[0, cell], shares[1, cell]
         known = min(32, n_steps)
-        for m in range(n_steps):
-            force[m] = 0.0
-            ramp[m] = 0.0
-        share, own = shares[0, cell], shares[1, cell]
-        for r in range(N_KERNELS):
-            for m in range(known):
-                rows[r, n_steps - 1 - m] = share * target[r, m] + own * striker[r, m]
-        b0 = rows[0, n_steps - 1]
-        c0 = rows[1, n_steps - 1]
-        b1 = rows[2, n_steps - 1]
-        c1 = rows[3, n_steps - 1]
-        d0 = 0.0
-        x0 = 0.0
-        f0 = 0.0
-        v0 = 0.0
+        combine(target[:, :known], striker[:, :known], share, mine, 0, rows[:, n_steps - known :])
+        last = n_steps - 1
+        own = (rows[0, last], rows[1, last], rows[2, last], rows[3, last], rows[4, last], rows[5, last])
+        kk = k / (1.0 + k * c)  # a linear contact pressed all along: everything is straight in the end approach y
+        lever = kk / (1.0 + kk * own[2])
+        turn = lever * own[3] * kk
+        over = 1.0 / (1.0 - own[0] * turn + own[1] * kk)
+        swift = own[0] + 12.0 * own[3]
+        swift_rate = own[4] + (12.0 * own[2] - 6.0 * own[0]) / h
+        d0, x0, f0, v0, rate = 0.0, 0.0, 0.0, 0.0, 1.0
+        ends[0] = 0.0
+        rates[0] = 1.0
         pressed = True
-        began = 0.0
+        began = touched = impulse = moment = deepest = mended = 0.0
+        jumps = bends = held = sloped = 0.0
         count = 0
-        touched = 0.0
-        impulse = 0.0
-        moment = 0.0
-        peak = 0.0
-        slope = 0.0
-        fastest = h
+        level = 0
         n_segments = 1
         segments[0, 0] = 0
         segments[0, 1] = n_steps
         status = LONG
+        ending = DONE
         n = 0
         while n < n_steps:
-            if not pressed:
-                jump = int(min(-d0 / (SAFETY * fastest), n_steps - 1.0 - n))
-                while n + jump - 1 >= known:
-                    more = min(2 * known, n_steps)
-                    combine(target[:, :more], striker[:, :more], share, own, known, rows[:, n_steps - more :])
-                    known = more
-                if jump > 1:
-                    n += jump
-                    convolve(rows, n - 1, segments, n_segments, force, ramp, sums)
-                    e = n * h - sums[0]
-                    fastest = max(fastest, abs(e - d0) / jump)
-                    d0 = x0 = min(e, 0.0)
-                    if e > 0.0:
-                        status = AWKWARD
-                        break
-            if n >= known:
+            if not pressed and level > 0 and n + 2**level > n_steps:
+                level = 0
+                continue
+            jump = 1 if pressed else 2**level
+            while n + jump > known:
                 more = min(2 * known, n_steps)
-                combine(target[:, :more], striker[:, :more], share, own, known, rows[:, n_steps - more :])
+                combine(target[:, :more], striker[:, :more], share, mine, known, rows[:, n_steps - more :])
                 known = more
-            convolve(rows, n, segments, n_segments, force, ramp, sums)
-            e = (n + 1.0) * h - sums[0]
-            ea = (n + 0.5) * h - sums[1]
-            if d0 <= 0.0 and e <= 0.0:
-                y, f, s, mean = e, 0.0, 0.0, ea
-                x1, f1, v1 = y, 0.0, 0.0
-            else:
-                scale = max(abs(e), abs(d0))
-                fine = False
-                x = 0.0
-                if a == 1.0 and d0 >= 0.0:
-                    kk = k / (1.0 + k * c)
-                    # fully pressed: everything is straight in y
-                    top = kk * (ea + c1 * kk * d0) / (1.0 + kk * b1)
-                    turn = kk * c1 * kk / (1.0 + kk * b1)
-                    y = (e - b0 * top + c0 * kk * d0) / (1.0 - b0 * turn + c0 * kk)
-                    if y > 0.0:
-                        f = top - turn * y
-                        s = kk * (y - d0)
-                        fine = True
-                        x1 = y / (1.0 + k * c)
-                        f1 = kk * y
-                        v1 = 0.5 * f1 * y
-                if not fine:
-                    x = x0 + slope * h if d0 > 0.0 else 0.5 * e
-                    if not x > -scale:
-                        x = 0.5 * e
-                    old_x = 0.0
-                    old_r = 0.0
-                    y = e
-                    f = 0.0
-                    s = 0.0
-                    settled = False
-                    for iteration in range(SOLVES):
-                        if x > 0.0:
-                            f1 = k * power(x, a)
-                            y = x + c * f1
-                            v1 = f1 * x / (a + 1.0) + 0.5 * c * f1 * f1
+            end, mean, turned = convolve(rows, n + jump - 1, segments, n_segments, force, ramp)
+            e = (n + jump) * h - end
+            vf = 1.0 - turned
+            if not pressed:
+                span = jump * h
+                if (e > 0.0 and jump > 1) or not parted(
+                    d0, rate * span, e, vf * span, errors[level, 0], errors[level, 1]
+                ):
+                    if level > 0:
+                        level -= 1
+                        continue
+                    sure = False
+                    if certify:
+                        if n_halves == 0:
+                            status = LONG
+                            break
+                        middle = (n + 0.5) * h
+                        middle -= share * midway(half_target, 0, n, segments, n_segments, half_force, half_ramp)
+                        middle -= mine * midway(half_striker, 0, n, segments, n_segments, half_force, half_ramp)
+                        passing = 1.0 - share * midway(half_target, 4, n, segments, n_segments, half_force, half_ramp)
+                        passing -= mine * midway(half_striker, 4, n, segments, n_segments, half_force, half_ramp)
+                        half = 0.5 * h
+                        sure = parted(d0, rate * half, middle, passing * half, errors[LEVELS, 0], errors[LEVELS, 1])
+                        if sure and middle <= 0.0:
+                            sure = parted(middle, passing * half, e, vf * half, errors[LEVELS, 0], errors[LEVELS, 1])
                         else:
-                            f1 = 0.0
-                            y = x
-                            v1 = 0.0
-                        x1 = x
-                        g, d = slopes(d0, x0, f0, v0, y, x1, f1, v1, k, a, c)
-                        s = f1 - f0
-                        f = (g + d * (ea - c1 * s - 0.5 * (d0 + y))) / (1.0 + d * b1)
-                        r = y - e + b0 * f + c0 * s
-                        if settled or r == 0.0:
-                            fine = True
-                            break
-                        rate = 1.0 + 0.5 * b0 * d if iteration == 0 else (r - old_r) / (x - old_x)
-                        old_x = x
-                        old_r = r
-                        if not abs(rate) > 0.0:
-                            break
-                        step = -r / rate
-                        x = x + step
-                        if not abs(step) < 1e3 * scale:
-                            break
-                        if abs(step) <= SETTLED * scale or x == old_x:
-                            settled = True
-                    fine = fine and f >= 0.0
-                if not fine:
-                    y, f = constant_force(d0, x0, f0, v0, e, b0, k, a, c)
-                    s = 0.0
-                    x1 = compression(y, k, a, c)
-                    f1 = k * power(x1, a) if y > 0.0 else 0.0
-                    v1 = f1 * x1 / (a + 1.0) + 0.5 * c * f1 * f1 if y > 0.0 else 0.0
-                mean = ea - b1 * f - c1 * s
-            force[n] = f
-            ramp[n] = s
-            ends[n + 1] = y
-            means[n] = mean
-            part = f * h
-            impulse += part
-            moment += part * (n + 0.5) * h + s * h * h / 12.0
-            turn = extreme(d0, y, mean)
-            if pressed:
-                if y > 0.0:
-                    if turn < -1e-9 * scale:
-                        status = AWKWARD
+                            sure = sure and e > 0.0
+                    if not sure:
+                        ending = DOUBTFUL
+                if e <= 0.0:
+                    n += jump
+                    ends[n] = d0 = x0 = e
+                    rates[n] = rate = vf
+                    level = min(level + 1, LEVELS - 1)
+                    gone = 1.0 - impulse * rigid[cell]
+                    place = n * h - rigid[cell] * (impulse * n * h - moment)
+                    energy = max(0.0, impulse * (1.0 - 0.5 * impulse * rigid[cell]))
+                    if gone < 0.0 and place + np.sqrt(2.0 * energy * static[cell]) < 0.0:
+                        status = ending
                         break
-                    top = f1
-                    if turn > y and turn > d0:
-                        top = k * power(compression(turn, k, a, c), a)
-                    peak = max(peak, top)
-                else:
-                    if n == 0:
-                        status = AWKWARD
-                        break
-                    if turn > d0:
-                        peak = max(peak, k * power(compression(turn, k, a, c), a))
-                    now = (n + crossing(d0, y, mean)) * h
-                    touched += now - began
-                    contacts[count, 0] = began
-                    contacts[count, 1] = now
-                    count += 1
-                    pressed = False
-                    segments[n_segments - 1, 1] = n + 1
-            elif y > 0.0:
-                began = (n + crossing(d0, y, mean)) * h
+                    continue
+                began = (n + crossing(d0, rate * h, e, vf * h)) * h
                 pressed = True
                 segments[n_segments, 0] = n
                 segments[n_segments, 1] = n_steps
                 n_segments += 1
-                peak = max(peak, f1)
-            elif turn != y and turn > -NEAR * max(-d0, -y):
+            ea = (n + 0.5) * h - mean
+            y = -1.0
+            f = s = x1 = f1 = v1 = 0.0
+            if a == 1.0 and d0 >= 0.0:
+                top = lever * (ea + own[3] * kk * d0)
+                y = over * (e - own[0] * top + own[1] * kk * d0)
+                f = top - turn * y
+                s = kk * (y - d0)
+                f1 = kk * y
+                x1 = y - c * f1
+                v1 = 0.5 * f1 * y
+            if y <= 0.0 or f < 0.0:
+                y, f, s = press(x0 + rate * h if d0 > 0.0 else 0.5 * e, d0, x0, f0, v0, e, ea, own, k, a, c)
+                x1, f1, v1 = spring(y, k, a, c)
+            rate1 = vf - own[4] * f - own[5] * s
+            force[n] = f
+            ramp[n] = s
+            if n_halves > 0:
+                half_force[2 * n] = f - 0.25 * s
+                half_force[2 * n + 1] = f + 0.25 * s
+                half_ramp[2 * n] = half_ramp[2 * n + 1] = 0.5 * s
+            jumps += abs(f - 0.5 * s - held)
+            bends += abs(s / h - sloped)
+            held = f + 0.5 * s
+            sloped = s / h
+            impulse += f * h
+            moment += f * h * (n + 0.5) * h + s * h * h / 12.0
+            if y > 0.0:
+                if rate < 0.0 < rate1 and d0 > 0.0 and turning(d0, rate * h, y, rate1 * h) < DIP * min(d0, y):
+                    ending = DOUBTFUL
+            elif n == 0 or d0 <= 0.0:
                 status = AWKWARD
                 break
-            slope = (x1 - x0) / h if x1 > 0.0 else 0.0
-            fastest = max(fastest, abs(y - d0))
-            d0, x0, f0, v0 = y, x1, f1, v1
+            elif rate1 >= 0.0:
+                ending = DOUBTFUL
+            d, r = ends[n], rates[n]
+            missed = 0.0  # by the straight force of the scheme at the step's end
+            if y > 0.0:
+                missed = (f1 - f - 0.5 * s) / (1.0 + f1 * a / y * swift)
+            ends[n + 1] = y - missed * swift
+            rates[n + 1] = rate1 - missed * swift_rate
+            if ends[n + 1] > deepest:
+                deepest = ends[n + 1]
+                mended = a * abs(missed * swift) / deepest
+            if r > 0.0 and rates[n + 1] < 0.0:
+                deepest = max(deepest, turning(d, r * h, ends[n + 1], rates[n + 1] * h))
+            if y <= 0.0:
+                now = (n + opening(d, e, ea, own, k, a, c)) * h
+                if now - began < FEWEST * h:
+                    ending = DOUBTFUL
+                touched += now - began
+                contacts[count, 0] = began
+                contacts[count, 1] = now
+                count += 1
+                pressed = False
+                level = 0
+                segments[n_segments - 1, 1] = n + 1
+                jumps += abs(held)
+                bends += abs(sloped)
+                held = sloped = 0.0
+                for i in range(LEVELS + 1):
+                    for j in range(2):
+                        errors[i, j] = jumps * (share * target_bounds[i, j, 0] + mine * striker_bounds[i, j, 0])
+                        errors[i, j] += bends * (share * target_bounds[i, j, 1] + mine * striker_bounds[i, j, 1])
+            d0, x0, f0, v0, rate = y, x1, f1, v1, rate1
             n += 1
-            if not pressed:
-                # apart: the rigid motions part at a known rate, and the energy left bounds how far the flexible reach
-                rate = 1.0 - impulse * rigid[cell]
-                if rate < 0.0:
-                    place = n * h - rigid[cell] * (impulse * n * h - moment)
-                    energy = max(0.0, impulse * (1.0 - 0.5 * impulse * rigid[cell]))
-                    if place + np.sqrt(2.0 * energy * static[cell]) < 0.0:
-                        status = DONE
-                        break
         out[0, cell] = count
         out[1, cell] = touched
         out[2, cell] = impulse
-        out[3, cell] = peak
+        out[3, cell] = spring(deepest, k, a, c)[1]
         out[4, cell] = 0.0
         out[5, cell] = status
-        if band > 0.0 and status == DONE:
-            out[4, cell] = centroid(contacts, count, n, h, ends, means, k, a, c, band)
+        out[6, cell] = mended
+        if band > 0.0 and status in (DONE, DOUBTFUL):
+            out[4, cell] = centroid(contacts, count, n, h, ends, rates, k, a, c, band)

@@ -43,6 +43,7 @@ def test_kernel_is_the_modal_propagation(damping_ratio):
         assert_allclose(rows[0, m], squared @ q, rtol=1e-12)  # the same sums in another order
         if m < 11:
             assert_allclose(rows[2, m + 1], squared @ (table[8] * q + table[9] * p), rtol=1e-11)
+        assert_allclose(rows[4, m], squared @ p, rtol=1e-11)
         q, p = table[0] * q + table[1] * p, table[2] * q + table[3] * p
 
 
@@ -110,7 +111,7 @@ def test_estimate_covers_the_error():
 def test_steps_do_not_grow_with_the_modes(n_modes):
     modes = fi.analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=100.0, n_modes=n_modes)
     engine = bounces._Engine(many(modes, fi.Striker.stick(0.1, 10e3), [1e5]), 0.0, 1, {})
-    assert engine.first_step(bounces.STEPS)[0] == 26  # h = 2**-13 s whatever the modes: 15 for 1.8 ms
+    assert engine.first_step(1e-3)[0] == 26  # h = 2**-13 s whatever the modes: 15 for 1.8 ms
 
 
 def test_only_stiffness_times_speed_to_the_power_matters():
@@ -126,3 +127,78 @@ def test_threads_change_nothing():
     one, two = (bounces.bounce(blows, tolerance=1e-3, workers=n) for n in (1, 2))
     for name in ("n_impacts", "contact_time", "impulse"):
         assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True)
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.05, 1.5])
+def test_looks_ahead_miss_no_more_of_a_flight_than_is_claimed(zeta):
+    """The bound behind every proved flight against the exact motion after a force of straight pieces with jumps."""
+    rng = np.random.default_rng(5)
+    omega, squared, h, n = np.sort(10.0 ** rng.uniform(2.0, 5.5, 30)), rng.uniform(0.1, 1.0, 30), 1e-4, 12
+    force, ramp = rng.uniform(0.0, 1.0, n), rng.uniform(-1.0, 1.0, n)
+    starts, ends, slopes = force - 0.5 * ramp, force + 0.5 * ramp, ramp / h
+    jumps = np.abs(np.append(starts, 0.0) - np.append(0.0, ends)).sum()
+    bends = np.abs(np.diff(np.concatenate([[0.0], slopes, [0.0]]))).sum()
+    family = bounces.Family((omega, np.zeros(1)), (np.full(30, zeta), np.zeros(1)), (squared, np.ones(1)), (0.0, 0.0))
+    table = np.empty((_kernels.N_TABLE, 30))
+    _kernels.step_table(omega, np.full(30, zeta), h, table)
+    q = p = np.zeros(30)
+    for f, s in zip(force, ramp):
+        q, p = table[0] * q + table[1] * p, table[2] * q + table[3] * p
+        q, p = q + table[4] * f + table[6] * s, p + table[5] * f + table[7] * s
+    claimed = family.bounds(h, 0) @ [jumps, bends]  # (LEVELS + 1, 2)
+    for (error, rate_error), steps in zip(claimed, (1.0, 2.0, 4.0, 8.0, 0.5)):
+        span, parts = steps * h, 200
+        small = np.empty((_kernels.N_TABLE, 30))
+        _kernels.step_table(omega, np.full(30, zeta), span / parts, small)
+        states = [(q, p)]
+        for _ in range(parts):
+            states.append((small[0] * states[-1][0] + small[1] * states[-1][1],
+                           small[2] * states[-1][0] + small[3] * states[-1][1]))  # fmt: skip
+        place = np.array([squared @ state[0] for state in states])
+        rate = span * np.array([squared @ state[1] for state in states])
+        t = np.linspace(0.0, 1.0, parts + 1)
+        cubic = [_batch.cubic(place[0], rate[0], place[-1], rate[-1], x) for x in t]
+        missed, missed_rate = (np.abs(np.array(cubic) - np.column_stack([place, rate]))).max(axis=0)
+        assert missed <= error
+        assert missed_rate <= rate_error
+        assert zeta > 1.0 or (missed > 1e-4 * error and missed_rate > 1e-4 * rate_error)  # not idle where modes ring
+
+
+@pytest.mark.parametrize(
+    ("approach", "apart"),
+    [
+        (lambda t: -1.0 + 0.0 * t, True),  # far away all along
+        (lambda t: -1e-3 - t, True),  # just parted and falling
+        (lambda t: -0.5 + t, True),  # rising into one contact
+        (lambda t: -1.0 + 4.1 * t * (1.0 - t), False),  # touches half way
+        (lambda t: -1.0 + 3.9 * t * (1.0 - t), False),  # nearly: 0.025 short, less than the doubt
+        (lambda t: -1.0 + 3.0 * t * (1.0 - t), True),
+        (lambda t: -0.01 + 1.2 * t - 3.0 * t * t + 1.95 * t**3, False),  # touches, parts and touches again
+    ],
+)
+def test_a_look_ahead_tells_a_touch_from_none(approach, apart):
+    small = 1e-6
+    start, end = ((approach(t + small) - approach(t - small)) / (2.0 * small) for t in (0.0, 1.0))
+    assert _batch.parted(approach(0.0), start, approach(1.0), end, 0.05, 0.1) == apart
+
+
+ADVERSARIAL = [  # mass [kg], stiffness [N/m] of sticks that part for 11 us, or touch for a moment
+    (0.0405238816672741, 304640.530612161),
+    (0.10856803301525185, 747597.6912943505),
+]
+
+
+def test_moments_between_the_steps_are_not_lost():
+    rng = np.random.default_rng(11)
+    cells = ADVERSARIAL + list(zip(rng.uniform(0.05, 0.2, 12), 10.0 ** rng.uniform(5.3, 6.0, 12)))
+    modes = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    blows = many(modes, fi.Striker.stick(0.1, 10e3), [k for _, k in cells], mass=np.array([m for m, _ in cells]))
+    found = bounces.bounce(blows, tolerance=1e-3)
+    assert found.done.mean() > 0.9
+    for i in np.flatnonzero(found.done):
+        hit = fi.strike(
+            modes, fi.Striker.stick(cells[i][0], 10e3), fi.Contact.linear(cells[i][1]), at=AT, speed=1.0, tolerance=1e-4
+        )
+        assert hit.n_impacts == found.n_impacts[i]
+        assert_allclose(found.contact_time[i], hit.contact_time, rtol=1.1e-3)  # 1e-3, and 1e-4 of the single blow
+        assert_allclose(found.restitution[i], hit.restitution, atol=1.1e-3)

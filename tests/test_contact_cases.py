@@ -259,10 +259,11 @@ def test_kernel_form_is_the_modal_form(exponent, n_steps, damping_ratio):
     modes = np.array(plate.omega), np.array(plate.damping_ratio)
     impulse = modal_blow(*modes, squared, mass, stiffness, exponent, h, 3 * n_steps)
     family = bounces.Family.of(plate, np.array([0.465, 0.3]), fi.Striker.rigid(mass), False)
-    out = np.empty((6, 1))
+    out = np.empty((7, 1))
     column = np.ones(1)
     _batch.run(
-        np.zeros(1, int), h, *family.kernels(h, 512), np.array([column / 2.0, column / mass]),
+        np.zeros(1, int), h, *family.kernels(h, 512), *family.kernels(0.5 * h, 1024)[:2], True,
+        np.array([column / 2.0, column / mass]),
         np.array([column * stiffness, column * exponent, 0.0 * column]), column / mass,
         column * family.static(0) / 2.0, 0.0, out,
     )  # fmt: skip
