@@ -31,6 +31,7 @@ import fem_impact as fi
 
 BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses
 WIDEST = 88  # [-] columns of text at most; a narrow terminal has fewer
+MOTION_TIMES = 100  # [-] instants in motion.pvd
 SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` writes any number
 
 
@@ -102,6 +103,10 @@ def _parser() -> argparse.ArgumentParser:
     strike.add_argument("--out", metavar="DIR", type=Path, help="where the files go (default: out/NAME-OF-SCENE)")
     _add_choices(strike)
     strike.add_argument("--verify", action="store_true", help="strike again, finer, and print the true differences")
+    strike.add_argument(
+        "--pictures", action="store_true", help="write mode shapes and the wave in space, as PNG and GIF"
+    )
+    strike.add_argument("--vtk", action="store_true", help="write the motion for ParaView and pyvista, motion.pvd")
     strike.add_argument("--json", action="store_true", help="print what response.json holds instead of the summary")
 
     plan = verbs.add_parser("plan", help="say what would be modelled, why, how well and at which cost; strike nothing")
@@ -194,10 +199,11 @@ def _strike(options: argparse.Namespace) -> None:
     scene = fi.load_scene(options.scene)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:
-        run = scene.run(_progress, before=_warn, verify=options.verify, **_choices(options))
+        needs = {"target": "modal"} if options.pictures or options.vtk else {}  # motion is that of modes
+        run = scene.run(_progress, before=_warn, verify=options.verify, **{**needs, **_choices(options)})
         start = time.perf_counter()
         with _progress("files"):
-            data = _write(staging, scene, run)
+            data = _write(staging, scene, run, options)
     seconds = {**run.seconds, "files": time.perf_counter() - start, "total": time.perf_counter() - began}
     if options.json:
         print(json.dumps(data, indent=2, allow_nan=False))
@@ -222,7 +228,7 @@ def _warn(plan: Any) -> None:
         print(_wrapped(f"fem-impact: {plan.cost}; Ctrl-C stops it, `fem-impact plan` says why"), file=sys.stderr)
 
 
-def _write(folder: Path, scene: Any, run: Any) -> dict[str, Any]:
+def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> dict[str, Any]:
     """Write every file of a strike; return what response.json holds."""
     response, extra, files = run.response, {}, ["response.json", "force.csv", "force.png"]
     fi.export.write_force(folder / "force.csv", response)
@@ -232,6 +238,18 @@ def _write(folder: Path, scene: Any, run: Any) -> dict[str, Any]:
         heard = fi.export.write_wav(folder / "strike.wav", response, scene.points[0])
         extra["sound"] = {"at": scene.points[0], "full_scale": heard.full_scale, "peak_level": heard.peak_level}
         files += ["modes.pvd", "strike.wav"]
+        if options.vtk:
+            end = fi.pictures.end_of(response)
+            times = [end * i / (MOTION_TIMES - 1) for i in range(MOTION_TIMES)]
+            fi.export.write_vtk(folder / "motion.pvd", response.target, response, times)
+            files.append("motion.pvd")
+        if options.pictures:
+            fi.pictures.animation(folder / "wave.gif", response)
+            fi.pictures.wave(folder / "wave.png", response)
+            missing = fi.pictures.mode_shapes(folder / "modes.png", response.target)
+            if missing:
+                print(_wrapped(f"fem-impact: pictures are drawn in the plane; {missing}"), file=sys.stderr)
+            files += ["modes.png", "wave.png", "wave.gif"]
     if run.verified is not None:
         extra["verified"] = run.verified
     changes = {name: value for name, value in run.plan.changes.items() if name in ("tolerance", "quantity")}

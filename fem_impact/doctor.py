@@ -1,8 +1,5 @@
 """Is this installation sound? Small checks with a known answer, and a sentence of help for each that fails."""
 
-import os
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -11,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import export, figures, mesh
+from . import export, figures, mesh, pictures
 from .assembly import assemble
 from .contact import Contact
 from .integrator import strike
@@ -20,12 +17,6 @@ from .section import Material, Plate
 from .striker import Striker
 
 SQUARE = 2.0 * np.pi**2  # [-] omega of a hinged unit square of unit stiffness and mass
-PATIENCE = 60.0  # [s] a rendering probe that takes longer has failed
-# Without a driver this ends the process by a signal no `try` catches, hence another process.
-RENDER = (
-    "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=(16, 16)); p.add_mesh(pyvista.Sphere()); "
-    "assert p.screenshot(None).std() > 0"
-)
 
 
 @dataclass(frozen=True)
@@ -46,7 +37,7 @@ def examine() -> list[Finding]:
         _tried("compiled kernels", _kernels, "install numba again; NUMBA_DISABLE_JIT=1 runs without, slowly"),
         _tried("pictures", _picture, "install matplotlib again"),
         _tried("mode shapes as files", _vtk, "check that the folder for temporary files can be written to"),
-        _tried("3-D rendering", _render, "for pictures in 3-D install libegl1 and libgl1-mesa-dri", vital=False),
+        _tried("3-D rendering", pictures.can_render, pictures.REMEDY, vital=False),
     ]
 
 
@@ -83,13 +74,3 @@ def _vtk() -> bool:
     with tempfile.TemporaryDirectory() as folder:
         export.write_vtk(Path(folder) / "rigid.vtu", Modes.rigid(1.0))
         return bool(list(Path(folder).iterdir()))
-
-
-def _render() -> bool:
-    environment = {**os.environ, "VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
-    command = [sys.executable, "-c", RENDER]
-    try:
-        run = subprocess.run(command, env=environment, capture_output=True, timeout=PATIENCE, check=False)
-    except subprocess.TimeoutExpired:
-        return False
-    return run.returncode == 0

@@ -3,8 +3,10 @@
 import numpy as np
 
 from .modal import Modes
+from .response import Response
 
 ENOUGH = 2500  # [-] points on a plate: each mode of the first hundred then has some points per half wave
+RIBBON = 0.06  # [-] width over length of the ribbon a beam is drawn as
 HALVINGS = 5  # [-] at most: each makes four triangles of one
 
 
@@ -19,6 +21,36 @@ def grid(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
             break
         points, cells = _halved(points, cells)
     return points, cells
+
+
+def surface(modes: Modes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The body as triangles in the plane, a beam as a ribbon.
+
+    Returns
+    -------
+    points : ndarray, shape (n_points, dimension) [m], where its shapes are evaluated
+    cells : ndarray, shape (n_cells, 3)
+    plane : ndarray, shape (n_points, 2) [m], where each point is drawn
+    """
+    points, cells = grid(modes)
+    if modes.dimension == 2:
+        return points, cells, points
+    x = np.sort(points[:, 0])
+    n, half = len(x), 0.5 * RIBBON * float(np.ptp(x))
+    here = np.arange(n - 1)
+    corners = ((here, here + 1, here + n), (here + 1, here + n + 1, here + n))
+    cells = np.vstack([np.column_stack(corner) for corner in corners])
+    plane = np.column_stack([np.tile(x, 2), np.repeat([-half, half], n)])
+    return plane[:, :1], cells, plane
+
+
+def gap(response: Response, times: np.ndarray) -> np.ndarray:
+    """How far the striker is from the surface it strikes [m], (n_times,); zero while it presses."""
+    striker = response.striker
+    if striker is None or response.at is None:
+        raise ValueError("response must be that of a strike, which has a striker, not of bodies that collide")
+    tip = response.displacement(striker.at[None] if striker.modes.dimension else None, times, body=0)
+    return np.maximum(response.displacement(response.at[None], times) - tip, 0.0)[:, 0]
 
 
 def _halved(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -49,7 +49,7 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
         Modes in one .vtu: a point array ``mode_001`` ... each, all frequencies as field data. Modes in a .pvd: one
         part per mode, its frequency as time value and field data, ``shape`` [kg**-0.5] and a ready-made ``warp``
         vector. Motion: one part per time (a .vtu takes one time only), ``displacement`` [m], ``velocity`` [m/s]
-        of the kept modes.
+        of the kept modes; as field data the contact ``force`` [N] and, of a strike, where the ``striker`` is [m].
     modes : Modes
     response : Response, optional
         Write its motion instead of mode shapes; modes is then the body it happened on.
@@ -246,7 +246,19 @@ def _motion_parts(response: Response, points: np.ndarray, times: np.ndarray) -> 
         vector = np.zeros((len(times), len(points), 3))
         vector[:, :, 2] = history  # (n_times, n_points)
         moves.append(vector)
-    return [({"displacement": d, "velocity": v}, {"time": t}) for d, v, t in zip(*moves, times)]
+    fields: list[dict[str, Any]] = [{"time": t} for t in times]
+    for i in range(response.history.n_contacts):
+        name = "force" if response.history.n_contacts == 1 else f"force_{i + 1}"
+        for field, force in zip(fields, response.history.force_at(times, i)[0]):
+            field[name] = force
+    if response.striker is not None and response.at is not None:
+        striker = response.striker
+        tip = response.displacement(striker.at[None] if striker.modes.dimension else None, times, body=0)[:, 0]
+        for field, way in zip(fields, tip):
+            place = np.zeros((1, 3))
+            place[0, : len(response.at)], place[0, 2] = response.at, way
+            field["striker"] = place
+    return [({"displacement": d, "velocity": v}, field) for d, v, field in zip(*moves, fields)]
 
 
 def _distinct(stamps: np.ndarray) -> np.ndarray:

@@ -227,11 +227,33 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
                 axes.add_collection(LineCollection(list(points[rim]), colors="#888888", linewidths=0.8))
                 axes.set_aspect("equal")
                 axes.set_axis_off()
-            axes.set_title(f"{i + 1}   {_frequency(modes.frequencies[i])}")
+            axes.set_title(f"{i + 1}   {in_hertz(modes.frequencies[i])}")
     return figure
 
 
-def _frequency(value: float) -> str:
+def snapshot(plane: np.ndarray, cells: np.ndarray, deflection: np.ndarray, at: np.ndarray, title: str) -> Figure:
+    """The deflection of a surface at one instant in colour, -1 to 1, and where it is struck.
+
+    Parameters
+    ----------
+    plane : ndarray, shape (n_points, 2) [m]
+    cells : ndarray, shape (n_cells, 3)
+    deflection : ndarray, shape (n_points,) [-]
+    at : ndarray, shape (dimension,) [m]
+    title : str
+    """
+    with _styled(7.2, 4.8) as figure:
+        axes: Any = figure.subplots()
+        axes.tripcolor(*plane.T, cells, deflection, cmap="PuOr", vmin=-1, vmax=1, shading="gouraud")
+        axes.add_collection(LineCollection(list(plane[svg.rim(cells)]), colors="#888888", linewidths=0.8))
+        axes.plot(at[0], at[1] if len(at) > 1 else 0.0, "o", mfc="none", mec=VERMILION, mew=2.0, ms=9.0)
+        axes.set(aspect="equal", title=title)
+        axes.set_axis_off()
+    return figure
+
+
+def in_hertz(value: float) -> str:
+    """A frequency with its unit, four digits."""
     return f"{value:.4g} Hz" if value < 1e4 else f"{value * 1e-3:.4g} kHz"
 
 

@@ -27,7 +27,6 @@ ENERGY_TIMES = 400  # [-] instants of the energies
 FRAMES = 72  # [-] of the wave: three seconds at 24 a second
 SHAPES = 12  # [-] modes shown
 AFTER = 1.35  # [-] the wave and the energies are followed so far beyond the last contact
-RIBBON = 0.06  # [-] width over length of the ribbon a beam is drawn as
 DIGITS = 6  # [-] of the numbers in the plots; the downloads keep all
 QUIET = -20.0  # [dB] re full scale: a sound below is offered a second time, raised
 DISTANCE = 1.0  # [m] from the plate at which its radiated sound is heard
@@ -307,15 +306,11 @@ def _energy(response: Response, times: np.ndarray, body: int) -> np.ndarray:
 def _view(response: Response, end: float) -> dict[str, Any]:
     """The body as a surface, its motion over time and its first shapes, for the views that turn with the mouse."""
     modes = response.target
-    points, cells = drawing.grid(modes)
-    surface = points
-    if modes.dimension == 1:
-        points, cells, surface = _ribbon(points)
+    points, cells, surface = drawing.surface(modes)
     rows = modes.shapes.at(points)  # (n_points, n_modes), found once: looking up the elements is the dear part
     times = np.linspace(0.0, end, FRAMES)
     wave = response.modal_state(times)[0] @ rows.T  # (n_times, n_points)
-    assert response.striker is not None and response.at is not None
-    tip = response.displacement(response.striker.at[None] if response.striker.modes.dimension else None, times, body=0)
+    assert response.at is not None
     struck = response.displacement(response.at[None], times)
     count = min(SHAPES, modes.n_modes)
     shapes = rows[:, :count].T / np.maximum(np.abs(rows[:, :count]).max(axis=0), 1e-300)[:, None]
@@ -329,24 +324,12 @@ def _view(response: Response, end: float) -> dict[str, Any]:
         "times": _short(times),
         "first": int(np.searchsorted(times, response.time[np.argmax(response.force)])),
         "surface": _short(struck[:, 0]),
-        "gap": _short(np.maximum(struck - tip, 0.0)[:, 0]),
+        "gap": _short(drawing.gap(response, times)),
         "wave": _packed(wave),
         "shapes": _packed(shapes),
         "frequencies": _short(modes.frequencies[:count]),
         "damping": _short(modes.damping_ratio[:count]),
     }
-
-
-def _ribbon(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A beam as a ribbon: its points twice, triangles between them, and their places in the plane."""
-    x = np.sort(points[:, 0])
-    n, half = len(x), 0.5 * RIBBON * float(np.ptp(x))
-    here = np.arange(n - 1)
-    cells = np.vstack(
-        [np.column_stack([here, here + 1, here + n]), np.column_stack([here + 1, here + n + 1, here + n])]
-    )
-    surface = np.column_stack([np.tile(x, 2), np.repeat([-half, half], n)])
-    return np.tile(x, 2)[:, None], cells, surface
 
 
 def _packed(rows: np.ndarray) -> dict[str, Any]:

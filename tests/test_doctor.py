@@ -1,10 +1,10 @@
 """The examination finds this very installation sound, and says so when it is not."""
 
-from fem_impact import cli, doctor
+from fem_impact import cli, doctor, pictures
 
 
 def test_this_installation_is_sound(monkeypatch):
-    monkeypatch.setattr(doctor, "_render", lambda: True)  # takes long, and may fail on a sound installation
+    monkeypatch.setattr(pictures, "can_render", lambda: True)  # takes long, and may fail on a sound installation
     findings = doctor.examine()
     assert [finding.name for finding in findings if not finding.works] == []
     assert all(finding.remedy == "" for finding in findings)
@@ -15,7 +15,7 @@ def test_what_fails_comes_with_its_remedy_and_reason(monkeypatch, capsys):
         raise OSError("no font")
 
     monkeypatch.setattr(doctor, "_picture", fail)
-    monkeypatch.setattr(doctor, "_render", lambda: False)
+    monkeypatch.setattr(pictures, "can_render", lambda: False)
     assert cli.main(["doctor"]) == 1
     captured = capsys.readouterr()
     assert "install matplotlib again (OSError: no font)" in " ".join(captured.out.split())
@@ -23,7 +23,7 @@ def test_what_fails_comes_with_its_remedy_and_reason(monkeypatch, capsys):
 
 
 def test_missing_rendering_is_no_failure(monkeypatch, capsys):
-    monkeypatch.setattr(doctor, "_render", lambda: False)
+    monkeypatch.setattr(pictures, "can_render", lambda: False)
     assert cli.main(["doctor"]) == 0
     assert "3-D rendering          missing" in capsys.readouterr().out
 

@@ -81,6 +81,11 @@ def test_motion_has_displacement_and_velocity_at_each_time(tmp_path, modes, hit)
             assert_allclose(
                 grid.point_data[name][:, 2], history(points, [instant], residual=False)[0], rtol=0, atol=1e-15
             )
+        place, force = grid.field_data["striker"][0], grid.field_data["force"][0]
+        assert_allclose(place[:2], hit.at, rtol=0, atol=0)
+        assert force == hit.history.force_at(np.array([instant]), 0)[0][0]
+        indentation = place[2] - hit.displacement([hit.at], [instant])[0, 0]
+        assert (force > 0.0) == (indentation > 0.0)  # it presses where it is pressed in
 
 
 @pytest.mark.parametrize(

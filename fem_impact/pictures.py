@@ -1,0 +1,251 @@
+"""Mode shapes and the wave of a blow in space, rendered without a screen, or in the plane where nothing can render."""
+
+import io
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from . import _check, drawing, figures
+from ._files import replacing
+from .modal import Modes
+from .response import Response
+
+PATIENCE = 60.0  # [s] a probe that takes longer has failed
+REMEDY = "for pictures in space install libegl1 and libgl1-mesa-dri"
+# Without a driver this ends the process by a signal no `try` catches, hence another process.
+PROBE = (
+    "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=(16, 16)); p.add_mesh(pyvista.Sphere()); "
+    "assert p.screenshot(None).std() > 0"
+)
+WINDOW = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
+SIZE = (720, 480)  # [px] of a frame
+TILE = (320, 250)  # [px] of one mode shape
+FRAMES = 48  # [-] of an animation: four seconds
+RATE = 12  # [1/s] frames
+AFTER = 1.35  # [-] the wave is followed so far beyond the last contact
+HEIGHT = 0.12  # [-] largest deflection drawn over the body's extent
+LIFT = 0.004  # [-] of lines above the surface over their extent
+BALL = 0.03  # [-] radius of the striker as drawn, likewise
+COLOURS = "PuOr"  # as in `figures`: even about zero, safe for the colour-blind
+VIEW = (-0.55, -1.0, 0.75)  # from where one looks
+
+
+@cache
+def can_render() -> bool:
+    """Whether pyvista can render here; found once, in another process."""
+    command = [sys.executable, "-c", PROBE]
+    try:
+        run = subprocess.run(command, env={**os.environ, **WINDOW}, capture_output=True, timeout=PATIENCE, check=False)
+    except subprocess.TimeoutExpired:
+        return False
+    return run.returncode == 0
+
+
+def mode_shapes(path: str | Path, modes: Modes, *, count: int = 12, columns: int = 4) -> str:
+    """Write the first mode shapes as a grid of warped surfaces with nodal lines.
+
+    Parameters
+    ----------
+    path : path ending in .png
+    modes : Modes of a plate or a beam
+    count : int, how many at most
+    columns : int
+
+    Returns
+    -------
+    str
+        Empty, or what to install for a picture in space where `figures.mode_shapes` had to stand in.
+    """
+    _check.between("dimension of modes", modes.dimension, 1, 2)
+    _ending(path, ".png")
+    if not can_render():
+        figures.save(path, figures.mode_shapes(modes, count=count, columns=columns))
+        return REMEDY
+    count = min(_check.count("count", count), modes.n_modes)
+    columns = min(_check.count("columns", columns), count)
+    rows = -(-count // columns)
+    points, cells, plane = drawing.surface(modes)
+    shapes = modes.truncated(n_modes=count).shapes.at(points)
+    shapes = shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300)
+    plotter = _plotter((TILE[0] * columns, TILE[1] * rows), shape=(rows, columns))
+    for i in range(count):
+        plotter.subplot(*divmod(i, columns))
+        mesh = _mesh(plane, cells, HEIGHT * _extent(plane) * shapes[:, i], shapes[:, i])
+        _add(plotter, mesh, 1.0)
+        _add_line(plotter, mesh.contour([0.0]), "black")
+        plotter.add_text(f"{i + 1}   {figures.in_hertz(modes.frequencies[i])}", font_size=9, position="upper_left")
+        _look(plotter, plane, zoom=1.15)
+    _save(path, plotter)
+    return ""
+
+
+def wave(path: str | Path, response: Response, *, time: float | None = None) -> str:
+    """Write the struck body at one instant, warped by its displacement, the striker above it.
+
+    Parameters
+    ----------
+    path : path ending in .png
+    response : Response of a struck plate or beam
+    time : float [s], optional
+        The instant of the largest force by default.
+
+    Returns
+    -------
+    str
+        Empty, or what to install for a picture in space where one in the plane had to stand in.
+    """
+    _ending(path, ".png")
+    instant = response.time[int(np.argmax(response.force))] if time is None else _check.non_negative("time", time, "s")
+    (frame,) = _frames(response, np.array([instant]))
+    with replacing(path) as temporary:
+        frame.save(temporary)
+    return "" if can_render() else REMEDY
+
+
+def animation(path: str | Path, response: Response, *, frames: int = FRAMES) -> str:
+    """Write the wave leaving the strike point as an animated GIF, the striker included and the time shown.
+
+    Parameters
+    ----------
+    path : path ending in .gif
+    response : Response of a struck plate or beam
+    frames : int, from the first touch to a third beyond the last contact
+
+    Returns
+    -------
+    str
+        As in `wave`.
+    """
+    _ending(path, ".gif")
+    times = np.linspace(0.0, end_of(response), _check.count("frames", frames, low=2))
+    pictures = list(_frames(response, times))
+    colours = _mosaic(pictures[:: max(1, len(pictures) // 8)]).quantize(255)  # one palette, so that nothing flickers
+    first, *rest = (picture.quantize(palette=colours, dither=Image.Dither.NONE) for picture in pictures)
+    with replacing(path) as temporary:
+        first.save(temporary, save_all=True, append_images=rest, duration=1000 // RATE, loop=0)
+    return "" if can_render() else REMEDY
+
+
+def _mosaic(pictures: list[Image.Image]) -> Image.Image:
+    mosaic = Image.new("RGB", (pictures[0].width, pictures[0].height * len(pictures)))
+    for i, picture in enumerate(pictures):
+        mosaic.paste(picture, (0, i * picture.height))
+    return mosaic
+
+
+def end_of(response: Response) -> float:
+    """How long a blow is worth watching [s]."""
+    return AFTER * (response.impacts[-1].end if response.impacts else float(response.time[-1]))
+
+
+def _ending(path: str | Path, ending: str) -> None:
+    _check.one_of("path ending", Path(path).suffix.lower(), (ending,))
+
+
+def _frames(response: Response, times: np.ndarray) -> Iterator[Image.Image]:
+    """Pictures of the body at times [s], all on one scale."""
+    modes = response.target
+    _check.between("dimension of the struck body", modes.dimension, 1, 2)
+    points, cells, plane = drawing.surface(modes)
+    rows = modes.shapes.at(points)
+    motion = response.modal_state(times)[0] @ rows.T  # (n_times, n_points)
+    whole = response.modal_state(np.linspace(0.0, end_of(response), FRAMES))[0] @ rows.T
+    largest = float(max(np.abs(motion).max(), np.abs(whole).max())) or 1.0
+    gap = drawing.gap(response, times)
+    for deflection, distance, time in zip(motion, gap, times):
+        title = f"{1e3 * time:.3f} ms, deflection up to {1e3 * largest:.3g} mm"
+        if can_render():
+            yield _in_space(response, plane, cells, deflection / largest, distance / largest, title)
+        else:
+            yield _in_plane(response, plane, cells, -deflection / largest, title)
+
+
+def _in_space(response: Response, plane: Any, cells: Any, deflection: Any, distance: float, title: str) -> Image.Image:
+    import pyvista
+
+    extent = _extent(plane)
+    plotter = _plotter(SIZE)
+    _add(plotter, _mesh(plane, cells, -HEIGHT * extent * deflection, -deflection), 1.0)
+    at = np.append(np.atleast_1d(np.asarray(response.at)), [0.0])[:2]
+    below = deflection[np.argmin(((plane - at) ** 2).sum(axis=1))]
+    height = extent * (BALL - HEIGHT * below + min(HEIGHT * distance, 2.0 * HEIGHT))
+    plotter.add_mesh(
+        pyvista.Sphere(radius=BALL * extent, center=(at[0], at[1], height)),
+        color=figures.VERMILION,
+        smooth_shading=True,
+    )
+    plotter.add_text(title, font_size=10, position="upper_left")
+    _look(plotter, plane)
+    picture = plotter.screenshot(None)
+    plotter.close()
+    return Image.fromarray(picture)
+
+
+def _in_plane(response: Response, plane: Any, cells: Any, deflection: Any, title: str) -> Image.Image:
+    file = io.BytesIO()
+    figures.snapshot(plane, cells, deflection, np.atleast_1d(np.asarray(response.at)), title).savefig(
+        file, format="png", dpi=100
+    )
+    return Image.open(file).convert("RGB")
+
+
+def _plotter(size: Any, **options: Any) -> Any:
+    os.environ.setdefault(*next(iter(WINDOW.items())))  # VTK reads it when it opens its first window
+    import pyvista
+
+    plotter: Any = pyvista.Plotter(off_screen=True, window_size=size, border=False, **options)
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    return plotter
+
+
+def _mesh(plane: np.ndarray, cells: np.ndarray, height: np.ndarray, value: np.ndarray) -> Any:
+    import pyvista
+
+    faces = np.column_stack([np.full(len(cells), 3), cells]).ravel()
+    mesh = pyvista.PolyData(np.column_stack([plane, height]), faces)
+    mesh["deflection"] = value
+    return mesh
+
+
+def _add(plotter: Any, mesh: Any, limit: float) -> None:
+    plotter.add_mesh(
+        mesh, scalars="deflection", cmap=COLOURS, clim=(-limit, limit), smooth_shading=True, show_scalar_bar=False,
+        ambient=0.4, diffuse=0.6, specular=0.0,
+    )  # fmt: skip
+    rim = mesh.extract_feature_edges(feature_edges=False, manifold_edges=False, non_manifold_edges=False)
+    _add_line(plotter, rim, "#666666")
+
+
+def _add_line(plotter: Any, line: Any, colour: str) -> None:
+    """A line on the surface, lifted a little so that the surface does not swallow it."""
+    if line.n_points:
+        plotter.add_mesh(line.translate((0.0, 0.0, LIFT * line.length)), color=colour, line_width=2)
+
+
+def _look(plotter: Any, plane: np.ndarray, zoom: float = 1.35) -> None:
+    """The same view for every picture of a body, whatever its deflection."""
+    low, high = plane.min(axis=0), plane.max(axis=0)
+    rise = HEIGHT * _extent(plane)
+    plotter.camera_position = [tuple(VIEW), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
+    plotter.reset_camera(bounds=(low[0], high[0], low[1], high[1], -rise, rise))
+    plotter.camera.zoom(zoom)
+    plotter.reset_camera_clipping_range()  # a striker may hover outside the bounds
+
+
+def _extent(plane: np.ndarray) -> float:
+    return float(np.ptp(plane, axis=0).max())
+
+
+def _save(path: str | Path, plotter: Any) -> None:
+    picture = plotter.screenshot(None)
+    plotter.close()
+    with replacing(path) as temporary:
+        Image.fromarray(picture).save(temporary)
