@@ -63,6 +63,32 @@ def kernel_rows(table, squared, out_rows):
         out_rows[5, m] = s5
 
 
+@njit(cache=True, error_model="numpy", nogil=True)
+def flight_bounds(omega, zeta, squared, h, out_bounds):
+    """What cubics through both ends of a look ahead miss of a body's free motion, at unit mass.
+
+    Parameters: out_bounds (LEVELS + 1, 2, 2), for looks of 1, 2, 4, ... and finally half a step: of the approach and of
+    its slope over the look H, after a force of unit jumps and one of unit bends (changes of its slope). A jump leaves
+    a mode with the velocity u**2 / omega at most, a bend with u**2 / omega**2. The cubic misses H**4 / 384 and
+    sqrt(3) / 216 H**4 times the fourth derivative, or no more than the motion itself.
+    """
+    out_bounds[:] = 0.0
+    for n in range(omega.size):
+        w, z = omega[n], zeta[n]
+        if w == 0.0:
+            continue
+        size = squared[n] * np.sqrt(1.0 + 4.0 * z * z) / (w * w)
+        for level in range(LEVELS + 1):
+            angle = w * h * (0.5 if level == LEVELS else 2.0**level)
+            steep = (angle * (1.0 + 2.0 * z)) ** 4
+            missed = size * min(steep / 384.0, 2.0 + 0.25 * angle)
+            missed_rate = size * min(np.sqrt(3.0) / 216.0 * steep, 3.0 + 2.0 * angle)
+            out_bounds[level, 0, 0] += missed
+            out_bounds[level, 0, 1] += missed / w
+            out_bounds[level, 1, 0] += missed_rate
+            out_bounds[level, 1, 1] += missed_rate / w
+
+
 @njit(cache=True, error_model="numpy")
 def power(x, exponent):
     """x**exponent for x >= 0 without the general power where a root will do."""

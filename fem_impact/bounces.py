@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import special
@@ -21,6 +22,7 @@ YIELD = 0.02  # [-] error of the peak over that part of the indentation by which
 ALIAS = (4.0, 8.0)  # [-] omega times step at which they are badly sampled; beyond, they follow the force statically
 LENGTHS = (48, 384, 3072)  # [-] steps a blow may take, tried in turn
 PIECE = 4096  # [-] blows handed to a thread at once
+FEW = 1024  # [-] blows not worth a second thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,26 +71,10 @@ class Family:
             _kernels.step_table(omega, zeta, h, table)
             rows = np.empty((_batch.N_KERNELS, n_steps))
             _batch.kernel_rows(table, squared, rows)
-            found.append(rows)
-        return *found, self.bounds(h, 0), self.bounds(h, 1)
-
-    def bounds(self, h: float, body: int) -> np.ndarray:
-        """What cubics through both ends of a look ahead miss of a body's free motion, (LEVELS + 1, 2, 2), at unit mass.
-
-        Of the approach and of its slope over the look, after a force of unit jumps and one of unit bends (changes of
-        its slope). A jump leaves a mode with the velocity u**2 / omega at most, a bend with u**2 / omega**2. The cubic
-        misses the fourth derivative, H**4 / 384 and sqrt(3) / 216 H**4 times, or no more than the motion itself.
-        """
-        flexible = self.omega[body] > 0.0
-        omega, zeta = self.omega[body][flexible], self.zeta[body][flexible]
-        angle = omega * h * 2.0 ** np.append(np.arange(_batch.LEVELS), -1)[:, None]  # (LEVELS + 1, n_modes)
-        steep = (angle * (1.0 + 2.0 * zeta)) ** 4
-        missed = (
-            np.minimum(steep / 384.0, 2.0 + 0.25 * angle),
-            np.minimum(np.sqrt(3.0) / 216.0 * steep, 3.0 + 2.0 * angle),
-        )
-        size = self.squared[body][flexible] * np.sqrt(1.0 + 4.0 * zeta**2) / omega**2
-        return np.stack([np.stack([part @ size, part @ (size / omega)], axis=-1) for part in missed], axis=1)
+            bounds = np.empty((_batch.LEVELS + 1, 2, 2))
+            _batch.flight_bounds(omega, zeta, squared, h, bounds)
+            found.append((rows, bounds))
+        return found[0][0], found[1][0], found[0][1], found[1][1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +138,22 @@ def bounce(
     With ``d = v x`` the blow depends on stiffness and speed through ``k v**(exponent - 1)`` alone; times stay, forces
     grow by v.
     """
-    engine = _Engine(blows, band, workers or os.cpu_count() or 1, {} if kernels is None else kernels)
+    workers = workers or os.cpu_count() or 1
+    if blows.n_cases < FEW:
+        workers = 1
+    with ThreadPoolExecutor(workers) as pool:
+        engine = _Engine(blows, band, pool.submit if workers > 1 else None, {} if kernels is None else kernels)
+        final, error = _refined(engine, tolerance)
+    v = blows.speed
+    return Bounces(
+        final[0], final[1], final[2] * engine.own_rigid - 1.0, final[2] * v, final[3] * v, error, final[4],
+        ~np.isnan(error),
+    )  # fmt: skip
+
+
+def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """What `_Engine.run` finds once steps are short enough, and its error; not a number where they never are."""
+    blows = engine.blows
     everyone = np.arange(blows.n_cases)
     step = engine.first_step(tolerance)
     coarse = engine.run(everyone, step - 2, sure=False)
@@ -169,18 +170,14 @@ def bounce(
         step[todo] += 2
         if not todo.size:
             break
-    v = blows.speed
-    return Bounces(
-        final[0], final[1], final[2] * engine.own_rigid - 1.0, final[2] * v, final[3] * v, error, final[4],
-        ~np.isnan(error),
-    )  # fmt: skip
+    return final, error
 
 
 class _Engine:
     """Kernels by family and step, and the numbers all runs share."""
 
-    def __init__(self, blows: Blows, band: float, workers: int, kernels: Kernels) -> None:
-        self.blows, self.band, self.workers, self.kernels = blows, band, workers, kernels
+    def __init__(self, blows: Blows, band: float, submit: Any, kernels: Kernels) -> None:
+        self.blows, self.band, self.submit, self.kernels = blows, band, submit, kernels
 
         self.keys, self.which = np.unique(blows.family, return_inverse=True)
         self.shares = np.array([1.0 / blows.target_mass, 1.0 / blows.striker_mass])
@@ -262,13 +259,12 @@ class _Engine:
                  self.band, out)
                 for i in range(0, len(part), PIECE)
             ]  # fmt: skip
-        if self.workers == 1 or len(cells) < 64:
+        if self.submit is None:
             for job in jobs:
                 _batch.run(*job)
             return
-        with ThreadPoolExecutor(self.workers) as pool:
-            for result in [pool.submit(_batch.run, *job) for job in jobs]:
-                result.result()
+        for result in [self.submit(_batch.run, *job) for job in jobs]:
+            result.result()
 
     def difference(self, coarse: np.ndarray, fine: np.ndarray, cells: np.ndarray) -> np.ndarray:
         """Largest difference of two runs in what the tolerance speaks of; infinite where they ended differently."""

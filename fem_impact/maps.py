@@ -2,7 +2,9 @@
 
 import json
 import math
+import os
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -199,7 +201,8 @@ def sweep(
     max_frequency : float [Hz], optional
         Adds the layer ``centroid``, the spectral centroid from zero to this frequency.
     layers : mapping of name to function of a Response, optional
-        More scalars to keep. Every cell is then struck one by one.
+        More scalars to keep, in threads. Every cell is then struck one by one, as are cells with loss or an exponent
+        below 1: some hundred times slower than the others, see ``studies/map_speed.py``.
     residual : bool
         As in `strike`.
     workers : int, optional
@@ -318,8 +321,14 @@ def solve(
         for row, name in enumerate(names):
             numbers[row, cells] = getattr(found, name)
         quick[cells] = found.done
-    for i in np.flatnonzero(~quick):
-        numbers[:, i], failures[i] = grid.strike(start + int(i))
+    rest = np.flatnonzero(~quick)
+    with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
+        struck = [pool.submit(grid.strike, start + int(i)) for i in rest]
+        try:
+            for i, cell in zip(rest, struck):
+                numbers[:, i], failures[i] = cell.result()
+        finally:
+            pool.shutdown(cancel_futures=True)
     return numbers, failures
 
 
@@ -362,22 +371,20 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray) -> xarray.Da
             attributes["max_frequency"] = grid.band
         data[name] = (dims, values.reshape(grid.shape), attributes)
     data["failure"] = (dims, failures.reshape(grid.shape).astype(str), {"long_name": "why the cell failed"})
-    table = xarray.Dataset(data, attrs={"title": "Map of blows", "scene": json.dumps(grid.scene())})
-    table.attrs |= {"tolerance": grid.tolerance, "residual": int(grid.residual)}
+    places: dict[str, Any] = {}
     for name, values in grid.axes.items():
         attributes = {"units": AXES[name][0] or "1", "long_name": AXES[name][1]}
         if name == "stiffness" and "exponent" not in grid.axes:
             power = grid.base.contact.exponent
             attributes["units"] = "N/m" if power == 1.0 else f"N/m**{power:g}"
         if name != "at":
-            table[name] = (name, values, attributes)
+            places[name] = (name, values, attributes)
         elif values.shape[1] == 1:
-            table["at"] = ("at", values[:, 0], attributes)
+            places["at"] = ("at", values[:, 0], attributes)
         else:
-            table = table.assign_coords(
-                {f"at_{letter}": ("at", values[:, i], attributes) for i, letter in enumerate("xyz"[: values.shape[1]])}
-            )
-    return table
+            places |= {f"at_{letter}": ("at", column, attributes) for letter, column in zip("xyz", values.T)}
+    about = {"title": "Map of blows", "scene": json.dumps(grid.scene())}
+    return xarray.Dataset(data, places, about | {"tolerance": grid.tolerance, "residual": int(grid.residual)})
 
 
 def _plain(modes: Modes, at: np.ndarray) -> dict[str, Any]:

@@ -85,6 +85,10 @@ def main():
         f"one bounce off 2 kg: map {1e6 * batch:.2f} us; loop over strike {1e6 * each:.0f} us, {each / batch:.0f} times"
     )
     print(f"solve_ivp (DOP853, rigid stick, first contact only) {1e6 * ivp:.0f} us, {ivp / batch:.0f} times")
+    lossy = {"mass": np.linspace(10e-3, 200e-3, 20), "loss": np.linspace(0.01, 0.2, 20)}
+    shared = {"at": source.AT, "speed": 1.0, "over": lossy, "tolerance": 1e-3}
+    seconds = best(2, lambda: fi.sweep(plates["2 kg"], STICK, fi.Contact.linear(88.6e3), **shared))
+    print(f"with loss, cell by cell: {1e6 * seconds / 400:.0f} us each of 400")
     for n_modes in (30, 300, 3000):
         seconds = best(2, grid, source.plate(2.0, n_modes=n_modes), 300)
         print(f"{n_modes} modes: {1e6 * seconds / 9e4:.2f} us each of 90 000")
