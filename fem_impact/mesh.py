@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _check, boundary, cad, meshfile
+from . import _check, boundary, cad, meshfile, svg
 from .curves import divided
 from .outline import Outline, circle, crossed, extent, straight_loop
 from .triangulation import triangulate
@@ -65,6 +65,14 @@ class Mesh:
         corner = self.points[self.cells]
         sides = corner[:, 1:] - corner[:, :1]
         return float(np.abs(np.linalg.det(sides)).sum()) / self.dimension
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the outline and what it is made of."""
+        kind = "triangles" if self.dimension == 2 else "elements"
+        edges = ", ".join(name for name in self.edges if name != "boundary")
+        extent = " x ".join(f"{size:.4g} m" for size in np.ptp(self.points, axis=0))
+        rows = [("extent", extent), ("points", len(self.points)), (kind, len(self.cells)), ("edges", edges)]
+        return svg.side_by_side(svg.body(self, title=f"Outline of a body of {extent}"), svg.table(rows))
 
     def refined(self, factor: float = 2.0) -> "Mesh":
         """The same body with elements smaller by a factor, on the true curve where the outline is known."""

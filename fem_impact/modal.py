@@ -6,9 +6,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from . import _check, pointload, spectrum, uff
+from . import _check, pointload, spectrum, svg, uff
 from .assembly import System
 from .eigen import Flexibility
+
+SHOWN = 10  # [-] modes listed in a notebook
 
 
 class Shapes(Protocol):
@@ -231,6 +233,17 @@ class Modes:
     def dimension(self) -> int:
         """Coordinates of a point on the body: 2 on a plate, 1 on a beam, 0 for a rigid mass."""
         return self.shapes.dimension
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the first modes."""
+        columns = [self.frequencies[:SHOWN], self.damping_ratio[:SHOWN]]
+        head, forms = ["mode", "frequency", "damping ratio"], ["{:.5g} Hz", "{:.3g}"]
+        if self.frequency_error is not None:
+            columns, head, forms = [*columns, self.frequency_error], [*head, "estimated error"], [*forms, "{:.0e}"]
+        rows = [(i, *map(str.format, forms, row)) for i, row in enumerate(zip(*columns), 1)]
+        more = f" The first {SHOWN}:" if self.n_modes > SHOWN else ""
+        span = f"{self.n_modes} modes up to {self.frequencies[-1]:.5g} Hz of a body of {self.mass:.4g} kg."
+        return f"<p>{span}{more}</p>{svg.table(rows, head)}"
 
     def points(self, name: str, points: Any) -> np.ndarray:
         """Return points as (n_points, dimension) [m]; raise ValueError where one is not on the body."""

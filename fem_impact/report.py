@@ -85,7 +85,7 @@ def write(path: str | Path, scene: Scene, run: Run, *, command: str = "") -> Non
     page = environment.get_template("report.html").render(
         title=scene.title or scene.path.stem,
         words=words(scene, response),
-        picture=picture(scene),
+        picture=scene.picture(),
         verdict=response.outcome,
         tiles=_tiles(response),
         error=_errors(response),
@@ -107,15 +107,6 @@ def write(path: str | Path, scene: Scene, run: Run, *, command: str = "") -> Non
     )
     with replacing(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
-
-
-def picture(scene: Scene) -> str:
-    """The struck body with its supports, strike point and points of observation, as SVG."""
-    at = np.atleast_1d(np.asarray(scene.blow.values["at"], float))
-    points = [] if scene.observe is None else [np.atleast_1d(np.asarray(p, float)) for p in scene.points]
-    listens = f", observed at {len(points)} point{'s' * (len(points) > 1)}" if points else ""
-    title = f"Outline of the struck body, struck at {place(at)}{listens}"
-    return svg.body(scene.body(), supports=scene.supports.values, at=at, points=points, title=title)
 
 
 def _tiles(response: Response) -> list[tuple[str, str]]:

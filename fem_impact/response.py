@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _check, _kernels
+from . import _check, _kernels, svg
 from .contact import Contact
 from .modal import Modes
 from .striker import Striker
@@ -494,6 +494,24 @@ class Response:
     def finished(self) -> bool:
         """Whether the bodies are proved to have separated for good."""
         return self.history.status == _kernels.FINISHED
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the force and the numbers read from it."""
+        rows = [
+            ("impacts", f"{self.n_impacts}, {self.outcome}"),
+            ("peak force", f"{self.peak_force:.5g} N"),
+            ("contact time", f"{self.contact_time:.5g} s"),
+            ("impulse", f"{self.impulse:.5g} N s"),
+            ("restitution", f"{self.restitution:.5f}"),
+            ("estimated error", f"{self.error.total:.1e} of {self.tolerance:.0e} accepted"),
+        ]
+        end = self.impacts[-1].end if self.impacts else np.inf
+        shown = self.time <= end
+        force = self.force if self.force.ndim == 1 else self.force.sum(axis=1)
+        said = f"Contact force over time: {self.n_impacts} impacts, peak {self.peak_force:.4g} N"
+        return svg.side_by_side(
+            svg.curve(self.time[shown], force[shown], label="force", unit="N", title=said), svg.table(rows)
+        )
 
     def summary(self) -> str:
         """The blow in a few lines a person can read."""

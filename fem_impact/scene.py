@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _check, analytic, assembly, modal, planner, spectrum
+from . import _check, analytic, assembly, modal, planner, spectrum, svg
 from .contact import Contact
 from .mesh import Mesh
 from .modal import Modes
@@ -111,6 +111,23 @@ class Scene:
     def points(self) -> list[Any]:
         """Where one looks and listens, (n_points, dimension) [m]: those of [observe], else the strike point."""
         return [self.blow.values["at"]] if self.observe is None else list(self.observe.values["points"])
+
+    def picture(self) -> str:
+        """The target with its supports, the strike point and the points of observation, as SVG."""
+        at = np.atleast_1d(np.asarray(self.blow.values["at"], float))
+        points = [] if self.observe is None else [np.atleast_1d(np.asarray(point, float)) for point in self.points]
+        title = f"Outline of the struck body, struck at ({', '.join(f'{x:.4g}' for x in at)}) m"
+        title += f", observed at {len(points)} point{'s' * (len(points) > 1)}" if points else ""
+        return svg.body(self.body(), supports=self.supports.values, at=at, points=points, title=title)
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the picture and what each table says."""
+        rows = []
+        for table, values in self.data().items():
+            if isinstance(values, dict) and table != "map":
+                rows.append((table, ", ".join(f"{key} {value}" for key, value in values.items())))
+        title = svg.table([(self.title or self.path.name,)])
+        return title + svg.side_by_side(self.picture(), svg.table(rows))
 
     def data(self, **changes: Any) -> dict[str, Any]:
         """The scene as its file would say it, with arguments of the strike replaced by ``changes``."""
