@@ -1,8 +1,12 @@
 """The same verbs at the prompt: parses, calls, prints; no physics."""
 
 import argparse
+import difflib
+import io
 import json
+import logging
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -14,7 +18,7 @@ import webbrowser
 from collections.abc import Iterator, MutableMapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from rich.console import Console
 from rich.progress import (
@@ -37,19 +41,22 @@ SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` w
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; the exit status is 0, 2 for bad input, 1 for a run that failed, 130 after Ctrl-C."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a title may hold what this terminal cannot show
     options = _parser().parse_args(arguments)
     plain = _prepare(os.environ, once=options.run in (_strike, _modes, _report))
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # so that temporary files go away
     try:
-        options.run(options)
-        sys.stdout.flush()
+        with _interruptible():
+            options.run(options)
+            print(end="", flush=True)
     except ValueError as error:
         return _complain(error, BAD_INPUT)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else Python complains again at its exit
+        _forget_output()
         return FAILED
     except OSError as error:
+        _forget_output()
         return _complain(f"{error.filename}: {error.strerror}" if error.filename else error.strerror or error, FAILED)
     except MemoryError:
         return _complain("not enough memory; allow a larger tolerance", FAILED)
@@ -61,8 +68,46 @@ def main(arguments: list[str] | None = None) -> int:
             return subprocess.run(again, env={**os.environ, "NUMBA_DISABLE_JIT": "0"}, check=False).returncode
         return _complain(error, FAILED)
     except KeyboardInterrupt:
-        return _complain("interrupted; nothing was written", INTERRUPTED)
+        return _complain(f"interrupted; {_kept(options)}", INTERRUPTED)
     return 0
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let the first Ctrl-C or SIGTERM end the block in good order, and no second one disturb that."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(number: int, _: Any) -> None:
+        for each in before:
+            signal.signal(each, signal.SIG_IGN)
+        if number == signal.SIGTERM:
+            sys.exit(128 + number)
+        raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _kept(options: argparse.Namespace) -> str:
+    """What is left of an interrupted command."""
+    if options.run is not _map:
+        return "nothing was written"
+    if options.store is None:
+        return "nothing was written; --store DIR keeps finished cells"
+    return f"finished cells are in {options.store}, the same command goes on from there"
+
+
+def _forget_output() -> None:
+    """Throw away what could not be printed; Python would try again at its exit, and complain again."""
+    if sys.stdout is not None:
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _prepare(environment: MutableMapping[str, str], once: bool) -> bool:
@@ -73,6 +118,7 @@ def _prepare(environment: MutableMapping[str, str], once: bool) -> bool:
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         # The dense algebra is small: on two busy cores two threads took 18 s where one took 4 s.
         environment.setdefault(name, "1")
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # a font or cache folder it does without is no news here
     if not once or "numba" in sys.modules or "NUMBA_DISABLE_JIT" in environment:
         return False
     package = Path(str(fi.__file__)).parent
@@ -86,12 +132,32 @@ def _prepare(environment: MutableMapping[str, str], once: bool) -> bool:
 
 
 def _complain(error: object, status: int) -> int:
-    print(f"fem-impact: {' '.join(str(error).split())}", file=sys.stderr)
+    with suppress(OSError):  # where nobody listens, the status has to do
+        print(f"fem-impact: {_printable(str(error))}", file=sys.stderr, flush=True)
     return status
 
 
+def _printable(text: str) -> str:
+    """One line, without what would act on a terminal."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says in one line what is wrong with a command, and the nearest word that would be right."""
+
+    def error(self, message: str) -> NoReturn:
+        found = re.search(r"(?:invalid choice: '|unrecognized arguments: )([^' ]+)", message)
+        verbs = [action.choices for action in self._actions if isinstance(action.choices, dict)]
+        parsers = [self, *(verb for choices in verbs for verb in choices.values())]
+        known = [word for each in parsers for action in each._actions for word in action.option_strings]
+        known += [word for action in self._actions for word in action.choices or ()]
+        close = difflib.get_close_matches(found[1], known, n=1) if found else []
+        hint = f"did you mean {close[0]}?" if close else f"see {self.prog} --help"
+        sys.exit(_complain(f"{message:.300}; {hint}", BAD_INPUT))
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="fem-impact", description="Strike anything thin with anything, and know how far to trust the answer."
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from . import _check
+
 LARGEST_BLOCK = 2**17  # [-] cells: about half a second of work, some 30 MB
 BLOCKS = 64  # [-] at least, where a map has so many cells: what a killed run loses at most is one per worker
 TEXT = 240  # [byte] kept of an error text
@@ -36,9 +38,13 @@ class Store:
         self.path = path
         with _needed("a store"):
             import zarr
-        group: Any = zarr.open_group(str(path), mode="r")
-        self.group = group
-        self.n_cases, self.block = (int(group.attrs[name]) for name in ("n_cases", "block"))
+        with _intact(path):
+            self.group: Any = zarr.open_group(str(path), mode="r")
+            self.n_cases, self.block = (int(self.group.attrs[name]) for name in ("n_cases", "block"))
+            fresh = _made(zarr, {}, self.group["numbers"].shape[0], self.n_cases, self.block)
+            for name in fresh:
+                if self.group[name].metadata.to_dict() != fresh[name].metadata.to_dict():
+                    raise ValueError(f"{name} is not kept as it should be")
 
     @classmethod
     def open(cls, path: str | Path, grid: Any) -> "Store":
@@ -48,29 +54,24 @@ class Store:
             import zarr
         mark = fingerprint(grid)
         if path.exists() and any(path.iterdir()):
-            known = None
-            if (path / "zarr.json").exists():
-                known = zarr.open_group(str(path), mode="r").attrs.get("fingerprint")
-            if known is None:
+            if not (path / "zarr.json").exists():
                 raise ValueError(f"store must be a new folder or the store of this map, got {path}")
-            if known != mark:
+            store = cls(path)
+            if store.group.attrs.get("fingerprint") != mark:
                 raise ValueError(
                     f"store holds another map (other bodies, axes or tolerance): {path}; name a new folder"
                 )
-            return cls(path)
-        n_layers, n_cases, block = len(grid.layers), grid.n_cases, block_size(grid.n_cases)
-        group = zarr.open_group(str(path), mode="w")
-        group.create_array(
-            "numbers", shape=(n_layers, n_cases), chunks=(n_layers, block), dtype="f8", fill_value=np.nan
-        )
-        group.create_array("failures", shape=(n_cases, TEXT), chunks=(block, TEXT), dtype="u1", fill_value=0)
-        group.create_array("done", shape=(math.ceil(n_cases / block),), chunks=(1,), dtype="u1", fill_value=0)
-        group.attrs.update({"n_cases": n_cases, "block": block, "fingerprint": mark})
+            if (store.group["numbers"].shape[0], store.n_cases) != (len(grid.layers), grid.n_cases):
+                raise _damaged(path, "it has another size than this map")
+            return store
+        group = _made(zarr, str(path), len(grid.layers), grid.n_cases, block_size(grid.n_cases))
+        group.attrs.update({"n_cases": grid.n_cases, "block": block_size(grid.n_cases), "fingerprint": mark})
         return cls(path)
 
     def missing(self) -> list[int]:
         """Blocks not there yet."""
-        return np.flatnonzero(self.group["done"][:] == 0).tolist()
+        with _intact(self.path):
+            return np.flatnonzero(self.group["done"][:] == 0).tolist()
 
     def bounds(self, block: int) -> tuple[int, int]:
         """First cell of a block and the one after its last."""
@@ -90,13 +91,27 @@ class Store:
     def read(self) -> tuple[np.ndarray, np.ndarray]:
         """Numbers (n_layers, n_cases) and error texts (n_cases,) of all cells."""
         failures = np.full(self.n_cases, "", dtype=object)
-        texts = self.group["failures"]
-        for block in range(math.ceil(self.n_cases / self.block)):
-            start, stop = self.bounds(block)
-            raw = texts[start:stop]
-            for i in np.flatnonzero(raw.any(axis=1)):
-                failures[start + i] = bytes(raw[i]).rstrip(b"\0").decode("utf-8", "ignore")
-        return self.group["numbers"][:], failures
+        with _intact(self.path):
+            for block in range(math.ceil(self.n_cases / self.block)):
+                start, stop = self.bounds(block)
+                raw = self.group["failures"][start:stop]
+                for i in np.flatnonzero(raw.any(axis=1)):
+                    failures[start + i] = bytes(raw[i]).rstrip(b"\0").decode("utf-8", "ignore")
+            return self.group["numbers"][:], failures
+
+
+def _made(zarr: Any, place: Any, n_layers: int, n_cases: int, block: int) -> Any:
+    """The arrays of a store, empty; uncompressed, so that a chunk cannot unpack to more than it is, and summed."""
+    group = zarr.open_group(place, mode="w")
+    for name, shape, chunks, kind, empty in (
+        ("numbers", (n_layers, n_cases), (n_layers, block), "f8", math.nan),
+        ("failures", (n_cases, TEXT), (block, TEXT), "u1", 0),
+        ("done", (math.ceil(n_cases / block),), (1,), "u1", 0),
+    ):
+        group.create_array(
+            name, shape=shape, chunks=chunks, dtype=kind, fill_value=empty, compressors=zarr.codecs.Crc32cCodec()
+        )
+    return group
 
 
 def fingerprint(grid: Any) -> str:
@@ -167,7 +182,7 @@ def _work(grid: Any, block: int, size: int, solve: Solve, path: str | None) -> t
         numbers, failures = solve(grid, block * size, min((block + 1) * size, grid.n_cases))
         return numbers, {int(i): failures[i] for i in np.flatnonzero(failures != "")}
     store = Store(Path(path))
-    if store.group["done"][block]:  # a worker died between keeping it and saying so
+    if block not in store.missing():  # a worker died between keeping it and saying so
         return None
     store.write(block, *solve(grid, *store.bounds(block)))
     return None
@@ -193,6 +208,19 @@ def _needed(name: str) -> Iterator[None]:
         yield
     except ImportError as error:
         raise ValueError(f"{name} needs {error.name}: {EXTRA}") from None
+
+
+@contextmanager
+def _intact(path: Path) -> Iterator[None]:
+    """Say that a store is damaged, whatever its reader makes of that."""
+    try:
+        yield
+    except Exception as error:  # zarr and its codecs raise whatever comes
+        raise _damaged(path, str(error)) from None
+
+
+def _damaged(path: Path, reason: str) -> ValueError:
+    return ValueError(f"store {path} is damaged ({_check.line(reason)}); name a new folder, or delete this one")
 
 
 def _encode(failures: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ from ._files import replacing
 from .prose import place, power, si, words
 from .response import Response
 from .scene import Run, Scene, load_scene, scene_of
-from .tables import LARGEST_FILE
+from .tables import fault, read_bytes
 
 BAND = (10.0, 20e3)  # [Hz] of the spectrum shown: about what is heard
 SPECTRUM_POINTS = 1000  # [-] one for each pixel
@@ -45,16 +45,12 @@ def read(path: str | Path) -> Scene:
         path = path / "response.json"
     if path.suffix.lower() != ".json":
         return load_scene(path)
-    with open(path, "rb") as file:
-        raw = file.read(LARGEST_FILE + 1)
     try:
-        data = json.loads(raw) if len(raw) <= LARGEST_FILE else None
-    except (ValueError, RecursionError):
+        data = json.loads(read_bytes(path).decode("utf-8", "replace"))
+    except (json.JSONDecodeError, RecursionError):
         data = None
     if not isinstance(data, dict) or not isinstance(data.get("scene"), dict):
-        raise ValueError(
-            f"{path}: not a result of `fem-impact strike`; give its response.json, or the scene's TOML file"
-        )
+        raise fault(path, "not a result of `fem-impact strike`; give its response.json, or the scene's TOML file")
     return scene_of(data["scene"], path, folder=Path())
 
 

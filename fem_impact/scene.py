@@ -52,7 +52,10 @@ class Scene:
         """Modes of the struck body: the first ``count``, or as many as the blow and its tolerance need."""
         if count is None:
             return planner.target(self.plan(target="modal"), Stages())
-        found = self.finder(Stages(), planner.tolerance_of(self))(_check.count("count", count))
+        most = planner.MOST_MODES[self.source]
+        if _check.count("count", count) > most:
+            raise fault(self.path, f"count must be at most {most} modes of this scene, got {count}")
+        found = self.finder(Stages(), planner.tolerance_of(self))(count)
         return found.scaled(**self.scale).damped(self.damping_ratio)
 
     def plan(self, *, watch: Watch | None = None, **changes: Any) -> Plan:

@@ -5,6 +5,7 @@ import math
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -129,16 +130,26 @@ def fault(path: Path, text: str) -> ValueError:
 
 def read_tables(path: Path) -> dict[str, Any]:
     """The tables of a TOML file as plain dicts; ValueError in one line where it is none."""
-    with open(path, "rb") as file:
-        raw = file.read(LARGEST_FILE + 1)
-    if len(raw) > LARGEST_FILE:
-        raise fault(path, f"a scene must be smaller than {LARGEST_FILE} bytes")
+    raw = read_bytes(path)
     try:
         return tomllib.loads(raw.decode("utf-8"))
     except UnicodeDecodeError:
         raise fault(path, "a scene must be UTF-8 text") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise fault(path, f"not valid TOML: {error}") from None
+
+
+def read_bytes(path: Path) -> bytes:
+    """What is in a scene or result; ValueError where there is none, with the nearest name there is."""
+    if not path.is_file():  # a folder, or a pipe that might never end
+        folder = path.parent
+        near = [name.name for name in islice(folder.iterdir(), 1000)] if folder.is_dir() else []
+        raise fault(path, f"there is no such file{_check.nearest(path.name, near)}")
+    with open(path, "rb") as file:
+        raw = file.read(LARGEST_FILE + 1)
+    if len(raw) > LARGEST_FILE:
+        raise fault(path, f"it must be smaller than {LARGEST_FILE} bytes")
+    return raw
 
 
 def read_part(path: Path, table: str, values: dict[str, Any], folder: Path) -> Part:

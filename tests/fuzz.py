@@ -29,13 +29,15 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from random import Random
 
 import numpy as np
 
 import fem_impact as fi
-from fem_impact import _apart
+from fem_impact import _apart, cli, farm, maps
+from fem_impact.scene import Scene
 
 PATIENCE = 10.0  # [s] per input
 MEMORY = 2 << 30  # [byte] more than the process has when it begins
@@ -314,6 +316,147 @@ def read_scene(path: Path) -> object:
     return fi.load_scene(path)
 
 
+def result_samples() -> list[tuple[str, bytes]]:
+    """What `fem-impact strike` keeps of a scene, without the numbers that nothing reads back."""
+    scenes = [fi.load_scene(path) for path in sorted(SCENES.glob("*.toml"))]
+    return [(f"response{i}.json", json.dumps({"scene": fi.export.plain(scene.data())}, indent=1).encode())
+            for i, scene in enumerate(scenes)]  # fmt: skip
+
+
+def read_result(path: Path) -> object:
+    """The scene of a result."""
+    return fi.report.read(path)
+
+
+def store_samples() -> list[tuple[str, bytes]]:
+    """Every file of a finished store of a map; a % stands for each / of its path."""
+    made = {}
+    with tempfile.TemporaryDirectory() as name:
+        store = Path(name) / "store"
+        farm.by_store(small_grid(), store, solved, None)
+        made = {str(path.relative_to(store)): path.read_bytes() for path in store.rglob("*") if path.is_file()}
+    PRISTINE.update(made)
+    return [(name.replace("/", "%"), raw) for name, raw in sorted(made.items())]
+
+
+PRISTINE: dict[str, bytes] = {}  # the store that one file of is mutated, by the paths in it
+
+
+def read_store(path: Path) -> object:
+    """All of a store in which one file is the one given."""
+    raw, place = path.read_bytes(), path.name.split("-", 1)[-1].replace("%", "/")
+    path.unlink()
+    for name, content in {**PRISTINE, place: raw}.items():
+        (path / name).parent.mkdir(parents=True, exist_ok=True)
+        (path / name).write_bytes(content)
+    numbers, failures = farm.by_store(small_grid(), path, solved, None)
+    assert numbers.shape == (6, 6) and numbers.dtype == float and failures.shape == (6,)
+    assert all(isinstance(text, str) for text in failures)
+    return numbers
+
+
+@cache
+def small_grid() -> maps.Grid:
+    """Six blows on a rigid body."""
+    base = maps.Case(fi.Modes.rigid(1.0), fi.Striker.rigid(1.0), fi.Contact.linear(1e5), np.zeros(0), 1.0)
+    return maps.Grid(base, {"mass": np.array([0.1, 0.2]), "speed": np.array([1.0, 2.0, 3.0])}, 1e-3, True, None, {})
+
+
+def solved(grid: maps.Grid, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
+    """Stands for the blows themselves, which are of no interest here."""
+    failures = np.array(["" if i % 2 else "the motion may be chaotic: é" for i in range(start, stop)], dtype=object)
+    return np.ones((len(grid.layers), stop - start)), failures
+
+
+COMMANDS = """strike SCENE --out OUT --tolerance 1e-2 --json
+strike SCENE --tolerance=0.1
+modes SCENE --count 5 --vtk OUT/modes.pvd
+modes SCENE --json --count=3
+hammer SCENE --bandwidth 800 --drop 10 --masses 0.1 0.2 --out OUT/hammers.png
+map SCENE --out OUT --format nc --workers 1 --store STORE
+report SCENE --out OUT/page.html
+completion
+--version
+--help"""
+
+
+def command_samples() -> list[tuple[str, bytes]]:
+    """A command line each, and the scene it names; what takes long is replaced by its result."""
+    path = Path(tempfile.mkdtemp()) / "scene.toml"
+    path.write_text(QUICK)
+    scene = fi.load_scene(path)
+    run, modes = scene.run(), scene.modes(5)
+    fi.atlas.hammers_for(scene, 800.0, [0.1])  # compiles, which may take half a minute
+    fi.atlas.map_scene(scene)
+    fi.figures.save = lambda path, figure: Path(path).write_bytes(b"")
+    fi.report.write = lambda path, scene, run: Path(path).write_bytes(b"")
+    Scene.run = lambda self, watch=None, **changes: run
+    Scene.modes = lambda self, count=None: modes if count is None else modes.truncated(n_modes=count)
+    shutil.rmtree(path.parent)
+    return [(f"{i}.txt", line.encode()) for i, line in enumerate(COMMANDS.splitlines())]
+
+
+QUICK = """
+[mesh]
+shape = "rectangle"
+length = 0.465
+width = 0.3
+[target]
+mass = 0.2
+first_frequency = 100.0
+source = "analytic"
+[supports]
+boundary = "hinged"
+[striker]
+kind = "rigid"
+mass = 0.03
+[contact]
+kind = "linear"
+stiffness = 1e4
+[strike]
+at = [0.1395, 0.09]
+speed = 2.0
+tolerance = 1e-1
+[map]
+over = { "striker.mass" = [0.03, 0.05] }
+"""
+
+
+def read_command(path: Path) -> object:
+    """Run a command in an empty folder; its message must be one line, and a failure leaves nothing."""
+    words = path.read_bytes().decode("utf-8", "surrogateescape").replace("\0", "").split()
+    folder = path.with_suffix(".run")
+    folder.mkdir()
+    (folder / "SCENE").write_text(QUICK)
+    out, err, here = io.TextIOWrapper(io.BytesIO()), io.TextIOWrapper(io.BytesIO()), Path.cwd()
+    os.chdir(folder)
+    try:
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            status = cli.main(words)
+    except SystemExit as end:
+        status = end.code or 0
+    finally:
+        os.chdir(here)
+        left = sorted(file.name for file in folder.iterdir())
+        partial = [file for file in folder.rglob("*") if "partial" in file.name]
+        shutil.rmtree(folder)
+    err.seek(0)
+    said = err.read()
+    assert not partial, partial
+    if status == 0:
+        assert said == "", said
+        return status
+    assert status in (1, 2), status
+    assert left == ["SCENE"], left
+    assert said.startswith("fem-impact: ") and said.endswith("\n") and said[:-1].isprintable(), said
+    assert len(said) < 1000 + len(path.read_bytes()), said
+    return REFUSED
+
+
+REFUSED = "refused"
+BROKEN = 77  # exit status of a worker that failed outside of any input
+
+
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
     """Raise Hang after some seconds."""
@@ -339,7 +482,7 @@ def judged(read: Callable[[Path], object], path: Path) -> str:
     try:
         with limited(PATIENCE), warnings.catch_warnings():
             warnings.simplefilter("error")
-            read(path)
+            return REFUSED if read(path) is REFUSED else ""
     except (ValueError, fi.SimulationError, OSError) as error:
         text = str(error)
         frame = traceback.extract_tb(error.__traceback__)[-1]
@@ -347,11 +490,10 @@ def judged(read: Callable[[Path], object], path: Path) -> str:
             return f"{type(error).__name__} from {Path(frame.filename).name}:{frame.lineno}: {text:.200}"
         if path.name not in text or not text.isprintable() or len(text) > 1000:
             return f"unclear: {type(error).__name__}: {text!r:.300}"
-        return "refused"
+        return REFUSED
     except (Exception, Hang) as error:
         frame = traceback.extract_tb(error.__traceback__)[-1]
         return f"{type(error).__name__} from {Path(frame.filename).name}:{frame.lineno}: {error!s:.200}"
-    return ""
 
 
 def one(category: str, number: int, folder: Path, samples: list[tuple[str, bytes]]) -> tuple[str, Path]:
@@ -408,7 +550,7 @@ class Worker:
                 work(category, numbers, write, keep)
             except BaseException:
                 traceback.print_exc()
-                os._exit(1)
+                os._exit(BROKEN)
             os._exit(0)
         os.close(write)
         self.pipe, self.current, self.last = read, numbers.start, time.monotonic()
@@ -423,9 +565,13 @@ class Worker:
         return [json.loads(line) for line in whole]
 
     def end(self) -> int:
-        os.kill(self.pid, signal.SIGKILL)
         os.close(self.pipe)
-        return os.waitpid(self.pid, 0)[1]
+        time.sleep(0.1)  # for one that is ending by itself
+        pid, status = os.waitpid(self.pid, os.WNOHANG)
+        if not pid:
+            os.kill(self.pid, signal.SIGKILL)
+            _, status = os.waitpid(self.pid, 0)
+        return os.waitstatus_to_exitcode(status)
 
 
 def fuzz(category: str, inputs: int, workers: int, keep: Path | None = None) -> tuple[Counter, list[list]]:
@@ -459,6 +605,8 @@ def fuzz(category: str, inputs: int, workers: int, keep: Path | None = None) -> 
             if again is None:
                 continue
             status = worker.end()
+            if status == BROKEN:
+                raise RuntimeError("the fuzzer itself failed, see above")
             running.remove(worker)
             if again < inputs:
                 tally["failed"] += 1
@@ -474,6 +622,9 @@ CATEGORIES = {
     "mesh": Category(mesh_samples, read_mesh),
     "outline": Category(outline_samples, read_outline),
     "uff": Category(uff_samples, read_uff),
+    "result": Category(result_samples, read_result),
+    "store": Category(store_samples, read_store),
+    "command": Category(command_samples, read_command),
 }
 
 

@@ -108,9 +108,44 @@ def test_bad_tolerance_of_the_command_is_told(scene, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-def test_missing_scene_is_a_sentence(tmp_path, capsys):
-    assert cli.main(["strike", str(tmp_path / "none.toml")]) == 1
-    assert capsys.readouterr().err == f"fem-impact: {tmp_path / 'none.toml'}: No such file or directory\n"
+def test_missing_scene_is_a_sentence_with_the_nearest_name(scene, tmp_path, capsys):
+    assert cli.main(["strike", str(tmp_path / "smal.toml")]) == 2
+    said = capsys.readouterr().err
+    assert said == f"fem-impact: {tmp_path / 'smal.toml'}: there is no such file; did you mean 'small.toml'?\n"
+    assert cli.main(["modes", str(tmp_path / "no" / "x.toml")]) == 2
+    assert capsys.readouterr().err == f"fem-impact: {tmp_path / 'no' / 'x.toml'}: there is no such file\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["strik", "SCENE"], "did you mean strike?"),
+        (["strike", "SCENE", "--tolerence", "1"], "did you mean --tolerance?"),
+        (["modes", "SCENE", "--vkt", "x.vtu"], "did you mean --vtk?"),
+        (["hammer", "SCENE"], "required: --bandwidth; see fem-impact hammer --help"),
+        (["modes", "SCENE", "--count", "x"], "invalid int value: 'x'; see fem-impact modes --help"),
+        (["map", "SCENE", "--format", "zar"], "did you mean zarr?"),
+        ([], "required: COMMAND; see fem-impact --help"),
+        (["\x1b[31m"], r"'\x1b[31m'"),
+    ],
+)
+def test_typo_is_one_line_with_the_nearest_word(words, hint, capsys):
+    with pytest.raises(SystemExit) as end:
+        cli.main(words)
+    said = capsys.readouterr().err
+    assert end.value.code == 2 and hint in said
+    assert said.startswith("fem-impact: ") and said[:-1].isprintable()
+
+
+def test_scene_may_not_be_a_pipe_that_never_ends(tmp_path, capsys):
+    os.mkfifo(tmp_path / "scene.toml")
+    assert cli.main(["strike", str(tmp_path / "scene.toml")]) == 2
+    assert "there is no such file" in capsys.readouterr().err
+
+
+def test_a_billion_modes_are_refused(scene, capsys):
+    assert cli.main(["modes", str(scene), "--count", "1000000000"]) == 2
+    assert "count must be at most 50000 modes of this scene, got 1000000000" in capsys.readouterr().err
 
 
 def test_place_that_cannot_be_written_to_is_a_sentence(scene, tmp_path, capsys):

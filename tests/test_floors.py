@@ -7,8 +7,8 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "fem_impact"
 FLOORS = [
-    {"_check", "_files", "_kernels", "_batch", "farm", "svg"},
-    {"_apart"},
+    {"_check", "_files", "_kernels", "_batch", "svg"},
+    {"_apart", "farm"},
     {"_meshread"},
     {"outline", "curves", "boundary", "meshfile"},
     {"triangulation", "cad"},
