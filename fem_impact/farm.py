@@ -40,11 +40,17 @@ class Store:
             import zarr
         with _intact(path):
             self.group: Any = zarr.open_group(str(path), mode="r")
-            self.n_cases, self.block = (int(self.group.attrs[name]) for name in ("n_cases", "block"))
-            fresh = _made(zarr, {}, self.group["numbers"].shape[0], self.n_cases, self.block)
+            attributes: Any = self.group.attrs
+            self.n_cases, self.block = int(attributes["n_cases"]), int(attributes["block"])
+            fresh = _made(zarr, {}, self.n_layers, self.n_cases, self.block)
             for name in fresh:
                 if self.group[name].metadata.to_dict() != fresh[name].metadata.to_dict():
                     raise ValueError(f"{name} is not kept as it should be")
+
+    @property
+    def n_layers(self) -> int:
+        """Numbers kept of each cell."""
+        return int(self.group["numbers"].shape[0])
 
     @classmethod
     def open(cls, path: str | Path, grid: Any) -> "Store":
@@ -61,7 +67,7 @@ class Store:
                 raise ValueError(
                     f"store holds another map (other bodies, axes or tolerance): {path}; name a new folder"
                 )
-            if (store.group["numbers"].shape[0], store.n_cases) != (len(grid.layers), grid.n_cases):
+            if (store.n_layers, store.n_cases) != (len(grid.layers), grid.n_cases):
                 raise _damaged(path, "it has another size than this map")
             return store
         group = _made(zarr, str(path), len(grid.layers), grid.n_cases, block_size(grid.n_cases))

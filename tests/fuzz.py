@@ -12,6 +12,7 @@ import contextlib
 import importlib.util
 import io
 import json
+import logging
 import os
 import re
 import resource
@@ -202,30 +203,22 @@ def read_mesh(path: Path) -> object:
     return finite(fi.mesh.load(path))
 
 
-def forked(path: Path, reader: str, arguments: tuple[str, ...], patience: float) -> tuple[int, bytes, bytes]:
-    """What `_apart.run` gives, from a fork of this process: one that starts afresh would take 0.2 s an input."""
-    read, write = os.pipe()
-    pid = os.fork()
-    if not pid:
-        os.close(read)
-        status, answer = _apart.main(path, reader, list(arguments))
-        with os.fdopen(write, "wb") as out:
-            out.write(answer)
-        os._exit(status)
-    os.close(write)
-    answer, end = b"", time.monotonic() + SHORT_PATIENCE
+def quick(path: Path, reader: str, arguments: tuple[str, ...], patience: float) -> tuple[int, bytes, bytes]:
+    """What `_apart.run` gives, from this process: one that starts afresh would take 0.2 s an input.
+
+    An input that ends this process is judged again by the real one, see `fuzz`.
+    """
+    h5py = sys.modules.get("h5py")
+    known = getattr(h5py, "File", None)
     try:
-        while select.select([read], [], [], max(0.0, end - time.monotonic()))[0]:
-            data = os.read(read, 1 << 20)
-            if not data:
-                break
-            answer += data
-        else:
-            os.kill(pid, signal.SIGKILL)
-            raise subprocess.TimeoutExpired("a fork", patience)
+        with limited(SHORT_PATIENCE):
+            status, answer = _apart.main(path, reader, list(arguments))
+    except Hang:
+        raise subprocess.TimeoutExpired("a reader", patience) from None
     finally:
-        os.close(read)
-        status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+        logging.disable(logging.NOTSET)
+        if h5py is not None:
+            h5py.File = known
     return status, *((b"", answer) if status else (answer, b""))
 
 
@@ -350,16 +343,16 @@ def read_store(path: Path) -> object:
         (path / name).parent.mkdir(parents=True, exist_ok=True)
         (path / name).write_bytes(content)
     numbers, failures = farm.by_store(small_grid(), path, solved, None)
-    assert numbers.shape == (6, 6) and numbers.dtype == float and failures.shape == (6,)
+    assert numbers.shape == (6, 2) and numbers.dtype == float and failures.shape == (2,)
     assert all(isinstance(text, str) for text in failures)
     return numbers
 
 
 @cache
 def small_grid() -> maps.Grid:
-    """Six blows on a rigid body."""
+    """Two blows on a rigid body."""
     base = maps.Case(fi.Modes.rigid(1.0), fi.Striker.rigid(1.0), fi.Contact.linear(1e5), np.zeros(0), 1.0)
-    return maps.Grid(base, {"mass": np.array([0.1, 0.2]), "speed": np.array([1.0, 2.0, 3.0])}, 1e-3, True, None, {})
+    return maps.Grid(base, {"mass": np.array([0.1, 0.2])}, 1e-3, True, None, {})
 
 
 def solved(grid: maps.Grid, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
@@ -465,12 +458,12 @@ def limited(seconds: float) -> Iterator[None]:
         raise Hang(f"longer than {seconds:g} s")
 
     before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    rest, _ = signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_REAL, rest)
 
 
 class Hang(BaseException):
@@ -508,15 +501,17 @@ def one(category: str, number: int, folder: Path, samples: list[tuple[str, bytes
     return judged(CATEGORIES[category].read, path), path
 
 
-def work(category: str, numbers: range, pipe: int, keep: Path | None) -> None:
-    """Judge inputs and write a line of JSON for each; runs in a process of its own, which an input may end."""
+def work(category: str, numbers: range, pipe: int, keep: Path | None, again: bool) -> None:
+    """Judge inputs and write a line of JSON for each; runs in a process of its own, which an input may end.
+
+    Unless it judges an input ``again``, it does itself what the package leaves to a process apart.
+    """
     samples = CATEGORIES[category].samples()
     own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY, resource.RLIM_INFINITY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    _apart.run = forked
-    for library in ("meshio", "svgelements", "ezdxf", "pyuff"):  # before any fork, for the same reason
-        importlib.import_module(library)
+    if not again:
+        _apart.run, _apart.confine = quick, lambda path: None  # which would bind this process for good
     with tempfile.TemporaryDirectory() as name, open(os.devnull, "w") as null, os.fdopen(pipe, "w") as out:
         os.dup2(null.fileno(), 1)
         os.dup2(null.fileno(), 2)
@@ -527,9 +522,9 @@ def work(category: str, numbers: range, pipe: int, keep: Path | None) -> None:
             began = time.monotonic()
             verdict, path = one(category, number, folder, samples)
             left = sorted(file.name for file in folder.iterdir() if file != path)
-            if left and verdict in ("", "refused"):
+            if left and verdict in ("", REFUSED):
                 verdict = f"left {left}"
-            if keep is not None and verdict not in ("", "refused"):
+            if keep is not None and verdict not in ("", REFUSED):
                 shutil.copy(path, keep)
             for file in folder.iterdir():
                 shutil.rmtree(file) if file.is_dir() else file.unlink()
@@ -540,14 +535,14 @@ def work(category: str, numbers: range, pipe: int, keep: Path | None) -> None:
 class Worker:
     """A process that judges every ``step``-th input from ``start`` on."""
 
-    def __init__(self, category: str, numbers: range, keep: Path | None) -> None:
-        self.category, self.numbers, self.keep, self.rest = category, numbers, keep, b""
+    def __init__(self, category: str, numbers: range, keep: Path | None, again: bool = False) -> None:
+        self.numbers, self.again, self.rest = numbers, again, b""
         read, write = os.pipe()
         self.pid = os.fork()
         if not self.pid:
             try:
                 os.close(read)
-                work(category, numbers, write, keep)
+                work(category, numbers, write, keep, again)
             except BaseException:
                 traceback.print_exc()
                 os._exit(BROKEN)
@@ -587,33 +582,35 @@ def fuzz(category: str, inputs: int, workers: int, keep: Path | None = None) -> 
     while running:
         ready, _, _ = select.select([worker.pipe for worker in running], [], [], 1.0)
         for worker in list(running):
-            again, why = None, ""
+            end = ""
             if worker.pipe in ready:
                 try:
                     for number, *rest in worker.lines():
                         worker.current = number
                         if rest:
-                            tally[rest[0] if rest[0] in ("", "refused") else "failed"] += 1
+                            tally[rest[0] if rest[0] in ("", REFUSED) else "failed"] += 1
                             worker.current = number + worker.numbers.step
-                            if rest[0] not in ("", "refused"):
+                            if rest[0] not in ("", REFUSED):
                                 failures.append([number, *rest])
-                    continue
                 except EOFError:
-                    again, why = worker.current, "died"
+                    end = "died"
             elif time.monotonic() - worker.last > 2.0 * PATIENCE:
-                again, why = worker.current, "hangs where no signal is heard"
-            if again is None:
+                end = "hangs where no signal is heard"
+            if not end:
                 continue
-            status = worker.end()
+            running.remove(worker)
+            status, current, step = worker.end(), worker.current, worker.numbers.step
             if status == BROKEN:
                 raise RuntimeError("the fuzzer itself failed, see above")
-            running.remove(worker)
-            if again < inputs:
+            if current not in worker.numbers:
+                continue
+            if worker.again:
                 tally["failed"] += 1
-                failures.append([again, f"{why} ({status})", "", 0.0])
-                rest = range(again + worker.numbers.step, inputs, worker.numbers.step)
-                if rest:
-                    running.append(Worker(category, rest, keep))
+                failures.append([current, f"{end} ({status})", "", 0.0])
+            else:
+                running.append(Worker(category, range(current, current + 1), keep, again=True))
+            if current + step in worker.numbers:
+                running.append(Worker(category, range(current + step, worker.numbers.stop, step), keep))
     return tally, failures
 
 
@@ -651,7 +648,7 @@ def main() -> int:
         options.keep.mkdir(exist_ok=True)
     began = time.monotonic()
     tally, failures = fuzz(options.category, options.inputs, options.workers, options.keep)
-    print(json.dumps({"category": options.category, "results": tally[""], "refused": tally["refused"],
+    print(json.dumps({"category": options.category, "results": tally[""], "refused": tally[REFUSED],
                       "failed": failures, "seconds": round(time.monotonic() - began, 1)}))  # fmt: skip
     return 1 if failures else 0
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -192,3 +193,23 @@ def _wait_for_blocks(store, count, patience=60.0):
                 return
         time.sleep(0.05)
     pytest.fail(f"the run kept fewer than {count} blocks in {patience:g} s")
+
+
+def test_damaged_store_is_told_not_trusted(tmp_path):
+    def damaged():
+        shutil.rmtree(tmp_path / "map", ignore_errors=True)
+        sweep(over={"mass": [0.1]}, store=tmp_path / "map")
+        return tmp_path / "map"
+
+    chunk = damaged() / "numbers" / "c" / "0" / "0"
+    chunk.write_bytes(bytes([chunk.read_bytes()[0] ^ 1]) + chunk.read_bytes()[1:])  # one bit
+    with pytest.raises(ValueError, match=r"store .*map is damaged \(.*checksum"):
+        sweep(over={"mass": [0.1]}, store=tmp_path / "map")
+    meta = damaged() / "numbers" / "zarr.json"
+    meta.write_text(meta.read_text().replace('"crc32c"', '"zstd"'))  # would unpack to any size
+    with pytest.raises(ValueError, match=r"store .*map is damaged"):
+        sweep(over={"mass": [0.1]}, store=tmp_path / "map")
+    meta = damaged() / "zarr.json"
+    meta.write_text(meta.read_text().replace('"n_cases": 1', '"n_cases": 1000000000000'))
+    with pytest.raises(ValueError, match=r"store .*map is damaged"):
+        sweep(over={"mass": [0.1]}, store=tmp_path / "map")
