@@ -16,10 +16,11 @@ WIDTH, COLOURS = 640, 256  # [-] pixels and colours of a small picture: some 30 
 def main() -> None:
     """Run the scripts one after another, then shrink what they drew."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else STUDIES / "out"
-    for script in sorted([*STUDIES.glob("fig*.py"), *STUDIES.glob("beyond_*.py")]):
+    for script in sorted(path for name in ("fig", "beyond_", "tutorial_") for path in STUDIES.glob(f"{name}*.py")):
         subprocess.run([sys.executable, str(script), str(folder)], check=True)
     (STUDIES / "pictures").mkdir(exist_ok=True)
-    for path in sorted([*folder.glob("fig*.png"), *folder.glob("beyond_*.png")]):
+    shown = ("fig*", "beyond_*", "ukulele_modes", "ukulele_wave", "hammer_test")
+    for path in sorted(path for name in shown for path in folder.glob(f"{name}.png")):
         picture = Image.open(path).convert("RGB")
         picture = picture.resize((WIDTH, round(WIDTH * picture.height / picture.width)), Image.Resampling.LANCZOS)
         picture.quantize(COLOURS, Image.Quantize.MAXCOVERAGE).save(STUDIES / "pictures" / path.name, optimize=True)

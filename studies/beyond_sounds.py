@@ -1,0 +1,104 @@
+"""Beyond the source: how the plate of 200 g sounds under soft and hard, light and heavy sticks, hit once and twice."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import source_scenes as source
+from scipy.io import wavfile
+
+import fem_impact as fi
+from fem_impact import charts
+
+DAMPING = 0.005  # [-] a wooden plate
+SPEED = 2.0  # [m/s] of the tip
+LISTEN = (1.085, 0.7)  # [m] where the motion is heard: 0.7 of both sides
+BLOWS = {  # name: mass of the stick [kg], stiffness of the Hertz contact [N/m^1.5]
+    "soft": (0.1, 2e5),
+    "hard": (0.1, 5e6),
+    "light": (0.02, 7e5),
+    "heavy": (0.2, 7e5),
+    "single": (0.1, 7e5),
+    "double": (0.1, 2e7),
+}
+COLOURS = (charts.BLUE, charts.VERMILION, charts.SKY, charts.ORANGE, charts.GREEN, charts.PURPLE)
+THIRD = 2.0 ** (1.0 / 6.0)  # [-] half a third of an octave: from the middle of a band to its edge
+BANDS = 50.0 * 2.0 ** (np.arange(25) / 3.0)  # [Hz] middles
+RING = 0.05  # [s] after which no blow touches any more, and the decay is measured
+
+
+def compute(duration=1.5, n_modes=150):
+    """Samples [m/s] of each blow's sound, and how often it struck."""
+    modes = source.plate(0.2, damping_ratio=DAMPING).truncated(n_modes=n_modes)
+    heard = {}
+    for name, (mass, stiffness) in BLOWS.items():
+        hit = fi.strike(
+            modes, source.stick(mass), fi.Contact.hertz(stiffness), at=source.AT, speed=SPEED, tolerance=1e-3
+        )
+        heard[name] = hit.n_impacts, fi.sound.synthesise(hit, LISTEN, duration=duration)
+    return heard
+
+
+def level(samples, full_scale=1.0):
+    """Root of the mean square in dB."""
+    return 20.0 * np.log10(np.sqrt(np.mean(samples**2)) / full_scale)
+
+
+def centroid(samples, rate):
+    """Mean frequency [Hz] of the sound's energy."""
+    power = np.abs(np.fft.rfft(samples)) ** 2
+    return float(np.fft.rfftfreq(len(samples), 1.0 / rate) @ power / power.sum())
+
+
+def bands(samples, rate):
+    """Level [dB] in thirds of an octave."""
+    power = np.abs(np.fft.rfft(samples) / len(samples)) ** 2
+    frequencies = np.fft.rfftfreq(len(samples), 1.0 / rate)
+    inside = (frequencies > BANDS[:, None] / THIRD) & (frequencies <= BANDS[:, None] * THIRD)
+    return 10.0 * np.log10(np.maximum(2.0 * inside @ power, 1e-14))
+
+
+def decay_time(samples, rate, frequency):
+    """Time [s] in which a mode loses 60 dB, from the size of its line in two windows of a recording."""
+    n = round(10 * rate / frequency)
+    starts = round(RING * rate), len(samples) - n
+    turns = np.exp(-2j * np.pi * frequency * np.arange(n) / rate) * np.hanning(n)
+    first, last = (abs(samples[start : start + n] @ turns) for start in starts)
+    return float(np.log(1e3) * (starts[1] - starts[0]) / rate / np.log(first / last))
+
+
+def draw(heard):
+    """Levels of all blows in thirds of an octave, on one scale."""
+    columns = {"frequency_Hz": BANDS}
+    for name, (_, sound) in heard.items():
+        columns[f"{name}_dB"] = bands(sound.samples, sound.rate)
+    curves = [charts.Curve(BANDS, columns[f"{name}_dB"], name, paint) for name, paint in zip(heard, COLOURS)]
+    figure = charts.curves(
+        curves,
+        x=charts.Axis("frequency", "Hz", log=True),
+        y=charts.Axis("level re 10 m/s", "dB", limits=(-120.0, -10.0)),
+        title="Sounds of one plate, in thirds of an octave",
+    )
+    return figure, columns
+
+
+def main():
+    """Write a WAV for each blow and print what is measured in the files."""
+    heard = compute()
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "out"
+    source.publish("beyond_sounds", *draw(heard))
+    print(f"{'blow':<8}{'impacts':>8}{'peak':>10}{'level':>10}{'centroid':>10}{'first mode loses 60 dB in':>28}")
+    for name, (n, sound) in heard.items():
+        path = folder / f"{name}.wav"
+        wavfile.write(path, sound.rate, sound.samples.astype(np.float32))
+        rate, samples = wavfile.read(path)
+        peak = 20.0 * np.log10(np.abs(samples).max())
+        lost = decay_time(samples, rate, 100.0)
+        print(f"{name:<8}{n:8d}{peak:7.1f} dB{level(samples):7.1f} dB{centroid(samples, rate):7.0f} Hz{lost:26.2f} s")
+    print(
+        f"dB re {sound.full_scale:g} {sound.unit}; theory for the decay: {np.log(1e3) / (DAMPING * 200 * np.pi):.2f} s"
+    )
+
+
+if __name__ == "__main__":
+    main()

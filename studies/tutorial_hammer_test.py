@@ -1,0 +1,97 @@
+"""Tutorial: is my hammer test going to double-hit? A plate, a hammer with three tips, and the bandwidth wanted.
+
+python studies/tutorial_hammer_test.py [FOLDER]
+"""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import fem_impact as fi
+from fem_impact import accuracy, charts, hammers
+
+BANDWIDTH, DROP = 800.0, 10.0  # [Hz] in which the force may fall by so many [dB]
+HAMMER = 0.1  # [kg]
+TIPS = {"rubber": 3e5, "nylon": 3e6, "steel": 3e7}  # [N/m] linear, as data sheets state them
+PLACES = {"middle": (0.3, 0.2), "corner": (0.02, 0.02)}  # [m]
+SPEED = 0.5  # [m/s]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What one tip does at one place."""
+
+    place: str
+    tip: str
+    n_impacts: int
+    reach: float  # [Hz] bandwidth
+    ratio: float  # [-] contact resonance over the threshold of the kinetic-energy criterion
+
+    @property
+    def good(self) -> bool:
+        """Whether it hits once and reaches the bandwidth."""
+        return self.n_impacts == 1 and self.reach >= BANDWIDTH
+
+
+def structure(max_frequency: float = 8e3) -> fi.Modes:
+    """An aluminium plate, free all round, as it hangs on soft cords."""
+    mesh = fi.mesh.rectangle(0.6, 0.4)
+    plate = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), thickness=4e-3)
+    return fi.find_modes(fi.assemble(mesh, plate), max_frequency=max_frequency, damping_ratio=0.002)
+
+
+def judge(modes: fi.Modes) -> list[Verdict]:
+    """Strike every place with every tip."""
+    found = []
+    for place, at in PLACES.items():
+        limit = fi.threshold_frequency(modes, at, HAMMER)
+        for tip, stiffness in TIPS.items():
+            law = fi.Contact.linear(stiffness)
+            hit = fi.strike(modes, fi.Striker.rigid(HAMMER), law, at=at, speed=SPEED, tolerance=1e-3)
+            resonance = 0.5 / accuracy.contact_duration(law, HAMMER, SPEED)
+            ratio = resonance / limit if limit else np.inf
+            found.append(Verdict(place, tip, hit.n_impacts, hammers.bandwidth_of(hit, DROP), ratio))
+    return found
+
+
+def draw(modes: fi.Modes) -> object:
+    """Force spectra of the three tips at the middle, over their value at zero frequency."""
+    frequencies = np.linspace(1.0, 4.0 * BANDWIDTH, 400)
+    curves = []
+    for (tip, stiffness), paint in zip(TIPS.items(), (charts.BLUE, charts.GREEN, charts.VERMILION)):
+        law = fi.Contact.linear(stiffness)
+        hit = fi.strike(modes, fi.Striker.rigid(HAMMER), law, at=PLACES["middle"], speed=SPEED, tolerance=1e-3)
+        size = np.abs(hit.spectrum(frequencies))
+        count = "one impact" if hit.n_impacts == 1 else f"{hit.n_impacts} impacts"
+        curves.append(charts.Curve(frequencies, 20.0 * np.log10(size / size[0]), f"{tip}, {count}", paint))
+    curves.append(charts.Curve(np.array([0.0, BANDWIDTH]), np.full(2, -DROP), "wanted", charts.GREY, "--"))
+    frequency, level = charts.Axis("frequency", "Hz"), charts.Axis("force spectrum", "dB", limits=(-40.0, 6.0))
+    return charts.curves(curves, x=frequency, y=level, title="Three tips on one hammer, struck at the middle")
+
+
+def main(folder: Path, max_frequency: float = 8e3) -> list[Verdict]:
+    """Say which tip to screw on, and where to strike."""
+    folder.mkdir(parents=True, exist_ok=True)
+    modes = structure(max_frequency)
+    print(f"A free plate of {modes.mass:.2f} kg, {modes.n_modes} modes up to {modes.frequencies[-1]:.0f} Hz; "
+          f"a hammer of {1e3 * HAMMER:g} g; {BANDWIDTH:g} Hz wanted, {DROP:g} dB down at most.")  # fmt: skip
+    verdicts = judge(modes)
+    print(f"{'place':<8}{'tip':<8}{'impacts':>8}{'reaches':>10}{'of threshold':>14}   verdict")
+    for one in verdicts:
+        why = "good" if one.good else f"hits {one.n_impacts} times" if one.n_impacts > 1 else "too soft"
+        print(f"{one.place:<8}{one.tip:<8}{one.n_impacts:8d}{one.reach:7.0f} Hz{one.ratio:14.2f}   {why}")
+    chosen = hammers.choose(modes, PLACES["middle"], BANDWIDTH, [0.01, HAMMER], drop=DROP)
+    for hammer in chosen:
+        advice = "no tip does it" if not hammer.works else (
+            f"tips from {hammer.softest:.2g} to {hammer.hardest:.2g} N/m do it"
+        )  # fmt: skip
+        print(f"In the middle, with a hammer of {1e3 * hammer.mass:g} g: {advice}.")
+    fi.figures.save(folder / "hammer_test.png", draw(modes))
+    print(f"{folder / 'hammer_test.png'}")
+    return verdicts
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "out")

@@ -1,0 +1,65 @@
+"""The tutorials run as they stand, and what they teach is so."""
+
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+STUDIES = Path(__file__).parents[1] / "studies"
+
+
+@pytest.fixture(autouse=True)
+def studies_path(monkeypatch):
+    monkeypatch.syspath_prepend(str(STUDIES))
+
+
+@pytest.mark.slow
+def test_from_the_outline_to_the_sound(tmp_path, capsys, monkeypatch):
+    from fem_impact import pictures
+
+    monkeypatch.setattr(pictures, "can_render", lambda: False)  # the plane is quicker; the picture has its own test
+    hits = import_module("tutorial_outline_to_sound").main(tmp_path, tolerance=1e-2)
+    assert hits["fingernail"].contact_time < hits["fingertip"].contact_time
+    assert {path.name for path in tmp_path.iterdir()} >= {"ukulele_modes.png", "ukulele_fingertip.wav"}
+    said = capsys.readouterr().out
+    assert "edges rim, hole" in said and "dB SPL" in said
+
+
+def test_hammer_test_warns_of_double_hits(tmp_path, capsys):
+    tutorial = import_module("tutorial_hammer_test")
+    verdicts = {(one.place, one.tip): one for one in tutorial.judge(tutorial.structure(3e3))}
+    assert verdicts["middle", "nylon"].good
+    assert verdicts["middle", "rubber"].reach < tutorial.BANDWIDTH and verdicts["middle", "rubber"].n_impacts == 1
+    assert verdicts["middle", "steel"].n_impacts > 1 and verdicts["corner", "nylon"].n_impacts > 1
+    assert verdicts["middle", "steel"].ratio > 1.0  # beyond the threshold, as the criterion foretells
+
+
+@pytest.mark.slow
+def test_hammer_test_writes_and_advises(tmp_path, capsys):
+    import_module("tutorial_hammer_test").main(tmp_path, max_frequency=4e3)
+    said = capsys.readouterr().out
+    assert "with a hammer of 100 g: tips from" in said and (tmp_path / "hammer_test.png").exists()
+
+
+def test_sounds_tell_the_blows_apart():
+    sounds = import_module("beyond_sounds")
+    heard = sounds.compute(duration=1.0, n_modes=60)
+    assert [n for n, _ in heard.values()] == [1, 1, 1, 1, 1, 2]
+    level = {name: sounds.level(sound.samples) for name, (_, sound) in heard.items()}
+    tone = {name: sounds.centroid(sound.samples, sound.rate) for name, (_, sound) in heard.items()}
+    assert tone["hard"] > 1.3 * tone["soft"] and tone["double"] > tone["single"]
+    assert level["heavy"] > level["light"] + 6.0
+    assert {sound.full_scale for _, sound in heard.values()} == {10.0}
+
+
+def test_decay_is_measured_in_the_file_as_it_was_modelled(tmp_path, monkeypatch):
+    from scipy.io import wavfile
+
+    sounds = import_module("beyond_sounds")
+    _, heard = sounds.compute(duration=1.0, n_modes=60)["hard"]
+    wavfile.write(tmp_path / "hard.wav", heard.rate, heard.samples.astype(np.float32))
+    rate, samples = wavfile.read(tmp_path / "hard.wav")
+    modelled = np.log(1e3) / (sounds.DAMPING * 2.0 * np.pi * 100.0)
+    # the window lets neighbours through by 1e-3 of their size, over 40 dB of decay
+    assert sounds.decay_time(samples, rate, 100.0) == pytest.approx(modelled, rel=1e-2)
