@@ -109,6 +109,7 @@ class Bounces:
 
 
 Kernels = dict[tuple[int, int], tuple[np.ndarray, ...]]  # by family and step, as long as was needed
+KEPT = 128e6  # [byte] of kernels at most from one call to the next
 NO_KERNELS = np.empty((_batch.N_KERNELS, 0)), np.empty((_batch.N_KERNELS, 0))
 
 
@@ -144,6 +145,8 @@ def bounce(
     with ThreadPoolExecutor(workers) as pool:
         engine = _Engine(blows, band, pool.submit if workers > 1 else None, {} if kernels is None else kernels)
         final, error = _refined(engine, tolerance)
+    if kernels is not None and sum(part.nbytes for parts in kernels.values() for part in parts) > KEPT:
+        kernels.clear()
     v = blows.speed
     return Bounces(
         final[0], final[1], final[2] * engine.own_rigid - 1.0, final[2] * v, final[3] * v, error, final[4],

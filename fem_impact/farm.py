@@ -17,7 +17,8 @@ BLOCKS = 64  # [-] at least, where a map has so many cells: what a killed run lo
 TEXT = 240  # [byte] kept of an error text
 EXTRA = "pip install 'fem-impact[cluster]'"
 
-Solve = Callable[[Any, int, int], tuple[np.ndarray, np.ndarray]]  # grid, start, stop: numbers, failures
+Texts = dict[int, str]  # of cells that failed: why
+Solve = Callable[[Any, int, int], tuple[np.ndarray, Texts]]  # grid, start, stop: numbers (n_layers, n_cells), texts
 Watch = Callable[[int, int], Any]
 
 
@@ -83,27 +84,31 @@ class Store:
         """First cell of a block and the one after its last."""
         return block * self.block, min((block + 1) * self.block, self.n_cases)
 
-    def write(self, block: int, numbers: np.ndarray, failures: np.ndarray) -> None:
+    def write(self, block: int, numbers: np.ndarray, texts: Texts) -> None:
         """Keep a block."""
         import zarr
 
         group: Any = zarr.open_group(str(self.path), mode="r+")
         start, stop = self.bounds(block)
         group["numbers"][:, start:stop] = numbers
-        if any(failures):
-            group["failures"][start:stop] = _encode(failures)
+        if texts:
+            raw = np.zeros((stop - start, TEXT), np.uint8)
+            for i, text in texts.items():
+                encoded = text.encode()[:TEXT]
+                raw[i - start, : len(encoded)] = list(encoded)
+            group["failures"][start:stop] = raw
         group["done"][block] = 1
 
-    def read(self) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers (n_layers, n_cases) and error texts (n_cases,) of all cells."""
-        failures = np.full(self.n_cases, "", dtype=object)
+    def read(self) -> tuple[np.ndarray, Texts]:
+        """Numbers (n_layers, n_cases) and error texts of all cells."""
+        found: Texts = {}
         with _intact(self.path):
             for block in range(math.ceil(self.n_cases / self.block)):
                 start, stop = self.bounds(block)
                 raw = self.group["failures"][start:stop]
                 for i in np.flatnonzero(raw.any(axis=1)):
-                    failures[start + i] = bytes(raw[i]).rstrip(b"\0").decode("utf-8", "ignore")
-            return self.group["numbers"][:], failures
+                    found[start + int(i)] = bytes(raw[i]).rstrip(b"\0").decode("utf-8", "ignore")
+            return self.group["numbers"][:], found
 
 
 def _made(zarr: Any, place: Any, n_layers: int, n_cases: int, block: int) -> Any:
@@ -129,7 +134,7 @@ def fingerprint(grid: Any) -> str:
     return body.hexdigest()
 
 
-def by_store(grid: Any, path: str | Path, solve: Solve, watch: Watch | None) -> tuple[np.ndarray, np.ndarray]:
+def by_store(grid: Any, path: str | Path, solve: Solve, watch: Watch | None) -> tuple[np.ndarray, Texts]:
     """Solve what a store lacks in this process; return all of it."""
     store = Store.open(path, grid)
     missing = store.missing()
@@ -145,7 +150,7 @@ def by_store(grid: Any, path: str | Path, solve: Solve, watch: Watch | None) -> 
 
 def by_cluster(
     grid: Any, client: Any, path: str | Path | None, solve: Solve, watch: Watch | None
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, Texts]:
     """Solve on a Dask cluster; workers keep finished blocks in the store themselves, if there is one.
 
     Parameters
@@ -166,27 +171,25 @@ def by_cluster(
             for i in todo
         }  # fmt: skip
         numbers = np.empty((len(grid.layers), grid.n_cases)) if store is None else np.empty((0, 0))
-        failures = np.full(grid.n_cases, "", dtype=object)
+        texts: Texts = {}
         done = grid.n_cases - sum(min(block, grid.n_cases - i * block) for i in todo)
         for future, result in as_completed(futures, with_results=True):
             start = futures[future] * block
             stop = min(start + block, grid.n_cases)
             if result is not None:
-                numbers[:, start:stop], texts = result
-                for i, text in texts.items():
-                    failures[start + i] = text
+                numbers[:, start:stop], new = result
+                texts |= new
             done += stop - start
             if watch is not None:
                 watch(done, grid.n_cases)
             future.release()
-        return (numbers, failures) if store is None else Store(store.path).read()
+        return (numbers, texts) if store is None else Store(store.path).read()
 
 
-def _work(grid: Any, block: int, size: int, solve: Solve, path: str | None) -> tuple[np.ndarray, dict[int, str]] | None:
-    """One block, on a worker: numbers, and texts where there are any; nothing where a store has it or takes it."""
+def _work(grid: Any, block: int, size: int, solve: Solve, path: str | None) -> tuple[np.ndarray, Texts] | None:
+    """One block, on a worker; nothing where a store has it or takes it."""
     if path is None:
-        numbers, failures = solve(grid, block * size, min((block + 1) * size, grid.n_cases))
-        return numbers, {int(i): failures[i] for i in np.flatnonzero(failures != "")}
+        return solve(grid, block * size, min((block + 1) * size, grid.n_cases))
     store = Store(Path(path))
     if block not in store.missing():  # a worker died between keeping it and saying so
         return None
@@ -227,8 +230,3 @@ def _intact(path: Path) -> Iterator[None]:
 
 def _damaged(path: Path, reason: str) -> ValueError:
     return ValueError(f"store {path} is damaged ({_check.line(reason)}); name a new folder, or delete this one")
-
-
-def _encode(failures: np.ndarray) -> np.ndarray:
-    """Texts as bytes, (n_cells, TEXT)."""
-    return np.array([list(text.encode()[:TEXT].ljust(TEXT, b"\0")) for text in failures], np.uint8)

@@ -5,7 +5,7 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -100,6 +100,7 @@ class Grid:
     residual: bool
     band: float | None  # [Hz] of the centroid
     extra: Mapping[str, Callable[[Response], float]]  # more layers
+    kernels: bounces.Kernels = field(default_factory=dict)  # found so far
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -153,7 +154,9 @@ class Grid:
         if striker.modes.dimension:
             striker = replace(striker, modes=_sampled(striker.modes, striker.at[None]))
         places = np.unique(np.vstack([places, self.base.at[None]]), axis=0)
-        return replace(self, base=replace(self.base, modes=_sampled(self.base.modes, places), striker=striker))
+        return replace(
+            self, base=replace(self.base, modes=_sampled(self.base.modes, places), striker=striker), kernels={}
+        )
 
     def without_speed(self) -> "Grid | None":
         """The grid with one speed, where all springs are linear and hence speed only scales forces."""
@@ -233,7 +236,9 @@ def sweep(
     workers = None if workers is None else _check.count("workers", workers)
     grid = Grid(base, checked_axes(base, over), tolerance, residual, band, dict(layers or {}))
     fewer = grid.without_speed()
-    numbers, failures = _solve_all(fewer or grid, workers, client, store, watch)
+    numbers, texts = _solve_all(fewer or grid, workers, client, store, watch)
+    failures = np.full((fewer or grid).n_cases, "", dtype=f"<U{max(map(len, texts.values()), default=1)}")
+    failures[list(texts)] = list(texts.values())
     if fewer is not None:
         numbers, failures = _with_speed(grid, fewer, numbers, failures)
     return _dataset(grid, numbers, failures)
@@ -241,22 +246,21 @@ def sweep(
 
 def _solve_all(
     grid: Grid, workers: int | None, client: Any, store: Any, watch: Watch | None
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, farm.Texts]:
     """All cells, by a cluster or by threads of this process, block by block."""
     if client is not None:
         return farm.by_cluster(grid, client, store, partial(solve, workers=1), watch)
-    kernels: bounces.Kernels = {}
     if store is not None:
-        return farm.by_store(grid, store, partial(solve, workers=workers, kernels=kernels), watch)
+        return farm.by_store(grid, store, partial(solve, workers=workers), watch)
     numbers = np.empty((len(grid.layers), grid.n_cases))
-    failures = np.full(grid.n_cases, "", dtype=object)
+    texts: farm.Texts = {}
     for start in range(0, grid.n_cases, BLOCK):
         stop = min(start + BLOCK, grid.n_cases)
-        part = slice(start, stop)
-        numbers[:, part], failures[part] = solve(grid, start, stop, workers=workers, kernels=kernels)
+        numbers[:, start:stop], new = solve(grid, start, stop, workers=workers)
+        texts |= new
         if watch is not None:
             watch(stop, grid.n_cases)
-    return numbers, failures
+    return numbers, texts
 
 
 def _with_speed(grid: Grid, fewer: Grid, numbers: np.ndarray, failures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -273,19 +277,16 @@ def _with_speed(grid: Grid, fewer: Grid, numbers: np.ndarray, failures: np.ndarr
     return whole.reshape(len(numbers), -1), failures.reshape(-1)
 
 
-def solve(
-    grid: Grid, start: int, stop: int, *, workers: int | None = None, kernels: bounces.Kernels | None = None
-) -> tuple[np.ndarray, np.ndarray]:
+def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> tuple[np.ndarray, farm.Texts]:
     """Strike the cells from ``start`` to ``stop``.
 
     Returns
     -------
     numbers : ndarray, shape (n_layers, n_cells)
-    failures : ndarray of str, shape (n_cells,)
+    texts : dict of cell to why it failed
     """
     names = grid.layers
     numbers = np.full((len(names), stop - start), np.nan)
-    failures = np.full(stop - start, "", dtype=object)
     place = dict(zip(grid.axes, np.unravel_index(np.arange(start, stop), grid.shape)))
     law = grid.base.contact
     column = {
@@ -317,19 +318,24 @@ def solve(
             kinds[family],
             *(column[name][cells] for name in ("target_mass", "mass", "stiffness", "exponent", "speed")),
         )
-        found = bounces.bounce(blows, tolerance=grid.tolerance, band=grid.band or 0.0, workers=workers, kernels=kernels)
+        found = bounces.bounce(
+            blows, tolerance=grid.tolerance, band=grid.band or 0.0, workers=workers, kernels=grid.kernels
+        )
         for row, name in enumerate(names):
             numbers[row, cells] = getattr(found, name)
         quick[cells] = found.done
     rest = np.flatnonzero(~quick)
+    texts = {}
     with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
         struck = [pool.submit(grid.strike, start + int(i)) for i in rest]
         try:
             for i, cell in zip(rest, struck):
-                numbers[:, i], failures[i] = cell.result()
+                numbers[:, i], text = cell.result()
+                if text:
+                    texts[start + int(i)] = text
         finally:
             pool.shutdown(cancel_futures=True)
-    return numbers, failures
+    return numbers, texts
 
 
 def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
@@ -370,7 +376,7 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray) -> xarray.Da
         if name == "centroid":
             attributes["max_frequency"] = grid.band
         data[name] = (dims, values.reshape(grid.shape), attributes)
-    data["failure"] = (dims, failures.reshape(grid.shape).astype(str), {"long_name": "why the cell failed"})
+    data["failure"] = (dims, failures.reshape(grid.shape), {"long_name": "why the cell failed"})
     places: dict[str, Any] = {}
     for name, values in grid.axes.items():
         attributes = {"units": AXES[name][0] or "1", "long_name": AXES[name][1]}
