@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -164,7 +165,7 @@ def by_cluster(
         block = block_size(grid.n_cases)
         todo = store.missing() if store is not None else list(range(math.ceil(grid.n_cases / block)))
         shared = connected.scatter(grid.sampled(), broadcast=True)
-        name = f"map-{fingerprint(grid)[:12]}"
+        name = f"map-{uuid.uuid4().hex[:12]}"  # no run is mistaken for an earlier one that the scheduler still forgets
         futures = {
             connected.submit(_work, shared, i, block, solve, None if store is None else str(store.path),
                              key=f"{name}-{i}", pure=False): i
