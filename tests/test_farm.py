@@ -103,6 +103,7 @@ def test_a_local_cluster_gives_the_same_map(tmp_path, undisturbed):
     settings = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "host": "127.0.0.1"}
     with distributed.LocalCluster(**settings) as cluster, distributed.Client(cluster) as client:
         assert_same(sweep(client=client), undisturbed)
+        assert_same(sweep(client=client), undisturbed)  # at once again, while the scheduler forgets the first
         assert_same(sweep(client=client, store=tmp_path / "map"), undisturbed)
 
 
