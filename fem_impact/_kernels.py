@@ -225,54 +225,71 @@ def decays(exponent, out_decay):
 
 
 @inner(allocates=True, fastmath={"contract"})
-def free_table(omega, zeta, h, out_free, out_decayed):
-    """Exact free motion of every mode over h: rows a11, a12, a22 of out_free (3, n_modes); a21 is -omega**2 a12.
+def free_table(omega, zeta, h, out_free, out_double):
+    """Exact free motion of every mode over h: rows a11, a12, a21, a22 of out_free (4 or more, n_modes).
 
-    out_decayed (n_modes,) receives twice the damping exponent x = zeta omega h.
+    out_double (n_modes,) receives twice the damping exponent zeta omega h, zero for modes beyond the fast lanes;
+    returns the number of those and of damped modes.
     """
     n_modes = omega.size
+    n_single = 0
+    n_damped = 0
+    for n in range(n_modes):
+        n_single += 1 if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT else 0
+        n_damped += 1 if zeta[n] != 0.0 else 0
     angle = np.empty(n_modes)
-    for n in range(n_modes):
-        z = zeta[n] if zeta[n] <= LIGHT else 0.0
-        y = omega[n] * h * np.sqrt((1.0 - z) * (1.0 + z))
-        angle[n] = y if y < ANGLE_LIMIT else 0.0
-        out_decayed[n] = z * omega[n] * h
+    if n_damped == 0:
+        for n in range(n_modes):
+            angle[n] = omega[n] * h
+            out_double[n] = 0.0
+    else:
+        for n in range(n_modes):
+            z = zeta[n] if zeta[n] <= LIGHT else 0.0
+            angle[n] = omega[n] * h * np.sqrt((1.0 - z) * (1.0 + z))
+            out_double[n] = z * omega[n] * h
+    if n_single > 0:
+        for n in range(n_modes):
+            angle[n] = min(angle[n], ANGLE_LIMIT)
     waves(angle, out_free[1], out_free[0])
-    damped = False
+    if n_damped == 0:
+        for n in range(n_modes):
+            y = angle[n]
+            c = out_free[0, n]
+            out_free[1, n] = h * (out_free[1, n] / y if y > 0.0 else 1.0)
+            out_free[3, n] = c
+    else:
+        decays(out_double, out_free[3])
+        for n in range(n_modes):
+            y = angle[n]
+            decay = out_free[3, n]
+            x = out_double[n]
+            s = decay * (out_free[1, n] / y if y > 0.0 else 1.0)
+            c = decay * out_free[0, n]
+            out_free[0, n] = c + x * s
+            out_free[1, n] = h * s
+            out_free[3, n] = c - x * s
+            out_double[n] = 2.0 * x
+    if n_single > 0:
+        for n in range(n_modes):
+            if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT:
+                a11, a12, a22, _, _, _ = mode_matrix(omega[n], zeta[n], h)
+                out_free[0, n] = a11
+                out_free[1, n] = a12
+                out_free[3, n] = a22
     for n in range(n_modes):
-        if zeta[n] != 0.0:
-            damped = True
-    if damped:
-        decays(out_decayed, out_free[2])
-    for n in range(n_modes):
-        decay = out_free[2, n] if damped else 1.0
-        s = decay * (out_free[1, n] / angle[n] if angle[n] > 0.0 else 1.0)
-        c = decay * out_free[0, n]
-        x = out_decayed[n]
-        out_free[0, n] = c + x * s
-        out_free[1, n] = h * s
-        out_free[2, n] = c - x * s
-        out_decayed[n] = 2.0 * x
-    for n in range(n_modes):
-        if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT:
-            a11, a12, a22, _, _, _ = mode_matrix(omega[n], zeta[n], h)
-            out_free[0, n] = a11
-            out_free[1, n] = a12
-            out_free[2, n] = a22
+        out_free[2, n] = -omega[n] * omega[n] * out_free[1, n]
+    return n_single, n_damped
 
 
 @inner(allocates=True, fastmath={"contract"})
-def near_moments(omega, h, double, out_moments):
-    """Moments 2 and 3 (rows of out_moments) by power series, for every mode with omega h < SERIES_END."""
+def near_moments(omega, h, double, n_damped, out_moments):
+    """Moments 2 and 3 (rows 5 and 6 of out_moments) by power series, for every mode with omega h < SERIES_END."""
     n_modes = omega.size
     square = np.empty(n_modes)
-    damped = False
     for n in range(n_modes):
         th = min(omega[n] * h, SERIES_END)
         square[n] = th * th
-        if double[n] != 0.0:
-            damped = True
-    if not damped:
+    if n_damped == 0:
         for n in range(n_modes):
             t2 = square[n]
             odd = 1.0 - t2 * (1.0 / 812.0)
@@ -287,7 +304,7 @@ def near_moments(omega, h, double, out_moments):
             odd = 1.0 - t2 * (1.0 / 110.0) * odd
             odd = 1.0 - t2 * (1.0 / 72.0) * odd
             odd = 1.0 - t2 * (1.0 / 42.0) * odd
-            out_moments[2, n] = (1.0 / 6.0) * (1.0 - t2 * (1.0 / 20.0) * odd)
+            out_moments[5, n] = (1.0 / 6.0) * (1.0 - t2 * (1.0 / 20.0) * odd)
             even = 1.0 - t2 * (1.0 / 756.0)
             even = 1.0 - t2 * (1.0 / 650.0) * even
             even = 1.0 - t2 * (1.0 / 552.0) * even
@@ -299,22 +316,22 @@ def near_moments(omega, h, double, out_moments):
             even = 1.0 - t2 * (1.0 / 132.0) * even
             even = 1.0 - t2 * (1.0 / 90.0) * even
             even = 1.0 - t2 * (1.0 / 56.0) * even
-            out_moments[3, n] = (1.0 / 24.0) * (1.0 - t2 * (1.0 / 30.0) * even)
+            out_moments[6, n] = (1.0 / 24.0) * (1.0 - t2 * (1.0 / 30.0) * even)
         return
     now = np.empty(n_modes)
     last = np.empty(n_modes)
     for n in range(n_modes):
         now[n] = 1.0
         last[n] = 0.0
-        out_moments[2, n] = 0.0
-        out_moments[3, n] = 0.0
+        out_moments[5, n] = 0.0
+        out_moments[6, n] = 0.0
     factor = 1.0 / 6.0
     for j in range(1, 30):
         after = factor / (j + 3.0)
         for n in range(n_modes):
             value = now[n]
-            out_moments[2, n] += value * factor
-            out_moments[3, n] += value * after
+            out_moments[5, n] += value * factor
+            out_moments[6, n] += value * after
             now[n] = -min(double[n], 2.0 * SERIES_END) * value - square[n] * last[n]
             last[n] = value
         factor = after
@@ -330,42 +347,37 @@ def lane_table(omega, zeta, h, whole, out_lanes):
     force is all that is made.
     """
     n_modes = omega.size
-    free = np.empty((3, n_modes))
     double = np.empty(n_modes)
-    m = np.empty((4, n_modes))
-    free_table(omega, zeta, h, free, double)
-    for n in range(n_modes):
-        out_lanes[0, n] = free[0, n]
-        out_lanes[1, n] = free[1, n]
-        out_lanes[2, n] = -omega[n] * omega[n] * free[1, n]
-        out_lanes[3, n] = free[2, n]
-        out_lanes[4, n] = 0.0
+    n_single, n_damped = free_table(omega, zeta, h, out_lanes, double)
     if not whole:
+        for n in range(n_modes):
+            out_lanes[4, n] = 0.0
         return
-    near_moments(omega, h, double, m)
+    near_moments(omega, h, double, n_damped, out_lanes)
     part = 1.0 / h
     for n in range(n_modes):
         th = omega[n] * h
         near = th < SERIES_END
         inverse = 1.0 / (1.0 if near else th * th)
-        first = free[1, n] * part
-        m1 = (1.0 - double[n] * first - free[2, n]) * inverse
+        first = out_lanes[1, n] * part
+        m1 = (1.0 - double[n] * first - out_lanes[3, n]) * inverse
         m2 = (1.0 - double[n] * m1 - first) * inverse
         m3 = (0.5 - double[n] * m2 - m1) * inverse
-        m[1, n] = 0.5 - double[n] * m[2, n] - th * th * m[3, n] if near else m1
-        m[2, n] = m[2, n] if near else m2
-        m[3, n] = m[3, n] if near else m3
-    work = np.empty((2, 3))
-    single = np.empty(4)
-    for n in range(n_modes):
-        if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT:
-            mode_moments(omega[n], zeta[n], h, single, work)
-            for k in range(1, 4):
-                m[k, n] = single[k]
-    for n in range(n_modes):
-        out_lanes[4, n] = h * m[1, n]
-        out_lanes[5, n] = h * m[2, n]
-        out_lanes[6, n] = h * (m[3, n] - 0.5 * m[2, n])
+        m2 = out_lanes[5, n] if near else m2
+        m3 = out_lanes[6, n] if near else m3
+        m1 = 0.5 - double[n] * m2 - th * th * m3 if near else m1
+        out_lanes[4, n] = h * m1
+        out_lanes[5, n] = h * m2
+        out_lanes[6, n] = h * (m3 - 0.5 * m2)
+    if n_single > 0:
+        work = np.empty((2, 3))
+        m = np.empty(4)
+        for n in range(n_modes):
+            if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT:
+                mode_moments(omega[n], zeta[n], h, m, work)
+                out_lanes[4, n] = h * m[1]
+                out_lanes[5, n] = h * m[2]
+                out_lanes[6, n] = h * (m[3] - 0.5 * m[2])
 
 
 @outer()
