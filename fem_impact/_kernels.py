@@ -1343,7 +1343,7 @@ def land(shape, offset, time, elapsed, first, found, row, stride, now, pressed, 
 
 
 @inner()
-def record(row, time, h, blind, sums, now, end, y, f, s, done):
+def record(row, time, h, blind, sums, now, pressed, end, y, f, s, done):
     """Write a step of the energy-exact schemes to a row of the steps, and add up its work."""
     row[0] = time
     row[1] = h
@@ -1351,7 +1351,7 @@ def record(row, time, h, blind, sums, now, end, y, f, s, done):
     for i in range(y.size):
         row[3 + 5 * i] = now[0, i]
         row[4 + 5 * i] = now[4, i]
-        row[5 + 5 * i] = 1.0 if f[i] > 0.0 else 0.0
+        row[5 + 5 * i] = 1.0 if f[i] > 0.0 or pressed[i] else 0.0
         row[6 + 5 * i] = f[i] - 0.5 * s[i]
         row[7 + 5 * i] = s[i]
         mean = end[1, i]
@@ -1372,7 +1372,7 @@ def run_energy(
     horizon: where to stop at the latest; max_impacts: stop after so many releases.
 
     Returns (steps, q, p, now, done, time, status, n_fallback, n_blind). Each row of steps is a step or a flight:
-    start, length, blind; then per contact start approach, start rate, whether it pushes, and the force as powers of
+    start, length, blind; then per contact start approach, start rate, whether it is closed, and the force as powers of
     the fraction of the step. now (5, n_contacts) ends with the last approach, .., rate; done (n_contacts,) is the
     integral of force times rate [J]. A finished run ends at the last separation.
     """
@@ -1497,7 +1497,7 @@ def run_energy(
         if not total < 1e300:
             status = FAILED
             break
-        record(steps[n_steps], time, h, blind, all_sums[slot], now, end, y, f, s, done)
+        record(steps[n_steps], time, h, blind, all_sums[slot], now, pressed, end, y, f, s, done)
         n_steps += 1
         if ramp and fine == 0:
             n_fallback += 1
@@ -2327,9 +2327,48 @@ def force_within(steps, now, law, n_coefficients, row, i, part):
     return max(f * (1.0 + law[i, 2] * rate), 0.0)
 
 
+@inner()
+def pushing(steps, now, law, n_coefficients, row, i):
+    """Fractions of a step between which contact i pushes, by the cubic through both ends; (0, 0) if it does not.
+
+    A lossy contact stops pushing while the bodies still overlap, when they part as fast as 1 / loss.
+    """
+    first = 3 + (3 + n_coefficients) * i
+    if steps[row, first + 2] == 0.0:
+        return 0.0, 0.0
+    final = row + 1 == steps.shape[0]
+    h = steps[row, 1]
+    d0 = steps[row, first]
+    v0 = steps[row, first + 1]
+    d1 = now[0, i] if final else steps[row + 1, first]
+    v1 = now[4, i] if final else steps[row + 1, first + 1]
+    lower = 0.0
+    upper = 1.0
+    if d0 < 0.0 < d1:
+        lower = hermite_root(d0, v0, d1, v1, h) / h
+    elif d1 < 0.0 < d0:
+        upper = hermite_root(d0, v0, d1, v1, h) / h
+    loss = law[i, 2]
+    start = 1.0 + loss * v0
+    end = 1.0 + loss * v1
+    if start <= 0.0 and end <= 0.0:
+        return 0.0, 0.0
+    if start < 0.0 or end < 0.0:
+        b = 2.0 * loss * (3.0 * (d1 - d0) / h - 2.0 * v0 - v1)
+        a = end - start - b
+        root = np.sqrt(max(0.0, b * b - 4.0 * a * start))
+        side = 1.0 if end > start else -1.0
+        at = -2.0 * start / (b + side * root) if side * b >= 0.0 else 0.5 * (side * root - b) / a
+        if start < 0.0:
+            lower = max(lower, at)
+        else:
+            upper = min(upper, at)
+    return lower, upper
+
+
 @outer()
 def find_impacts(steps, now, law, n_coefficients, looks, touch):
-    """Every unbroken contact, (n_impacts, 5): start, end, peak force, impulse, contact; contact by contact.
+    """Every unbroken push, (n_impacts, 5): start, end, peak force, impulse, contact; contact by contact.
 
     Bodies that touch and approach no faster than ``touch`` [m/s] before the first push press from the start of that
     time. The peak is sought with ``looks`` per step about the largest of a few, and refined by parabolas.
@@ -2343,18 +2382,20 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
         first = 3 + width * i
         row: Any = ZERO
         while row < n_steps:
-            if steps[row, first + 2] == 0.0:
+            lower, upper = pushing(steps, now, law, n_coefficients, row, i)
+            if lower >= upper:
                 row += 1
                 continue
             if count == result.shape[0]:
                 result = resized(result, count, 2 * count)
             begin = row
-            start = steps[row, 0]
+            start = steps[row, 0] + lower * steps[row, 1]
+            end = start
             impulse = 0.0
             peak = 0.0
             peak_row = row
             peak_part = 0.0
-            while row < n_steps and steps[row, first + 2] != 0.0:
+            while upper > lower:
                 for k in range(n_coefficients):
                     impulse += steps[row, 1] * steps[row, first + 3 + k] / (k + 1.0)
                 for look in range(n_coefficients):
@@ -2362,7 +2403,13 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
                     if f > peak:
                         peak = f
                         peak_row = row
+                end = steps[row, 0] + upper * steps[row, 1]
                 row += 1
+                if upper < 1.0 or row == n_steps:
+                    break
+                lower, upper = pushing(steps, now, law, n_coefficients, row, i)
+                if lower > 0.0:
+                    break
             last = row - 1
             for near in range(max(begin, peak_row - 1), min(last, peak_row + 1) + 1):
                 for look in range(looks + 1):
@@ -2371,17 +2418,6 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
                         peak = f
                         peak_row = near
                         peak_part = look / looks
-            end = steps[last, 0] + steps[last, 1]
-            final = row == n_steps
-            after = now[0, i] if final else steps[row, first]
-            following = now[0, i] if begin + 1 == n_steps else steps[begin + 1, first]
-            if steps[begin, first] < 0.0 and following > 0.0:
-                v1 = now[4, i] if begin + 1 == n_steps else steps[begin + 1, first + 1]
-                start += hermite_root(steps[begin, first], steps[begin, first + 1], following, v1, steps[begin, 1])
-            if steps[last, first] > 0.0 and after < 0.0:
-                v1 = now[4, i] if final else steps[row, first + 1]
-                end = steps[last, 0]
-                end += hermite_root(steps[last, first], steps[last, first + 1], after, v1, steps[last, 1])
             if steps[begin, first] == 0.0:
                 while begin > 0 and steps[begin - 1, first] == 0.0 and abs(steps[begin - 1, first + 1]) <= touch:
                     begin -= 1

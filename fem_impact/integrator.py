@@ -28,7 +28,8 @@ DOUBLINGS = 7  # [-] how often the step is halved before the run gives up
 # [-] Difference of two runs over the error of the finer one: for speeds and impulse, and for what hangs on one instant,
 # contact time and peak force, where modes faster than the step keep scheme A4 from its order.
 RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 2.0), "collocation": (1.0, 1.0), "secular": (1.0, 1.0)}
-LOSSY = 0.25  # [-] the second of them where a contact loses energy: its force jumps when it begins, and peaks early
+LOSSY = (3.0, 0.5)  # [-] at most, where a contact loses energy: it lets go within a step, which leaves second order
+RESOLVED = 2.0  # [rad] of those modes' motion in the longer of two steps
 COLLOCATION_BELOW = 1e-7  # [-] tolerance from which collocation needs less work than A4
 BAND_POINTS = 257  # [-] frequencies at which two spectra are compared
 NODES = 5  # [-] of collocation; more gain nothing where onset and release limit the smoothness
@@ -437,12 +438,13 @@ def _controlled(
 
     Returns the history, its estimated error, the scheme, and the coarser history with its size.
     """
+    free = scheme is None and dt is None
     scheme = scheme or _scheme_for(tolerance, float(system.law[:, 1].min()))
     if scheme == "collocation" and (system.law[:, 1] < 1.0).any():
         raise ValueError(f"scheme collocation needs exponents of at least 1, got {system.law[:, 1].min():g}; take A4")
     over = RICHARDSON[scheme]
     if (system.law[:, 2] > 0.0).any():
-        over = over[0], LOSSY
+        over = min(over[0], LOSSY[0]), min(over[1], LOSSY[1])
     shortest = pace[0]
     if scheme == "secular":
         _check_secular(system)
@@ -455,7 +457,8 @@ def _controlled(
     if scheme == "collocation":
         sizes = [max(1e-15, tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)]
     else:
-        sizes = [shortest / _first_count(scheme, tolerance) * 2.0 ** (1 - n) for n in range(DOUBLINGS + 1)]
+        first = min(2.0 * shortest / _first_count(scheme, tolerance), _longest_lossy(system, pace, tolerance))
+        sizes = [first * 0.5**n for n in range(DOUBLINGS + 1)]
     coarse = _run(system, scheme, sizes[0], pace, horizon, n_max)
     best = np.inf
     for before, size in pairwise(sizes):
@@ -465,10 +468,33 @@ def _controlled(
             return fine, estimate, scheme, coarse, before
         best = min(best, estimate)
         coarse = fine
+    if free and scheme == "A4" and (system.law[:, 1] >= 1.0).all():
+        return _controlled(system, "collocation", dt, tolerance, differ, pace, horizon, n_max)
     raise SimulationError(
         f"the step error stays at {best:.1e}, tolerance {tolerance:.1e}, with {len(fine.steps)} steps; after "
         f"{len(fine.contacts)} impacts the motion may be chaotic: raise tolerance, or give duration or max_impacts"
     )
+
+
+def _longest_lossy(system: _System, pace: tuple[float, float], tolerance: float) -> float:
+    """Longest step [s] that follows the modes whose ringing shows in a lossy contact's force; infinity without loss.
+
+    Such a force hangs on the rate of approach, in which a mode struck by a force rising like a spring's rings with the
+    share stiffness times u**2 / omega**2 of the approach's speed.
+    """
+    longest = np.inf
+    slow = system.omega <= np.pi / pace[0]
+    order = np.argsort(-system.omega, kind="stable")[: np.count_nonzero(system.omega)]  # fastest first
+    omega = system.omega[order]
+    for shape, loss in zip(system.shape, system.law[:, 2]):
+        number = loss * pace[1]
+        if number > 0.0 and len(omega):
+            stiffness = (1.0 + number) * (np.pi / pace[0]) ** 2 / max(float(shape[slow] @ shape[slow]), 1e-300)
+            ringing = number / (1.0 + number) * stiffness * np.cumsum((shape[order] / omega) ** 2)
+            heard = np.searchsorted(ringing, tolerance)
+            if heard < len(omega):
+                longest = min(longest, RESOLVED / float(omega[heard]))
+    return longest
 
 
 def _run(system: _System, scheme: str, size: float, pace: tuple[float, float], horizon: float, n_max: int) -> History:

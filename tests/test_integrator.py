@@ -496,3 +496,57 @@ def test_a_run_without_end_says_what_to_do():
     touches = [Touch(fi.Contact.linear(1e5), 0, 1, [0.0], [0.0])]
     with pytest.raises(fi.SimulationError, match="duration or max_impacts"):
         collide(bodies, touches, states=[(np.zeros(3), np.full(3, 0.1)), (np.zeros(3), np.zeros(3))])
+
+
+def lossy_blow(seed):
+    """A random blow of a mass on a plate through a contact that throws back 5 to 99 % of the speed, off a wall."""
+    rng = np.random.default_rng(seed)
+    length, width = rng.uniform(0.5, 2.0, 2)
+    plate = fi.analytic.rectangle(
+        length, width, mass=10 ** rng.uniform(-1.5, 1.0), first_frequency=10 ** rng.uniform(1.5, 2.7),
+        n_modes=int(rng.integers(5, 60)),
+    )  # fmt: skip
+    speed, exponent = 10 ** rng.uniform(-1.0, 1.0), rng.choice([1.0, 1.2, 1.5, 2.0, 2.5])
+    law = fi.Contact.restituting(
+        10 ** rng.uniform(4.0, 6.0) * 1e3 ** (exponent - 1.0),
+        exponent,
+        restitution=rng.uniform(0.05, 0.99),
+        speed=speed,
+    )
+    at = (length * rng.uniform(0.1, 0.9), width * rng.uniform(0.1, 0.9))
+    return plate, fi.Striker.rigid(10 ** rng.uniform(-3.0, -0.5)), law, {"at": at, "speed": speed, "residual": False}
+
+
+@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 60), marks=pytest.mark.slow)], ids=["few", "many"])
+def test_lossy_contacts_keep_their_promise(seeds):
+    for seed in seeds:
+        *blow, options = lossy_blow(seed)
+        tolerance = 10.0 ** -(2 + seed % 3)
+        hit = fi.strike(*blow, tolerance=tolerance, scheme="A4", **options)
+        truth = fi.strike(*blow, tolerance=1e-8, scheme="collocation", **options)
+        assert hit.n_impacts == truth.n_impacts
+        assert abs(hit.restitution - truth.restitution) <= tolerance
+        for name in ("impulse", "contact_time", "peak_force"):
+            assert_allclose(getattr(hit, name), getattr(truth, name), rtol=tolerance, err_msg=f"{name}, seed {seed}")
+
+
+@pytest.mark.parametrize("scheme", ["A4", "collocation"])
+def test_lossy_contact_lets_go_while_the_bodies_overlap(scheme):
+    """On a wall a mass leaves at e v with 1 + loss rate = 0 never reached; drawn away by a force, it is."""
+    law = fi.Contact.linear(1e4, loss=2.0)
+    mass, pull = 0.1, -60.0  # [kg], [N]
+    hit = collide(
+        [fi.Modes.rigid(mass)], [Touch(law, 0, None)], speeds=[1.0], forces=[pull], tolerance=1e-6, scheme=scheme
+    )
+
+    def rate(t, z):
+        return [z[1], (pull - max(0.0, 1e4 * max(z[0], 0.0) * (1.0 + 2.0 * z[1]))) / mass]
+
+    def let_go(t, z):
+        return 1.0 + 2.0 * z[1]
+
+    let_go.terminal = True
+    exact = solve_ivp(rate, (0.0, 1.0), [0.0, 1.0], method="DOP853", rtol=1e-12, atol=1e-15, events=let_go)
+    assert exact.y[0, -1] > 1e-5  # [m] still overlapping
+    assert hit.n_impacts == 1
+    assert_allclose(hit.contact_time, exact.t[-1], rtol=2e-6)  # the tolerance, and that of the event's search
