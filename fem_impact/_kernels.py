@@ -24,6 +24,7 @@ LOOK_LIMIT = 20_000_000  # [-] looks ahead times modes in one free flight before
 WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it
 SECULAR_MISFIT = 1e-12  # [-] of the peak force: what recorded polynomials may miss of the exact force
 LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
+LET_GO = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to this
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
 EVENT_LIMIT = 64  # [-] events without one full step between them: chatter, passed with unlocated steps
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = 0, 1, 2, 3, 4, 5  # why a run ended
@@ -1298,6 +1299,34 @@ def enclose(now, y, rate, h, target, bracket):
 
 
 @inner()
+def letting_go(loss, d0, v0, d1, v1, h):
+    """Fraction of a step at which the factor 1 + loss * rate changes its sign, by the cubic through both ends."""
+    start = 1.0 + loss * v0
+    b = 2.0 * loss * (3.0 * (d1 - d0) / h - 2.0 * v0 - v1)
+    a = loss * (v1 - v0) - b
+    root = np.sqrt(max(0.0, b * b - 4.0 * a * start))
+    side = 1.0 if v1 > v0 else -1.0
+    return -2.0 * start / (b + side * root) if side * b >= 0.0 else 0.5 * (side * root - b) / a
+
+
+@inner()
+def first_letting_go(now, law, y, rate, h):
+    """The closed contact that stops or begins to push first within a step, and when; -1 and h where none does."""
+    target = -1
+    at = h
+    for i in range(y.size):
+        loss = law[i, 2]
+        start = 1.0 + loss * now[4, i]
+        end = 1.0 + loss * rate[i]
+        if loss > 0.0 and now[0, i] > 0.0 and (end < -LET_GO < LET_GO < start or start < -LET_GO < LET_GO < end):
+            root = h * letting_go(loss, now[0, i], now[4, i], y[i], rate[i], h)
+            if 0.0 < root < at:
+                at = root
+                target = i
+    return target, at
+
+
+@inner()
 def settle(now, pressed, y, rate, target, depth, still):
     """Take over approaches and rates at a step's end; the number of contacts that opened."""
     opened = 0
@@ -1414,6 +1443,10 @@ def run_energy(
     stalled = False
     status = EXHAUSTED
     quiet = not any_of(bias)
+    lossy = False
+    for i in range(m):
+        if law[i, 2] > 0.0:
+            lossy = True
     begin(shape, offset, q, p, now, pressed)
     start_energy = total_energy(omega, bias, law, q, p, now)
     while n_steps < max_steps:
@@ -1491,6 +1524,32 @@ def run_energy(
             if not abs(y[target]) <= 1e-9 * bracket[2]:
                 target = -1
                 blind = True
+        letting, guess = -1, h
+        if lossy and not blind:
+            letting, guess = first_letting_go(now, law, y, rate, h)
+        if letting >= 0:
+            target = -1
+            slot = odd
+            bracket[0] = 0.0
+            bracket[1] = h
+            bracket[3] = h
+            bracket[4] = 1.0 + law[letting, 2] * rate[letting]
+            start = 1.0 + law[letting, 2] * now[4, letting]
+            for _ in range(LOCATE_LIMIT):
+                h = guess
+                lane_table(omega, zeta, h, WHOLE, tables[slot])
+                contact_sums(shape, tables[slot], h, all_sums[slot])
+                predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, end)
+                fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
+                miss = 1.0 + law[letting, 2] * rate[letting]
+                if abs(miss) <= 0.1 * LET_GO or bracket[1] - bracket[0] <= 1e-9 * bracket[1]:
+                    break
+                bracket[0 if miss * start > 0.0 else 1] = h
+                guess = h - miss * (h - bracket[3]) / (miss - bracket[4]) if miss != bracket[4] else 0.0
+                bracket[3] = h
+                bracket[4] = miss
+                if not bracket[0] < guess < bracket[1]:
+                    guess = 0.5 * (bracket[0] + bracket[1])
         total = 0.0
         for i in range(m):
             total += abs(y[i]) + abs(rate[i]) + f[i]
@@ -1507,7 +1566,7 @@ def run_energy(
         n_released += settle(now, pressed, y, rate, target, depth, still)
         if target >= 0:
             events += 1
-        elif level > 0:
+        elif level > 0 and letting < 0:
             level -= 1
         if m == 1 and slot == level and pressed[0] and time + h <= horizon:
             advance(shape, tables, slot, h, twice, offset, bias, f, s, q, p, free_q, free_p, end)
@@ -2354,11 +2413,7 @@ def pushing(steps, now, law, n_coefficients, row, i):
     if start <= 0.0 and end <= 0.0:
         return 0.0, 0.0
     if start < 0.0 or end < 0.0:
-        b = 2.0 * loss * (3.0 * (d1 - d0) / h - 2.0 * v0 - v1)
-        a = end - start - b
-        root = np.sqrt(max(0.0, b * b - 4.0 * a * start))
-        side = 1.0 if end > start else -1.0
-        at = -2.0 * start / (b + side * root) if side * b >= 0.0 else 0.5 * (side * root - b) / a
+        at = letting_go(loss, d0, v0, d1, v1, h)
         if start < 0.0:
             lower = max(lower, at)
         else:

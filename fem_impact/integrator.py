@@ -28,7 +28,7 @@ DOUBLINGS = 7  # [-] how often the step is halved before the run gives up
 # [-] Difference of two runs over the error of the finer one: for speeds and impulse, and for what hangs on one instant,
 # contact time and peak force, where modes faster than the step keep scheme A4 from its order.
 RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 2.0), "collocation": (1.0, 1.0), "secular": (1.0, 1.0)}
-LOSSY = (3.0, 0.5)  # [-] at most, where a contact loses energy: it lets go within a step, which leaves second order
+LOSSY = 0.5  # [-] the second of them where a contact loses energy: its peak hangs on the rates of fast modes
 RESOLVED = 2.0  # [rad] of those modes' motion in the longer of two steps
 COLLOCATION_BELOW = 1e-7  # [-] tolerance from which collocation needs less work than A4
 BAND_POINTS = 257  # [-] frequencies at which two spectra are compared
@@ -444,7 +444,7 @@ def _controlled(
         raise ValueError(f"scheme collocation needs exponents of at least 1, got {system.law[:, 1].min():g}; take A4")
     over = RICHARDSON[scheme]
     if (system.law[:, 2] > 0.0).any():
-        over = min(over[0], LOSSY[0]), min(over[1], LOSSY[1])
+        over = over[0], min(over[1], LOSSY)
     shortest = pace[0]
     if scheme == "secular":
         _check_secular(system)
