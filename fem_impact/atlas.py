@@ -262,9 +262,16 @@ def _unit(values: xarray.DataArray) -> str:
     return {"1": "", "kg": "g"}.get(unit, unit.replace(f"**{power}", f"$^{{{power}}}$") if power else unit)
 
 
+def can_write(form: str) -> str:
+    """The format of a map's file, if it can be written here; better known before the work than after it."""
+    if _check.one_of("format", form, FORMATS) == "zarr":
+        _check.extra("zarr", "cluster", "format zarr")
+    return form
+
+
 def write(folder: Path, table: xarray.Dataset, form: str = "nc") -> list[str]:
     """Write map.nc or map.zarr, map.csv and, where there are two axes, a picture of each layer; return the names."""
-    form = _check.one_of("format", form, FORMATS)
+    form = can_write(form)
     names = [f"map.{form}", "map.csv"]
     if form == "nc":
         table.to_netcdf(folder / names[0], engine="scipy")

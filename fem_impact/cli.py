@@ -347,6 +347,7 @@ def _plan(options: argparse.Namespace) -> None:
 
 def _map(options: argparse.Namespace) -> None:
     began = time.perf_counter()
+    fi.atlas.can_write(options.format)
     scene = fi.load_scene(options.scene)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:

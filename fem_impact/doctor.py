@@ -1,5 +1,6 @@
 """Is this installation sound? Small checks with a known answer, and a sentence of help for each that fails."""
 
+import importlib.util
 import tempfile
 import time
 from collections.abc import Callable
@@ -17,6 +18,14 @@ from .section import Material, Plate
 from .striker import Striker
 
 SQUARE = 2.0 * np.pi**2  # [-] omega of a hinged unit square of unit stiffness and mass
+
+EXTRAS = {  # what each is for, and the modules it needs
+    "cad": ("drawings", "svgelements", "ezdxf"),
+    "uff": ("universal files", "pyuff"),
+    "cluster": ("clusters and stores", "distributed", "zarr"),
+    "hdf5": ("meshes in HDF5", "h5py"),
+    "web": ("report and explore", "plotly", "bokeh", "jinja2"),
+}
 
 
 @dataclass(frozen=True)
@@ -38,6 +47,7 @@ def examine() -> list[Finding]:
         _tried("pictures", _picture, "install matplotlib again"),
         _tried("mode shapes as files", _vtk, "check that the folder for temporary files can be written to"),
         _tried("3-D rendering", pictures.can_render, pictures.REMEDY, vital=False),
+        *(_extra(name, purpose, modules) for name, (purpose, *modules) in EXTRAS.items()),
     ]
 
 
@@ -49,6 +59,13 @@ def _tried(name: str, check: Callable[[], bool], remedy: str, vital: bool = True
     except (ArithmeticError, ImportError, LookupError, OSError, RuntimeError, TypeError, ValueError) as error:
         works, reason = False, f" ({type(error).__name__}: {error})"
     return Finding(name, works, time.perf_counter() - start, "" if works else remedy + reason, vital)
+
+
+def _extra(name: str, purpose: str, modules: list[str]) -> Finding:
+    """Whether an optional extra is installed; nothing is loaded."""
+    missing = [module for module in modules if importlib.util.find_spec(module) is None]
+    remedy = f"pip install 'fem-impact[{name}]' ({', '.join(missing)})" if missing else ""
+    return Finding(purpose, not missing, 0.0, remedy, vital=False)
 
 
 def _finite_elements() -> bool:

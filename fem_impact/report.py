@@ -38,8 +38,10 @@ WEB = Path(__file__).parent / "web"
 def read(path: str | Path) -> Scene:
     """The scene of a TOML file, or of what `fem-impact strike` wrote: response.json or the folder that holds it.
 
-    File names in a result are taken as they stand, relative to where the strike was run.
+    File names in a result are taken as they stand, relative to where the strike was run. ValueError where the extra
+    ``web`` is not installed: better known before the work than after it.
     """
+    _tools()
     path = Path(path)
     if path.is_dir():
         path = path / "response.json"
@@ -52,6 +54,10 @@ def read(path: str | Path) -> Scene:
     if not isinstance(data, dict) or not isinstance(data.get("scene"), dict):
         raise fault(path, "not a result of `fem-impact strike`; give its response.json, or the scene's TOML file")
     return scene_of(data["scene"], path, folder=Path())
+
+
+def _tools() -> list[Any]:
+    return [_check.extra(module, "web", "a report") for module in ("jinja2", "plotly.offline")]
 
 
 def write(path: str | Path, scene: Scene, run: Run, *, command: str = "") -> None:
@@ -69,7 +75,7 @@ def write(path: str | Path, scene: Scene, run: Run, *, command: str = "") -> Non
     ValueError
         Where the extra ``web`` is not installed.
     """
-    jinja2, plotly = (_check.extra(module, "web", "a report") for module in ("jinja2", "plotly.offline"))
+    jinja2, plotly = _tools()
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(WEB), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
     )

@@ -15,11 +15,7 @@ DIRECTIONS = {"x": "r1", "y": "r2", "z": "r3"}
 
 
 def _pyuff() -> Any:
-    try:
-        import pyuff
-    except ImportError:
-        raise ValueError("universal files need pyuff: pip install 'fem-impact[uff]'") from None
-    return pyuff
+    return _check.extra("pyuff", "uff", "a universal file")
 
 
 def write(path: Any, frequencies, damping_ratio, shapes, points, cells) -> None:

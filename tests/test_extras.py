@@ -1,0 +1,80 @@
+"""Without the optional extras every core command works, and one that needs an extra names it."""
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from test_cli import TEXT
+
+from fem_impact import cli, doctor
+
+ROOT = Path(__file__).parents[1]
+MODULES = [module for _, *modules in doctor.EXTRAS.values() for module in modules]
+MAP = '[map.over]\n"striker.mass" = [0.02, 0.03]\n'
+
+
+@pytest.fixture
+def bare(monkeypatch):
+    """No extra can be imported."""
+    for module in [*MODULES, "plotly.offline", "bokeh.server.tornado"]:
+        monkeypatch.setitem(sys.modules, module, None)
+
+
+@pytest.fixture
+def scene(tmp_path):
+    (tmp_path / "small.toml").write_text(TEXT + MAP)
+    return str(tmp_path / "small.toml")
+
+
+def test_package_loads_without_any_extra():
+    modules = [path.stem for path in (ROOT / "fem_impact").glob("*.py") if path.stem not in ("__init__", "_apart")]
+    block = "".join(f"sys.modules[{module!r}] = None; " for module in [*MODULES, "dask"])
+    code = f"import sys; {block} import " + ", ".join(f"fem_impact.{module}" for module in sorted(modules))
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (run.returncode, run.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["strike", "SCENE", "--out", "OUT"],
+        ["modes", "SCENE", "--count", "2"],
+        ["plan", "SCENE"],
+        ["map", "SCENE", "--out", "OUT"],
+        ["hammer", "SCENE", "--bandwidth", "500", "--masses", "0.01"],
+        ["completion"],
+    ],
+)
+def test_core_commands_need_no_extra(bare, scene, tmp_path, words):
+    assert cli.main([{"SCENE": scene, "OUT": str(tmp_path / "out")}.get(word, word) for word in words]) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["report", "SCENE", "--out", "OUT/r.html"], "a report needs jinja2: pip install 'fem-impact[web]'"),
+        (["explore", "SCENE", "--no-open"], "exploring needs bokeh: pip install 'fem-impact[web]'"),
+        (
+            ["map", "SCENE", "--out", "OUT", "--format", "zarr"],
+            "format zarr needs zarr: pip install 'fem-impact[cluster]'",
+        ),
+        (["map", "SCENE", "--out", "OUT", "--store", "OUT/s"], "a store needs zarr: pip install 'fem-impact[cluster]'"),
+        (["map", "SCENE", "--out", "OUT", "--cluster", "tcp://127.0.0.1:1"], "pip install 'fem-impact[cluster]'"),
+    ],
+)
+def test_command_that_needs_an_extra_names_it(bare, scene, tmp_path, capsys, words, text):
+    words = [scene if word == "SCENE" else word.replace("OUT", str(tmp_path / "out")) for word in words]
+    assert cli.main(words) == 2
+    captured = capsys.readouterr()
+    assert text in captured.err and captured.err.count("\n") == 1 and captured.out == ""
+    assert not (tmp_path / "out").exists()
+
+
+def test_doctor_knows_the_extras_there_are(monkeypatch):
+    known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert set(doctor.EXTRAS) == set(known) - {"test", "peers"}  # peers are for one study
+    monkeypatch.setattr(doctor.importlib.util, "find_spec", lambda name: None)
+    finding = doctor._extra("web", "report and explore", ["plotly"])
+    assert not finding.works and not finding.vital and finding.remedy == "pip install 'fem-impact[web]' (plotly)"
