@@ -1,6 +1,6 @@
 """Strike anything thin with anything, and know how far to trust the answer."""
 
-from importlib import import_module, metadata
+from importlib import import_module
 from typing import Any
 
 # Public names and the module each lives in; loaded at first use, so that the command line answers at once.
@@ -43,7 +43,7 @@ def __getattr__(name: str) -> Any:
     if name in _MODULES:
         return import_module(f".{name}", __name__)
     if name == "__version__":
-        return metadata.version("fem-impact")
+        return import_module("importlib.metadata").version("fem-impact")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

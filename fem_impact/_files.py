@@ -4,11 +4,36 @@ import os
 import secrets
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 PARTIAL = ".partial-"  # prefix of every temporary name, so that what a killed run left behind can be told
+
+UNDONE: list[Callable[[], object]] = []  # how to take back what this process is at, the last one first
+FINISHING: list[Path] = []  # folders whose files are being moved in: too late to take back
+
+
+@contextmanager
+def undoable(undo: Callable[[], object]) -> Iterator[None]:
+    """While the block runs, `undo` is what takes it back when the process has to end at once."""
+    UNDONE.append(undo)
+    try:
+        yield
+    finally:
+        UNDONE.remove(undo)
+
+
+def undo_all() -> bool:
+    """Take back everything unfinished, from a signal handler; False where files are just appearing in their place.
+
+    Raising an exception there does not do: one raised in a finaliser or a callback of a library is swallowed.
+    """
+    if FINISHING:
+        return False
+    for undo in reversed(UNDONE):
+        undo()
+    return True
 
 
 @contextmanager
@@ -18,11 +43,12 @@ def replacing(path: str | Path) -> Iterator[Path]:
     if path.is_dir():
         raise IsADirectoryError(21, "Is a directory", str(path))
     temporary = path.with_name(f"{PARTIAL}{secrets.token_hex(4)}-{path.name}")
-    try:
-        yield temporary
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with undoable(lambda: temporary.unlink(missing_ok=True)):
+        try:
+            yield temporary
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -34,19 +60,34 @@ def staged(folder: str | Path) -> Iterator[Path]:
     """
     folder = Path(folder)
     new = [path for path in (folder, *folder.parents) if not path.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        staging = Path(tempfile.mkdtemp(prefix=PARTIAL, dir=folder))
-        try:
-            yield staging
-            _move(staging, folder)
-        finally:
-            shutil.rmtree(staging, ignore_errors=True)
-    except BaseException:  # Ctrl-C too must leave nothing behind; it is raised again
+    staging = folder / f"{PARTIAL}{secrets.token_hex(4)}"
+
+    def undo() -> None:
+        shutil.rmtree(staging, ignore_errors=True)
         for path in new:
             if path.is_dir() and not any(path.iterdir()):
                 path.rmdir()
-        raise
+
+    with undoable(undo):
+        try:
+            staging.mkdir(parents=True)
+            yield staging
+            FINISHING.append(folder)
+            try:
+                _move(staging, folder)
+            finally:
+                FINISHING.remove(folder)
+            shutil.rmtree(staging, ignore_errors=True)
+        except BaseException:  # Ctrl-C too must leave nothing behind; it is raised again
+            undo()
+            raise
+
+
+@contextmanager
+def scratch() -> Iterator[Path]:
+    """Yield a temporary folder; it goes away with the block."""
+    with tempfile.TemporaryDirectory() as name, undoable(lambda: shutil.rmtree(name, ignore_errors=True)):
+        yield Path(name)
 
 
 def _move(staging: Path, folder: Path) -> None:

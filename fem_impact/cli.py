@@ -9,7 +9,6 @@ import os
 import re
 import shutil
 import signal
-import subprocess
 import sys
 import textwrap
 import threading
@@ -33,6 +32,8 @@ from rich.progress import (
 
 import fem_impact as fi
 
+from ._files import undo_all, undoable
+
 BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses
 WIDEST = 88  # [-] columns of text at most; a narrow terminal has fewer
 MOTION_TIMES = 100  # [-] instants in motion.pvd
@@ -47,7 +48,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     plain = _prepare(os.environ, once=options.run in (_strike, _modes, _report))
     try:
-        with _interruptible():
+        with _interruptible(options):
             options.run(options)
             print(end="", flush=True)
     except ValueError as error:
@@ -64,8 +65,8 @@ def main(arguments: list[str] | None = None) -> int:
         if not isinstance(error, fi.SimulationError):
             raise
         if plain:  # too much for plain Python, perhaps: once more, compiled
-            again = [sys.executable, "-m", "fem_impact.cli", *(sys.argv[1:] if arguments is None else arguments)]
-            return subprocess.run(again, env={**os.environ, "NUMBA_DISABLE_JIT": "0"}, check=False).returncode
+            again = [sys.executable, "-m", "fem_impact", *(sys.argv[1:] if arguments is None else arguments)]
+            os.execve(sys.executable, again, {**os.environ, "NUMBA_DISABLE_JIT": "0"})
         return _complain(error, FAILED)
     except KeyboardInterrupt:
         return _complain(f"interrupted; {_kept(options)}", INTERRUPTED)
@@ -73,20 +74,24 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 @contextmanager
-def _interruptible() -> Iterator[None]:
-    """Let the first Ctrl-C or SIGTERM end the block in good order, and no second one disturb that."""
+def _interruptible(options: argparse.Namespace) -> Iterator[None]:
+    """End the process on Ctrl-C or SIGTERM, with what is unfinished taken back."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
-    def interrupt(number: int, _: Any) -> None:
+    def end(number: int, _: Any) -> None:
         for each in before:
             signal.signal(each, signal.SIG_IGN)
-        if number == signal.SIGTERM:
-            sys.exit(128 + number)
-        raise KeyboardInterrupt
+        if options.run is _explore and number == signal.SIGINT:
+            os._exit(0)  # that is how one ends it
+        if undo_all():
+            word = "interrupted" if number == signal.SIGINT else "terminated"
+            with suppress(OSError):
+                os.write(2, f"fem-impact: {word}; {_kept(options)}\n".encode())
+            os._exit(128 + number)
 
-    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
@@ -410,8 +415,7 @@ def _explore(options: argparse.Namespace) -> None:
         if not options.no_open:
             webbrowser.open(address)
 
-    with suppress(KeyboardInterrupt):
-        fi.explore.serve(scene, port=options.port, ready=ready)
+    fi.explore.serve(scene, port=options.port, ready=ready)
 
 
 def _modes(options: argparse.Namespace) -> None:
@@ -479,6 +483,11 @@ def _wrapped(text: str) -> str:
     return "\n".join(line for wrapped in lines for line in wrapped)
 
 
+def _show_cursor() -> None:
+    """Undo what a running display does to the terminal."""
+    os.write(2, b"\r\x1b[2K\x1b[?25h")
+
+
 @contextmanager
 def _progress(stage: str) -> Iterator[None]:
     """Show on a terminal that a stage is at work, and for how long."""
@@ -487,7 +496,7 @@ def _progress(stage: str) -> Iterator[None]:
         yield
         return
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
+    with undoable(_show_cursor), Progress(*columns, console=console, transient=True) as progress:
         progress.add_task(stage, total=None)
         yield
 
@@ -503,7 +512,7 @@ def _counted(what: str) -> Iterator[Any]:
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
         TextColumn("{task.fields[rate]}"), TimeRemainingColumn(),
     )  # fmt: skip
-    with Progress(*columns, console=console, transient=True) as progress:
+    with undoable(_show_cursor), Progress(*columns, console=console, transient=True) as progress:
         task, began = progress.add_task(what, total=None, rate=""), time.perf_counter()
         known: list[int] = []
 

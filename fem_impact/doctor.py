@@ -1,15 +1,14 @@
 """Is this installation sound? Small checks with a known answer, and a sentence of help for each that fails."""
 
 import importlib.util
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from . import export, figures, mesh, pictures
+from ._files import scratch
 from .assembly import assemble
 from .contact import Contact
 from .integrator import strike
@@ -80,14 +79,14 @@ def _kernels() -> bool:
 
 
 def _picture() -> bool:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "picture.png"
+    with scratch() as folder:
+        path = folder / "picture.png"
         hit = strike(Modes.rigid(1.0), Striker.rigid(1.0), Contact.linear(1e5), at=None, speed=1.0)
         figures.save(path, figures.force(hit))
         return path.stat().st_size > 1000
 
 
 def _vtk() -> bool:
-    with tempfile.TemporaryDirectory() as folder:
-        export.write_vtk(Path(folder) / "rigid.vtu", Modes.rigid(1.0))
-        return bool(list(Path(folder).iterdir()))
+    with scratch() as folder:
+        export.write_vtk(folder / "rigid.vtu", Modes.rigid(1.0))
+        return bool(list(folder.iterdir()))

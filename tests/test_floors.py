@@ -33,6 +33,7 @@ FLOORS = [
     {"bench"},
     {"explore"},
     {"cli"},
+    {"__main__"},
 ]
 FLOOR = {name: level for level, names in enumerate(FLOORS) for name in names}
 OWNERS = {"numba": {"_kernels", "_batch"}, "skfem": {"elements"}, "matplotlib": {"figures", "charts"}}
