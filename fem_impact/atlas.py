@@ -20,6 +20,7 @@ from .tables import MAKERS, Part
 FIRST_LOOK = 40  # [-] modes found first, from which those a map needs are estimated
 MOST_MODES = 300  # [-] a hammer is chosen on at most so many; the residual compliance stands for the rest
 FORMATS = ("nc", "zarr")
+MOST_ROWS = 10**6  # [-] of a CSV file
 PICTURED = {  # layers drawn where there are two axes, and what they are called there
     "n_impacts": "number of impacts",
     "contact_time": "time in contact",
@@ -51,7 +52,7 @@ def map_scene(
     tolerance : float [-], optional
         Instead of the scene's.
     **wanted
-        ``workers``, ``client``, ``store`` and ``watch`` of `sweep`.
+        ``workers``, ``client``, ``store``, ``watch``, ``max_cells`` and ``tell`` of `sweep`.
 
     Returns
     -------
@@ -73,14 +74,20 @@ def map_scene(
         _check_key(scene, name)
     if not quick:
         quick = {"strike.speed": [scene.blow.values["speed"]]}
+    law = scene.make_contact()
+    maps.admit(
+        math.prod(len(values) for values in over.values()), len(maps.LAYERS), wanted.pop("max_cells", maps.MOST_CELLS),
+        quick=law.loss == 0.0 and law.exponent >= 1.0 and not {"loss", "contact.loss"} & set(over),
+        tell=wanted.pop("tell", None),
+    )  # fmt: skip
     pieces = []
+    store = wanted.pop("store", None)
     for number, chosen in enumerate(product(*slow.values())):
         changed = scene
         for name, value in zip(slow, chosen):
             changed = changed_scene(changed, name, value)
-        if slow and wanted.get("store") is not None:
-            wanted = {**wanted, "store": Path(wanted["store"]).parent / f"{Path(wanted['store']).name}-{number}"}
-        pieces.append(_quick_map(changed, quick, band, limit, wanted))
+        own = store if store is None or not slow else Path(store).with_name(f"{Path(store).name}-{number}")
+        pieces.append(_quick_map(changed, quick, band, limit, {**wanted, "store": own, "max_cells": math.inf}))
     result = _joined(pieces, slow)
     result.attrs["scene"] = json.dumps(
         {**scene.data(), "map": {name: list(map(_plain, v)) for name, v in over.items()}}
@@ -270,14 +277,19 @@ def can_write(form: str) -> str:
 
 
 def write(folder: Path, table: xarray.Dataset, form: str = "nc") -> list[str]:
-    """Write map.nc or map.zarr, map.csv and, where there are two axes, a picture of each layer; return the names."""
+    """Write map.nc or map.zarr, map.csv and, where there are two axes, a picture of each layer; return the names.
+
+    A map of more than MOST_ROWS cells has no CSV file: it would be slow to write and of no use.
+    """
     form = can_write(form)
-    names = [f"map.{form}", "map.csv"]
+    names = [f"map.{form}"]
     if form == "nc":
         table.to_netcdf(folder / names[0], engine="scipy")
     else:
-        table.drop_vars("failure").to_zarr(folder / names[0])
-    table.to_dataframe().to_csv(folder / names[1])
+        table.to_zarr(folder / names[0], zarr_format=2)  # version 3 has no agreed form of texts yet
+    if table.n_impacts.size <= MOST_ROWS:
+        names.append("map.csv")
+        table.to_dataframe().to_csv(folder / "map.csv")
     if len(table.n_impacts.dims) == 2:
         for layer in PICTURED:
             if layer in table and bool((table.n_impacts >= 0).any()):

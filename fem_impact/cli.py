@@ -206,6 +206,7 @@ def _parser() -> argparse.ArgumentParser:
     chart.add_argument(
         "--store", metavar="DIR", type=Path, help="keep finished cells there; a killed run goes on from it"
     )
+    chart.add_argument("--max-cells", metavar="N", type=float, default=1e8, help="refuse larger maps (default: 1e8)")
 
     hammer = verbs.add_parser("hammer", help="choose a hammer: bandwidth without a double hit")
     hammer.set_defaults(run=_hammer)
@@ -359,7 +360,7 @@ def _map(options: argparse.Namespace) -> None:
         with _counted("cells") as watch:
             table = fi.atlas.map_scene(
                 scene, tolerance=options.tolerance, workers=options.workers, client=options.cluster,
-                store=options.store, watch=watch,
+                store=options.store, watch=watch, max_cells=options.max_cells, tell=_tell,
             )  # fmt: skip
         with _progress("files"):
             names = fi.atlas.write(staging, table, options.format)
@@ -369,6 +370,11 @@ def _map(options: argparse.Namespace) -> None:
     print(_wrapped(f"{table.n_impacts.size} blows over {axes}: {single} hit once, {failed} failed"))
     print(_wrapped(f"Time: {time.perf_counter() - began:.2f} s"))
     print(_wrapped(f"Files in {folder}{os.sep}: {', '.join(names)}"))
+
+
+def _tell(text: str) -> None:
+    """One sentence beside what the command prints."""
+    print(_wrapped(f"fem-impact: {text}"), file=sys.stderr, flush=True)
 
 
 def _hammer(options: argparse.Namespace) -> None:

@@ -60,7 +60,12 @@ LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
 }
 
 
+MOST_CELLS = 10**8  # [-] of a map unless asked for: half an hour to two of work, 8 GB
+SECONDS = {True: 1e-5, False: 2e-3}  # of a blow in kernel form or by itself: the slower plates of studies/map_speed.py
+NUMBER = 8  # [byte]
+COSTLY = 10.0, 2e9  # [s], [byte] from which a map says what it will cost
 Watch = Callable[[int, int], Any]
+Tell = Callable[[str], Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +114,11 @@ class Grid:
     @property
     def n_cases(self) -> int:
         return math.prod(self.shape)
+
+    @property
+    def lossy(self) -> bool:
+        """Whether any contact loses energy."""
+        return bool(self.base.contact.loss or "loss" in self.axes)
 
     @property
     def layers(self) -> list[str]:
@@ -161,8 +171,7 @@ class Grid:
     def without_speed(self) -> "Grid | None":
         """The grid with one speed, where all springs are linear and hence speed only scales forces."""
         exponents = self.axes.get("exponent", np.array([self.base.contact.exponent]))
-        lossy = self.base.contact.loss or "loss" in self.axes
-        if "speed" not in self.axes or (exponents != 1.0).any() or lossy or self.base.contact.gap or self.extra:
+        if "speed" not in self.axes or (exponents != 1.0).any() or self.lossy or self.base.contact.gap or self.extra:
             return None
         return replace(self, axes={**self.axes, "speed": self.axes["speed"][:1]})
 
@@ -189,6 +198,8 @@ def sweep(
     client: Any = None,
     store: Any = None,
     watch: Watch | None = None,
+    max_cells: float = MOST_CELLS,
+    tell: Tell | None = None,
 ) -> xarray.Dataset:
     """Strike once for every combination of parameters.
 
@@ -217,6 +228,10 @@ def sweep(
         write to it themselves, under the same path.
     watch : callable, optional
         Called now and then with the number of cells done and of all.
+    max_cells : float
+        A map of more is refused before it starts.
+    tell : callable, optional
+        Called before the start with one sentence, where the map will take more than 10 s or 2 GB.
 
     Returns
     -------
@@ -228,13 +243,14 @@ def sweep(
     Raises
     ------
     ValueError
-        Where an axis is unknown or a value cannot be.
+        Where an axis is unknown, a value cannot be, or the map is too large.
     """
     tolerance = _check.between("tolerance", tolerance, 1e-12, 1.0)
     base = Case(modes, striker, contact, modes.points("at", at)[0], _check.positive("speed", speed, "m/s"))
     band = None if max_frequency is None else _check.positive("max_frequency", max_frequency, "Hz")
     workers = None if workers is None else _check.count("workers", workers)
     grid = Grid(base, checked_axes(base, over), tolerance, residual, band, dict(layers or {}))
+    admit(grid.n_cases, len(grid.layers), max_cells, quick=not grid.extra and not grid.lossy, tell=tell)
     fewer = grid.without_speed()
     numbers, texts = _solve_all(fewer or grid, workers, client, store, watch)
     failures = np.full((fewer or grid).n_cases, "", dtype=f"<U{max(map(len, texts.values()), default=1)}")
@@ -242,6 +258,17 @@ def sweep(
     if fewer is not None:
         numbers, failures = _with_speed(grid, fewer, numbers, failures)
     return _dataset(grid, numbers, failures)
+
+
+def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, tell: Tell | None = None) -> None:
+    """Refuse a map of more cells than allowed; tell what a costly one will take."""
+    seconds = n_cells * SECONDS[quick] / (os.cpu_count() or 1)
+    memory = n_cells * NUMBER * (n_layers + 2.0)
+    cost = f"{n_cells:.3g} cells: some {seconds:.2g} s on this machine and {memory / 1e9:.2g} GB of memory"
+    if n_cells > max_cells:
+        raise ValueError(f"over asks for {cost}; give fewer values, or a max_cells of more than {max_cells:.3g}")
+    if tell is not None and (seconds > COSTLY[0] or memory > COSTLY[1]):
+        tell(cost)
 
 
 def _solve_all(

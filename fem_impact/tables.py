@@ -78,11 +78,14 @@ def _along(name: str, values: Any) -> np.ndarray:
         )
     low, high = _check.number(f"{name}.from", values["from"]), _check.number(f"{name}.to", values["to"])
     count = _check.count(f"{name}.count", values["count"])
+    if count > MOST_VALUES:
+        raise ValueError(f"{name}.count must be at most {MOST_VALUES} along one axis, got {count}")
     if _check.one_of(f"{name}.scale", values.get("scale", "linear"), ("linear", "log")) == "linear":
         return np.linspace(low, high, count)
     return np.geomspace(_check.positive(f"{name}.from", low), _check.positive(f"{name}.to", high), count)
 
 
+MOST_VALUES = 10**6  # [-] along one axis of a map
 SOURCES = ("fe", "analytic")
 # What makes each part of a scene: the keys of its table are the arguments of these functions, no list is kept twice.
 # A table whose first entry is not empty names its maker by that key.

@@ -9,7 +9,7 @@ import xarray
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact import atlas, cli, hammers
+from fem_impact import atlas, cli, hammers, maps
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
 OVER = {"contact.stiffness": [2e4, 1e5, 4e5], "striker.mass": [0.02, 0.1]}
@@ -62,6 +62,48 @@ def test_files_say_what_the_map_holds(table, tmp_path):
         assert read.attrs["scene"] == table.attrs["scene"]
     assert len((tmp_path / "map.csv").read_text().splitlines()) == 7
     assert (tmp_path / "restitution.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_zarr_keeps_why_a_cell_failed(table, tmp_path):
+    pytest.importorskip("zarr", reason="the cluster extra is not installed")
+    failed = table.copy(deep=True)
+    failed["failure"] = failed.failure.astype("<U40")
+    failed.failure[1, 0] = "the motion may be chaotic: é"
+    atlas.write(tmp_path, failed, "zarr")
+    with xarray.open_zarr(tmp_path / "map.zarr") as read:
+        assert read.failure.values.tolist() == [["", ""], ["the motion may be chaotic: é", ""], ["", ""]]
+        assert_allclose(read.contact_time, table.contact_time)
+
+
+def scene_of_size(folder, count):
+    text = (SCENES / "drumstick_map.toml").read_text().replace("count = 20", f"count = {count}")
+    (folder / "large.toml").write_text(text)
+    return str(folder / "large.toml")
+
+
+def test_too_large_a_map_is_refused_and_a_costly_one_says_so(tmp_path, capsys, scene):
+    assert cli.main(["map", scene_of_size(tmp_path, 10**6), "--out", str(tmp_path / "out")]) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "over asks for 1e+12 cells: some" in told
+    assert (
+        "7.2e+04 GB of memory; give fewer values, or a max_cells of more than 1e+08" in told
+    )  # seven layers and two more numbers of 8 byte
+    assert cli.main(["map", scene_of_size(tmp_path, 10**12), "--out", str(tmp_path / "out")]) == 2
+    assert "stiffness.count must be at most 1000000 along one axis" in " ".join(capsys.readouterr().err.split())
+    with pytest.raises(ValueError, match="over asks for 6 cells"):
+        atlas.map_scene(scene, over=OVER, max_cells=5)
+    said = []
+    maps.admit(10**8, 6, 1e9, tell=said.append)
+    maps.admit(10**4, 6, 1e9, tell=said.append)
+    assert len(said) == 1
+    assert "6.4 GB of memory" in said[0]
+
+
+def test_stores_of_an_axis_for_which_the_body_is_built_anew(scene, tmp_path):
+    pytest.importorskip("zarr", reason="the cluster extra is not installed")
+    over = {"mesh.width": [1.0, 0.9, 0.8], "striker.mass": [0.05, 0.1]}
+    atlas.map_scene(scene, over=over, store=tmp_path / "map")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["map-0", "map-1", "map-2"]
 
 
 def test_map_at_the_prompt(tmp_path, capsys):
