@@ -1,0 +1,276 @@
+"""What accuracy costs: error against time for every choice there is, and where the tolerance puts a scene among them.
+
+    python studies/frontier.py [--out studies/out]
+
+The scene is the source's hinged plate of 200 g struck by a rigid hammer of 33 g through a Hertz spring. Four pictures:
+mesh size and element (largest error of the first sixty frequencies), number of modes with and without the residual
+compliance, step and scheme, and the whole chain from mesh to response, where every combination of mesh, modes and steps
+is one dot and the tolerance, 1e-1 to 1e-8, walks along their edge. Prints the README's table, the ratio of the
+tolerance's cost to the cheapest combination found, and the constants by which a plan predicts seconds and memory.
+Errors are the largest of restitution (absolute), impulse, contact time and peak force (relative), against closed-form
+modes: 20 000 of them where modes are counted, as many as 1e-9 takes for the chain.
+"""
+
+import argparse
+import resource
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+import fem_impact as fi
+
+SCENE = """
+[mesh]
+shape = "rectangle"
+length = 1.55
+width = 1.0
+[target]
+mass = 0.2
+first_frequency = 100.0
+source = "{source}"
+[supports]
+boundary = "hinged"
+[striker]
+kind = "rigid"
+mass = 0.0333333333333333
+[contact]
+kind = "hertz"
+stiffness = 695e3
+[strike]
+at = [0.465, 0.3]
+speed = 1.0
+"""
+TOLERANCES = [10.0**-n for n in range(1, 9)]
+SIZES = (0.5, 0.35, 0.25, 0.18, 0.125, 0.09, 0.06)  # [m] of elements
+NUMBERS = (10, 20, 40, 80, 160, 320, 640, 1280)  # [-] modes
+STEPS = [2.0**-n for n in range(1, 11)]  # [-] of the contact time
+REPEATS = 3  # [-] runs of each setting; the fastest counts
+
+
+@dataclass(frozen=True)
+class Point:
+    """One setting: what it costs and how far it errs."""
+
+    name: str
+    seconds: float
+    error: float
+    detail: str = ""
+
+
+def difference(hit: fi.Response, other: fi.Response) -> float:
+    """What the tolerance speaks of; 1 where the impacts are counted differently."""
+    if hit.n_impacts != other.n_impacts:
+        return 1.0
+    relative = (abs(getattr(hit, x) / getattr(other, x) - 1.0) for x in ("impulse", "contact_time", "peak_force"))
+    return max(abs(hit.restitution - other.restitution), *relative)
+
+
+def timed(make: Callable[[], object], repeats: int = REPEATS) -> tuple[float, object]:
+    """Fewest seconds of some calls, and what the last returned."""
+    best = np.inf
+    for _ in range(repeats):
+        start = time.perf_counter()
+        made = make()
+        best = min(best, time.perf_counter() - start)
+    return best, made
+
+
+def scene(source: str, folder: Path) -> fi.Scene:
+    """The scene with closed-form or finite-element modes."""
+    path = folder / f"{source}.toml"
+    path.write_text(SCENE.format(source=source))
+    return fi.load_scene(path)
+
+
+def meshes() -> list[Point]:
+    """Error of the first sixty frequencies over element size, two elements."""
+    plate = fi.Plate(fi.Material(E=70e9, nu=0.3, rho=2700.0), 2e-3)
+    exact = fi.analytic.rectangle(1.55, 1.0, section=plate, n_modes=60).frequencies
+    points = []
+    for element, size in product(("argyris", "morley"), SIZES):
+        size = size if element == "argyris" else size / 4.0
+
+        def find(element=element, size=size):
+            body = fi.mesh.rectangle(1.55, 1.0, size=size)
+            return fi.find_modes(fi.assemble(body, plate, {"boundary": "hinged"}, element), n_modes=60)
+
+        try:
+            seconds, modes = timed(find)
+        except ValueError:  # fewer unknowns than modes
+            continue
+        error = float(np.abs(modes.frequencies / exact - 1.0).max())
+        points.append(Point(element, seconds, error, f"size {size:g} m"))
+    return points
+
+
+def blow(whole: fi.Scene) -> dict[str, object]:
+    """Arguments of `fi.strike` of the scene."""
+    return {"striker": whole.make_striker(), "contact": whole.make_contact(), "at": (0.465, 0.3), "speed": 1.0}
+
+
+def truncations(whole: fi.Scene, reference: fi.Response) -> list[Point]:
+    """Error over the number of closed-form modes, with and without the residual compliance."""
+    points = []
+    for residual, number in product((True, False), NUMBERS):
+        modes = reference.target.truncated(n_modes=number)
+        strike = lambda: fi.strike(modes, **blow(whole), residual=residual, tolerance=1e-7)  # noqa: B023, E731
+        seconds, hit = timed(strike)
+        name = "with residual compliance" if residual else "bare modes"
+        points.append(Point(name, seconds, difference(hit, reference), f"{number} modes"))
+    return points
+
+
+def steps(whole: fi.Scene, reference: fi.Response) -> list[Point]:
+    """Error over the step of each scheme, and over collocation's tolerance; the bare set, so that only steps err."""
+    modes, length = reference.target.truncated(n_modes=80), reference.contact_time
+    exact = fi.strike(modes, **blow(whole), tolerance=1e-12, scheme="collocation")
+    points = []
+    for scheme, step in product(("A", "A4"), STEPS):
+        strike = lambda: fi.strike(modes, **blow(whole), scheme=scheme, dt=step * length)  # noqa: B023, E731
+        seconds, hit = timed(strike)
+        points.append(Point(f"scheme {scheme}", seconds, difference(hit, exact), f"step {step:g} of the contact"))
+    for tolerance in TOLERANCES[2:]:
+        strike = lambda: fi.strike(modes, **blow(whole), scheme="collocation", tolerance=tolerance)  # noqa: B023, E731
+        seconds, hit = timed(strike)
+        points.append(Point("collocation", seconds, difference(hit, exact), f"tolerance {tolerance:g}"))
+    return points
+
+
+def combinations(whole: fi.Scene, reference: fi.Response) -> list[Point]:
+    """The whole chain with every combination of mesh, modes and steps."""
+    points = []
+    for size, number in product(SIZES, NUMBERS[:-1]):
+        start = time.perf_counter()
+        body = fi.mesh.rectangle(1.55, 1.0, size=size)
+        plate = fi.Plate(fi.Material(E=70e9, nu=0.3, rho=2700.0), 2e-3)
+        try:
+            modes = fi.find_modes(fi.assemble(body, plate, {"boundary": "hinged"}), n_modes=number)
+        except ValueError:
+            continue
+        modes = modes.scaled(mass=0.2, first_frequency=100.0)
+        modes.residual_compliance([(0.465, 0.3)])
+        found = time.perf_counter() - start
+        for step in STEPS[1:8:2]:
+            strike = lambda: fi.strike(modes, **blow(whole), dt=step * reference.contact_time)  # noqa: B023, E731
+            seconds, hit = timed(strike)
+            detail = f"size {size:g} m, {number} modes, step {step:g} of the contact"
+            points.append(Point("combination", found + seconds, difference(hit, reference), detail))
+    return points
+
+
+@dataclass(frozen=True)
+class Dial:
+    """What a tolerance chose and what that cost."""
+
+    tolerance: float
+    seconds: float
+    run: object
+    megabytes: float
+    error: float = np.nan
+
+
+def dials(whole: fi.Scene) -> list[Dial]:
+    """The chain as the tolerance chooses it, from the loosest on, so that the peak of memory is that of each."""
+    found = []
+    for tolerance in TOLERANCES:
+        repeats = REPEATS if tolerance > 1e-6 else 1
+        seconds, run = timed(lambda: whole.run(tolerance=tolerance, target="modal"), repeats)  # noqa: B023
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+        found.append(Dial(tolerance, seconds, run, peak))
+    return found
+
+
+def table(found: list[Dial]) -> str:
+    """The README's table."""
+    lines = ["| tolerance | seconds | unknowns | modes | steps | MB | true error |", "|---|---|---|---|---|---|---|"]
+    for d in found:
+        hit = d.run.response
+        unknowns, n_steps = hit.target.shapes.base.system.n_dofs, len(hit.history.steps)
+        sizes = f"{unknowns} | {hit.target.n_modes} | {n_steps} | {d.megabytes:.0f}"
+        lines.append(f"| {d.tolerance:.0e} | {d.seconds:.2f} | {sizes} | {d.error:.1e} |")
+    return "\n".join(lines)
+
+
+def cheapest(points: list[Point], found: list[Dial]) -> list[str]:
+    """Cost of the dial's choice over that of the cheapest combination as exact as asked."""
+    lines, ratios = [], []
+    for dial in found:
+        good = [point for point in points if point.error <= dial.tolerance]
+        if good:
+            best = min(good, key=lambda point: point.seconds)
+            ratios.append(dial.seconds / best.seconds)
+            lines.append(
+                f"  {dial.tolerance:.0e}: {dial.seconds:.3f} s, cheapest of {len(points)} combinations "
+                f"{best.seconds:.3f} s ({best.detail}), ratio {ratios[-1]:.2f}"
+            )
+    return [f"cost over the cheapest combination's: median {np.median(ratios):.2f}", *lines]
+
+
+def predictions(found: list[Dial]) -> list[str]:
+    """Seconds and megabytes predicted over measured."""
+    return [
+        f"  {d.tolerance:.0e}: predicted {d.run.plan.seconds:.2f} s and {d.run.plan.memory / 1e6:.0f} MB, "
+        f"took {d.seconds:.2f} s and {d.megabytes:.0f} MB"
+        for d in found
+    ]
+
+
+def draw(panels: dict[str, list[Point]], found: list[Dial], path: Path) -> None:
+    """Error over seconds, one picture for each choice and one for the whole."""
+    figure, axes = plt.subplots(2, 2, figsize=(11, 8), layout="constrained")
+    for axis, (title, points) in zip(axes.flat, panels.items()):
+        for name, marker in zip(dict.fromkeys(point.name for point in points), "osd^"):
+            mine = [point for point in points if point.name == name]
+            style = "." if name == "combination" else f"{marker}-"
+            shown = np.maximum([point.error for point in mine], 1e-14)
+            axis.loglog([point.seconds for point in mine], shown, style, ms=5, label=name, alpha=0.8)
+        axis.set(title=title, xlabel="seconds", ylabel="error")
+    last = axes.flat[-1]
+    last.loglog([d.seconds for d in found], [d.error for d in found], "k*-", ms=11, label="chosen by the tolerance")
+    for d in found:
+        last.annotate(f"{d.tolerance:.0e}", (d.seconds, d.error), textcoords="offset points", xytext=(6, 4), fontsize=8)
+    for axis in axes.flat:
+        axis.legend(frameon=False, fontsize=8)
+        axis.grid(alpha=0.3)
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+def main() -> None:
+    """Run the study at the prompt."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "out")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        exact, whole = scene("analytic", Path(folder)), scene("fe", Path(folder))
+        found = dials(whole)
+        everything = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20_000)
+        reference = fi.strike(everything, **blow(exact), tolerance=1e-9)
+        found = [replace(dial, error=difference(dial.run.response, reference)) for dial in found]
+        panels = {
+            "first 60 frequencies: mesh and element": meshes(),
+            "blow: number of modes": truncations(exact, reference),
+            "blow: step and scheme": steps(exact, reference),
+            "from mesh to response": combinations(whole, reference),
+        }
+    print(table(found))
+    print("\n".join(cheapest(list(panels.values())[-1], found)))
+    print("\n".join(["predicted and measured:", *predictions(found)]))
+    draw(panels, found, options.out / "frontier.png")
+    rows = [f'"{t}","{p.name}","{p.detail}",{p.seconds:.4e},{p.error:.4e}' for t, ps in panels.items() for p in ps]
+    rows += [f'"chosen","tolerance {d.tolerance:g}","",{d.seconds:.4e},{d.error:.4e}' for d in found]
+    (options.out / "frontier.csv").write_text("\n".join(["panel,name,detail,seconds,error", *rows]) + "\n")
+
+
+if __name__ == "__main__":
+    main()
