@@ -163,7 +163,7 @@ def write_json(path: str | Path, data: dict[str, Any]) -> None:
         temporary.write_text(json.dumps(plain(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
-ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "total", "resolvable")
+ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "sensitivity", "total", "resolvable")
 
 
 def numbers(response: Response) -> dict[str, Any]:

@@ -245,7 +245,8 @@ def _follow(bodies, contacts, parts, speed, options) -> Response:
         system, options.scheme, options.dt, options.tolerance, differ, pace, *last
     )
     truncation, resolvable = _truncation(parts, contacts, system, coarse, ran, size, differ, pace, *last)
-    error = Error(step_error, truncation, _mesh_error(bodies, history), resolvable)
+    mesh_error = _mesh_error(bodies, history)
+    error = Error(step_error, truncation, mesh_error, resolvable, sensitivity=_sensitivity(coarse, history))
     laws = tuple(touch.law for touch in contacts)
     dips = tuple(_dip(part, system) for part in parts)
     return Response(tuple(bodies), laws, history, speed, options.tolerance, ran, error, dips=dips)
@@ -466,13 +467,18 @@ def _controlled(
         estimate = differ(coarse, fine, over)
         if estimate <= tolerance:
             return fine, estimate, scheme, coarse, before
-        best = min(best, estimate)
+        best, last = min(best, estimate), (coarse, fine)
         coarse = fine
     if free and scheme == "A4" and (system.law[:, 1] >= 1.0).all():
         return _controlled(system, "collocation", dt, tolerance, differ, pace, horizon, n_max)
+    hint = ""
+    if len(fine.contacts) > 1:
+        hint = (
+            f"; differences grow {_sensitivity(*last):.1g}-fold over {len(fine.contacts)} impacts, and digits with them"
+        )
     raise SimulationError(
-        f"the step error stays at {best:.1e}, tolerance {tolerance:.1e}, with {len(fine.steps)} steps; after "
-        f"{len(fine.contacts)} impacts the motion may be chaotic: raise tolerance, or give duration or max_impacts"
+        f"the step error stays at {best:.1e}, tolerance {tolerance:.1e}, with {len(fine.steps)} steps{hint}; raise "
+        "tolerance, or give duration or max_impacts"
     )
 
 
@@ -593,6 +599,17 @@ def _difference(
 
 def _force_spectrum(history: History, frequencies: np.ndarray) -> np.ndarray:
     return Response((), (), history, 1.0, 1.0, "", Error(0.0, 0.0, 0.0)).spectrum(frequencies)
+
+
+def _sensitivity(coarse: History, fine: History) -> float:
+    """How much the difference of two runs grows from the end of the first impact to that of the last [-]."""
+    one, two = (np.sort(history.contacts[:, 1]) for history in (coarse, fine))
+    if len(one) != len(two):
+        return float("inf")
+    if len(two) < 2:
+        return 1.0
+    least = ROUNDING * two[-1]
+    return max(1.0, float((abs(one[-1] - two[-1]) + least) / (abs(one[0] - two[0]) + least)))
 
 
 def _truncation(parts, contacts, system: _System, whole: History, scheme, size, differ, pace, horizon, n_max):

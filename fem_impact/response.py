@@ -11,6 +11,7 @@ from .contact import Contact
 from .modal import Modes
 from .striker import Striker
 
+CHAOTIC = 1e3  # [-] growth of small differences from which a blow is called chaotic
 TOUCH = 1e-12  # [-] of the fastest approach: bodies that touch and hardly move press from the first push on
 LEAST_SAMPLES = 800.0  # [-] of an impact: its spectrum is right to 1e-3 up to thirty lobes
 PEAK_LOOKS = 16  # [-] looks per step for the peak force before a parabola refines it: (pi/11/16)**2/8 of it at worst
@@ -42,6 +43,7 @@ class Error:
     mesh: float  # [-] of the finite elements
     resolvable: bool = True  # False: the modes left out are the contact's own dynamics; no estimate holds
     idealisation: float = 0.0  # [-] of holding the target for rigid or infinite
+    sensitivity: float = 1.0  # [-] growth of a small difference from the first impact to the last
 
     @property
     def total(self) -> float:
@@ -534,6 +536,11 @@ class Response:
             f"estimated error {error.total:.1e} (step {error.step:.1e}, truncation {error.truncation:.1e}, "
             f"mesh {error.mesh:.1e}, idealisation {error.idealisation:.1e}); energy kept to {self.energy_error:.1e}",
         ]
+        if error.sensitivity > CHAOTIC:
+            lines.append(
+                f"chaotic: small differences grow {error.sensitivity:.0e}-fold from the first impact to the last; "
+                "trust counts and averages, not digits"
+            )
         if not error.resolvable:
             lines.append("not resolvable: the modes left out matter to this contact; keep more modes")
         return "\n".join(lines)

@@ -154,10 +154,8 @@ def draw(found: list[Outcome], path: Path) -> None:
             values = [o.value for o in found if o.axis == outcome.axis]
             x.append(values.index(outcome.value) / max(1, len(values) - 1))
         axis.plot(x, [rows.index(o.axis) for o in mine], "s", color=colour, ms=7, label=f"{kind} ({len(mine)})")
-    labels = [
-        f"{row}  {min(o.value for o in found if o.axis == row):.0e} ... {max(o.value for o in found if o.axis == row):.0e}"
-        for row in rows
-    ]
+    ends = [[o.value for o in found if o.axis == row] for row in rows]
+    labels = [f"{row}  {min(values):.0e} ... {max(values):.0e}" for row, values in zip(rows, ends)]
     axis.set(yticks=range(len(rows)), yticklabels=labels, xticks=[], xlabel="from the smallest to the largest value")
     axis.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=4)
     figure.savefig(path, dpi=120)
