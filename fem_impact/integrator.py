@@ -24,6 +24,8 @@ MAX_STEPS = 500_000  # [-] of one run, some seconds
 PLAIN_WORK = 300_000  # [-] modes times steps of one run where the kernels are not compiled, likewise
 FIRST_STEPS = 24.0  # [-] steps per contact at which A4 errs by less than FIRST_ERROR; of 12 to 32 the least work in all
 FIRST_ERROR = 1e-4  # [-]
+AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that hang on no single instant
+AVERAGED = 0.5  # [-] of the steps that they need
 DOUBLINGS = 7  # [-] how often the step is halved before the run gives up
 # [-] Difference of two runs over the error of the finer one: for speeds and impulse, and for what hangs on one instant,
 # contact time and peak force, where modes faster than the step keep scheme A4 from its order.
@@ -242,7 +244,7 @@ def _follow(bodies, contacts, parts, speed, options) -> Response:
     last = options.horizon, options.n_max
     differ = partial(_difference, options.quantities)
     history, step_error, ran, coarse, size = _controlled(
-        system, options.scheme, options.dt, options.tolerance, differ, pace, *last
+        system, options.scheme, options.dt, options.tolerance, options.quantities, pace, *last
     )
     truncation, resolvable = _truncation(parts, contacts, system, coarse, ran, size, differ, pace, *last)
     mesh_error = _mesh_error(bodies, history)
@@ -417,28 +419,35 @@ def _scheme_for(tolerance: float, exponent: float) -> str:
     return "collocation" if tolerance < COLLOCATION_BELOW and exponent >= 1.0 else "A4"
 
 
-def _first_count(scheme: str, tolerance: float) -> float:
+def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float | None]) -> float:
     """Steps per contact to begin with."""
-    return max(6.0, FIRST_STEPS * (FIRST_ERROR / tolerance) ** (0.5 if scheme == "A" else 0.25))
+    count = FIRST_STEPS * (FIRST_ERROR / tolerance) ** (0.5 if scheme == "A" else 0.25)
+    return max(6.0, count * (AVERAGED if set(quantities) <= AVERAGES else 1.0))
 
 
 def steps_for(
-    contact: Contact, duration: float, tolerance: float, scheme: str | None = None, dt: float | None = None
+    contact: Contact,
+    duration: float,
+    tolerance: float,
+    quantities: Mapping[str, float | None],
+    scheme: str | None = None,
+    dt: float | None = None,
 ) -> tuple[str, float]:
     """Scheme and first step [s] that `strike` takes for a contact of a duration [s] on a rigid wall."""
     scheme = scheme or _scheme_for(tolerance, contact.exponent)
     if scheme in ("A", "A4"):
-        return scheme, dt or duration / _first_count(scheme, tolerance)
+        return scheme, dt or duration / _first_count(scheme, tolerance, quantities)
     return scheme, dt or duration / (2.0 if scheme == "collocation" else 1.0)
 
 
 def _controlled(
-    system, scheme, dt, tolerance, differ, pace, horizon, n_max
+    system, scheme, dt, tolerance, quantities, pace, horizon, n_max
 ) -> tuple[History, float, str, History, float]:
     """Run so that the tolerance is met, judged by a second, finer run.
 
     Returns the history, its estimated error, the scheme, and the coarser history with its size.
     """
+    differ = partial(_difference, quantities)
     free = scheme is None and dt is None
     scheme = scheme or _scheme_for(tolerance, float(system.law[:, 1].min()))
     if scheme == "collocation" and (system.law[:, 1] < 1.0).any():
@@ -458,7 +467,9 @@ def _controlled(
     if scheme == "collocation":
         sizes = [max(1e-15, tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)]
     else:
-        first = min(2.0 * shortest / _first_count(scheme, tolerance), _longest_lossy(system, pace, tolerance))
+        first = min(
+            2.0 * shortest / _first_count(scheme, tolerance, quantities), _longest_lossy(system, pace, tolerance)
+        )
         sizes = [first * 0.5**n for n in range(DOUBLINGS + 1)]
     coarse = _run(system, scheme, sizes[0], pace, horizon, n_max)
     best = np.inf
@@ -470,7 +481,7 @@ def _controlled(
         best, last = min(best, estimate), (coarse, fine)
         coarse = fine
     if free and scheme == "A4" and (system.law[:, 1] >= 1.0).all():
-        return _controlled(system, "collocation", dt, tolerance, differ, pace, horizon, n_max)
+        return _controlled(system, "collocation", dt, tolerance, quantities, pace, horizon, n_max)
     hint = ""
     if len(fine.contacts) > 1:
         hint = (
@@ -634,9 +645,9 @@ def _truncation(parts, contacts, system: _System, whole: History, scheme, size, 
     thin = [_thinned(part) for part in parts]
     least = min(ratio for _, ratio in thin)  # of the body that loses least
     if not 1.0 < least < np.inf:
-        return expected, resolvable
+        return float(expected), resolvable
     less = _run(_joined([part for part, _ in thin], contacts), scheme, size, pace, horizon, n_max)
-    return max(differ(less, whole) / (least**2 - 1.0), AT_LEAST * expected), resolvable
+    return max(differ(less, whole) / (least**2 - 1.0), AT_LEAST * float(expected)), resolvable
 
 
 def _mesh_error(bodies: tuple[Modes, ...], history: History) -> float:

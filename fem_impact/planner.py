@@ -339,7 +339,7 @@ def _plan(scene: Any, changes: Mapping[str, Any], blow: _Blow, *, errors, reason
         stiff = "is held for rigid" if bending == 0 else f"keeps {bending} of its {whole} bending modes"
         reasons = (*reasons, f"the striker {stiff}")
     fixed = blow.values.get("scheme"), blow.values.get("dt")
-    scheme, dt = integrator.steps_for(blow.contact, blow.duration, SHARE * blow.tolerance, *fixed)
+    scheme, dt = integrator.steps_for(blow.contact, blow.duration, SHARE * blow.tolerance, blow.quantities, *fixed)
     until = "as told" if fixed[1] else f"halved until two runs agree to {SHARE * blow.tolerance:.1e}"
     lasts = blow.values.get("duration")
     end = "until the two have parted for good" if lasts is None else f"for {lasts:g} s"
