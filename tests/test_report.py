@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from conftest import Page
 from test_cli import TEXT
 
 import fem_impact as fi
@@ -33,6 +34,16 @@ def opened(page, visit):
         return shown
 
     return opened
+
+
+@pytest.fixture(scope="module")
+def desktop(page, chromium):
+    """The page on a desk, shared by tests that only look at it."""
+    shown = Page(chromium)
+    shown.tab.goto(page.as_uri())
+    shown.tab.wait_for_selector("html[data-ready]")
+    yield shown
+    shown.context.close()
 
 
 def download(text, name):
@@ -123,8 +134,8 @@ def test_small_numbers_have_powers(value, text):
     assert prose.power(value) == text
 
 
-def test_nothing_fails_and_nothing_is_asked_for(opened):
-    shown = opened()
+def test_nothing_fails_and_nothing_is_asked_for(desktop):
+    shown = desktop
     shown.tab.wait_for_timeout(300)
     assert shown.errors == []
     assert [url for url in shown.requests if not url.startswith(("data:", "blob:"))] == shown.requests[:1]
@@ -162,8 +173,8 @@ def test_view_turns_with_the_keyboard_and_plays_when_asked(opened):
     assert tab.locator("#wave-play").inner_text() == "Pause"
 
 
-def test_sounds_load(opened):
-    shown = opened()
+def test_sounds_load(desktop):
+    shown = desktop
     shown.until("[...document.querySelectorAll('audio')].every(a => a.readyState >= 1)")
     lengths = shown.tab.evaluate("[...document.querySelectorAll('audio')].map(a => a.duration)")
     assert len(lengths) >= 2 and all(0.4 < length < 4.0 for length in lengths)
@@ -186,8 +197,8 @@ def test_page_fits_a_phone(opened, scheme):
     )
 
 
-def test_keyboard_reaches_everything_and_shows_where_it_is(opened):
-    stops = opened().tabbed_to()
+def test_keyboard_reaches_everything_and_shows_where_it_is(desktop):
+    stops = desktop.tabbed_to()
     tags = [tag for tag, _, _ in stops]
     names = [name for _, name, _ in stops]
     for tag in ("A", "BUTTON", "INPUT", "SELECT", "AUDIO"):
@@ -198,8 +209,8 @@ def test_keyboard_reaches_everything_and_shows_where_it_is(opened):
     assert [stop for stop in stops if not stop[2]] == []
 
 
-def test_pictures_have_a_text_for_those_who_cannot_see_them(opened):
-    tab = opened().tab
+def test_pictures_have_a_text_for_those_who_cannot_see_them(desktop):
+    tab = desktop.tab
     pictures = "[...document.querySelectorAll('[role=img], audio, [role=application]')]"
     bare = "e => !e.getAttribute('aria-label') && !e.getAttribute('aria-labelledby')"
     assert tab.evaluate(f"{pictures}.length") > 5 and tab.evaluate(f"{pictures}.filter({bare}).length") == 0
