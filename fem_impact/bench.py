@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from . import accuracy, atlas, maps, threshold
+from . import accuracy, atlas, maps, planner, threshold
 from .contact import Contact
 from .integrator import strike
 from .mesh import Mesh
@@ -16,8 +16,8 @@ from .scene import Scene
 
 TOLERANCE = 1e-3  # [-] of the blows shown: finer than a picture
 MAP_TOLERANCE = 1e-2  # [-] of those on the map, which only counts impacts
-FIRST_LOOK = 40  # [-] modes found first, from which the number needed is estimated
-MOST_MODES = 200  # [-] at most; the residual compliance stands for the rest, and the error is shown
+FIRST_LOOK = 30  # [-] modes found first, from which the number needed is estimated
+MOST_MODES = 100  # [-] at most; the residual compliance stands for the rest, and the error is shown
 CELLS = {False: 24, True: 10}  # [-] of the map along an axis; contacts with loss are struck one by one
 SPANS = {"mass": 20.0, "stiffness": 1000.0, "speed": 10.0, "bending": 20.0}  # [-] a slider's end over the scene's value
 EXPONENTS = (1.0, 3.0)  # [-] from a linear spring to a felt-covered head
@@ -57,14 +57,17 @@ class Bench:
     @classmethod
     def of(cls, scene: Scene) -> "Bench":
         """The bench of a scene, with modes enough for the quickest blow on it where `MOST_MODES` reach."""
-        first = scene.modes(FIRST_LOOK)
+        plan = scene.plan(target="modal", n_modes=FIRST_LOOK)
+        first = planner.target(plan, planner.Stages())
         at = np.atleast_1d(np.asarray(scene.blow.values["at"], float))
         case = maps.Case(first, scene.make_striker(), scene.make_contact(), at, float(scene.blow.values["speed"]))
         bench = cls(scene, scene.body(), case)
-        start = bench.start
-        hard = replace(start, stiffness=SPANS["stiffness"] ** 0.5, mass=start.mass / SPANS["mass"] ** 0.5)
+        hard = replace(bench.start, stiffness=SPANS["stiffness"] ** 0.5, mass=bench.start.mass / SPANS["mass"] ** 0.5)
         needed = atlas.number_of_modes(first, atlas.needed_frequency(bench.case(hard), TOLERANCE))
-        return replace(bench, base=replace(case, modes=scene.modes(min(max(needed, FIRST_LOOK), MOST_MODES))))
+        if needed <= first.n_modes:
+            return bench
+        more = planner.target(plan.but(n_modes=min(needed, MOST_MODES)), planner.Stages())
+        return replace(bench, base=replace(case, modes=more))
 
     @cached_property
     def start(self) -> Settings:

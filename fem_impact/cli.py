@@ -421,7 +421,7 @@ def _explore(options: argparse.Namespace) -> None:
         if not options.no_open:
             webbrowser.open(address)
 
-    fi.explore.serve(scene, port=options.port, ready=ready)
+    fi.explore.serve(scene, port=options.port, ready=ready, watch=_progress)
 
 
 def _modes(options: argparse.Namespace) -> None:

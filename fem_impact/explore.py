@@ -6,6 +6,7 @@ import math
 import socket
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -17,6 +18,7 @@ from ._check import SimulationError
 from .bench import Bench, Picture, Settings, blow, limit_of, resonance_of, spectrum
 from .contact import Contact
 from .maps import Case
+from .planner import Watch
 from .prose import RAISED, place, power, si
 from .response import Response
 from .scene import Scene
@@ -62,7 +64,9 @@ TICKS = """
 """
 
 
-def serve(scene: Scene, *, port: int = 0, ready: Callable[[str], None] | None = None) -> None:
+def serve(
+    scene: Scene, *, port: int = 0, ready: Callable[[str], None] | None = None, watch: Watch | None = None
+) -> None:
     """Serve the page until interrupted.
 
     Parameters
@@ -71,6 +75,8 @@ def serve(scene: Scene, *, port: int = 0, ready: Callable[[str], None] | None = 
     port : int, 0 for any that is free
     ready : callable, optional
         Called with the address once the page can be opened.
+    watch : callable, optional
+        Called with the name of the stage before that; returns a context manager that is held while the stage lasts.
 
     Raises
     ------
@@ -87,8 +93,9 @@ def serve(scene: Scene, *, port: int = 0, ready: Callable[[str], None] | None = 
         raise ValueError(f"port must lie between 0 and 65535, got {port}")
     for name in ("tornado.access", "bokeh.server.views.ws"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # who was refused is no news for the terminal
-    bench = Bench.of(scene)
-    blow(bench.case(bench.start))  # compiles the kernels before anyone waits for them
+    with (watch or nullcontext)("modes"):
+        bench = Bench.of(scene)
+        blow(bench.case(bench.start))  # compiles the kernels before anyone waits for them
     server, address = _server(bench, port)
     server.start()
     if ready is not None:

@@ -48,6 +48,8 @@ def words(scene: Scene, response: Response) -> list[str]:
     low, high = (f(modes.shapes.grid()[0], axis=0) for f in (np.min, np.max))
     extent = " × ".join(si(x, "m") for x in high - low)
     kind = {1: "beam", 2: "plate"}[modes.dimension]
+    if scene.mesh.kind == "disk":
+        kind, extent = "disk", f"{si(2.0 * scene.mesh.values['radius'], 'm')} diameter"
     flexible = modes.frequencies[modes.omega > 0.0]
     held = dict(scene.supports.values) or {"boundary": "free"}
     if len(set(held.values())) == 1 and ("boundary" in held or len(held) == len(scene.body().edges) - 1):

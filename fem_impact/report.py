@@ -21,7 +21,8 @@ from .response import Response
 from .scene import Run, Scene, load_scene, scene_of
 from .tables import fault, read_bytes
 
-BAND = (10.0, 20e3)  # [Hz] of the spectrum shown: about what is heard
+BAND = (10.0, 20e3)  # [Hz] of the spectrum shown: about what is heard, or more where the blow is shorter
+LOBES = 3.0  # [-] the spectrum reaches at least so many times the reciprocal of the shortest impact
 SPECTRUM_POINTS = 1000  # [-] one for each pixel
 ENERGY_TIMES = 400  # [-] instants of the energies
 FRAMES = 72  # [-] of the wave: three seconds at 24 a second
@@ -88,6 +89,7 @@ def write(path: str | Path, scene: Scene, run: Run, *, command: str = "") -> Non
         title=scene.title or scene.path.stem,
         words=words(scene, response),
         picture=scene.picture(),
+        observed=scene.observe is not None,
         verdict=response.outcome,
         tiles=_tiles(response),
         error=_errors(response),
@@ -221,7 +223,7 @@ def audio(samples: np.ndarray, rate: int) -> str:
 
 def _downloads(scene: Scene, run: Run) -> list[dict[str, str]]:
     response = run.response
-    frequencies = np.geomspace(*BAND, SPECTRUM_POINTS)
+    frequencies = _frequencies(response)
     spectrum = response.spectrum(frequencies)
     changes = {"tolerance": response.tolerance}
     data = {**export.numbers(response), "scene": scene.data(**changes), "seconds": dict(run.seconds)}
@@ -266,16 +268,16 @@ def _plots(response: Response) -> dict[str, Any]:
     modes = response.target
     end = AFTER * (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
     shown = response.time <= end
-    frequencies = np.geomspace(*BAND, SPECTRUM_POINTS)
+    frequencies = _frequencies(response)
     times = np.linspace(0.0, end, ENERGY_TIMES)
     energy = [_energy(response, times, body) for body in (0, -1)]
-    moving = (modes.omega > 0.0) & (modes.frequencies < 2.0 * BAND[1])
+    moving = (modes.omega > 0.0) & (modes.frequencies < 2.0 * frequencies[-1])
     last = response.impacts[-1].end if response.impacts else 0.0
     return {
         "force": {"x": _short(response.time[shown]), "y": _short(response.force[shown])},
         "impacts": [[impact.start, impact.end] for impact in response.impacts],
         "spectrum": {"x": _short(frequencies), "y": _short(np.abs(response.spectrum(frequencies)))},
-        "natural": _short(modes.frequencies[(modes.omega > 0.0) & (modes.frequencies < BAND[1])]),
+        "natural": _short(modes.frequencies[(modes.omega > 0.0) & (modes.frequencies < frequencies[-1])]),
         "energy": {
             "x": _short(times),
             "striker": _short(energy[0].sum(axis=1)),
@@ -288,6 +290,11 @@ def _plots(response: Response) -> dict[str, Any]:
         },
         "view": _view(response, end),
     }
+
+
+def _frequencies(response: Response) -> np.ndarray:
+    shortest = min((impact.duration for impact in response.impacts), default=1.0)
+    return np.geomspace(BAND[0], max(BAND[1], LOBES / shortest), SPECTRUM_POINTS)
 
 
 def _energy(response: Response, times: np.ndarray, body: int) -> np.ndarray:

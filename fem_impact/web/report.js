@@ -130,7 +130,7 @@
   // The tip rests on the surface while it presses, and hovers at its distance when it does not.
   const striker = () => ({
     type: "scatter3d", mode: "markers", x: [view.at[0]], y: [view.at[1]],
-    z: [Math.min(0.1 * largest - view.surface[instant] + view.gap[instant], 1.75 * largest)],
+    z: [Math.min(0.17 * largest - view.surface[instant] + view.gap[instant], 1.75 * largest)],
     marker: { size: 8, color: colour("strike") }, hovertemplate: "striker<extra></extra>",
   });
   const atRest = () => ({
