@@ -70,7 +70,8 @@ def staged(folder: str | Path) -> Iterator[Path]:
 
     with undoable(undo):
         try:
-            staging.mkdir(parents=True)
+            folder.mkdir(parents=True, exist_ok=True)
+            staging.mkdir()
             yield staging
             FINISHING.append(folder)
             try:

@@ -1,6 +1,7 @@
 """The same verbs at the prompt: parses, calls, prints; no physics."""
 
 import argparse
+import atexit
 import difflib
 import io
 import json
@@ -10,6 +11,7 @@ import re
 import shutil
 import signal
 import sys
+import tempfile
 import textwrap
 import threading
 import time
@@ -124,9 +126,11 @@ def _prepare(environment: MutableMapping[str, str], once: bool) -> bool:
         # The dense algebra is small: on two busy cores two threads took 18 s where one took 4 s.
         environment.setdefault(name, "1")
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # a font or cache folder it does without is no news here
+    package = Path(str(fi.__file__)).parent
+    if "numba" not in sys.modules:
+        _find_cache(environment, package)
     if not once or "numba" in sys.modules or "NUMBA_DISABLE_JIT" in environment:
         return False
-    package = Path(str(fi.__file__)).parent
     source = (package / "_kernels.py").stat().st_mtime
     compiled = (package / "__pycache__").glob("_kernels.run_energy-*.nbi")
     if any(file.stat().st_mtime >= source for file in compiled):
@@ -134,6 +138,19 @@ def _prepare(environment: MutableMapping[str, str], once: bool) -> bool:
     # A single strike takes some 0.3 to 1 s in plain Python, compiling it 15 to 30 s: `doctor` does that once.
     environment["NUMBA_DISABLE_JIT"] = "1"
     return True
+
+
+def _find_cache(environment: MutableMapping[str, str], package: Path) -> None:
+    """Give numba a folder of this run alone where it may write in none of its own: it refuses to work without one."""
+    given = environment.get("NUMBA_CACHE_DIR")
+    home = environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    for place in [given] if given else [str(package / "__pycache__"), home]:
+        with suppress(OSError):
+            os.makedirs(place, exist_ok=True)
+            tempfile.TemporaryFile(dir=place).close()
+            return
+    environment["NUMBA_CACHE_DIR"] = folder = tempfile.mkdtemp(prefix="fem-impact-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
 
 
 def _complain(error: object, status: int) -> int:

@@ -1,0 +1,162 @@
+"""Harsh surroundings: full disks, closed streams, no home, no fonts, no extras give a sentence, never a trace."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import fem_impact
+
+ROOT = str(Path(fem_impact.__file__).parents[1])
+SCENE = """
+[mesh]
+shape = "rectangle"
+length = 0.465
+width = 0.3
+[target]
+mass = 0.2
+first_frequency = 100.0
+source = "analytic"
+[supports]
+boundary = "hinged"
+[striker]
+kind = "rigid"
+mass = 0.03
+[contact]
+kind = "linear"
+stiffness = 1e4
+[strike]
+at = [0.1395, 0.09]
+speed = 2.0
+tolerance = 1e-2
+[map]
+over = { "striker.mass" = [0.03, 0.05] }
+"""
+# Hides optional libraries from this interpreter and those it starts.
+WITHOUT = """
+import importlib.machinery
+real = importlib.machinery.PathFinder.find_spec
+def find(cls, name, path=None, target=None):
+    return None if name.split(".")[0] in {hidden} else real(name, path, target)
+importlib.machinery.PathFinder.find_spec = classmethod(find)
+"""
+HIDDEN = {"svgelements", "ezdxf", "pyuff", "h5py", "dask", "distributed", "zarr", "plotly", "bokeh", "jinja2"}
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="shells, limits and devices of POSIX")
+
+
+def run(folder, command, path=(), **environment):
+    (folder / "scene.toml").write_text(SCENE)
+    search = os.pathsep.join([*map(str, path), ROOT])
+    whole = {**os.environ, "PYTHONPATH": search, "FEM": f"{sys.executable} -m fem_impact", **environment}
+    whole = {name: value for name, value in whole.items() if value is not None}
+    done = subprocess.run(["bash", "-c", command], cwd=folder, env=whole, capture_output=True, text=True, timeout=120)
+    assert "Traceback" not in done.stderr and "Error" not in done.stderr, done.stderr
+    return done
+
+
+@pytest.mark.parametrize(
+    ("command", "status", "said"),
+    [
+        ("$FEM modes scene.toml > /dev/full", 1, "fem-impact: No space left on device\n"),
+        ("$FEM modes scene.toml >&-", 0, ""),
+        ("$FEM modes scene.toml <&-", 0, ""),
+        ("$FEM modes none.toml 2>&-", 2, ""),
+        ("$FEM modes scene.toml --vtk /dev/null/x.pvd", 1, "fem-impact: /dev/null: File exists\n"),
+        ("mkdir gone; cd gone; rmdir ../gone; $FEM strike ../scene.toml", 2, None),
+    ],
+)
+def test_streams_and_places_that_fail_are_a_sentence(tmp_path, command, status, said):
+    done = run(tmp_path, command)
+    assert done.returncode == status or (said is None and done.returncode in (1, 2))
+    if said is None:
+        assert done.stderr.startswith("fem-impact: ") and done.stderr.count("\n") == 1
+    else:
+        assert done.stderr == said
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
+
+
+def test_text_that_a_terminal_cannot_show_is_escaped(tmp_path):
+    poor = {"LANG": "C", "LC_ALL": "C", "PYTHONIOENCODING": "ascii", "COLUMNS": "20", "TERM": "dumb", "NO_COLOR": "1"}
+    (tmp_path / "title.toml").write_text('title = "Plaque frappée ☃"\n' + SCENE, encoding="utf-8")
+    done = run(tmp_path, "$FEM modes title.toml", **poor)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "frapp\\xe9e" in done.stdout and "\x1b" not in done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("limit", [1, 8, 64])  # blocks of 512 or 1024 bytes a file may have
+def test_disk_that_is_full_half_way_leaves_nothing(tmp_path, limit):
+    done = run(tmp_path, f"ulimit -f {limit}; $FEM strike scene.toml --out out")
+    assert done.returncode in (0, 1)
+    if done.returncode:
+        assert done.stderr == "fem-impact: File too large\n"
+        assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "missing",
+    [
+        {"HOME": None, "XDG_CACHE_HOME": None, "DISPLAY": None},
+        {"HOME": "/dev/null", "MPLCONFIGDIR": "/dev/null/fonts", "NUMBA_CACHE_DIR": "/dev/null/cache"},
+    ],
+)
+def test_strike_needs_no_home_no_display_and_no_cache(tmp_path, missing):
+    done = run(tmp_path, "$FEM strike scene.toml --out out", **missing)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "out" / "force.png").stat().st_size > 1000
+
+
+@pytest.mark.slow  # compiles, as nothing can be kept
+def test_kernels_compile_where_no_cache_can_be_written(tmp_path):
+    script = "from fem_impact import cli; import os; cli._find_cache(os.environ, cli.Path('/dev/null')); "
+    script += "import fem_impact as fi; print(fi.Contact.linear(1.0)); from fem_impact import _kernels"
+    done = run(tmp_path, f'{sys.executable} -c "{script}"', HOME="/dev/null", NUMBA_CACHE_DIR="/dev/null/cache")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+CORE = ["strike scene.toml --out o", "modes scene.toml", "hammer scene.toml --bandwidth 300", "doctor", "completion"]
+CORE += ["map scene.toml --out m", "plan scene.toml"]
+EXTRA = [
+    ("report scene.toml --out r/r.html", "a report needs jinja2: pip install 'fem-impact[web]'"),
+    ("explore scene.toml --no-open", "exploring needs bokeh: pip install 'fem-impact[web]'"),
+    ("map scene.toml --out m --format zarr", "format zarr needs zarr: pip install 'fem-impact[cluster]'"),
+    ("map scene.toml --out m --store s", "a store needs zarr: pip install 'fem-impact[cluster]'"),
+    ("map scene.toml --out m --cluster tcp://x:1", "client needs distributed: pip install 'fem-impact[cluster]'"),
+    ("modes svg.toml", "this needs svgelements: pip install 'fem-impact[cad]'"),
+    ("modes med.toml", "this needs h5py: pip install 'fem-impact[hdf5]'"),
+]
+
+
+@pytest.fixture
+def without(tmp_path):
+    """A folder that hides optional libraries from the interpreters that find it on their path."""
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "sitecustomize.py").write_text(WITHOUT.format(hidden=HIDDEN))
+    return [tmp_path / "site"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", CORE)
+def test_core_commands_work_without_extras(tmp_path, without, words):
+    done = run(tmp_path, f"$FEM {words}", without)
+    assert (done.returncode, done.stderr) == (0, "")
+    if words == "doctor":
+        assert "pip install 'fem-impact[cad]'" in " ".join(done.stdout.split())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("words", "remedy"), EXTRA)
+def test_commands_that_need_an_extra_name_it(tmp_path, without, words, remedy):
+    free = SCENE.replace('source = "analytic"', "")
+    for name, shape in (("svg", 'shape = "outline"\nsource = "a.svg"'), ("med", 'shape = "file"\npath = "a.med"')):
+        text = free.replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', shape)
+        (tmp_path / f"{name}.toml").write_text(text)
+    (tmp_path / "a.svg").write_text("<svg/>")
+    (tmp_path / "a.med").write_bytes(b"\x89HDF\r\n\x1a\n")
+    done = run(tmp_path, f"$FEM {words}", without)
+    assert done.returncode == 2 and remedy in done.stderr and done.stderr.count("\n") == 1
+    assert not {"r", "m", "s", "out"} & {path.name for path in tmp_path.iterdir()}
