@@ -31,7 +31,7 @@ _HOME = {
 _MODULES = (
     "mesh", "analytic", "spectra", "threshold", "accuracy", "export", "figures", "charts", "sound", "section",
     "contact", "doctor", "maps", "plans", "planner", "atlas", "hammers", "report",
-    "explore", "pictures",
+    "explore", "pictures", "drawing",
 )  # fmt: skip
 
 __all__ = [*_HOME, *_MODULES, "__version__"]

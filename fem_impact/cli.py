@@ -328,7 +328,7 @@ def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> d
         extra["sound"] = {"at": scene.points[0], "full_scale": heard.full_scale, "peak_level": heard.peak_level}
         files += ["modes.pvd", "strike.wav"]
         if options.vtk:
-            end = fi.pictures.end_of(response)
+            end = fi.drawing.end_of(response)
             times = [end * i / (MOTION_TIMES - 1) for i in range(MOTION_TIMES)]
             fi.export.write_vtk(folder / "motion.pvd", response.target, response, times)
             files.append("motion.pvd")

@@ -7,6 +7,7 @@ from .response import Response
 
 ENOUGH = 2500  # [-] points on a plate: each mode of the first hundred then has some points per half wave
 RIBBON = 0.06  # [-] width over length of the ribbon a beam is drawn as
+AFTER = 1.35  # [-] a blow is followed so far beyond its last contact
 HALVINGS = 5  # [-] at most: each makes four triangles of one
 
 
@@ -51,6 +52,11 @@ def gap(response: Response, times: np.ndarray) -> np.ndarray:
         raise ValueError("response must be that of a strike, which has a striker, not of bodies that collide")
     tip = response.displacement(striker.at[None] if striker.modes.dimension else None, times, body=0)
     return np.maximum(response.displacement(response.at[None], times) - tip, 0.0)[:, 0]
+
+
+def end_of(response: Response) -> float:
+    """How long a blow is worth watching [s]."""
+    return AFTER * (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
 
 
 def _halved(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -29,7 +29,6 @@ SIZE = (720, 480)  # [px] of a frame
 TILE = (320, 250)  # [px] of one mode shape
 FRAMES = 48  # [-] of an animation: four seconds
 RATE = 12  # [1/s] frames
-AFTER = 1.35  # [-] the wave is followed so far beyond the last contact
 HEIGHT = 0.12  # [-] largest deflection drawn over the body's extent
 LIFT = 0.0015  # [-] of lines above the surface over their extent
 BALL = 0.03  # [-] radius of the striker as drawn, likewise
@@ -124,7 +123,7 @@ def animation(path: str | Path, response: Response, *, frames: int = FRAMES) -> 
         As in `wave`.
     """
     _ending(path, ".gif")
-    times = np.linspace(0.0, end_of(response), _check.count("frames", frames, low=2))
+    times = np.linspace(0.0, drawing.end_of(response), _check.count("frames", frames, low=2))
     pictures = list(_frames(response, times))
     colours = _mosaic(pictures[:: max(1, len(pictures) // 8)]).quantize(255)  # one palette, so that nothing flickers
     first, *rest = (picture.quantize(palette=colours, dither=Image.Dither.NONE) for picture in pictures)
@@ -140,11 +139,6 @@ def _mosaic(pictures: list[Image.Image]) -> Image.Image:
     return mosaic
 
 
-def end_of(response: Response) -> float:
-    """How long a blow is worth watching [s]."""
-    return AFTER * (response.impacts[-1].end if response.impacts else float(response.time[-1]))
-
-
 def _ending(path: str | Path, ending: str) -> None:
     _check.one_of("path ending", Path(path).suffix.lower(), (ending,))
 
@@ -156,7 +150,7 @@ def _frames(response: Response, times: np.ndarray) -> Iterator[Image.Image]:
     points, cells, plane = drawing.surface(modes)
     rows = modes.shapes.at(points)
     motion = response.modal_state(times)[0] @ rows.T  # (n_times, n_points)
-    whole = response.modal_state(np.linspace(0.0, end_of(response), FRAMES))[0] @ rows.T
+    whole = response.modal_state(np.linspace(0.0, drawing.end_of(response), FRAMES))[0] @ rows.T
     largest = float(max(np.abs(motion).max(), np.abs(whole).max())) or 1.0
     gap = drawing.gap(response, times)
     for deflection, distance, time in zip(motion, gap, times):

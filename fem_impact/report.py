@@ -27,7 +27,6 @@ SPECTRUM_POINTS = 1000  # [-] one for each pixel
 ENERGY_TIMES = 400  # [-] instants of the energies
 FRAMES = 72  # [-] of the wave: three seconds at 24 a second
 SHAPES = 12  # [-] modes shown
-AFTER = 1.35  # [-] the wave and the energies are followed so far beyond the last contact
 DIGITS = 6  # [-] of the numbers in the plots; the downloads keep all
 QUIET = -20.0  # [dB] re full scale: a sound below is offered a second time, raised
 DISTANCE = 1.0  # [m] from the plate at which its radiated sound is heard
@@ -61,20 +60,19 @@ def _tools() -> list[Any]:
     return [_check.extra(module, "web", "a report") for module in ("jinja2", "plotly.offline")]
 
 
-def write(path: str | Path, scene: Scene, run: Run, *, command: str = "") -> None:
+def write(path: str | Path, scene: Scene, run: Run) -> None:
     """Write the page of a strike.
 
     Parameters
     ----------
     path : path of the HTML file
     scene : Scene
-    run : Run, what `Scene.run` returned
-    command : str, what reproduces the result; by default the strike of the scene at the prompt
+    run : Run, what `Scene.run` returned with ``target="modal"``: the page shows the body's motion
 
     Raises
     ------
     ValueError
-        Where the extra ``web`` is not installed.
+        Where the extra ``web`` is not installed, or the body was struck without its modes.
     """
     jinja2, plotly = _tools()
     environment = jinja2.Environment(
@@ -82,9 +80,7 @@ def write(path: str | Path, scene: Scene, run: Run, *, command: str = "") -> Non
     )
     response = run.response
     if run.plan.target != "modal":
-        raise ValueError(
-            f"a report shows the body's motion: run the scene with target='modal', not {run.plan.target!r}"
-        )
+        raise ValueError(f"run must have target 'modal' for a report, which shows motion, got {run.plan.target!r}")
     page = environment.get_template("report.html").render(
         title=scene.title or scene.path.stem,
         words=words(scene, response),
@@ -100,7 +96,7 @@ def write(path: str | Path, scene: Scene, run: Run, *, command: str = "") -> Non
         sounds=_sounds(scene, response),
         files=_downloads(scene, run),
         versions=export.versions(),
-        command=command or f"fem-impact strike {shlex.quote(str(scene.path))} --tolerance {response.tolerance:g}",
+        command=_command(scene, response),
         force_picture=_force_picture(response),
         data=_script_text(_plots(response)),
         plotly=plotly.get_plotlyjs(),
@@ -111,6 +107,14 @@ def write(path: str | Path, scene: Scene, run: Run, *, command: str = "") -> Non
     )
     with replacing(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def _command(scene: Scene, response: Response) -> str:
+    """What reproduces the blow: of a result, the report itself."""
+    path = shlex.quote(str(scene.path))
+    if scene.path.suffix.lower() == ".json":
+        return f"fem-impact report {path}"
+    return f"fem-impact strike {path} --target modal --tolerance {response.tolerance:g}"
 
 
 def _tiles(response: Response) -> list[tuple[str, str]]:
@@ -141,7 +145,6 @@ def _errors(response: Response) -> dict[str, Any]:
         ],
         "total": error.total,
         "tolerance": response.tolerance,
-        "limit": response.tolerance / scale,
         "met": error.total <= response.tolerance,
         "resolvable": error.resolvable,
         "energy": response.energy_error,
@@ -160,17 +163,20 @@ def _modelled(response: Response, run: Run) -> list[tuple[str, str]]:
 def _shares(response: Response) -> list[dict[str, Any]]:
     energies = response.energies
     total = sum(max(value, 0.0) for value in energies.values()) or 1.0
-    names = {"striker": "striker", "target": "struck body", "contact": "contact", "dissipated": "dissipated"}
     return [
-        {"name": names.get(name, name), "key": name, "joule": value, "part": max(value, 0.0) / total}
+        {
+            "name": "struck body" if name == "target" else name,
+            "key": name,
+            "joule": value,
+            "part": max(value, 0.0) / total,
+        }
         for name, value in energies.items()
     ]
 
 
 def _force_picture(response: Response) -> str:
     said = f"Contact force over time: {response.n_impacts} impacts, peak {si(response.peak_force, 'N')}"
-    end = AFTER * (response.impacts[-1].end if response.impacts else float(response.time[-1]))
-    shown = response.time <= end
+    shown = response.time <= drawing.end_of(response)
     return svg.curve(response.time[shown], response.force[shown], label="force", unit="N", title=said)
 
 
@@ -266,7 +272,7 @@ def _script_text(data: Mapping[str, Any]) -> str:
 def _plots(response: Response) -> dict[str, Any]:
     """What the page's script draws: histories, spectrum, energies, and the shapes as packed integers."""
     modes = response.target
-    end = AFTER * (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
+    end = drawing.end_of(response)
     shown = response.time <= end
     frequencies = _frequencies(response)
     times = np.linspace(0.0, end, ENERGY_TIMES)

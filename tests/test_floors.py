@@ -31,6 +31,7 @@ FLOORS = [
     {"hammers"},
     {"atlas"},
     {"bench"},
+    {"desk"},
     {"explore"},
     {"cli"},
     {"__main__"},
