@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _check, _kernels, svg
+from . import _batch, _check, _kernels, svg
 from .contact import Contact
 from .modal import Modes
 from .striker import Striker
@@ -287,12 +287,8 @@ class Response:
         Exact for the sampled force taken as straight between its samples.
         """
         omega = 2.0 * np.pi * _check.array("frequencies", np.atleast_1d(frequencies), (None,), "Hz")
-        time, force = self._samples
         total = np.zeros(len(omega), complex)
-        force = force.sum(axis=1)
-        keep = (force[1:] != 0.0) | (force[:-1] != 0.0)
-        h, t = np.diff(time)[keep], time[:-1][keep]
-        f0, f1 = force[:-1][keep], force[1:][keep]
+        t, h, f0, f1 = self._pieces()
         for block in np.array_split(np.arange(len(omega)), max(1, len(omega) * len(h) // 2**20)):
             x = omega[block, None] * h  # (n_block, n_pieces)
             small = np.abs(x) < 1e-2
@@ -306,6 +302,13 @@ class Response:
             total[block] = (start * h * (f0 * mean + (f1 - f0) * ramp)).sum(axis=1)
         return total
 
+    def _pieces(self) -> tuple[np.ndarray, ...]:
+        """Start [s], length [s], first and last force [N] of all straight pieces but those of no force."""
+        time, force = self._samples
+        force = force.sum(axis=1)
+        keep = (force[1:] != 0.0) | (force[:-1] != 0.0)
+        return time[:-1][keep], np.diff(time)[keep], force[:-1][keep], force[1:][keep]
+
     def spectral_centroid(self, max_frequency: float) -> float:
         """Mean frequency [Hz] of the force spectrum's magnitude from zero to ``max_frequency`` [Hz]."""
         limit = _check.positive("max_frequency", max_frequency, "Hz")
@@ -313,7 +316,13 @@ class Response:
         if span == 0.0:
             raise ValueError("spectral_centroid needs a contact; nothing touched")
         frequencies = np.linspace(0.0, limit, int(np.clip(32.0 * limit * span, 512, 65536)))
-        size = np.abs(self.spectrum(frequencies))
+        if _kernels.COMPILED:
+            spectrum = np.zeros(len(frequencies), complex)
+            pieces: Any = self._pieces()
+            _batch.straight_spectrum(2.0 * np.pi * frequencies[1], *pieces, spectrum)
+        else:
+            spectrum = self.spectrum(frequencies)
+        size = np.abs(spectrum)
         return float(np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies))
 
     def body_slice(self, body: int) -> slice:
