@@ -318,8 +318,8 @@ class Response:
         frequencies = np.linspace(0.0, limit, int(np.clip(32.0 * limit * span, 512, 65536)))
         if _kernels.COMPILED:
             spectrum = np.zeros(len(frequencies), complex)
-            pieces: Any = self._pieces()
-            _batch.straight_spectrum(2.0 * np.pi * frequencies[1], *pieces, spectrum)
+            t, h, f0, f1 = self._pieces()
+            _batch.straight_spectrum(2.0 * np.pi * frequencies[1], t, h, f0, f1, spectrum)
         else:
             spectrum = self.spectrum(frequencies)
         size = np.abs(spectrum)
