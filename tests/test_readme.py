@@ -17,7 +17,7 @@ def blocks(language):
 
 
 def test_python_example_runs_and_writes_its_files(tmp_path, monkeypatch, capsys):
-    (example,) = blocks("python")
+    example = blocks("python")[0]
     monkeypatch.chdir(tmp_path)
     names = {}
     exec(compile(example, "README.md", "exec"), names)
@@ -26,6 +26,14 @@ def test_python_example_runs_and_writes_its_files(tmp_path, monkeypatch, capsys)
     assert names["hit"].n_impacts >= 1
     assert f"{names['hit'].n_impacts}" in capsys.readouterr().out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["force.png", "strike.wav"]
+
+
+def test_python_example_of_a_plan_runs(monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    exec(compile(blocks("python")[1], "README.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert "Plan for restitution to 0.001" in printed
+    assert 0.2 < float(printed.splitlines()[-1]) < 0.4  # 0.314 on modes enough for 1e-4; fifty err by a few per cent
 
 
 def test_first_two_commands_are_single_lines_that_install_then_run_and_test():
