@@ -289,10 +289,15 @@ def _strike(options: argparse.Namespace) -> None:
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:
         needs = {"target": "modal"} if options.pictures or options.vtk else {}  # motion is that of modes
-        run = scene.run(_progress, before=_warn, verify=options.verify, **{**needs, **_choices(options)})
+        keep = folder.with_name(
+            f"{folder.name}.modes.npz"
+        )  # beside the folder, which a broken-off run leaves as it was
+        choices = {**needs, **_choices(options)}
+        run = scene.run(_progress, before=_warn, verify=options.verify, keep=keep, **choices)
         start = time.perf_counter()
         with _progress("files"):
             data = _write(staging, scene, run, options)
+    keep.unlink(missing_ok=True)
     seconds = {**run.seconds, "files": time.perf_counter() - start, "total": time.perf_counter() - began}
     if options.json:
         print(json.dumps(data, indent=2, allow_nan=False))
@@ -314,7 +319,8 @@ def _strike(options: argparse.Namespace) -> None:
 def _warn(plan: Any) -> None:
     """Say beforehand what would surprise."""
     if plan.costly:
-        print(_wrapped(f"fem-impact: {plan.cost}; Ctrl-C stops it, `fem-impact plan` says why"), file=sys.stderr)
+        text = f"{plan.cost}; Ctrl-C stops it, and the same command goes on from the modes it had found"
+        print(_wrapped(f"fem-impact: {text} (`fem-impact plan` says why)"), file=sys.stderr)
 
 
 def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -410,6 +411,7 @@ def find_modes(
     damping_ratio: Damping = 0.0,
     tolerance: float | None = None,
     bounds: bool = False,
+    keep: str | Path | None = None,
 ) -> Modes:
     """The lowest modes of a body, none missed; rigid motions first, with frequency exactly zero.
 
@@ -426,6 +428,9 @@ def find_modes(
     bounds : bool
         Whether to enclose each frequency between guaranteed bounds (`Modes.bounds`): isotropic plates of constant
         thickness with straight edges. Rounding and the eigensolver are covered by a margin, not by a proof.
+
+    keep : path of an .npz file, optional
+        Where the modes are kept as soon as they are found; the same call takes them from there. Not with a tolerance.
 
     Returns
     -------
@@ -450,7 +455,9 @@ def find_modes(
     if tolerance is not None:
         found = spectrum.refine(system, n_modes, max_frequency, _check.between("tolerance", tolerance, 1e-10, 0.1))
     else:
-        found = spectrum.solve(spectrum.fine_enough(system, n_modes, max_frequency, None), n_modes, max_frequency)
+        fine = spectrum.fine_enough(system, n_modes, max_frequency, None)
+        wanted = n_modes, max_frequency
+        found = spectrum.solve(fine, *wanted) if keep is None else spectrum.kept(fine, *wanted, Path(keep))
     shapes = FieldShapes(found.system, found.vectors.copy(), found.flexibility)
     damping = damping_ratios(damping_ratio, found.omega)
     enclosed = spectrum.enclosure(found) if bounds else None

@@ -103,8 +103,11 @@ def make(scene: Any, changes: Mapping[str, Any], stages: Stages) -> Plan:
     return plan or _modal(scene, changes, blow, stages)
 
 
-def carry_out(plan: Plan, stages: Stages) -> Run:
-    """Strike as planned; where the modes left out turn out to matter, with more of them."""
+def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
+    """Strike as planned; where the modes left out turn out to matter, with more of them.
+
+    ``keep`` is a file for the modes of a costly plan.
+    """
     scene = plan.scene
     blow = _checked(scene, plan.changes)
     fixed = {"n_modes", "max_frequency"} & set(blow.pieces) or not blow.values.get("residual", True)
@@ -112,7 +115,7 @@ def carry_out(plan: Plan, stages: Stages) -> Run:
     for margin in MARGINS:
         if margin > 1.0:
             plan = _modal(scene, plan.changes, blow, stages, plan.first, margin)
-        modes, striker = target(plan, stages), _shortened(blow.striker, plan.n_striker_modes)
+        modes, striker = target(plan, stages, keep), _shortened(blow.striker, plan.n_striker_modes)
         if plan.target == "modal":
             with scene.blame("observe"):
                 for point in scene.points:
@@ -389,8 +392,9 @@ def _shortened(striker: Striker, n_modes: int) -> Striker:
     return Striker.flexible(striker.modes.truncated(n_modes=n_modes), at=striker.at)
 
 
-def target(plan: Plan, stages: Stages) -> Modes:
-    """The struck body as planned."""
+def target(plan: Plan, stages: Stages, keep: Any = None) -> Modes:
+    """The struck body as planned; ``keep`` as in `carry_out`."""
+    keep = keep if plan.costly and plan.n_dofs else None
     scene = plan.scene
     blow = _checked(scene, plan.changes)
     if plan.target != "modal":
@@ -403,9 +407,9 @@ def target(plan: Plan, stages: Stages) -> Modes:
         first, modes, number = plan.first, plan.first, blow.pieces.get("n_modes")
         ratio = first.scaled(**scene.scale).frequencies[-1] / first.frequencies[-1]
         if number is not None and number > first.n_modes:
-            modes = find(number, None, first)
+            modes = find(number, None, first, keep)
         elif plan.max_frequency > ratio * first.frequencies[-1] * (1.0 + 1e-9):
-            modes = find(FIRST_LOOK, plan.max_frequency / ratio, first)
+            modes = find(FIRST_LOOK, plan.max_frequency / ratio, first, keep)
         if number is not None:
             modes = modes.truncated(n_modes=number)
         elif "max_frequency" in blow.pieces:

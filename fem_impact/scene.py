@@ -84,6 +84,7 @@ class Scene:
         plan: Plan | None = None,
         before: Callable[[Plan], object] | None = None,
         verify: bool = False,
+        keep: str | Path | None = None,
         **changes: Any,
     ) -> Run:
         """Strike, timing every stage.
@@ -97,6 +98,8 @@ class Scene:
             Called with the plan before it is carried out.
         verify : bool
             Whether to strike again with everything one notch finer and note the true differences.
+        keep : path of an .npz file, optional
+            Where the modes of a costly plan are kept once they are found, so that a run broken off goes on from there.
         **changes : as in `plan`
 
         Returns
@@ -107,7 +110,7 @@ class Scene:
         plan = planner.make(self, changes, stages) if plan is None else plan
         if before is not None:
             before(plan)
-        run = planner.carry_out(plan, stages)
+        run = planner.carry_out(plan, stages, keep)
         return planner.verify(run, watch) if verify else run
 
     @property
@@ -192,7 +195,7 @@ class Scene:
         return "size" in self.mesh.values
 
     def _finite_elements(self, stages: Stages, tolerance: float, size: float | None) -> Finder:
-        def find(n_modes: int, max_frequency: float | None = None, first: Any = None) -> Modes:
+        def find(n_modes: int, max_frequency: float | None = None, first: Any = None, keep: Any = None) -> Modes:
             whole = self._system(stages, size) if first is None else None
             insisted = size is not None or self.size_stated
             with self.blame("mesh"), np.errstate(all="ignore"):
@@ -204,7 +207,7 @@ class Scene:
                 enough = insisted or (max_frequency is not None and spectrum.resolves(system, max_frequency))
                 system = replace(system, mesh=replace(system.mesh, size_stated=enough))
                 reach = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}
-                modes = modal.find_modes(system, **reach)
+                modes = modal.find_modes(system, **reach, keep=keep)
                 error = np.full(modes.n_modes, max(first.frequency_error.max(), SHORT_WAVES))
                 error[: first.n_modes] = first.frequency_error[: modes.n_modes]
                 return replace(modes, frequency_error=error)
@@ -244,7 +247,7 @@ class Scene:
                 )
         section = self.make_section("beam" if self.mesh.kind == "line" else "plate")
 
-        def find(n_modes: int, max_frequency: float | None = None, first: Any = None) -> Modes:
+        def find(n_modes: int, max_frequency: float | None = None, first: Any = None, keep: Any = None) -> Modes:
             wanted = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}
             with self.blame("mesh"), np.errstate(all="ignore"):
                 return make(**values, section=section, **wanted)

@@ -1,11 +1,15 @@
 """The lowest modes of a system: on a mesh fine enough, none missed, refined until their error is known to be small."""
 
+import hashlib
+import zipfile
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
 from . import _check
+from ._files import replacing
 from .assembly import System, assemble, reassemble
 from .eigen import RESIDUAL, SPARE, Flexibility, count_below, lowest
 from .mesh import Mesh
@@ -93,6 +97,24 @@ def solve(system: System, n_modes: int | None, max_frequency: float | None) -> S
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
     vectors = np.column_stack([system.rigid, vectors])[:, :n_modes]
     return Spectrum(system, flexibility, omega, vectors, _expected(system, omega))
+
+
+def kept(system: System, n_modes: int | None, max_frequency: float | None, path: Path) -> Spectrum:
+    """What `solve` returns, kept in a file: a later call for the same modes of the same matrices reads it there."""
+    asked = repr((n_modes, max_frequency)).encode()
+    key = hashlib.sha256(b"".join([asked, system.K.data.tobytes(), system.M.data.tobytes()])).hexdigest()
+    names = ("omega", "vectors", "error")
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            if str(file["key"]) == key:
+                flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
+                return Spectrum(system, flexibility, *(file[name] for name in names))
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError):
+        pass  # none there, of another kind, or damaged: found anew and written over
+    found = solve(system, n_modes, max_frequency)
+    with replacing(path) as temporary:
+        np.savez(temporary, key=key, **{name: getattr(found, name) for name in names})
+    return found
 
 
 def _expected(system: System, omega: np.ndarray) -> np.ndarray:

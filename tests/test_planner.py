@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact import _check, assembly, plans
+from fem_impact import _check, assembly, planner, plans, spectrum
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
 BALL = """
@@ -218,3 +218,26 @@ def test_costly_plan_says_so():
     plan = fi.plan(SCENES / "marked_linear.toml", tolerance=1e-2, n_modes=2000)
     assert plan.costly and "would cost less" in str(plan)
     assert not fi.plan(SCENES / "drumstick_map.toml").costly
+
+
+def test_modes_of_a_costly_plan_are_kept_and_taken_up_again(tmp_path, monkeypatch):
+    """Broken off after the modes were found, the next run starts with them; other modes are found anew."""
+    monkeypatch.setattr(plans, "COSTLY", (0.0, 0.0))
+    scene, keep = fi.load_scene(SCENES / "marked_linear.toml"), tmp_path / "modes.npz"
+    solved = []
+    solve = spectrum.solve
+    monkeypatch.setattr(spectrum, "solve", lambda *args: solved.append(args[2]) or solve(*args))
+
+    def broken_off(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(planner.integrator, "strike", broken_off)
+        with pytest.raises(KeyboardInterrupt):
+            scene.run(keep=keep, tolerance=1e-2)
+    assert len([limit for limit in solved if limit]) == 1  # by frequency; the stick and the first look go by number
+    hit = scene.run(keep=keep, tolerance=1e-2).response
+    assert len([limit for limit in solved if limit]) == 1
+    assert difference(hit, scene.strike(tolerance=1e-2)) == 0.0
+    keep.write_bytes(keep.read_bytes()[:1000])  # damaged: found anew
+    assert difference(scene.run(keep=keep, tolerance=1e-2).response, hit) == 0.0
