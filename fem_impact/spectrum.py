@@ -105,7 +105,7 @@ def kept(system: System, n_modes: int | None, max_frequency: float | None, path:
     key = hashlib.sha256(b"".join([asked, system.K.data.tobytes(), system.M.data.tobytes()])).hexdigest()
     names = ("omega", "vectors", "error")
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
             if str(file["key"]) == key:
                 flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
                 return Spectrum(system, flexibility, *(file[name] for name in names))
