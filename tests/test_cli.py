@@ -292,7 +292,7 @@ def test_uncompiled_kernels_run_as_plain_python(monkeypatch, tmp_path):
     many: dict[str, str] = {}
     cli._prepare(many, once=False)
     assert "NUMBA_DISABLE_JIT" not in many
-    (tmp_path / "__pycache__").mkdir()
+    (tmp_path / "__pycache__").mkdir(exist_ok=True)
     (tmp_path / "__pycache__" / "_kernels.run_energy-1.py311.nbi").write_text("")
     compiled: dict[str, str] = {}
     assert not cli._prepare(compiled, once=True)
