@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 import fem_impact as fi
 from fem_impact import farm, maps
@@ -214,3 +215,42 @@ def test_damaged_store_is_told_not_trusted(tmp_path):
     meta.write_text(meta.read_text().replace('"n_cases": 1', '"n_cases": 1000000000000'))
     with pytest.raises(ValueError, match=r"store .*map is damaged"):
         sweep(over={"mass": [0.1]}, store=tmp_path / "map")
+
+
+SCENE = Path(__file__).parents[1] / "studies" / "scenes" / "drumstick_map.toml"
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
+def test_a_map_at_the_prompt_survives_its_own_end(tmp_path, cluster):
+    """As a user would: scheduler and workers in their own processes, the run killed in the middle, then once more."""
+    address, running = cluster
+    text = (
+        SCENE.read_text()
+        .replace("[contact]\n", "[contact]\nloss = 0.05\n")
+        .replace('kind = "linear"', 'kind = "power"')
+    )
+    (tmp_path / "map.toml").write_text(
+        text.replace("88.6e3", "88.6e3\nexponent = 1.0").replace("count = 20", "count = 12")
+    )
+    command = [sys.executable, "-m", "fem_impact.cli", "map", "map.toml", "--out", "out", "--store", "kept"]
+    run = _start([*command, "--cluster", address], tmp_path)
+    _wait_for_blocks(tmp_path / "kept", 6)
+    os.kill(running["one"].pid, signal.SIGKILL)
+    _wait_for_blocks(tmp_path / "kept", 12)
+    os.kill(run.pid, signal.SIGKILL)
+    run.wait()
+    time.sleep(1.0)  # the other worker finishes what it has begun
+    kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "kept" / "numbers").rglob("*") if path.is_file()}
+    assert 12 <= farm.Store(tmp_path / "kept").group["done"][:].sum() < 48
+    again = subprocess.run([*command, "--cluster", address], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert again.returncode == 0, again.stderr
+    assert "144 blows over stiffness (12), mass (12)" in again.stdout
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept  # nothing twice
+    alone = [*command[:6], "whole"]
+    subprocess.run(alone, cwd=tmp_path, capture_output=True, check=True)
+    with (
+        xarray.open_dataset(tmp_path / "out" / "map.nc") as one,
+        xarray.open_dataset(tmp_path / "whole" / "map.nc") as two,
+    ):
+        assert_same(one, two)
