@@ -55,8 +55,13 @@ def highest_frequency(modes: Modes, at: Any, bandwidth: float, masses: Any, *, d
             modes, at, contact=Contact.linear(TIPS[-1] * mass * (2.0 * np.pi * centre) ** 2), mass=mass, speed=1.0,
             tolerance=TOLERANCE,
         )
-        for mass in masses
+        for mass in _checked(masses)
     )  # fmt: skip
+
+
+def _checked(masses: Any) -> np.ndarray:
+    masses = _check.array("masses", np.atleast_1d(masses), (None,), "kg")
+    return np.array([_check.positive("masses", mass, "kg") for mass in masses])
 
 
 def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float = 10.0) -> tuple[Hammer, ...]:
@@ -81,7 +86,7 @@ def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float 
     The blows decide, not the kinetic-energy criterion: several impacts happen well below its threshold. Linear tips
     make the answer the same at any speed.
     """
-    masses = _check.array("masses", masses, (None,), "kg")
+    masses = _checked(masses)
     drop = _check.between("drop", drop, 1.0, 40.0, "dB")
     centre = _check.positive("bandwidth", bandwidth, "Hz") / _half_sine_reach(drop)
     found = []

@@ -213,7 +213,8 @@ def sweep(
     tolerance : float [-]
         As in `strike`, in every cell.
     max_frequency : float [Hz], optional
-        Adds the layer ``centroid``, the spectral centroid from zero to this frequency.
+        Adds the layer ``centroid``, the spectral centroid from zero to this frequency, which the layer states. There is
+        none without: the mean frequency of a pulse grows with the end of its band beyond all limits.
     layers : mapping of name to function of a Response, optional
         More scalars to keep, in threads. Every cell is then struck one by one, as are cells with loss or an exponent
         below 1: some hundred times slower than the others, see ``studies/map_speed.py``.

@@ -139,3 +139,24 @@ def test_hammer_at_the_prompt(capsys):
     assert cli.main([*arguments, "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert [hammer["softest"] is not None for hammer in data["hammers"]] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["--bandwidth", "0"], "bandwidth must be positive, got 0 Hz"),
+        (["--bandwidth", "inf"], "bandwidth must be finite, got inf Hz"),
+        (["--bandwidth", "500", "--masses", "0"], "masses must be positive, got 0 kg"),
+        (["--bandwidth", "500", "--masses", "0.01", "nan"], "masses must be finite"),
+        (["--bandwidth", "500", "--drop", "60"], "drop must lie between 1 and 40 dB, got 60 dB"),
+    ],
+)
+def test_hammers_of_no_sense_are_told(given, message, capsys):
+    assert cli.main(["hammer", str(SCENES / "drumstick_map.toml"), *given]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_bandwidth_beyond_every_tip_has_no_hammer():
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=60)
+    (hammer,) = hammers.choose(plate, (0.465, 0.3), 1e6, [0.01])
+    assert not hammer.works
