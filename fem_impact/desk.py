@@ -33,6 +33,7 @@ LABELS = {
     "bending": "First bending mode",
 }
 STEPS = 200  # [-] of a slider
+MOMENT = 8  # [ms] in which the messages of a quick hand gather
 REST = 200  # [ms] without a change, and the map follows: it takes the time of many blows
 SLIDER = """
 .bk-slider-title { display: none; }
@@ -146,7 +147,7 @@ class Page:
 
         made: Any = figure(
             name=name, title=title, x_axis_label=x, y_axis_label=y, height=HEIGHT, sizing_mode="stretch_width",
-            tools=options.pop("tools", "box_zoom,reset"), toolbar_location=None,
+            tools="", toolbar_location=None,
             background_fill_color=None, border_fill_color=None, **options,
         )  # fmt: skip
         made.title.text_font_size = "14px"
@@ -164,7 +165,7 @@ class Page:
         """The struck body from above, or a beam from the side."""
         mesh = self.bench.mesh
         if mesh.dimension == 2:
-            plot = self._figure("body", "Strike point", "x", "y", match_aspect=True, tools="tap")
+            plot = self._figure("body", "Strike point", "x", "y", match_aspect=True)
             ends = mesh.points[mesh.facets]  # (n_facets, 2, 2)
             cells = mesh.points[mesh.cells]
             fill = plot.patches(list(cells[:, :, 0]), list(cells[:, :, 1]), line_width=1)
@@ -172,7 +173,7 @@ class Page:
             self._formatted(plot.yaxis[0], "m")
         else:
             low, high = float(mesh.points.min()), float(mesh.points.max())
-            plot = self._figure("body", "Strike point", "x", "", tools="tap", y_range=(-0.2, 0.2))
+            plot = self._figure("body", "Strike point", "x", "", y_range=(-0.2, 0.2))
             fill = plot.quad(left=[low], right=[high], bottom=[-0.02], top=[0.02])
             plot.yaxis.visible = plot.ygrid.visible = False
         fill.glyph.name = "body-fill"
@@ -185,7 +186,7 @@ class Page:
         ends = {name: self.bench.range(name) for name in ("mass", "stiffness")}
         plot = self._figure(
             "map", "Number of impacts", "mass of the striker", "contact stiffness, scene's = 1", x_axis_type="log",
-            y_axis_type="log", x_range=ends["mass"], y_range=ends["stiffness"], tools="tap",
+            y_axis_type="log", x_range=ends["mass"], y_range=ends["stiffness"],
         )  # fmt: skip
         plot.grid.visible = False
         plot.quad("left", "right", "bottom", "top", color="colour", line_color="colour", source=self.sources["cells"])
@@ -243,11 +244,11 @@ class Page:
             self.sliders[name].value = math.log10(min(max(float(value), low), high))
 
     def _change(self, **changes: Any) -> None:
-        """Strike anew once all messages that have arrived are read, so that a quick hand does not queue up blows."""
+        """Strike anew in a moment, for all that has arrived till then: a quick hand must not queue up blows."""
         self.settings = replace(self.settings, **changes)
         if not self.waiting:
             self.waiting = True
-            self.document.add_next_tick_callback(self.update)
+            self.document.add_timeout_callback(self.update, MOMENT)
 
     def update(self) -> None:
         """Strike with the settings and show it."""

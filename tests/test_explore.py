@@ -18,10 +18,15 @@ from fem_impact import cli
 FOLLOWS = 0.1  # [s] within which the page follows
 # Turn a slider; how long until the new spectrum is there, in ms.
 TURN = """name => new Promise(done => {
-    const page = Bokeh.documents[0], source = page.get_model_by_name('spectrum-data');
-    const slider = page.get_model_by_name(name);
-    const began = performance.now(), signal = source.properties.data.change;
-    const then = () => { signal.disconnect(then); done(performance.now() - began); };
+    const page = Bokeh.documents[0], slider = page.get_model_by_name(name);
+    const signal = page.get_model_by_name('spectrum-data').properties.data.change;
+    const said = page.get_model_by_name('said');
+    const began = performance.now(), before = JSON.stringify(said.data.text);
+    const then = () => {  // an answer to an earlier turn may still be on its way
+        if (JSON.stringify(said.data.text) === before) return;
+        signal.disconnect(then);
+        done(performance.now() - began);
+    };
     signal.connect(then);
     slider.value += 0.005 * (slider.end - slider.start);
 })"""
@@ -131,7 +136,8 @@ def test_sliders_change_the_pictures_in_time(opened):
     for name in ("mass", "stiffness", "exponent", "speed", "bending", "x", "y"):
         before = {plot: shown.tab.locator(f"figure >> nth={i}").screenshot() for plot, i in (("map", 1), ("force", 2))}
         times = [shown.tab.evaluate(TURN, name)]
-        while min(times) > 1e3 * FOLLOWS and len(times) < 30:  # the least: other programs run here too
+        while min(times) > 1e3 * FOLLOWS and len(times) < 20:  # the least: other programs run here too
+            shown.tab.wait_for_timeout(300)
             times.append(shown.tab.evaluate(TURN, name))
         assert min(times) < 1e3 * FOLLOWS, (name, times)
         shown.tab.wait_for_timeout(100)
@@ -152,6 +158,21 @@ def test_click_moves_the_strike_point(opened):
     shown.until(f"Math.abs(Bokeh.documents[0].get_model_by_name('x').value - {x}) < 1e-9")  # the sliders follow
     refined = "[...document.querySelectorAll('.readout *')].some(e => /10[⁻0-9]/.test(e.shadowRoot?.textContent ?? ''))"
     shown.until(refined)  # and the exact blow takes the place of the quick one
+
+
+def test_quick_hand_does_not_queue_up_blows(opened):
+    shown = opened()
+    box = shown.tab.locator(".noUi-handle").first.bounding_box()
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    shown.tab.mouse.move(x, y)
+    shown.tab.mouse.down()
+    for i in range(120):
+        shown.tab.mouse.move(x + 80.0 * (-1) ** i * i / 120.0, y)
+    shown.tab.mouse.up()
+    page = "Bokeh.documents[0].get_model_by_name"
+    # 120 blows one after another would take some 3 s, and every one would be drawn
+    shown.until(f"Math.abs(Math.log10({page}('here').data.x[0]) - {page}('mass').value) < 1e-9", 2.0)
+    assert shown.errors == []
 
 
 def test_button_plays_the_sound(opened):
