@@ -20,13 +20,14 @@ N_TABLE = 12  # rows of a step table, in the order of `step_table`
 N_LANE = 7  # rows of what a run keeps of it, in the order of `lane_table`
 PATIENT = 4  # [-] looks of a flight that make do with the table of a step up to four times shorter than allowed
 GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before
+SLOW_LOOKS = 300  # [-] looks of a flight that lead hardly on before a stepping scheme takes over
 LOOK_LIMIT = 20_000_000  # [-] looks ahead times modes in one free flight before the run gives up: some 0.1 s
 WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it
 SECULAR_MISFIT = 1e-12  # [-] of the peak force: what recorded polynomials may miss of the exact force
 LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
 LET_GO = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to this
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
-EVENT_LIMIT = 64  # [-] events without one full step between them: chatter, passed with unlocated steps
+EVENT_LIMIT = 64  # [-] events within one step's time: chatter, passed with unlocated steps, each time for twice as long
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = 0, 1, 2, 3, 4, 5  # why a run ended
 
 
@@ -1093,7 +1094,7 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
                 return elapsed, first, 0 if leading > 0.0 else 3
             if wait < shortest:
                 slow += 1
-                if slow > 4000:
+                if slow > SLOW_LOOKS:
                     return elapsed, first, 3
             power_of_two = int(np.floor(np.log2(wait / base))) + GLIDES // 2
             if not close and bounds[first, 5] != 0.0 and 2 <= power_of_two < GLIDES:
@@ -1439,8 +1440,9 @@ def run_energy(
     events = 0
     ready = -1  # slot of the table with which the coming step is predicted already
     reset = 0.0
+    pause = 0.0  # until when events are passed, not located
+    respite = base  # how long the next such time will be
     time = 0.0
-    stalled = False
     status = EXHAUSTED
     quiet = not any_of(bias)
     lossy = False
@@ -1458,7 +1460,7 @@ def run_energy(
             break
         if n_steps + 1 >= steps.shape[0]:
             steps = resized(steps, n_steps, 2 * steps.shape[0])
-        if not stalled and not any_of(pressed):
+        if time >= pause and not any_of(pressed):
             elapsed, first, found = find_onset(
                 omega, zeta, shape, offset, bias, horizon - time, base, 1e-3 * base, depth, still, flights, flown, q, p
             )
@@ -1473,9 +1475,15 @@ def run_energy(
                 time += elapsed
             if found == 0:
                 events += 1
-            stalled = found == 3
-            continue
-        blind = stalled or events > EVENT_LIMIT
+            if found == 3:
+                events = EVENT_LIMIT + 1
+            else:
+                continue
+        if events > EVENT_LIMIT:
+            pause = time + respite
+            respite *= 2.0
+            events = 0
+        blind = time < pause
         if blind:
             level = 0
         h = base * 0.5**level
@@ -1502,13 +1510,12 @@ def run_energy(
                         shorter = max(shorter, 3 if level == 0 else 1)
                 elif dipped(now, pressed, y, rate, h, i):
                     shorter = max(shorter, 1)
-            if shorter > 0 and level + shorter < LEVELS:
-                level += shorter
-                continue
             if shorter > 0:
-                blind = True
-            else:
-                target, guess = first_crossing(now, pressed, y, rate, h, depth, still)
+                level += shorter
+                if level >= LEVELS:
+                    events = EVENT_LIMIT + 1
+                continue
+            target, guess = first_crossing(now, pressed, y, rate, h, depth, still)
         if target >= 0:
             enclose(now, y, rate, h, target, bracket)
             slot = odd
@@ -1522,8 +1529,8 @@ def run_energy(
                 if guess == 0.0:
                     break
             if not abs(y[target]) <= 1e-9 * bracket[2]:
-                target = -1
-                blind = True
+                events = EVENT_LIMIT + 1
+                continue
         letting, guess = -1, h
         if lossy and not blind:
             letting, guess = first_letting_go(now, law, y, rate, h)
@@ -1576,7 +1583,6 @@ def run_energy(
         if time - reset > base:
             reset = time
             events = 0
-        stalled = False
         n_looks += 1
         if quiet and n_looks % 512 == 0 and total_energy(omega, bias, law, q, p, now) <= 1e-24 * start_energy:
             status = SETTLED

@@ -20,8 +20,9 @@ from .striker import Striker
 
 TOLERANCE = 1e-4  # [-] the default promise
 SCHEMES = ("A", "A4", "collocation", "secular")
-MAX_STEPS = 500_000  # [-] of one run, some seconds
-PLAIN_WORK = 300_000  # [-] modes times steps of one run where the kernels are not compiled, likewise
+MAX_STEPS = 500_000  # [-] of one run, a second
+MAX_WORK = 500_000_000  # [-] modes times steps of one run, likewise
+PLAIN_WORK = 300_000  # [-] where the kernels are not compiled
 FIRST_STEPS = 24.0  # [-] steps per contact at which A4 errs by less than FIRST_ERROR; of 12 to 32 the least work in all
 FIRST_ERROR = 1e-4  # [-]
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that hang on no single instant
@@ -455,12 +456,13 @@ def _controlled(
     over = RICHARDSON[scheme]
     if (system.law[:, 2] > 0.0).any():
         over = over[0], min(over[1], LOSSY)
-    shortest = pace[0]
+    shortest = min(pace[0], horizon)  # or two runs of one step each, cut to the same length, would agree on anything
     if scheme == "secular":
         _check_secular(system)
         only = _run(system, scheme, shortest, pace, horizon, n_max)
         return only, ROUNDING * max(1, len(only.contacts)), scheme, only, shortest
     if dt is not None:
+        dt = min(dt, 0.5 * horizon)
         fine = _run(system, scheme, dt, pace, horizon, n_max)
         coarse = _run(system, scheme, 2.0 * dt, pace, horizon, n_max)
         return fine, differ(coarse, fine, over), scheme, coarse, 2.0 * dt
@@ -480,6 +482,8 @@ def _controlled(
             return fine, estimate, scheme, coarse, before
         best, last = min(best, estimate), (coarse, fine)
         coarse = fine
+        if 2 * len(fine.steps) > _most_steps(system):
+            break  # the next run would not come to its end
     if free and scheme == "A4" and (system.law[:, 1] >= 1.0).all():
         return _controlled(system, "collocation", dt, tolerance, quantities, pace, horizon, n_max)
     hint = ""
@@ -514,13 +518,20 @@ def _longest_lossy(system: _System, pace: tuple[float, float], tolerance: float)
     return longest
 
 
+def _most_steps(system: _System) -> int:
+    """Steps of one run at which it gives up."""
+    if _kernels.COMPILED:
+        return min(MAX_STEPS, max(1000, MAX_WORK // len(system.omega)))
+    return max(100, PLAIN_WORK // len(system.omega))
+
+
 def _run(system: _System, scheme: str, size: float, pace: tuple[float, float], horizon: float, n_max: int) -> History:
     """One run; ``size`` is the step in contact, or the misfit allowed to collocation."""
     parts = (
         system.omega, system.zeta, system.shape, system.offset, system.bias, system.law, system.start_q, system.start_p
     )  # fmt: skip
     noise = NOISE * pace[0] * pace[1], STILL * pace[1]
-    most = MAX_STEPS if _kernels.COMPILED else max(100, PLAIN_WORK // len(system.omega))
+    most = _most_steps(system)
     if scheme == "collocation":
         nodes, powers = _gauss(NODES)
         result = _kernels.run_collocation(
