@@ -1259,7 +1259,8 @@ def narrow(now, pressed, y, rate, h, depth, still, target, bracket):
     polynomial changes too.
     """
     for i in range(y.size):
-        if i != target and crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
+        slack = max(depth, LOCATED * (abs(now[0, i]) + abs(y[i])))  # or contacts that open together take turns for ever
+        if i != target and crossed(pressed[i], now[0, i], now[4, i], y[i], slack, still):
             enclose(now, y, rate, h, i, bracket)
             guess = hermite_root(now[0, i], now[4, i], y[i], rate[i], h)
             return i, guess if guess < h else 0.5 * h
@@ -1333,12 +1334,13 @@ def settle(now, pressed, y, rate, target, depth, still):
     opened = 0
     for i in range(y.size):
         was = pressed[i]
+        slack = max(depth, LOCATED * abs(now[0, i])) if target >= 0 else depth  # contacts may open together
         now[0, i] = y[i]
         now[4, i] = rate[i]
         if i == target:
             now[0, i] = 0.0
             pressed[i] = not was
-        elif abs(y[i]) <= depth:
+        elif abs(y[i]) <= slack:
             now[0, i] = 0.0
             pressed[i] = rate[i] > still or (was and rate[i] >= -still)
         else:
@@ -1529,8 +1531,11 @@ def run_energy(
                 if guess == 0.0:
                     break
             if not abs(y[target]) <= 1e-9 * bracket[2]:
-                events = EVENT_LIMIT + 1
-                continue
+                if h < 1e-3 * base:
+                    events = EVENT_LIMIT + 1
+                    continue
+                target = -1
+                blind = True
         letting, guess = -1, h
         if lossy and not blind:
             letting, guess = first_letting_go(now, law, y, rate, h)
