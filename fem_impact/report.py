@@ -49,11 +49,11 @@ def read(path: str | Path) -> Scene:
         return load_scene(path)
     try:
         data = json.loads(read_bytes(path).decode("utf-8", "replace"))
-    except (json.JSONDecodeError, RecursionError):
-        data = None
-    if not isinstance(data, dict) or not isinstance(data.get("scene"), dict):
-        raise fault(path, "not a result of `fem-impact strike`; give its response.json, or the scene's TOML file")
-    return scene_of(data["scene"], path, folder=Path())
+        if isinstance(data, dict) and isinstance(data.get("scene"), dict):
+            return scene_of(data["scene"], path, folder=Path())
+    except (json.JSONDecodeError, RecursionError):  # the latter where lists nest without end
+        pass
+    raise fault(path, "not a result of `fem-impact strike`; give its response.json, or the scene's TOML file")
 
 
 def _tools() -> list[Any]:

@@ -323,6 +323,7 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
     title = tables.pop("title", "")
     if not isinstance(title, str):
         raise fault(path, f"title must be text, got {title!r:.80}")
+    title = "".join(c if c.isprintable() else " " for c in title)  # it is printed to terminals, which obey some
     for name, table in tables.items():
         if name not in TABLES:
             raise fault(path, f"[{name}] is not a table of a scene{_check.nearest(name, TABLES)}")

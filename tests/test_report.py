@@ -82,7 +82,17 @@ def test_result_of_a_strike_gives_the_same_blow(page, tmp_path):
         assert again.strike().impulse == report.read(scene).strike().impulse
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"scene": 3}', "[" * 100_000, '{"scene": {"mesh": {}}}'])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        '{"scene": 3}',
+        "[" * 100_000,
+        '{"scene": {"mesh": {"x": ' + "[" * 900 + "]" * 900 + "}}}",
+        '{"scene": {"mesh": {}}}',
+    ],
+)
 def test_file_that_is_no_result_is_a_sentence(tmp_path, capsys, text):
     path = tmp_path / "response.json"
     path.write_text(text)

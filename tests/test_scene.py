@@ -62,6 +62,11 @@ def edited(folder, old, new):
     return write(folder, TEXT.replace(old, new))
 
 
+def test_title_cannot_command_a_terminal(tmp_path):
+    path = edited(tmp_path, 'title = "test"', r'title = "a\u001b[31m\u202e\nb"')
+    assert scene.load_scene(path).title == "a [31m  b"
+
+
 def test_scene_strikes_what_the_public_functions_strike(tmp_path):
     hit = scene.load_scene(write(tmp_path)).strike()
     body = analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=hit.target.n_modes)
