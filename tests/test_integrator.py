@@ -550,3 +550,12 @@ def test_lossy_contact_lets_go_while_the_bodies_overlap(scheme):
     assert exact.y[0, -1] > 1e-5  # [m] still overlapping
     assert hit.n_impacts == 1
     assert_allclose(hit.contact_time, exact.t[-1], rtol=2e-6)  # the tolerance, and that of the event's search
+
+
+def test_a_short_duration_is_still_judged_by_two_runs_of_different_steps():
+    """Two runs of one step each, cut to one length, would agree on anything."""
+    hit = fi.strike(
+        fi.Modes.rigid(1.0), fi.Striker.rigid(1.0), fi.Contact.linear(1e5), at=None, speed=1.0, duration=1e-5,
+        tolerance=1e-2,
+    )  # fmt: skip
+    assert len(hit.history.steps) >= 4  # a contact lasts 7 ms; the plan's first step is longer than the duration
