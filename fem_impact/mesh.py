@@ -10,10 +10,11 @@ import numpy as np
 
 from . import _check, boundary, cad, meshfile, svg
 from .curves import divided
-from .outline import Outline, circle, crossed, extent, straight_loop
+from .outline import Outline, circle, crossed, extent, polyline, signed_area, straight_loop
 from .triangulation import triangulate
 
 LONG_DIVISIONS = 64  # [-] likewise along a strip, whose elements are then longer than wide
+MOST_CELLS = 200_000  # [-] elements: several times what `find_modes` can solve
 DEFAULT_DIVISIONS = 8  # [-] elements across the shorter side where no size is stated; find_modes refines on its own
 
 
@@ -102,6 +103,11 @@ def _element_size(size: float | None, default: float) -> tuple[float, bool]:
     return (default, False) if size is None else (_check.positive("size", size, "m"), True)
 
 
+def _check_affordable(cells: float, size: float) -> None:
+    if cells > MOST_CELLS:
+        raise ValueError(f"size must be larger: {size:g} m makes some {cells:.1g} elements, more than {MOST_CELLS}")
+
+
 def rectangle(length: float, width: float, *, size: float | None = None) -> Mesh:
     """Rectangle [0, length] x [0, width] [m]; edges left, right (x = 0, length), bottom, top (y = 0, width).
 
@@ -111,6 +117,7 @@ def rectangle(length: float, width: float, *, size: float | None = None) -> Mesh
     width = _check.positive("width", width, "m")
     short, long = sorted((length, width))
     size, stated = _element_size(size, max(short / DEFAULT_DIVISIONS, long / LONG_DIVISIONS))
+    _check_affordable(2.0 * (length / size + 1.0) * (width / size + 1.0), size)
     least = 1 if stated else 2
     nx, ny = max(least, round(length / size)), max(least, round(width / size))
     x, y = np.meshgrid(np.linspace(0.0, length, nx + 1), np.linspace(0.0, width, ny + 1), indexing="ij")
@@ -142,6 +149,7 @@ def line(length: float, *, size: float | None = None) -> Mesh:
     """Line [0, length] [m] for a beam; edges left (x = 0) and right (x = length)."""
     length = _check.positive("length", length, "m")
     size, stated = _element_size(size, length / (4 * DEFAULT_DIVISIONS))
+    _check_affordable(length / size, size)
     n = max(1, round(length / size))
     cells = np.column_stack([np.arange(n), np.arange(1, n + 1)])
     edges = {"left": np.array([0]), "right": np.array([1]), "boundary": np.array([0, 1])}
@@ -165,6 +173,8 @@ def fill(outline: Outline, *, size: float | None = None) -> Mesh:
     if problem:
         raise ValueError(problem)
     size, stated = _element_size(size, extent(outline.outer) / DEFAULT_DIVISIONS)
+    around = polyline(outline.outer, extent(outline.outer) / 50.0)
+    _check_affordable(2.0 * abs(signed_area(around)) / size / size, size)
     arrays = triangulate(outline, size)
     return Mesh(**arrays, recipe=partial(fill, outline), size=size, size_stated=stated)
 
@@ -297,6 +307,7 @@ def save(path: Any, mesh: Mesh) -> None:
 
 def _divided(mesh: Mesh, *, size: float) -> Mesh:
     """The mesh with its triangles divided in four until they are no larger than a size [m]."""
+    _check_affordable(len(mesh.cells) * (mesh.size / size) ** 2, size)
     fine = mesh
     for _ in range(max(0, int(np.ceil(np.log2(mesh.size / size) - 1e-9)))):
         fine = _quartered(fine)

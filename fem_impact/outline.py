@@ -11,7 +11,7 @@ from . import _check
 SLENDER = 1e4  # [-] area over square of the half width: the mesher is quick up to 4e3 and never ends from 4e4 on
 FINEST = 16  # [-] widths looked at, each a quarter of the one before: down to rounding
 TURN = 0.25  # [rad] most that an edge turns within one facet: 26 facets on a circle
-MOST_PIECES = 10_000  # [-] of an outline: ten times what tracing programs write; each takes 0.1 ms here and again there
+MOST_PIECES = 2000  # [-] of an outline: several times what tracing programs write
 SAMPLES = 256  # [-] points per piece on which its length and turning are integrated
 
 
@@ -143,6 +143,8 @@ def divide(piece: Piece, size: float) -> np.ndarray:
 
 def crossing(piece: Piece, start: np.ndarray, end: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Parameters (n,) where the piece passes a share (n,) [-] of its chords between parameters start and end (n,)."""
+    if isinstance(piece, Bezier) and len(piece.control) == 2:
+        return start + share * (end - start)
     a, b = piece.at(start), piece.at(end)
     chord = b - a
     wanted = a + share[:, None] * chord
@@ -230,11 +232,12 @@ def crossed(outline: Outline) -> str:
     return _slender(outer.difference(shapely.union_all(holes)) if holes else outer)
 
 
-def _slender(body: shapely.Polygon) -> str:
+def _slender(whole: shapely.Polygon) -> str:
     """Where a body is much longer than it is wide, as at a needle; triangles as small as that would be countless."""
-    span = max(np.ptp(np.reshape(body.bounds, (2, 2)), axis=0))
+    span = max(np.ptp(np.reshape(whole.bounds, (2, 2)), axis=0))
     for k in range(1, FINEST):
         width = span * 4.0**-k
+        body = whole.simplify(0.05 * width)  # what is finer does not matter at this width, and costs
         rest = body.difference(body.buffer(-width, quad_segs=1).buffer(1.001 * width, quad_segs=2))
         if rest.area > SLENDER * width**2:  # a strip of this half width and `SLENDER` / 2 times as long
             x, y = max(getattr(rest, "geoms", [rest]), key=lambda part: part.area).representative_point().coords[0]

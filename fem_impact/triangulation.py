@@ -69,8 +69,11 @@ def _follow(
     )
     place = points.copy()
     edges: dict[str, list[int]] = {}
-    for piece in dict.fromkeys(chord[0] for chord in chords):
-        mine = np.flatnonzero([chords[j][0] is piece for j in owner])
+    pieces = list({id(piece): piece for piece, _, _ in chords}.values())
+    rank = {id(piece): k for k, piece in enumerate(pieces)}
+    kind = np.array([rank[id(piece)] for piece, _, _ in chords])[owner]
+    order = np.argsort(kind, kind="stable")
+    for piece, mine in zip(pieces, np.split(order, np.searchsorted(kind[order], np.arange(1, len(pieces))))):
         low, high = np.array([chords[j][1:] for j in owner[mine]]).T
         ends = points[facets[mine]]  # (n, 2, 2)
         a, b = piece.at(low), piece.at(high)

@@ -5,7 +5,7 @@ import pytest
 import shapely
 from numpy.testing import assert_allclose
 
-from fem_impact import mesh
+from fem_impact import _apart, mesh
 from fem_impact.assembly import assemble
 from fem_impact.modal import find_modes
 from fem_impact.section import Material, Plate
@@ -113,7 +113,7 @@ def test_dxf_ellipse_and_spline(tmp_path):
         ),
         (lambda t: mesh.outline(svg(t, "")), "has no outline"),
         (lambda t: mesh.outline(t / "none.svg"), "there is no such file"),
-        (lambda t: mesh.outline([(0, 0), (1, 0)]), "must have 3 to 10000 points, got 2"),
+        (lambda t: mesh.outline([(0, 0), (1, 0)]), "must have 3 to 2000 points, got 2"),
         (lambda t: mesh.outline([(0, 0), (1, 1), (1, 0), (0, 1)]), "must not cross or touch itself"),
         (lambda t: mesh.outline(shapely.Point(0, 0)), "one shapely Polygon, got a Point"),
         (lambda t: mesh.outline(dxf(t, lambda s: s.add_circle((0, 0), 150.0))), "looks like millimetres"),
@@ -131,3 +131,32 @@ def test_broken_files_are_refused(tmp_path):
         (tmp_path / name).write_text("neither")
         with pytest.raises(ValueError, match=f"{name} cannot be read as"):
             mesh.outline(tmp_path / name)
+
+
+LAUGHS = '<!DOCTYPE svg [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]>'
+OUTSIDE = '<!DOCTYPE svg [<!ENTITY a SYSTEM "file:///etc/passwd">]>'
+
+
+@pytest.mark.parametrize("head", [LAUGHS, OUTSIDE])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_entities_are_refused_not_expanded(tmp_path, head, encoding):
+    text = f'<?xml version="1.0" encoding="{encoding}"?>{head}' + SVG.format(head="", body="<text>&a;</text>")
+    (tmp_path / "plate.svg").write_bytes(text.encode(encoding))
+    with pytest.raises(ValueError, match="declares XML entities; save it as plain SVG"):
+        mesh.outline(tmp_path / "plate.svg")
+
+
+def test_what_refers_to_itself_or_multiplies_is_a_sentence(tmp_path, monkeypatch):
+    monkeypatch.setattr(_apart, "PATIENCE", 2.0)
+    with pytest.raises(ValueError, match=r"plate\.svg cannot be read as SVG \(maximum recursion"):
+        mesh.outline(svg(tmp_path, '<g id="a"><use href="#a"/></g>'))
+    uses = "".join(f'<g id="a{i}">' + f'<use href="#a{i - 1}"/>' * 10 + "</g>" for i in range(1, 9))
+    with pytest.raises(ValueError, match=r"plate\.svg cannot be read as SVG \(it takes longer|its reader died"):
+        mesh.outline(svg(tmp_path, f'<g id="a0"><rect width="1" height="1"/></g>{uses}'))
+
+
+def test_links_to_other_files_are_not_followed(tmp_path):
+    (tmp_path / "other.svg").write_text(SVG.format(head="", body='<circle id="x" r="1"/>'))
+    for href in ("other.svg#x", f"file://{tmp_path}/other.svg#x", "http://localhost:1/other.svg#x"):
+        with pytest.raises(ValueError, match="has no outline"):
+            mesh.outline(svg(tmp_path, f'<use href="{href}"/><image href="{href}" width="1" height="1"/>'))

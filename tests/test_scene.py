@@ -347,3 +347,14 @@ def test_file_and_table_are_named_once(tmp_path):
     with pytest.raises(ValueError, match="length must be a number in m, got True") as caught:
         scene.load_scene(path).modes(2)
     assert str(caught.value).count("[mesh]") == 1 and str(caught.value).count(str(path)) == 1
+
+
+@pytest.mark.parametrize("shape", ['shape = "file"\npath = "{}"', 'shape = "outline"\nsource = "{}"'])
+@pytest.mark.parametrize("place", ["../../../../../../../../etc/passwd", "/etc/passwd", "secret.svg", "secret.msh"])
+def test_a_file_that_is_no_mesh_is_told_without_its_content(tmp_path, shape, place):
+    for name in ("secret.svg", "secret.msh"):
+        (tmp_path / name).write_text("root:x:0:0:hunter2:/root\n")
+    text = TEXT.replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', shape.format(place))
+    with pytest.raises(ValueError, match=r"scene\.toml: \[mesh\]") as caught:
+        scene.load_scene(write(tmp_path, text.replace('"analytic"', '"fe"'))).modes(1)
+    assert "hunter2" not in str(caught.value) and "root:" not in str(caught.value)
