@@ -190,7 +190,8 @@ def _idealised(scene: Any, changes: Mapping[str, Any], blow: _Blow, target: str 
     """The plan for a body that does not yield or has no edges, where that is good enough or wanted; else None."""
     values = blow.values
     pressed = values.get("striker_force") or values.get("target_force") or blow.contact.gap < 0.0
-    if target is None and (pressed or "sound" in blow.quantities or not values.get("residual", True)):
+    moving = "sound" in blow.quantities or scene.observe is not None  # the target's own motion is asked for
+    if target is None and (pressed or moving or not values.get("residual", True)):
         return None
     seen = _outside(scene, blow, stages)
     allowed = SHARE * blow.tolerance

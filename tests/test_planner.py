@@ -140,6 +140,10 @@ def test_sound_and_spectrum_bring_the_modes_they_need(scene):
     assert fi.plan(SCENES / "heavy_plate.toml", quantity={"spectrum": 5e3}).target == "rigid"
 
 
+def test_points_of_observation_want_the_motion_of_modes(scene):
+    assert scene(PLATE + "[observe]\npoints = [[0.1, 0.1]]\n", mass=500e3).plan().target == "modal"
+
+
 def test_fewer_quantities_take_fewer_steps():
     scene = fi.load_scene(SCENES / "drumstick_map.toml")
     everything, one = scene.run(tolerance=1e-5), scene.run(tolerance=1e-5, quantity="restitution")
