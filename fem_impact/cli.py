@@ -311,7 +311,11 @@ def _strike(options: argparse.Namespace) -> None:
             _wrapped(f"Model: {run.plan.reasons[0]}; no modes and no sound (--target modal, or --quantity sound=5000)")
         )
     if run.verified is not None:
-        print(_wrapped("Verified by a finer run: " + ", ".join(f"{x} {y:.1e}" for x, y in run.verified.items())))
+        tested = (
+            "" if run.finer.target == "modal" else f" (with the body {run.finer.target} too: it has too many modes)"
+        )
+        differences = ", ".join(f"{name} {value:.1e}" for name, value in run.verified.items())
+        print(_wrapped(f"Verified by a finer run{tested}: {differences}"))
     print(_wrapped("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())))
     print(_wrapped(f"Files in {folder}{os.sep}: {', '.join(data['files'])}"))
 

@@ -12,6 +12,7 @@ import numpy as np
 from . import _check, accuracy, idealisation, integrator, spectrum
 from .assembly import System, support_of_facets
 from .contact import Contact
+from .integrator import BAND_POINTS
 from .modal import FieldShapes, Modes
 from .plans import Plan, asked_for
 from .response import Response
@@ -164,6 +165,10 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
     for name in ("impulse", "contact_time", "peak_force"):
         size = getattr(two, name)
         true[name] = abs(getattr(one, name) - size) / size if size else 0.0
+    for name, band in plan.quantities.items():
+        if band is not None:
+            spectra = [response.spectrum(np.linspace(0.0, band, BAND_POINTS)) for response in (one, two)]
+            true[name] = float(np.abs(spectra[0] - spectra[1]).max() / (np.abs(spectra[1]).max() or 1.0))
     return replace(run, verified=MappingProxyType(true), finer=other.plan)
 
 
