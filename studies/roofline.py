@@ -4,7 +4,7 @@
 
 Measures one core's multiply-add peak and its read bandwidth at several array sizes with small compiled loops, then the
 time of one step of scheme A4 from 10 to 10 000 modes. A mode-step of one contact takes about 36 floating-point
-operations and 26 reads and writes of 8 bytes; the bound is the slower of the two. Draws time per step and the share
+operations and 15 reads and writes of 8 bytes; the bound is the slower of the two. Draws time per step and the share
 of the bound reached.
 """
 
@@ -23,8 +23,8 @@ import numpy as np
 from fem_impact import _kernels
 
 COUNTS = [10, 30, 100, 300, 1000, 3000, 10000]
-OPERATIONS = 36.0  # [-] per mode-step: free motion and bias 10, three sums 2 + 7 + 2, response 10, the rest 5
-BYTES = 8.0 * 26.0  # [-] per mode-step: 8 + 2 for the free motion, 9 for the sums, 7 for the response
+OPERATIONS = 36.0  # [-] per mode-step: response 11, free motion and bias 12, three sums 13
+BYTES = 8.0 * 15.0  # [-] per mode-step: state, shape, bias, damping and six coefficients read, four values written
 
 
 @numba.njit(fastmath=True)
