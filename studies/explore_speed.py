@@ -4,6 +4,7 @@ python studies/explore_speed.py [SCENE]; needs chromium, and playwright (pip ins
 """
 
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -49,7 +50,7 @@ def main(scene: str) -> None:
                     print(f"{name:<12}{min(times):8.0f}{np.median(times):8.0f}{max(times):8.0f}")
             browser.close()
     finally:
-        server.terminate()
+        server.send_signal(signal.SIGINT)
         server.wait()
 
 

@@ -137,7 +137,7 @@ def test_sliders_change_the_pictures_in_time(opened):
         before = {plot: shown.tab.locator(f"figure >> nth={i}").screenshot() for plot, i in (("map", 1), ("force", 2))}
         times = [shown.tab.evaluate(TURN, name)]
         while min(times) > 1e3 * FOLLOWS and len(times) < 20:  # the least: other programs run here too
-            shown.tab.wait_for_timeout(300)
+            shown.tab.wait_for_timeout(1000)  # until the map, drawn when the hand rests, is done too
             times.append(shown.tab.evaluate(TURN, name))
         assert min(times) < 1e3 * FOLLOWS, (name, times)
         shown.tab.wait_for_timeout(100)
