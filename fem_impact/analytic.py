@@ -14,6 +14,7 @@ from .modal import Damping, Modes, damping_ratios
 LEVY_TERMS = 4000  # [-] sum over sines across a hinged plate: with its tail corrected, 1e-11 of the compliance
 DISK_TERMS = 100_000  # [-] cap for points at the very edge of a disk, where terms fall as n**-3 only: 5e-11
 MOST_PAIRS = 30_000_000  # [-] half-wave numbers of a plate looked at: about 2 GB
+MOST_MODES = 50_000  # [-] that may be asked for: minutes, and a matrix of the static compliance that fills the memory
 ENDS = ("clamped", "hinged", "free")
 
 
@@ -45,7 +46,9 @@ def _enough(n_modes: int | None, max_frequency: float | None, per_unit: Callable
     if (n_modes is None) == (max_frequency is None):
         raise ValueError("give either n_modes or max_frequency [Hz]")
     if n_modes is not None:
-        return _check.count("n_modes", n_modes), np.inf
+        if _check.count("n_modes", n_modes) > MOST_MODES:
+            raise ValueError(f"n_modes must be at most {MOST_MODES}, got {n_modes}")
+        return n_modes, np.inf
     return 10**9, per_unit(_check.positive("max_frequency", max_frequency, "Hz"))
 
 

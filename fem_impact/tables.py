@@ -164,7 +164,10 @@ def read_part(path: Path, table: str, values: dict[str, Any], folder: Path) -> P
     def wrong(text: str) -> ValueError:
         return fault(path, f"[{table}] {text}")
 
-    bad = _not_finite(values)
+    try:
+        bad = _not_finite(values)
+    except RecursionError:
+        raise wrong("is nested too deeply") from None
     if bad:
         raise wrong(f"{bad[0]} must be finite, got {bad[1]}")
     if table == "supports":

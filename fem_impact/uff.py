@@ -131,6 +131,10 @@ def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:
         "shapes": np.column_stack([table[i][2] for i in order]),
         "points": points[:, keep],
     }
+    if len(result["shapes"]) != len(points):
+        raise ValueError(
+            f"{path.name} has shapes at {len(result['shapes'])} nodes but names {len(points)}; export it again"
+        )
     for what, values in result.items():
         if not np.isfinite(values).all() or (what == "frequencies" and values.min() < 0.0):
             raise ValueError(f"{path.name} has {what} that are negative or no numbers; export it again")
