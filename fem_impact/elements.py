@@ -15,6 +15,7 @@ SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in sci
 ON_BODY = 1e-9  # [-] of a triangle: how far outside a point may lie by rounding
 NEAR_CURVE = 1e-5  # [-] of a triangle on a curved edge: it leaves the true curve by less
 CANDIDATES = 8  # [-] nearest triangles looked at before all of them are
+REACH = 0.5  # [-] of a triangle: no curved edge bulges so far
 CURVE_STEPS = 12  # [-] fixed-point steps from a point to its place in a curved triangle
 REFERENCE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) - 1.0 / 3.0  # corners in coordinates of the triangle
 DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
@@ -112,19 +113,21 @@ class Triangles:
         """The cell that holds each point (n, 2), or the nearest one, and whether the point lies in it."""
         near = self.tree.query(points, k=min(CANDIDATES, len(self.origin)))[1].reshape(len(points), -1)
         cell, depth = self._deepest(points, near)
-        lost = depth < 0.0
+        margin = np.where(self.curved, -NEAR_CURVE, -ON_BODY)
+        lost = depth < margin[cell]
         if lost.any():
             every = np.broadcast_to(np.arange(len(self.origin)), (1, len(self.origin)))
             for i in np.flatnonzero(lost):
                 cell[i], depth[i] = (a[0] for a in self._deepest(points[i : i + 1], every))
-        return cell, depth >= np.where(self.curved[cell], -NEAR_CURVE, -ON_BODY)
+        return cell, depth >= margin[cell]
 
     def _deepest(self, points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of candidate cells (n, k), the one in which the point lies deepest, and how deep (in area coordinates)."""
         cells = np.broadcast_to(cells, (len(points), cells.shape[1]))
         offset = points[:, None] - self.origin[cells]
         local = np.einsum("nkij,nkj->nki", self.inverse[cells], offset) + 1.0 / 3.0
-        bent = self.curved[cells]
+        straight = np.minimum(local.min(axis=2), 1.0 - local.sum(axis=2))
+        bent = self.curved[cells] & (straight > -REACH)
         if self.bent is not None and bent.any():
             which, away = cells[bent], offset[bent]
             place = local[bent]
