@@ -258,6 +258,8 @@ def _refuse_overlap(path: Path, points: np.ndarray, cells: np.ndarray) -> None:
             "join them, or save the piece you want alone"
         )
     rim = boundary(cells)
+    if not len(rim):
+        raise ValueError(f"{name} has triangles that close on themselves; a plate has a rim")
     if not np.array_equal(np.sort(rim[:, 0]), np.sort(rim[:, 1])):
         raise ValueError(
             f"{name} has triangles that overlap: some side has both its triangles on one side; mesh it again"

@@ -109,7 +109,7 @@ def tangent(piece: Piece, t: np.ndarray) -> np.ndarray:
         inside = piece.at(np.where(t < 0.5, t + 1e-4, t - 1e-4), 1)
         speed = np.where(still[..., None], inside, speed)
         length = np.linalg.norm(speed, axis=-1, keepdims=True)
-    return speed / length
+    return speed / np.where(length > 0.0, length, 1.0)
 
 
 def curvature(piece: Piece, t: np.ndarray) -> np.ndarray:
@@ -235,6 +235,8 @@ def crossed(outline: Outline) -> str:
 def _slender(whole: shapely.Polygon) -> str:
     """Where a body is much longer than it is wide, as at a needle; triangles as small as that would be countless."""
     span = max(np.ptp(np.reshape(whole.bounds, (2, 2)), axis=0))
+    if whole.area * SLENDER < span**2:
+        return "outline must not be a thousand times longer than wide; widen it"
     for k in range(1, FINEST):
         width = span * 4.0**-k
         body = whole.simplify(0.05 * width)  # what is finer does not matter at this width, and costs
