@@ -74,8 +74,8 @@ def test_sixty_modes_meet_the_eigen_solution():
             hit = fi.strike(target, striker, law, at=[0.0], speed=1.0, scheme=scheme, dt=dt)
             errors.append(abs(hit.restitution - 0.704365580386))
             assert hit.energy_error < 1e-13  # rounding of a hundred steps
-        assert_allclose(np.log2(errors[0] / errors[1]), slope, atol=0.1)  # 2.00 and 4.00 were measured
-        assert_allclose(np.log2(errors[1] / errors[2]), slope, atol=0.1)
+        assert_allclose(np.log2(errors[0] / errors[1]), slope, atol=0.05)  # 2.00 and 4.00 were measured
+        assert_allclose(np.log2(errors[1] / errors[2]), slope, atol=0.05)
     assert_allclose(hit.contact_time, 3.1553252963599e-4, rtol=1e-8)  # A4 with 100 steps: 4e-10 was measured
 
 
@@ -262,7 +262,7 @@ def test_onset_at_any_phase_of_the_step(exponent):
     """A gap walks the onset through the step: it is located, so the rebound hardly notices (case 19)."""
     target, striker = target_of(12), fi.Striker.rigid(0.01)
     rebounds = []
-    for gap in np.linspace(0.0, 1.3e-5, 12):
+    for gap in np.linspace(0.0, 1.3e-5, 100):
         law = fi.Contact.power(1e6 if exponent == 1.0 else 1e8, exponent, gap=gap)
         rebounds.append(fi.strike(target, striker, law, at=[0.0], speed=1.0, scheme="A4", dt=1.3e-5).restitution)
     assert np.ptp(rebounds) < 1e-12
@@ -366,8 +366,10 @@ def test_residual_compliance_stands_for_the_modes_left_out():
             assert bare.error.truncation == 0.0
         assert with_rest[-1] < 1e-5  # what is asked of 2000 modes holds with 1000 here
         assert with_rest[0] < 0.2 * without[0]
-        assert np.log(with_rest[0] / with_rest[-1]) / np.log(10.0) > 1.8  # falls as omega_c**-2 or faster, n ~ omega_c
-        assert np.log(without[0] / without[-1]) / np.log(10.0) < 1.5
+        assert (
+            np.log(with_rest[0] / with_rest[-1]) / np.log(10.0) > 2.5
+        )  # -2 is proved, -3 and steeper measured; n ~ omega_c
+        assert 0.8 < np.log(without[0] / without[-1]) / np.log(10.0) < 1.1  # as 1 / omega_c
 
 
 def test_contact_the_modes_cannot_resolve_says_so():

@@ -226,8 +226,8 @@ def test_degenerate_and_split_modes_do_not_change_the_force():
     order = np.random.default_rng(0).permutation(13)
     order = np.concatenate([[0], order[order > 0], [13]])
     two = run(np.append(omega, omega[5])[order], split[order] * np.where(order == 3, -1.0, 1.0), k=1e6, h=2e-5)
-    assert_allclose(two.force, one.force, rtol=0, atol=1e-13 * one.force.max())  # sums in another order
-    assert_allclose(two.time, one.time, rtol=1e-13)
+    assert_allclose(two.force, one.force, rtol=0, atol=1e-14 * one.force.max())  # sums in another order
+    assert_allclose(two.time, one.time, rtol=1e-14)
 
 
 # --- cases 7, 12, 13: free flight, scaling, reversal -----------------------------------------------------------------
@@ -251,8 +251,8 @@ def test_long_free_flight_keeps_energy_and_phase():
 def test_linear_force_scales_with_speed(speed):
     omega, shape = plate(12)
     one, other = (run(omega, shape, k=1e6, h=2e-5, speed=v) for v in (1.0, speed))
-    assert_allclose(other.force / speed, one.force, atol=1e-12 * one.force.max())  # rounding through 40 steps
-    assert_allclose(other.time, one.time, rtol=1e-12)
+    assert_allclose(other.force / speed, one.force, atol=1e-14 * one.force.max())  # rounding through 40 steps
+    assert_allclose(other.time, one.time, rtol=1e-14)
 
 
 @pytest.mark.parametrize("exponent", [1.2, 1.5, 3.0])
@@ -260,7 +260,9 @@ def test_power_law_depends_on_stiffness_and_speed_in_one_way(exponent):
     omega, shape = plate(12)
     one = run(omega, shape, k=1e7, exponent=exponent, h=2e-5)
     other = run(omega, shape, k=1e7 * 100.0 ** (1.0 - exponent), exponent=exponent, h=2e-5, speed=100.0)
-    assert_allclose(other.force / 100.0, one.force, atol=1e-11 * one.force.max())  # pow() is good to some eps
+    assert_allclose(
+        other.force / 100.0, one.force, atol=5e-14 * one.force.max()
+    )  # pow() is good to some eps; 7e-15 was measured
 
 
 @pytest.mark.parametrize("scheme", ["A", "A4"])
@@ -452,11 +454,12 @@ def test_far_contacts_of_separate_bodies_do_not_mix(scheme):
     assert_allclose(speeds, [left.p[0], right.p[0]], atol={"A": 1e-4, "A4": 1e-6, "collocation": 1e-6}[scheme])
 
 
-def test_final_separation_is_final():
+@pytest.mark.parametrize("cases", [100, pytest.param(1000, marks=pytest.mark.slow)])
+def test_final_separation_is_final(cases):
     """Where the certificate was given, ten thousand looks later nothing has touched."""
     rng = np.random.default_rng(11)
     given_out = 0
-    for _ in range(100):
+    for _ in range(cases):
         n = int(rng.integers(1, 12))
         omega = np.append(0.0, np.sort(rng.uniform(100.0, 2e4, n)))
         shape = np.append(rng.uniform(3.0, 30.0), -rng.normal(0.0, 3.0, n))
@@ -467,7 +470,7 @@ def test_final_separation_is_final():
         t = np.linspace(0.0, 0.1, 10001)[:, None]
         q = r.q * np.cos(omega * t) + r.p * np.where(omega > 0.0, np.sin(omega * t) / np.maximum(omega, 1.0), t)
         assert (q[1:] @ shape).max() < 0.0
-    assert given_out > 50
+    assert given_out > 0.5 * cases
 
 
 def test_no_certificate_while_a_force_pushes_back():
