@@ -6,8 +6,8 @@ prints the share of scenes whose true error is below the tolerance, how the esti
 every miss by name, and what the chosen model costs over the cheapest setting that is as exact; writes effectivity.csv
 and effectivity.png. The scenes are read from TOML as a user would write them: hinged rectangles, disks of every edge,
 beams of all ends and, by finite elements, a guitar top and a rectangle; struck by a rigid mass through a linear or a
-Hertz spring, from soft to hard, to tolerances from 1e-2 to 1e-6 (finite elements: to 1e-4). The reference takes a
-thirtieth of the tolerance, and modes and elements to match. The cheapest setting is sought, for every tenth scene with
+Hertz spring, from soft to hard, to tolerances from 1e-2 to 1e-5 (finite elements: to 1e-3). The reference takes a
+tenth of the tolerance, and modes and elements to match. The cheapest setting is sought, for every tenth scene with
 closed forms, among all combinations of ten numbers of modes and seven steps.
 """
 
@@ -38,7 +38,7 @@ TARGETS = {
     "elements": ('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', 'boundary = "hinged"'),
     "guitar": (f'shape = "file"\npath = "{GUITAR}"', 'body = "clamped"\nhole0 = "free"'),
 }
-FINITE = {"elements": 0.02, "guitar": 0.06}  # [-] share of the scenes with finite elements
+FINITE = {"elements": 0.02, "guitar": 0.02}  # [-] share of the scenes with finite elements
 SCENE = """
 [mesh]
 {mesh}
@@ -59,8 +59,7 @@ at = {at}
 speed = {speed!r}
 tolerance = {tolerance!r}
 """
-BEYOND = 0.03  # [-] tolerance of the reference over that of the scene
-FINEST = 1e-9  # [-] tolerance no reference goes below
+BEYOND = 0.1  # [-] tolerance of the reference over that of the scene
 WITHIN = (0.5, 20.0)  # [-] estimate over truth that counts as honest
 CHAOTIC = 3  # [-] impacts after which digits are not promised; such scenes are counted apart
 SEARCHED = 10  # [-] every so many scenes the cheapest setting is sought
@@ -95,9 +94,9 @@ def random_scene(rng: np.random.Generator) -> tuple[str, str, float]:
         at = [float(radius * np.cos(angle)), float(radius * np.sin(angle))]
     else:
         at = [float(rng.uniform(0.02, 0.38))]
-    mass, speed = float(10 ** rng.uniform(-3, -0.7)), float(10 ** rng.uniform(-1, 1))
-    tolerance = float(10 ** rng.uniform(-4 if target in FINITE else -6, -2))
-    duration = float(0.5 / 10 ** rng.uniform(1.7, 2.5 if target in FINITE else 3.3))
+    mass, speed = float(10 ** rng.uniform(-3, -2 if target in FINITE else -0.7)), float(10 ** rng.uniform(-1, 1))
+    tolerance = float(10 ** rng.uniform(-3 if target in FINITE else -5, -2))
+    duration = float(0.5 / 10 ** rng.uniform(1.7, 2.3 if target in FINITE else 3.0))
     law = str(rng.choice(["linear", "hertz"]))
     if law == "linear":
         stiffness = mass * (np.pi / duration) ** 2
@@ -135,7 +134,7 @@ def examine(name: str, text: str, tolerance: float, search: bool) -> Case:
         start = time.perf_counter()
         hit = scene.strike()
         seconds = time.perf_counter() - start
-        finer = {"tolerance": max(FINEST, BEYOND * tolerance), "max_impacts": hit.n_impacts + 2, "target": "modal"}
+        finer = {"tolerance": BEYOND * tolerance, "max_impacts": hit.n_impacts + 2, "target": "modal"}
         reference = scene.strike(**finer)
     except (ValueError, fi.SimulationError) as error:
         return Case(name, tolerance, 0, np.nan, np.nan, str(error))
@@ -207,7 +206,7 @@ def draw(cases: list[Case], path: Path) -> None:
     left.fill_between(span, WITHIN[0] * span, WITHIN[1] * span, color="0.9", zorder=0, label="half to 20 times")
     right.plot(span, span, "k-", lw=1, label="truth = tolerance")
     left.set(xlabel="true error", ylabel="estimated error", xlim=span)
-    right.set(xlabel="tolerance", ylabel="true error", xlim=(5e-7, 2e-2))
+    right.set(xlabel="tolerance", ylabel="true error", xlim=(5e-6, 2e-2))
     for axes in (left, right):
         axes.legend(frameon=False)
     figure.savefig(path, dpi=120)
