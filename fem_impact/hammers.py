@@ -17,6 +17,8 @@ from .striker import Striker
 TOLERANCE = 1e-2  # [-] of the blows behind a choice
 TIPS = np.geomspace(0.03, 10.0, 61)  # [-] of the stiffness at which a half sine has the bandwidth: 24 for each decade
 ROUNDS = 7  # [-] halvings of the span between two tips when the softest that reaches the bandwidth is sought
+MASSES = (1e-6, 1e6)  # [kg] of hammers: beyond, a blow takes for ever or leaves the range of numbers
+BANDWIDTHS = (1e-3, 1e9)  # [Hz] likewise
 LOOKS = 400  # [-] frequencies at which a spectrum is searched for where it falls
 
 
@@ -49,7 +51,7 @@ def bandwidth_of(hit: Response, drop: float) -> float:
 
 def highest_frequency(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float = 10.0) -> float:
     """Frequency [Hz] up to which modes are needed to choose a hammer; a few modes are enough to tell."""
-    centre = _check.positive("bandwidth", bandwidth, "Hz") / _half_sine_reach(drop)
+    centre = _centre(bandwidth, drop)
     return max(
         accuracy.cutoff_frequency(
             modes, at, contact=Contact.linear(TIPS[-1] * mass * (2.0 * np.pi * centre) ** 2), mass=mass, speed=1.0,
@@ -61,7 +63,13 @@ def highest_frequency(modes: Modes, at: Any, bandwidth: float, masses: Any, *, d
 
 def _checked(masses: Any) -> np.ndarray:
     masses = _check.array("masses", np.atleast_1d(masses), (None,), "kg")
-    return np.array([_check.positive("masses", mass, "kg") for mass in masses])
+    return np.array([_check.between("masses", mass, *MASSES, "kg") for mass in masses])
+
+
+def _centre(bandwidth: float, drop: float) -> float:
+    """Contact resonance [Hz] at which a half sine has a bandwidth."""
+    drop = _check.between("drop", drop, 1.0, 40.0, "dB")
+    return _check.between("bandwidth", bandwidth, *BANDWIDTHS, "Hz") / _half_sine_reach(drop)
 
 
 def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float = 10.0) -> tuple[Hammer, ...]:
@@ -87,8 +95,7 @@ def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float 
     make the answer the same at any speed.
     """
     masses = _checked(masses)
-    drop = _check.between("drop", drop, 1.0, 40.0, "dB")
-    centre = _check.positive("bandwidth", bandwidth, "Hz") / _half_sine_reach(drop)
+    centre = _centre(bandwidth, drop)
     found = []
     for mass in masses:
         striker = Striker.rigid(mass)

@@ -160,3 +160,16 @@ def test_a_bandwidth_beyond_every_tip_has_no_hammer():
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=60)
     (hammer,) = hammers.choose(plate, (0.465, 0.3), 1e6, [0.01])
     assert not hammer.works
+
+
+@pytest.mark.parametrize(
+    ("bandwidth", "masses", "text"),
+    [
+        (800.0, [1e308, 0.2], r"masses must lie between 1e-06 and 1e\+06 kg, got 1e\+308 kg"),
+        (800.0, [5e-324], "masses must lie between"),
+        (1e300, [0.1], r"bandwidth must lie between 0.001 and 1e\+09 Hz"),
+    ],
+)
+def test_hammers_beyond_all_reason_are_refused_at_once(bandwidth, masses, text):
+    with pytest.raises(ValueError, match=text):
+        fi.hammers.choose(fi.Modes.rigid(1.0), None, bandwidth, masses)
