@@ -63,12 +63,13 @@ def highest_frequency(modes: Modes, at: Any, bandwidth: float, masses: Any, *, d
 
 def _checked(masses: Any) -> np.ndarray:
     masses = _check.array("masses", np.atleast_1d(masses), (None,), "kg")
-    return np.array([_check.between("masses", mass, *MASSES, "kg") for mass in masses])
+    return np.array([_check.between("masses", _check.positive("masses", mass, "kg"), *MASSES, "kg") for mass in masses])
 
 
 def _centre(bandwidth: float, drop: float) -> float:
     """Contact resonance [Hz] at which a half sine has a bandwidth."""
     drop = _check.between("drop", drop, 1.0, 40.0, "dB")
+    bandwidth = _check.positive("bandwidth", bandwidth, "Hz")
     return _check.between("bandwidth", bandwidth, *BANDWIDTHS, "Hz") / _half_sine_reach(drop)
 
 
