@@ -5,16 +5,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.colors import ListedColormap, LogNorm, Normalize
+from matplotlib import colormaps
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, _styled
 
 BLACK, GREY = "#222222", "#777777"
 PALETTE = "cividis"  # even in lightness and for every colour vision
+FEW = 10  # [-] whole numbers that get a colour each
+HALO = withStroke(linewidth=2.2, foreground=BLACK)  # behind white lines, which bright colours would swallow
+RIM = withStroke(linewidth=4.0, foreground="white")  # behind circles, on dark colours
 TILT = np.array([[1.0, 0.42], [0.0, 0.5]])  # oblique view of the plane of a plate: rows are screen x and y
 __all__ = ["BLACK", "BLUE", "GREEN", "GREY", "ORANGE", "PURPLE", "SKY", "VERMILION", "Axis", "Curve", "Mark"]
 
@@ -119,7 +124,11 @@ def colour_map(
     low, high = colour.limits
     low = float(field.min()) if low is None and field.count() else low
     high = float(field.max()) if high is None and field.count() else high
-    norm = LogNorm(low, high) if colour.log else Normalize(low, high)
+    norm: Any = LogNorm(low, high) if colour.log else Normalize(low, high)
+    whole = field.count() and bool((field == field.round()).all()) and not colour.unit and not colour.log
+    few = whole and 0.0 < high - low < FEW
+    if few:  # one colour for each number
+        norm = BoundaryNorm(np.arange(low - 0.5, high + 1.0), colormaps[PALETTE].N)
     with _styled(6.4, 4.6) as figure:
         axes = figure.subplots()
         axes.grid(False)
@@ -134,10 +143,13 @@ def colour_map(
             lines = axes.contour(along_x, along_y, data, levels=levels, colors=paint, linewidths=1.0, linestyles=style)
             if unit:
                 axes.clabel(lines, fmt={level: EngFormatter(unit=unit, sep=" ")(level) for level in levels}, fontsize=8)
-            handles.append(Line2D([], [], color=paint, ls=style, lw=1.0, label=name))
+            for part in (lines, *lines.labelTexts):
+                part.set_path_effects([HALO])
+            handles.append(Line2D([], [], color=paint, ls=style, lw=1.0, label=name, path_effects=[HALO]))
         for mark in marks:
             ring: dict[str, Any] = {"ls": "", "marker": "o", "ms": 10, "mfc": "none", "mec": mark.color, "mew": 2.2}
-            axes.plot([mark.x], [mark.y], **ring)
+            ring["path_effects"] = [RIM]
+            axes.plot([mark.x], [mark.y], clip_on=False, **ring)
             handles.append(Line2D([], [], label=mark.label, **ring))
         axes.set_title(title)
         x.apply(axes, "x")
@@ -148,8 +160,10 @@ def colour_map(
             bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         bar.ax.yaxis.set_minor_formatter(NullFormatter())
         bar.ax.yaxis.set_major_formatter(EngFormatter(unit=colour.unit, sep=" ") if colour.unit else "{x:g}")
-        whole = field.count() and bool((field == field.round()).all())
-        if whole and not colour.unit and not colour.log:
+        if few:
+            bar.set_ticks(np.arange(low, high + 0.5))
+            bar.ax.tick_params(which="both", length=0)
+        elif whole:
             bar.ax.yaxis.set_major_locator(MaxNLocator(integer=True))
         if handles:
             legend = figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=9)

@@ -24,8 +24,8 @@ def compute(masses=MASSES, stiffnesses=STIFFNESSES, max_frequency=12e3):
 def draw(table):
     """Number of impacts."""
     figure = charts.colour_map(
-        table.n_impacts.clip(max=4),
-        x=charts.Axis("mass of the clapper [kg]", "", log=True),
+        table.n_impacts.clip(max=4).assign_coords(mass=1e3 * table.mass),
+        x=charts.Axis("mass of the clapper", "g", log=True),
         y=charts.Axis("contact stiffness", "N/m$^{1.5}$", log=True),
         colour=charts.Axis("number of impacts, 4 or more as 4"),
         title="Clapper on the rim of a free steel disk of 4.4 kg",

@@ -26,13 +26,14 @@ def compute(masses=MASSES, stiffnesses=STIFFNESSES):
 def draw(result):
     """The hardest clean head over the mallet's mass."""
     drawn = [
-        charts.Curve(1e3 * MASSES, values, f"at {place:g}", fig16.PLACES[place]) for place, values in result.items()
+        charts.Curve(1e3 * MASSES, values, f"at {place:g} of the length", fig16.PLACES[place])
+        for place, values in result.items()
     ]
     figure = charts.curves(
         drawn,
         x=charts.Axis("mass of the mallet", "g", log=True),
-        y=charts.Axis("hardest head that hits once", "N/m", log=True),
-        title="Free bar of 200 g, 100 Hz",
+        y=charts.Axis("hardest head that hits once", "N/m", log=True, limits=(None, 1.3 * STIFFNESSES[-1])),
+        title="Free bar of 200 g, 100 Hz; heads of up to 10 MN/m tried",
     )
     return figure, {"mass [kg]": MASSES} | {f"at {place:g} [N/m]": values for place, values in result.items()}
 

@@ -47,13 +47,14 @@ def compute():
 
 
 def draw(result: Cradle):
-    """Positions over time."""
+    """Where each ball is over time, the first at zero when it hangs at rest and each next one a diameter on."""
     curves = [
-        charts.Curve(result.time, result.position[:, i], f"ball {i + 1}", PAINTS[i])
+        charts.Curve(result.time, result.position[:, i] + 2.0 * RADIUS * i, f"ball {i + 1}", PAINTS[i])
         for i in range(result.position.shape[1])
     ]
+    axis = charts.Axis("time", "s", limits=(None, 1.65 * SWING))  # room for the legend
     title = f"Newton's cradle, {len(curves)} balls: the first arrives at time zero"
-    figure = charts.curves(curves, x=source.TIME, y=charts.Axis("displacement", "m"), title=title)
+    figure = charts.curves(curves, x=axis, y=charts.Axis("position", "m"), title=title)
     columns = {"time [s]": result.time}
     columns |= {f"ball {i + 1} [m]": result.position[:, i] for i in range(result.position.shape[1])}
     return figure, columns

@@ -25,7 +25,10 @@ def compute(hammers=HAMMERS):
 
 def draw(result, places=fig14.PLACES, title="Threshold of a clean rebound, plate of 200 g"):
     """The four curves on logarithmic axes."""
-    drawn = [charts.Curve(1e3 * HAMMERS, values, f"at {place:g}", places[place]) for place, values in result.items()]
+    drawn = [
+        charts.Curve(1e3 * HAMMERS, values, f"at {place:g} of the length", places[place])
+        for place, values in result.items()
+    ]
     figure = charts.curves(
         drawn,
         x=charts.Axis("mass of the hammer", "g", log=True),

@@ -37,8 +37,9 @@ def draw(result):
         colour=charts.Axis("stiffness over threshold, several impacts", "", log=True, limits=(None, 1.0)),
         shades=[
             (table.n_impacts == 1, charts.BLACK, "one clean impact"),
-            ((table.n_impacts > 1) & (ratio >= 1.0), "white", "beyond the threshold"),
+            ((table.n_impacts > 1) & (ratio >= 1.0), "white", "several, beyond the threshold"),
         ],
+        contours=[(ratio, [1.0], "", "threshold")],
         marks=[source.mark(source.MARKED, "figure 21"), source.mark(source.STIFF, "figure 22", charts.ORANGE)],
         title="Single and multiple impacts, plate of 200 g",
     )

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact import atlas, cli, hammers, maps
+from fem_impact.scene import scene_of
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
 OVER = {"contact.stiffness": [2e4, 1e5, 4e5], "striker.mass": [0.02, 0.1]}
@@ -173,3 +174,46 @@ def test_a_bandwidth_beyond_every_tip_has_no_hammer():
 def test_hammers_beyond_all_reason_are_refused_at_once(bandwidth, masses, text):
     with pytest.raises(ValueError, match=text):
         fi.hammers.choose(fi.Modes.rigid(1.0), None, bandwidth, masses)
+
+
+PIECES = {
+    "plate": {
+        "mesh": {"shape": "rectangle", "length": 0.3, "width": 0.2},
+        "material": {"E": 11e9, "nu": 0.37, "rho": 420.0, "E_across": 0.7e9, "G": 0.7e9},
+        "section": {"kind": "plate", "thickness": 2.8e-3},
+        "supports": {"boundary": "clamped"},
+        "striker": {"kind": "rigid", "mass": 0.005},
+        "strike": {"at": [0.13, 0.08], "speed": 1.0, "tolerance": 1e-2},
+    },
+    "bar": {
+        "mesh": {"shape": "line", "length": 0.35},
+        "material": {"E": 20e9, "nu": 0.3, "rho": 1000.0},
+        "section": {"kind": "beam", "width": 0.05, "height": 0.02},
+        "supports": {"left": "free", "right": "free"},
+        "striker": {"kind": "stick", "mass": 0.06, "first_frequency": 2e3},
+        "strike": {"at": [0.11], "speed": 2.0, "tolerance": 1e-3},
+    },
+}
+
+
+@pytest.mark.parametrize("body", [pytest.param("plate", marks=pytest.mark.slow), "bar"])
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_cells_of_finite_element_scenes_are_struck_scenes(body, exponent):
+    """Masses and stiffnesses over more than a decade, any cell."""
+    contact = {"kind": "power", "stiffness": 1e5, "exponent": exponent}
+    found = scene_of({**PIECES[body], "contact": contact}, Path(f"{body}.toml"), folder=Path())
+    soft = 1e3 if exponent == 1.0 else 1e5
+    over = {"striker.mass": [2e-3, 8e-3, 0.03], "contact.stiffness": soft * np.array([1.0, 6.0, 40.0])}
+    table = atlas.map_scene(found, over=over)
+    rng = np.random.default_rng(5)
+    for _ in range(4):
+        mass, stiffness = (float(rng.choice(values)) for values in over.values())
+        changed = atlas.changed_scene(found, "contact.stiffness", stiffness)
+        hit, cell = (
+            atlas.changed_scene(changed, "striker.mass", mass).strike(),
+            table.sel(mass=mass, stiffness=stiffness),
+        )
+        assert int(cell.n_impacts) == hit.n_impacts
+        assert_allclose(float(cell.restitution), hit.restitution, atol=2.0 * hit.tolerance)  # one each
+        for layer in ("contact_time", "peak_force", "impulse"):
+            assert_allclose(float(cell[layer]), getattr(hit, layer), rtol=2.0 * hit.tolerance)

@@ -237,3 +237,77 @@ def test_a_script_alone_writes_picture_and_data(number, tmp_path, monkeypatch):
     rows = (tmp_path / f"fig{number:02d}.csv").read_text().splitlines()
     assert len(rows) > 4
     assert len({row.count(",") for row in rows}) == 1
+
+
+# Where the source leaves a number open, other choices: strike points on and off the lines of symmetry, damping ratios.
+PLACES = [(0.2, 0.3), (0.3, 0.3), (0.45, 0.5), (0.4, 0.25)]
+DAMPING = [0.0, 0.005, 0.02]
+
+
+def blow(plate_mass, stiffness, place, damping_ratio, speed=1.0):
+    """The source's 100 g stick on one of its plates, struck at shares of the sides."""
+    source = study("source_scenes")
+    target = source.plate(plate_mass, damping_ratio=damping_ratio)
+    at = (place[0] * source.LENGTH, place[1] * source.WIDTH)
+    return fi.strike(target, source.stick(), fi.Contact.linear(stiffness), at=at, speed=speed, tolerance=1e-3)
+
+
+@pytest.mark.parametrize("damping_ratio", DAMPING)
+@pytest.mark.parametrize("place", PLACES)
+def test_fig10_fig18_fig19_hold_wherever_the_plate_is_struck(place, damping_ratio):
+    source = study("source_scenes")
+    at = (place[0] * source.LENGTH, place[1] * source.WIDTH)
+    few = {"masses": source.MASSES[[0, 9, 18]], "stiffnesses": source.STIFFNESSES[[0, 9, 19]]}
+    wanted = {**few, "at": at, "damping_ratio": damping_ratio, "max_frequency": None}
+    rigid, medium, light = (source.linear_map(mass, **wanted) for mass in (5e5, 2.0, 0.2))
+    flat = 2.0 * source.contact_resonance(rigid) * rigid.contact_time.values
+    assert_allclose(flat, 1.0, rtol=0.065)  # 0.061 at 2.8 kHz, where the stick bends along at 10 kHz
+    change = {name: np.abs(table.contact_time / rigid.contact_time - 1.0).values for name, table in
+              (("2 kg", medium), ("200 g", light))}  # fmt: skip
+    assert change["2 kg"].max() < 0.2  # "virtually nothing": colours span a factor of 30
+    assert change["200 g"][2, 2] > 1.0  # "especially in the upper right-hand region"
+    assert change["200 g"][0, 0] < 0.2
+
+
+@pytest.mark.parametrize("speed", [0.3, 10.0])
+@pytest.mark.parametrize("damping_ratio", DAMPING)
+@pytest.mark.parametrize("place", [(0.2, 0.3), (0.25, 0.3), (0.3, 0.3)])
+def test_fig21_fig22_hold_near_the_strike_point_chosen(place, damping_ratio, speed):
+    """One contact of two humps at the marked case, several at the stiff one, at any speed and usual damping."""
+    marked, stiff = (blow(0.2, k, place, damping_ratio, speed) for k in (88.6e3, 1e6))
+    assert marked.n_impacts == 1
+    assert len(humps(marked)) == 2
+    assert stiff.n_impacts >= 2
+    assert stiff.contact_time > 2.0 * blow(5e5, 1e6, place, damping_ratio, speed).contact_time
+
+
+@pytest.mark.parametrize("damping_ratio", DAMPING)
+@pytest.mark.parametrize("place", PLACES)
+def test_fig23_holds_wherever_the_plate_is_struck(place, damping_ratio):
+    frequencies = np.linspace(600.0, 900.0, 301)  # Hz, around the first dip
+    first = []
+    for mass in (5e5, 2.0):
+        hit = blow(mass, 88.6e3, place, damping_ratio)
+        level = 20.0 * np.log10(np.abs(hit.spectrum(frequencies)) / hit.impulse)
+        first.append(dips(frequencies, level)[0, 1])
+    assert first[0] < first[1] - 5.0  # dB: "as the impacted plate gets lighter, the dips get shallower"
+
+
+@pytest.mark.parametrize("line", [0.5, 0.3, 0.15])
+def test_fig15_holds_on_other_lines_across_the_plate(line):
+    source, fig14, fig15 = study("source_scenes"), study(14), study(15)
+    points = {place: (place * source.LENGTH, line * source.WIDTH) for place in fig14.PLACES}
+    result = fig15.thresholds(source.plate(0.2), points, HAMMERS)
+    heavy = HAMMERS > 4e-3  # "a few grams"
+    for place, values in result.items():
+        assert (np.diff(values) < 0.0).all()
+        assert place == 0.05 or (result[0.05] > values)[heavy].all()
+
+
+def test_fig17_holds_at_either_end_of_the_beam():
+    fig15, fig16 = study(15), study(16)
+    beam = fi.analytic.beam(1.0, ends=("free", "free"), mass=0.2, first_frequency=100.0, n_modes=400)
+    there = fig15.thresholds(beam, {place: (1.0 - place,) for place in fig16.PLACES}, HAMMERS)
+    here = study(17).compute(HAMMERS)
+    for place in fig16.PLACES:
+        assert_allclose(there[place], here[place], rtol=1e-9)  # the same numbers but for rounding
