@@ -126,9 +126,10 @@ def colour_map(
     high = float(field.max()) if high is None and field.count() else high
     norm: Any = LogNorm(low, high) if colour.log else Normalize(low, high)
     whole = field.count() and bool((field == field.round()).all()) and not colour.unit and not colour.log
-    few = whole and 0.0 < high - low < FEW
+    few = whole and low is not None and high is not None and 0.0 < high - low < FEW
+    numbers = [float(n) for n in range(int(low or 0), int(high or 0) + 1)] if few else []
     if few:  # one colour for each number
-        norm = BoundaryNorm(np.arange(low - 0.5, high + 1.0), colormaps[PALETTE].N)
+        norm = BoundaryNorm([number - 0.5 for number in [*numbers, numbers[-1] + 1.0]], colormaps[PALETTE].N)
     with _styled(6.4, 4.6) as figure:
         axes = figure.subplots()
         axes.grid(False)
@@ -161,7 +162,7 @@ def colour_map(
         bar.ax.yaxis.set_minor_formatter(NullFormatter())
         bar.ax.yaxis.set_major_formatter(EngFormatter(unit=colour.unit, sep=" ") if colour.unit else "{x:g}")
         if few:
-            bar.set_ticks(np.arange(low, high + 0.5))
+            bar.set_ticks(numbers)
             bar.ax.tick_params(which="both", length=0)
         elif whole:
             bar.ax.yaxis.set_major_locator(MaxNLocator(integer=True))
