@@ -115,8 +115,7 @@ def nearest(word: Any, known: Iterable[str]) -> str:
 
 def lock_arrays(instance: Any) -> None:
     """Make every array field of a frozen dataclass read-only; frozen alone leaves contents writable."""
-    for name in instance.__dataclass_fields__:
-        value = getattr(instance, name)
+    for value in vars(instance).values():
         if isinstance(value, np.ndarray):
             value.setflags(write=False)
 

@@ -12,6 +12,7 @@ from . import _check
 from .modal import Damping, Modes, damping_ratios
 
 LEVY_TERMS = 4000  # [-] sum over sines across a hinged plate: with its tail corrected, 1e-11 of the compliance
+COTH_ONE = 19.0  # [-] argument from which coth is 1 to rounding: exp(-38) is 3e-17
 DISK_TERMS = 100_000  # [-] cap for points at the very edge of a disk, where terms fall as n**-3 only: 5e-11
 MOST_PAIRS = 30_000_000  # [-] half-wave numbers of a plate looked at: about 2 GB
 MOST_MODES = 50_000  # [-] that may be asked for: minutes, and a matrix of the static compliance that fills the memory
@@ -96,19 +97,29 @@ class RectangleShapes:
         beta = np.arange(1, LEVY_TERMS + 1) * np.pi / self.length
         whole = -np.expm1(-2.0 * beta * self.width)
         tail = 0.5 * (self.length / np.pi) ** 3 / 4.0 / (2.0 * LEVY_TERMS * (LEVY_TERMS + 1.0))  # mean sin**2 = 1/2
-        return beta, np.stack([whole, 1.0 / beta + self.width * (2.0 - whole) / whole]), tail
+        return beta, np.stack([whole, 1.0 / beta + self.width * (2.0 - whole) / whole, beta**-2.0]), tail
+
+    def _sines(self, x: float) -> np.ndarray:
+        """Sines of the wave numbers at a place along the length, products of few rotations, (LEVY_TERMS,)."""
+        turn = 1j * np.pi * x / self.length
+        side = int(LEVY_TERMS**0.5) + 1
+        inner, outer = np.exp(turn * np.arange(side)), np.exp(turn * side * np.arange(side))
+        return (outer.real[:, None] * inner.imag + outer.imag[:, None] * inner.real).ravel()[1 : LEVY_TERMS + 1]
 
     def _green(self, place: np.ndarray, load: np.ndarray) -> float:
-        beta, (whole, span), tail = self._levy
+        beta, (whole, span, inverse), tail = self._levy
         low, high = min(place[1], load[1]), self.width - max(place[1], load[1])
         gap = self.width - low - high
         if min(low, high) <= 0.0:
             return 0.0
-        near, far = -np.expm1(-2.0 * low * beta), -np.expm1(-2.0 * high * beta)
+        fourth = span - (low + high)  # where coth is 1 to the last digit, else:
+        n = np.searchsorted(beta, COTH_ONE / min(low, high))
+        near, far = -np.expm1(-2.0 * low * beta[:n]), -np.expm1(-2.0 * high * beta[:n])
         # x coth(x beta) is x (2 - t) / t with t = 1 - exp(-2 x beta)
-        fourth = near * far / whole * (span - low * (2.0 - near) / near - high * (2.0 - far) / far) / beta**2
-        sines = np.sin(place[0] * beta)
-        sines *= sines if place[0] == load[0] else np.sin(load[0] * beta)
+        fourth[:n] = near * far / whole[:n] * (span[:n] - low * (2.0 - near) / near - high * (2.0 - far) / far)
+        fourth *= inverse
+        sines = self._sines(place[0])
+        sines *= sines if place[0] == load[0] else self._sines(load[0])
         if gap > 0.0:
             sines *= np.exp(-gap * beta)
         total = float(sines @ fourth) / 4.0

@@ -184,12 +184,11 @@ def strike(
     touch = Touch(contact, 0, 1, striker.at[None] if striker.modes.dimension else None, point)
     whole = striker.compliance if residual and striker.modes.dimension else None
     end = striker.at[None] if striker.modes.dimension else np.zeros((1, 0))
-    arriving = _part(striker.modes, ((0, 1.0),), end, striker.shape[None], whole, forces[0])
+    motion = speed * striker.motion
+    arriving = _part(striker.modes, ((0, 1.0),), end, striker.shape[None], whole, forces[0], motion)
     whole = modes.shapes.compliance(point) if residual and modes.dimension else None
     struck = _part(modes, ((0, -1.0),), point, modes.shapes.at(point), whole, forces[1])
-    arriving = replace(arriving, p=speed * striker.motion)
-    response = _follow((striker.modes, modes), [touch], [arriving, struck], speed, options)
-    return replace(response, striker=striker, at=point[0])
+    return _follow((striker.modes, modes), [touch], [arriving, struck], speed, options, striker, point[0])
 
 
 def collide(
@@ -233,7 +232,7 @@ def collide(
     return _follow(bodies, contacts, parts, arriving, options)
 
 
-def _follow(bodies, contacts, parts, speed, options) -> Response:
+def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> Response:
     """Run the bodies to the options' tolerance and estimate what is left of error."""
     system = _joined(parts, contacts)
     endless = not np.isfinite(options.horizon) and not options.n_max
@@ -252,7 +251,7 @@ def _follow(bodies, contacts, parts, speed, options) -> Response:
     error = Error(step_error, truncation, mesh_error, resolvable, sensitivity=_sensitivity(coarse, history))
     laws = tuple(touch.law for touch in contacts)
     dips = tuple(_dip(part, system) for part in parts)
-    return Response(tuple(bodies), laws, history, speed, options.tolerance, ran, error, dips=dips)
+    return Response(tuple(bodies), laws, history, speed, options.tolerance, ran, error, striker, at, dips)
 
 
 def _dip(part: _Part, system: _System) -> Dip | None:
@@ -297,9 +296,15 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Pa
 
 
 def _part(
-    modes: Modes, touched: tuple, points: np.ndarray, rows: np.ndarray, whole: np.ndarray | None, force: float
+    modes: Modes,
+    touched: tuple,
+    points: np.ndarray,
+    rows: np.ndarray,
+    whole: np.ndarray | None,
+    force: float,
+    motion: np.ndarray | None = None,
 ) -> _Part:
-    """One body at rest: its modes, their shapes at its contacts, and what they leave out of its compliance there."""
+    """One undeformed body, at rest or with modal velocities: its shapes and the compliance left out at its contacts."""
     rest = np.zeros((len(touched), len(touched)))
     if whole is not None:
         flexible = modes.omega > 0.0
@@ -310,8 +315,9 @@ def _part(
             rest = np.zeros_like(rest)
     still = np.zeros(modes.n_modes)
     bias = force * rows[0] if force else still
+    velocity = still if motion is None else motion
     above = REST_ABOVE[min(modes.dimension, 2)] if modes.dimension else 1.0
-    return _Part(modes.omega, modes.damping_ratio, rows, touched, rest, above, still, still, bias, force, points)
+    return _Part(modes.omega, modes.damping_ratio, rows, touched, rest, above, still, velocity, bias, force, points)
 
 
 def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
@@ -380,12 +386,13 @@ def _pace(system: _System) -> tuple[float, float]:
     rate = system.omega * np.maximum(1.0, 2.0 * system.zeta)  # what is overdamped yields as a dashpot, not as a mass
     order = np.argsort(rate, kind="stable")
     omega = rate[order]
-    last = np.append(omega[1:] > omega[:-1], True)  # of several modes with one frequency
+    last = np.concatenate([omega[1:] > omega[:-1], [True]])  # of several modes with one frequency
+    beyond = np.concatenate([omega[last][1:], [np.inf]])
     shortest, fastest = np.inf, 0.0
     for i, (k, exponent, _, compliance) in enumerate(system.law):
         mobile = np.cumsum(system.shape[i, order] ** 2)  # [1/kg] of the modes up to each
-        mobile, above = mobile[last], np.append(omega[last][1:], np.inf)
-        above, mobile = above[mobile > 0.0], mobile[mobile > 0.0]
+        mobile = mobile[last]
+        above, mobile = beyond[mobile > 0.0], mobile[mobile > 0.0]
         if not mobile.size:
             continue
         approach = system.offset[i] + float(system.shape[i] @ system.start_q)
@@ -600,23 +607,29 @@ def _difference(
     """
     if len(coarse.contacts) != len(fine.contacts) or coarse.status != fine.status:
         return 1.0
-    momentum = float(np.linalg.norm(fine.start_p) or np.linalg.norm(fine.end_p) or 1.0)
-    speed = coarse.end_p[coarse.omega == 0.0] - fine.end_p[fine.omega == 0.0]
-    found = {"restitution": float(np.abs(speed).max(initial=0.0)) / momentum / over[0]}
-    one, two = coarse.contacts, fine.contacts
-    if len(two):
-        pairs = {
-            "impulse": (one[:, 3].sum(), two[:, 3].sum(), over[0]),
-            "contact_time": ((one[:, 1] - one[:, 0]).sum(), (two[:, 1] - two[:, 0]).sum(), over[1]),
-            "force": (one[:, 2].max(), two[:, 2].max(), over[1]),
-        }
-        found |= {name: abs(x - y) / (y or 1.0) / share for name, (x, y, share) in pairs.items()}
+    momentum = _size(fine.start_p) or _size(fine.end_p) or 1.0
+    speed = np.abs(coarse.end_p[coarse.omega == 0.0] - fine.end_p[fine.omega == 0.0])
+    found = {"restitution": float(speed.max(initial=0.0)) / momentum / over[0]}
+    if len(fine.contacts):
+        one, two = (_totals(history) for history in (coarse, fine))
+        shares = {"impulse": over[0], "contact_time": over[1], "force": over[1]}
+        found |= {name: abs(x - y) / (y or 1.0) / shares[name] for name, x, y in zip(shares, one, two)}
     for name, band in quantities.items():
         if band is not None:
             frequencies = np.linspace(0.0, band, BAND_POINTS)
             first, second = (_force_spectrum(history, frequencies) for history in (coarse, fine))
             found[name] = float(np.abs(first - second).max() / (np.abs(second).max() or 1.0)) / over[0]
     return max(ROUNDING, *(float(found.get(name, 0.0)) for name in quantities))
+
+
+def _size(vector: np.ndarray) -> float:
+    return float(vector @ vector) ** 0.5
+
+
+def _totals(history: History) -> tuple[float, float, float]:
+    """Impulse [N s], time in contact [s] and peak force [N] of a run that has impacts."""
+    rows = history.contacts.tolist()
+    return sum(row[3] for row in rows), sum(row[1] - row[0] for row in rows), max(row[2] for row in rows)
 
 
 def _force_spectrum(history: History, frequencies: np.ndarray) -> np.ndarray:

@@ -5,7 +5,8 @@
 Measures one core's multiply-add peak and its read bandwidth at several array sizes with small compiled loops, then the
 time of one step of scheme A4 from 10 to 10 000 modes. A mode-step of one contact takes about 36 floating-point
 operations and 15 reads and writes of 8 bytes; the bound is the slower of the two. Draws time per step and the share
-of the bound reached.
+of the bound reached. Then the time of blows of a batch, from 100 to 10 000 of them: both costs as powers of their
+number, 1 where they are linear.
 """
 
 import argparse
@@ -20,9 +21,11 @@ import matplotlib.pyplot as plt
 import numba
 import numpy as np
 
-from fem_impact import _kernels
+import fem_impact as fi
+from fem_impact import _kernels, bounces
 
 COUNTS = [10, 30, 100, 300, 1000, 3000, 10000]
+BLOWS = [100, 300, 1000, 3000, 10000]
 OPERATIONS = 36.0  # [-] per mode-step: response 11, free motion and bias 12, three sums 13
 BYTES = 8.0 * 15.0  # [-] per mode-step: state, shape, bias, damping and six coefficients read, four values written
 
@@ -109,6 +112,24 @@ def step_time(n_modes: int, compliance: float = 0.0) -> float:
     return (run(1000) - run(200)) / 800.0
 
 
+def batch_time(n_blows: int) -> float:
+    """Seconds for a batch of blows of a rigid mass on a plate, on one core."""
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=100.0, n_modes=100)
+    family = bounces.Family.of(plate, np.array([0.465, 0.3]), fi.Striker.rigid(0.02), True)
+    spread = 10.0 ** np.random.default_rng(3).uniform(-0.5, 0.5, (3, n_blows))
+    one = np.ones(n_blows)
+    blows = bounces.Blows(
+        {0: family}, np.zeros(n_blows, int), 2.0 * spread[0], 0.02 * spread[1], 1e5 * spread[2], one, one
+    )
+    return best(lambda: bounces.bounce(blows, tolerance=1e-3, workers=1), 5)
+
+
+def power(counts: np.ndarray, seconds: np.ndarray) -> float:
+    """Exponent of the power law through the upper half of the counts, in the mean."""
+    half = len(counts) // 2
+    return float(np.polyfit(np.log(counts[half:]), np.log(seconds[half:]), 1)[0])
+
+
 def main() -> None:
     """Measure, print, draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -128,6 +149,12 @@ def main() -> None:
             f"  {bound / taken:10.0%}"
         )
     counts, taken, bound = np.array(rows).T
+    print(f"cost of a step grows with modes to the power {power(counts, taken):.2f}")
+    print("blows   batch (ms)   each (us)")
+    batches = np.array([batch_time(n) for n in BLOWS])
+    for n, seconds in zip(BLOWS, batches):
+        print(f"{n:5d}  {seconds * 1e3:11.2f}  {seconds / n * 1e6:10.2f}")
+    print(f"cost of a batch grows with its blows to the power {power(np.array(BLOWS), batches):.2f}")
     figure, axes = plt.subplots(figsize=(6, 4.5))
     axes.loglog(counts, taken * 1e6, "o-", label="A4, one contact")
     axes.loglog(counts, bound * 1e6, "k--", label="bound of the machine")

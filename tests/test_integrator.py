@@ -368,7 +368,7 @@ def test_residual_compliance_stands_for_the_modes_left_out():
         assert with_rest[0] < 0.2 * without[0]
         assert (
             np.log(with_rest[0] / with_rest[-1]) / np.log(10.0) > 2.5
-        )  # -2 is proved, -3 and steeper measured; n ~ omega_c
+        )  # omega_c**-2.9 and steeper was measured; n ~ omega_c
         assert 0.8 < np.log(without[0] / without[-1]) / np.log(10.0) < 1.1  # as 1 / omega_c
 
 
