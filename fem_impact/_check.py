@@ -72,8 +72,8 @@ def array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "") 
         result = np.array(value, dtype=float)
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be numbers{f' in {unit}' if unit else ''}, got {value!r:.80}") from None
-    wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
     if result.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, result.shape)):
+        wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
         raise ValueError(f"{name} must have shape {wanted}, got {result.shape}")
     if not np.isfinite(result).all():
         where = np.argwhere(~np.isfinite(result))[0]

@@ -88,7 +88,9 @@ def left_out_error(softness: Any, ratio: Any, exponent: Any, dimension: int) -> 
 
 def _order(exponent: Any) -> tuple[Any, Any]:
     """Power of the contact frequency over the highest one kept in the error, and its factor."""
-    return np.minimum(SMOOTH[0] + exponent, SMOOTH[1]), np.clip(2.0 * exponent - 1.0, *FACTOR)
+    return np.minimum(SMOOTH[0] + exponent, SMOOTH[1]), np.minimum(
+        np.maximum(2.0 * exponent - 1.0, FACTOR[0]), FACTOR[1]
+    )
 
 
 def _density(modes: Modes, at: Any, contact: Contact, mass: float, speed: float) -> tuple[float, float, float, float]:

@@ -390,8 +390,7 @@ def _pace(system: _System) -> tuple[float, float]:
     beyond = np.concatenate([omega[last][1:], [np.inf]])
     shortest, fastest = np.inf, 0.0
     for i, (k, exponent, _, compliance) in enumerate(system.law):
-        mobile = np.cumsum(system.shape[i, order] ** 2)  # [1/kg] of the modes up to each
-        mobile = mobile[last]
+        mobile = np.cumsum(system.shape[i, order] ** 2)[last]  # [1/kg] of the modes up to each
         above, mobile = beyond[mobile > 0.0], mobile[mobile > 0.0]
         if not mobile.size:
             continue
@@ -638,11 +637,11 @@ def _force_spectrum(history: History, frequencies: np.ndarray) -> np.ndarray:
 
 def _sensitivity(coarse: History, fine: History) -> float:
     """How much the difference of two runs grows from the end of the first impact to that of the last [-]."""
-    one, two = (np.sort(history.contacts[:, 1]) for history in (coarse, fine))
-    if len(one) != len(two):
+    if len(coarse.contacts) != len(fine.contacts):
         return float("inf")
-    if len(two) < 2:
+    if len(fine.contacts) < 2:
         return 1.0
+    one, two = (np.sort(history.contacts[:, 1]) for history in (coarse, fine))
     least = ROUNDING * two[-1]
     return max(1.0, float((abs(one[-1] - two[-1]) + least) / (abs(one[0] - two[0]) + least)))
 
@@ -677,6 +676,8 @@ def _truncation(parts, contacts, system: _System, whole: History, scheme, size, 
 def _mesh_error(bodies: tuple[Modes, ...], history: History) -> float:
     """Estimated effect of the frequency errors the modes carry, each weighed by its share of the energy."""
     total, start = 0.0, 0
+    if all(modes.frequency_error is None for modes in bodies):
+        return total
     energy = 0.5 * (history.end_p**2 + (history.omega * history.end_q) ** 2)
     whole = float(energy.sum())
     for modes in bodies:
