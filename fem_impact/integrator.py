@@ -372,13 +372,13 @@ def _thinned(part: _Part) -> tuple[_Part, float]:
     if not part.rest.any() or len(flexible) < 2:
         return part, np.inf
     limit = max(flexible[-1] / THINNED, flexible[0])
-    keep = part.omega <= limit
-    gone = part.rows[:, ~keep] / part.omega[~keep]
+    n = int(np.searchsorted(part.omega, limit, side="right"))
+    gone = part.rows[:, n:] / part.omega[n:]
     thin = replace(
-        part, omega=part.omega[keep], zeta=part.zeta[keep], rows=part.rows[:, keep], rest=part.rest + gone @ gone.T,
-        q=part.q[keep], p=part.p[keep], bias=part.bias[keep],
+        part, omega=part.omega[:n], zeta=part.zeta[:n], rows=part.rows[:, :n], rest=part.rest + gone @ gone.T,
+        q=part.q[:n], p=part.p[:n], bias=part.bias[:n],
     )  # fmt: skip
-    return thin, float(flexible[-1] / part.omega[keep][-1])
+    return thin, float(flexible[-1] / part.omega[n - 1])
 
 
 def _pace(system: _System) -> tuple[float, float]:
