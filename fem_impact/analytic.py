@@ -81,7 +81,8 @@ class RectangleShapes:
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         slack = 1e-9 * max(self.length, self.width)
-        return ((points >= -slack) & (points <= (self.length + slack, self.width + slack))).all(axis=1)
+        inside = (points >= -slack) & (points <= np.array([self.length, self.width]) + slack)
+        return np.asarray(inside.all(axis=1))
 
     def compliance(self, points: np.ndarray) -> np.ndarray:
         """Levy's series: sines along the length, the exact Green's function across."""
