@@ -258,6 +258,18 @@ def test_chatter_of_a_soft_power_comes_to_an_end(exponent, scheme):
     assert drift(r) < 1e-12  # rounding of a thousand steps
 
 
+def test_lossy_chatter_is_passed_in_ever_longer_rests():
+    """A weight settles on a soft power: 4500 steps for the time of 3000, 27 500 if rests stay short."""
+    r = run(
+        [0.0, 580.0, 1170.0], [10.0, -0.654, -2.27], k=7e3, exponent=0.5, loss=0.49, h=5.2e-5, speed=2.9e-8,
+        bias=[0.055, 0.0, 0.0], horizon=3000 * 5.2e-5, max_steps=100_000,
+    )  # fmt: skip
+    assert r.status == _kernels.HORIZON
+    assert 0 < r.n_blind < len(r.steps) < 9000
+    assert (r.force >= 0.0).all()
+    assert r.after < r.before + 1e-12 * r.scale
+
+
 @pytest.fixture
 def runs(monkeypatch):
     """Steps of every run that `collide` makes, in order."""
