@@ -25,7 +25,7 @@ def contact_duration(contact: Contact, mass: float, speed: float) -> float:
     mass, speed = _check.positive("mass", mass, "kg"), _check.positive("speed", speed, "m/s")
     q = 1.0 / (contact.exponent + 1.0)
     # in logarithms, because extreme stiffness and speed overflow the direct form
-    indentation = np.exp(q * (np.log(0.5 * mass / (q * contact.stiffness)) + 2.0 * np.log(speed)))
+    indentation = np.exp(q * (np.log(0.5 / q) + np.log(mass) - np.log(contact.stiffness) + 2.0 * np.log(speed)))
     return float(2.0 * np.sqrt(np.pi) * special.gamma(1.0 + q) / special.gamma(0.5 + q) * indentation / speed)
 
 
