@@ -5,7 +5,7 @@
 The scene is the source's hinged plate of 200 g struck by a rigid hammer of 33 g through a Hertz spring. Four pictures:
 mesh size and element (largest error of the first sixty frequencies), number of modes with and without the residual
 compliance, step and scheme, and the whole chain from mesh to response, where every combination of mesh, modes and steps
-is one dot and the tolerance, 1e-1 to 1e-8, walks along their edge. Prints the README's table, the ratio of the
+is one dot and the tolerance, 1e-1 to 1e-8, stands beside them. Prints the README's table, the ratio of the
 tolerance's cost to the cheapest combination found, and the constants by which a plan predicts seconds and memory.
 Errors are the largest of restitution (absolute), impulse, contact time and peak force (relative), against closed-form
 modes: 20 000 of them where modes are counted, as many as 1e-9 takes for the chain.
