@@ -289,9 +289,7 @@ def _strike(options: argparse.Namespace) -> None:
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:
         needs = {"target": "modal"} if options.pictures or options.vtk else {}  # motion is that of modes
-        keep = folder.with_name(
-            f"{folder.name}.modes.npz"
-        )  # beside the folder, which a broken-off run leaves as it was
+        keep = folder.with_name(f"{folder.name}.modes.npz")  # beside the folder: a broken-off run leaves that as it was
         choices = {**needs, **_choices(options)}
         run = scene.run(_progress, before=_warn, verify=options.verify, keep=keep, **choices)
         start = time.perf_counter()

@@ -22,9 +22,7 @@ SHARE = 0.45  # [-] of the tolerance each for what the model leaves out and for 
 MARGINS = (1.0, 4.0, 16.0)  # [-] stricter choices of modes, taken one after another while those left out matter
 NOTCH = 8.0  # [-] by which a verifying run is stricter
 FINEST = 1e-10  # [-] but never stricter than this
-CAUTION = (
-    2.0  # [-] by which modes are chosen more strictly than expected: a quarter more, and hardly ever a second time
-)
+CAUTION = 2.0  # [-] by which modes are chosen more strictly than expected: a quarter more, and seldom a second time
 LOSSY = 5.0  # [-] times the error of a lossless contact: what is left out then acts as one mode, not as a spring
 STRIKER_SHARE = 0.05  # [-] of the tolerance for the striker's modes left out: few modes, cheaply kept
 FIRST_LOOK = 20  # [-] modes found first: enough to set the scale and to tell how densely the others follow

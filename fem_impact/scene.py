@@ -267,7 +267,11 @@ class Scene:
         return section
 
     def make_striker(self) -> Striker:
-        return self._make("striker", self.striker)
+        return self._striker
+
+    @cached_property
+    def _striker(self) -> Striker:
+        return self._make("striker", self.striker)  # a stick is found by finite elements
 
     def make_contact(self) -> Contact:
         if self.contact.kind != "between":
