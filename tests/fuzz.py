@@ -35,6 +35,7 @@ from pathlib import Path
 from random import Random
 
 import numpy as np
+from scenes import QUICK as SCENE
 
 import fem_impact as fi
 from fem_impact import _apart, cli, farm, maps
@@ -389,30 +390,7 @@ def command_samples() -> list[tuple[str, bytes]]:
     return [(f"{i}.txt", line.encode()) for i, line in enumerate(COMMANDS.splitlines())]
 
 
-QUICK = """
-[mesh]
-shape = "rectangle"
-length = 0.465
-width = 0.3
-[target]
-mass = 0.2
-first_frequency = 100.0
-source = "analytic"
-[supports]
-boundary = "hinged"
-[striker]
-kind = "rigid"
-mass = 0.03
-[contact]
-kind = "linear"
-stiffness = 1e4
-[strike]
-at = [0.1395, 0.09]
-speed = 2.0
-tolerance = 1e-1
-[map]
-over = { "striker.mass" = [0.03, 0.05] }
-"""
+QUICK = SCENE.replace("tolerance = 1e-2", "tolerance = 1e-1")
 
 
 def read_command(path: Path) -> object:

@@ -6,34 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from scenes import QUICK as SCENE
 
 import fem_impact
 
 ROOT = str(Path(fem_impact.__file__).parents[1])
-SCENE = """
-[mesh]
-shape = "rectangle"
-length = 0.465
-width = 0.3
-[target]
-mass = 0.2
-first_frequency = 100.0
-source = "analytic"
-[supports]
-boundary = "hinged"
-[striker]
-kind = "rigid"
-mass = 0.03
-[contact]
-kind = "linear"
-stiffness = 1e4
-[strike]
-at = [0.1395, 0.09]
-speed = 2.0
-tolerance = 1e-2
-[map]
-over = { "striker.mass" = [0.03, 0.05] }
-"""
 # Hides optional libraries from this interpreter and those it starts.
 WITHOUT = """
 import importlib.machinery

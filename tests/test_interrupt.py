@@ -9,35 +9,14 @@ import time
 from pathlib import Path
 
 import pytest
+from scenes import QUICK
 
 import fem_impact
 from fem_impact import _files
 
 ENDS = {signal.SIGINT: (130, -2), signal.SIGTERM: (143, -15)}  # ours, and Python's own before and after our part
-SCENE = """
-[mesh]
-shape = "rectangle"
-length = 0.465
-width = 0.3
-[target]
-mass = 0.2
-first_frequency = 100.0
-source = "analytic"
-[supports]
-boundary = "hinged"
-[striker]
-kind = "rigid"
-mass = 0.03
-[contact]
-kind = "linear"
-stiffness = 1e4
-[strike]
-at = [0.1395, 0.09]
-speed = 2.0
-tolerance = 1e-2
-[map]
-over = { "striker.mass" = { from = 0.01, to = 0.1, count = 8 }, "contact.loss" = [0.0, 0.01] }
-"""
+OVER = 'over = { "striker.mass" = { from = 0.01, to = 0.1, count = 8 }, "contact.loss" = [0.0, 0.01] }'
+SCENE = QUICK.replace('over = { "striker.mass" = [0.03, 0.05] }', OVER)
 COMMANDS = {  # words, and what is there when they are done
     "strike": ("strike scene.toml --out out", ["force.csv", "force.png", "modes", "modes.pvd", "response.json"]),
     "modes": ("modes scene.toml --vtk out/m.pvd", ["m", "m.pvd"]),

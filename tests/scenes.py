@@ -1,0 +1,26 @@
+"""A scene that strikes at once, as text, for tests of everything around the strike."""
+
+QUICK = """
+[mesh]
+shape = "rectangle"
+length = 0.465
+width = 0.3
+[target]
+mass = 0.2
+first_frequency = 100.0
+source = "analytic"
+[supports]
+boundary = "hinged"
+[striker]
+kind = "rigid"
+mass = 0.03
+[contact]
+kind = "linear"
+stiffness = 1e4
+[strike]
+at = [0.1395, 0.09]
+speed = 2.0
+tolerance = 1e-2
+[map]
+over = { "striker.mass" = [0.03, 0.05] }
+"""
