@@ -195,6 +195,10 @@ def _parser() -> argparse.ArgumentParser:
         "--pictures", action="store_true", help="write mode shapes and the wave in space, as PNG and GIF"
     )
     strike.add_argument("--vtk", action="store_true", help="write the motion for ParaView and pyvista, motion.pvd")
+    strike.add_argument(
+        "--listener", metavar=("X", "Y", "Z"), nargs=3, type=float,
+        help="write the sound the plate radiates to there [m], Z off its plane: radiated.wav",
+    )  # fmt: skip
     strike.add_argument("--json", action="store_true", help="print what response.json holds instead of the summary")
 
     plan = verbs.add_parser("plan", help="say what would be modelled, why, how well and at which cost; strike nothing")
@@ -286,6 +290,8 @@ class _Version(argparse.Action):
 def _strike(options: argparse.Namespace) -> None:
     began = time.perf_counter()
     scene = fi.load_scene(options.scene)
+    if options.listener is not None:
+        scene = scene.heard_from(options.listener)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:
         needs = {"target": "modal"} if options.pictures or options.vtk else {}  # motion is that of modes
@@ -314,6 +320,10 @@ def _strike(options: argparse.Namespace) -> None:
         )
         differences = ", ".join(f"{name} {value:.1e}" for name, value in run.verified.items())
         print(_wrapped(f"Verified by a finer run{tested}: {differences}"))
+    if "radiated" in data:
+        heard = data["radiated"]
+        text = f"Heard: peak {heard['level']:.1f} dB re 20 µPa; 1.0 in radiated.wav is {heard['full_scale']:g} Pa"
+        print(_wrapped(text))
     print(_wrapped("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())))
     print(_wrapped(f"Files in {folder}{os.sep}: {', '.join(data['files'])}"))
 
@@ -327,14 +337,13 @@ def _warn(plan: Any) -> None:
 
 def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> dict[str, Any]:
     """Write every file of a strike; return what response.json holds."""
-    response, extra, files = run.response, {}, ["response.json", "force.csv", "force.png"]
+    response, files = run.response, ["response.json", "force.csv", "force.png"]
+    extra: dict[str, Any] = {}
     fi.export.write_force(folder / "force.csv", response)
     fi.figures.save(folder / "force.png", fi.figures.force(response))
     if run.plan.target == "modal":
         fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=SHAPES_WRITTEN))
-        heard = fi.export.write_wav(folder / "strike.wav", response, scene.points[0])
-        extra["sound"] = {"at": scene.points[0], "full_scale": heard.full_scale, "peak_level": heard.peak_level}
-        files += ["modes.pvd", "strike.wav"]
+        files += ["modes.pvd", *_write_sounds(folder, scene, response, extra)]
         if options.vtk:
             end = fi.drawing.end_of(response)
             times = [end * i / (MOTION_TIMES - 1) for i in range(MOTION_TIMES)]
@@ -364,6 +373,18 @@ def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> d
     )
     fi.export.write_json(folder / "response.json", data)
     return data
+
+
+def _write_sounds(folder: Path, scene: Any, response: Any, extra: dict[str, Any]) -> list[str]:
+    """Write the motion of a point as sound, and what a listener hears; note places and levels."""
+    heard = {"sound": ("strike.wav", {"at": scene.points[0]})}
+    if scene.listener is not None:
+        heard["radiated"] = ("radiated.wav", {"listener": scene.listener})
+    for key, (name, where) in heard.items():
+        wav = fi.export.write_wav(folder / name, response, **where)
+        levels = {"full_scale": wav.full_scale, "unit": wav.unit, "peak_level": wav.peak_level, "level": wav.level}
+        extra[key] = {**where, **levels, "reference": fi.sound.REFERENCE[wav.unit][0]}
+    return [name for name, _ in heard.values()]
 
 
 def _plan(options: argparse.Namespace) -> None:

@@ -85,7 +85,7 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
         title=scene.title or scene.path.stem,
         words=words(scene, response),
         picture=scene.picture(),
-        observed=scene.observe is not None,
+        observed=bool(scene.watched),
         verdict=response.outcome,
         tiles=_tiles(response),
         error=_errors(response),
@@ -196,15 +196,14 @@ def _sounds(scene: Scene, response: Response) -> list[Player]:
         for point in scene.points[:MOST_POINTS]
     ]
     if response.target.dimension == 2:
-        listener = np.append(np.asarray(response.at), DISTANCE)
+        listener = scene.listener or [*np.asarray(response.at).tolist(), DISTANCE]
+        where = f"to {place(listener)}" if scene.listener else f", {DISTANCE:g} m in front of the strike point"
         pressure = sound.radiate(response, listener, duration=_duration(response))
-        heard.append((f"Sound radiated, {DISTANCE:g} m in front of the strike point", pressure))
+        heard.append((f"Sound radiated {where}".replace(" ,", ","), pressure))
     players = []
     for name, samples in heard:
         level = samples.peak_level
-        stated = f"full scale is {samples.full_scale:g} {samples.unit} in every report; peak {level:.1f} dB".replace(
-            "-", "−"
-        )
+        stated = f"peak {samples.said}; full scale is {samples.full_scale:g} {samples.unit} in every report"
         players.append(Player(name, stated, audio(samples.samples, samples.rate)))
         if -math.inf < level < QUIET:
             raised = samples.samples * 10.0 ** (-level / 20.0)

@@ -116,12 +116,29 @@ class Scene:
     @property
     def points(self) -> list[Any]:
         """Where one looks and listens, (n_points, dimension) [m]: those of [observe], else the strike point."""
-        return [self.blow.values["at"]] if self.observe is None else list(self.observe.values["points"])
+        return list(self.watched or [self.blow.values["at"]])
+
+    @property
+    def listener(self) -> list[float] | None:
+        """Where the sound radiated by the plate is heard, (3,) [m]; None where [observe] names no listener."""
+        return None if self.observe is None else self.observe.values.get("listener")
+
+    @property
+    def watched(self) -> list[Any]:
+        """The points of [observe], (n_points, dimension) [m]; none where it names none."""
+        return [] if self.observe is None else self.observe.values.get("points", [])
+
+    def heard_from(self, listener: Any) -> "Scene":
+        """The same scene with a listener (3,) [m] beside the plate, whose third coordinate is off its plane."""
+        part = Part("", {**(NOTHING if self.observe is None else self.observe).values, "listener": listener})
+        scene = replace(self, observe=part)
+        _check_whole(scene)
+        return scene
 
     def picture(self) -> str:
         """The target with its supports, the strike point and the points of observation, as SVG."""
         at = np.atleast_1d(np.asarray(self.blow.values["at"], float))
-        points = [] if self.observe is None else [np.atleast_1d(np.asarray(point, float)) for point in self.points]
+        points = [np.atleast_1d(np.asarray(point, float)) for point in self.watched]
         title = f"Outline of the struck body, struck at ({', '.join(f'{x:.4g}' for x in at)}) m"
         title += f", observed at {len(points)} point{'s' * (len(points) > 1)}" if points else ""
         return svg.body(self.body(), supports=self.supports.values, at=at, points=points, title=title)
@@ -361,6 +378,8 @@ def _check_whole(scene: Scene) -> None:
         part = getattr(scene, table)
         if part is not None:
             scene._make(table, part)
+    if scene.listener is not None and scene.mesh.kind == "line":
+        raise fault(scene.path, "[observe] listener hears plates only; this beam has no surface to radiate")
     if scene.section is not None:
         scene.make_section(scene.section.kind)
     if scene.contact.kind == "between" and (scene.striker.kind != "sphere" or scene.section is None):

@@ -11,6 +11,7 @@ from .response import Response
 RATE = 48_000  # [Hz] sample rate: every audible mode lies below half of it
 FULL_SCALE = 10.0  # [m/s] the velocity written as 1.0; a plate struck at some m/s stays below, and strikes compare
 LOUDEST = 200.0  # [Pa] the pressure written as 1.0: 140 dB, far above any struck plate at some distance
+REFERENCE = {"m/s": (1e-9, "1 nm/s"), "Pa": (20e-6, "20 µPa")}  # what 0 dB stands for in acoustics, ISO 1683
 AIR = (1.204, 343.2)  # [kg/m^3], [m/s] density and speed of sound at 20 degrees C
 OVERSAMPLING = 8  # [-] instants per sample while the first waves arrive: differences err by 0.5 % at 10 kHz
 SHORTEST, LONGEST = 0.5, 5.0  # [s] bounds of the length chosen when none is given
@@ -36,6 +37,16 @@ class Sound:
         """Largest sample in dB relative to full scale; minus infinity for silence."""
         peak = float(np.abs(self.samples).max(initial=0.0))
         return 20.0 * float(np.log10(peak)) if peak else -np.inf
+
+    @property
+    def level(self) -> float:
+        """Largest sample in dB relative to ``REFERENCE``: 20 micropascal, or 1 nm/s."""
+        return self.peak_level + 20.0 * float(np.log10(self.full_scale / REFERENCE[self.unit][0]))
+
+    @property
+    def said(self) -> str:
+        """The level with what it refers to."""
+        return f"{self.level:.1f} dB re {REFERENCE[self.unit][1]}".replace("-", "−")
 
 
 def synthesise(
@@ -113,9 +124,7 @@ def radiate(
     modes = response.target
     if modes.dimension != 2:
         raise ValueError(f"response must be that of a plate, got a body of dimension {modes.dimension}")
-    place = _check.array("listener", listener, (3,), "m")
-    if not abs(place[2]) > 0.0:
-        raise ValueError("listener must lie off the plate's plane, got a third coordinate of 0 m")
+    place = beside(listener)
     density, speed = _check.positive("air[0]", air[0], "kg/m^3"), _check.positive("air[1]", air[1], "m/s")
     rate, heard = _audible(response, rate)
     points, cells = drawing.grid(modes)
@@ -130,6 +139,14 @@ def radiate(
     )
     ring = _ring(response, times[n_first:], heard, delayed, 2) if n_first < len(times) else np.zeros(0)
     return _scaled(np.concatenate([first, ring]), rate, LOUDEST, "Pa", normalise)
+
+
+def beside(listener: Any) -> np.ndarray:
+    """Coordinates (3,) [m] of a listener; ValueError where they are none or lie in the plate's plane."""
+    place = _check.array("listener", listener, (3,), "m")
+    if not abs(place[2]) > 0.0:
+        raise ValueError("listener must lie off the plate's plane, got a third coordinate of 0 m")
+    return place
 
 
 def _audible(response: Response, rate: int) -> tuple[int, np.ndarray]:
@@ -183,14 +200,16 @@ def _areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 def _arrival(response, times: np.ndarray, heard: np.ndarray, shapes: np.ndarray, delay: np.ndarray) -> np.ndarray:
     """Pressure (n_times,) [Pa] while the blow is still heard: delayed accelerations, point by point."""
-    pressure = np.zeros(len(times))
-    silent = int(np.searchsorted(times, response.time[0] + delay.min(), side="right"))
-    if silent >= len(times) - 1:
-        return pressure
-    # from the first touch to the latest instant that is heard by the end
-    fine = np.linspace(response.time[0], times[-1] - delay.min(), OVERSAMPLING * (len(times) - silent) + 1)
-    momentum = response.modal_state(fine)[1][:, heard]  # (n_fine, n_heard)
-    acceleration = np.gradient(momentum, fine[1] - fine[0], axis=0)
-    for shape, late in zip(shapes, delay):
-        pressure[silent:] += np.interp(times[silent:] - late, fine, acceleration @ shape, left=0.0)
+    pressure, began = np.zeros(len(times)), response.time[0]
+    silent = int(np.searchsorted(times, began + delay.min(), side="right"))
+    step = (times[-1] - times[0]) / max(1, len(times) - 1) / OVERSAMPLING
+    for start in range(max(1, silent), len(times), BLOCK):
+        part = slice(start, start + BLOCK)
+        # the instants heard meanwhile, and one more on either side for the differences
+        first, last = max(began, times[start] - delay.max() - step), times[part][-1] - delay.min() + step
+        fine = np.linspace(first, last, int(np.ceil((last - first) / step)) + 1)
+        momentum = response.modal_state(fine)[1][:, heard]  # (n_fine, n_heard)
+        acceleration = np.gradient(momentum, fine[1] - fine[0], axis=0)
+        for shape, late in zip(shapes, delay):
+            pressure[part] += np.interp(times[part] - late, fine, acceleration @ shape, left=0.0)
     return pressure

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _check, integrator, mesh
+from . import _check, integrator, mesh, sound
 from .contact import Contact
 from .section import Beam, Material, Plate
 from .striker import Striker
@@ -54,10 +54,13 @@ def target_values(*, mass=None, first_frequency=None, nu=0.3, damping_ratio=0.0,
     }
 
 
-def _observe(*, points: Any) -> Any:
-    if not isinstance(points, list) or not points:
+def _observe(*, points: Any = None, listener: Any = None) -> None:
+    if points is None and listener is None:
+        raise ValueError("points or listener must be given, or the table left out")
+    if points is not None and (not isinstance(points, list) or not points):
         raise ValueError(f"points must be a list of points such as [[0.1, 0.2]], got {points!r:.80}")
-    return points
+    if listener is not None:
+        sound.beside(listener)
 
 
 def map_values(*, over: Any, max_frequency: Any = None) -> dict[str, Any]:

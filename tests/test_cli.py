@@ -6,10 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import pyvista
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from scipy.io import wavfile
 
 import fem_impact as fi
 from fem_impact import cli
@@ -61,6 +64,61 @@ def test_strike_writes_every_file_and_prints_a_summary(scene, tmp_path, capsys):
     assert data["response"]["n_impacts"] == len(data["impacts"]) > 0
     reader = pyvista.get_reader(tmp_path / "out" / "modes.pvd")
     assert reader.time_values[0] == pytest.approx(100.0, rel=1e-9)
+
+
+def hear(scene, folder, speed=2.0):
+    """Strike the scene's plate and return the samples of radiated.wav [Pa] and what the command notes of them."""
+    text = TEXT.replace("speed = 2.0", f"speed = {speed}").replace('"hertz"', '"linear"')
+    text = text.replace("damping_ratio = 0.01", "damping_ratio = 0.002").replace("695e3", "1e5")
+    text = text.replace("mass = 0.03", "mass = 0.003")  # light: gone before the first mode swings back
+    scene.write_text(text + "[observe]\nlistener = [0.5, 0.3, 1.0]\n")
+    assert cli.main(["strike", str(scene), "--out", str(folder)]) == 0
+    rate, samples = wavfile.read(folder / "radiated.wav")
+    said = json.loads((folder / "response.json").read_text())["radiated"]
+    assert rate == 48_000 and said["unit"] == "Pa" and said["listener"] == [0.5, 0.3, 1.0]
+    return samples.astype(float) * said["full_scale"], said
+
+
+def test_sound_radiated_to_a_listener_rings_at_the_modes_and_decays_with_them(scene, tmp_path, capsys):
+    pressure, said = hear(scene, tmp_path / "out")
+    times = np.arange(len(pressure)) / 48_000
+    frequencies = fi.load_scene(scene).modes(5).frequencies
+    # hinged 0.465 x 0.3 m: modes (1,1), (2,1), (3,1), (1,2), (2,2) in the ratio of their squared wave numbers
+    m, n = np.array([1, 2, 3, 1, 2]), np.array([1, 1, 1, 2, 2])
+    squares = (m / 0.465) ** 2 + (n / 0.3) ** 2
+    assert_allclose(np.sort(frequencies), np.sort(100.0 * squares / squares[0]), rtol=1e-9)
+    spectrum = np.abs(np.fft.rfft(pressure))
+    bins = np.fft.rfftfreq(len(pressure), 1 / 48_000)
+    inner = np.flatnonzero((spectrum[1:-1] > spectrum[:-2]) & (spectrum[1:-1] > spectrum[2:])) + 1
+    peaks = inner[(spectrum[inner] > 0.02 * spectrum.max()) & (bins[inner] < 405.0)]
+    # bins are 0.2 Hz apart; a neighbour's flank shifts a peak by less than one
+    assert_allclose(bins[peaks], np.sort(frequencies), rtol=0, atol=2 * bins[1])
+    for frequency in frequencies:
+        ring = pressure * np.exp(-2j * np.pi * frequency * times)
+        early, late = (np.abs((ring[a : a + 24000] * np.hanning(24000)).sum()) for a in (9600, 9600 + 24000))
+        # 3 %: half a second of a Hann window keeps a neighbour 23 Hz away 60 dB down
+        assert_allclose(np.log(early / late) / 0.5, 0.002 * 2 * np.pi * frequency, rtol=0.03)
+    assert f"peak {said['level']:.1f} dB re 20 µPa" in capsys.readouterr().out
+    assert_allclose(said["level"], 20 * np.log10(np.abs(pressure).max() / 20e-6), atol=1e-5)  # 32-bit samples
+
+
+def test_twice_the_speed_sounds_six_decibel_louder(scene, tmp_path):
+    (soft, low), (loud, high) = (hear(scene, tmp_path / str(speed), speed=speed) for speed in (1.0, 2.0))
+    # a linear contact scales exactly; what is left is the 32 bits of a sample
+    assert_allclose(loud, 2.0 * soft, rtol=0, atol=1e-6 * np.abs(loud).max())
+    assert_allclose(high["level"] - low["level"], 20 * np.log10(2.0), atol=1e-6)
+
+
+def test_listener_of_the_command_is_the_one_of_the_scene(scene, tmp_path, capsys):
+    _, said = hear(scene, tmp_path / "one")
+    scene.write_text(scene.read_text().partition("[observe]")[0])
+    place = ["--listener", "0.5", "0.3", "1.0"]
+    assert cli.main(["strike", str(scene), "--out", str(tmp_path / "two"), *place]) == 0
+    again = json.loads((tmp_path / "two" / "response.json").read_text())
+    assert again["radiated"] == said and again["scene"]["observe"] == {"listener": [0.5, 0.3, 1.0]}
+    assert "radiated.wav" in again["files"]
+    assert cli.main(["strike", str(scene), *place[:3], "0"]) == 2
+    assert "[observe] listener must lie off the plate's plane" in capsys.readouterr().err
 
 
 def test_json_is_printed_as_it_is_written(scene, tmp_path, capsys):

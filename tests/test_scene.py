@@ -210,6 +210,9 @@ BAD = [
     ('title = "test"', "title = 3", r"title must be text, got 3"),
     ("mass = 0.2", "mass = 0.2\nmass = 0.3", r"not valid TOML: .*line"),
     ("speed = 2.0", "speed = 2.0\n[observe]\npoints = [[9.0, 9.0]]", r"\[observe\] points must lie on the body"),
+    ("speed = 2.0", "speed = 2.0\n[observe]", r"\[observe\] points or listener must be given, or the table left out"),
+    ("speed = 2.0", "speed = 2.0\n[observe]\nlistener = [0.1]", r"\[observe\] listener must have shape \(3\)"),
+    ("speed = 2.0", "speed = 2.0\n[observe]\nlistener = [0.1, 0.1, 0]", r"\[observe\] listener must lie off the plate"),
     ("speed = 2.0", "speed = 2.0\n[observe]\npoints = 3", r"\[observe\] points must be a list of points"),
     (
         "[target]",
