@@ -1,14 +1,40 @@
 """One wording for every input error, one place that decides what a valid number is."""
 
 import difflib
+import functools
 import importlib
+import inspect
 import math
-from collections.abc import Iterable
-from typing import Any
+import os
+from collections.abc import Callable, Iterable
+from itertools import chain
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 
 LONGEST = 500  # [-] characters of a foreign text quoted in a message
+SHOWN = 80  # [-] characters of a value quoted in a message
+REACH = 1e75  # [-] numbers may have this size or its reciprocal: the fourth power of either is still a float
+MOST = 10**9  # [-] that can be counted: more of anything would not fit into memory
+LONGEST_PATH = 4000  # [-] characters, about what systems allow
+SOURCES = {  # where what is not a number comes from
+    "Contact": "fi.Contact.hertz, linear or power",
+    "Figure": "fi.figures",
+    "Material": "fi.Material",
+    "Mesh": "fi.mesh",
+    "Modes": "fi.find_modes, fi.analytic or fi.Modes",
+    "Plan": "fi.plan",
+    "Response": "fi.strike or fi.collide",
+    "Run": "Scene.run",
+    "Scene": "fi.load_scene",
+    "Striker": "fi.Striker.rigid, sphere, stick or flexible",
+    "System": "fi.assemble",
+    "Touch": "fem_impact.integrator.Touch",
+}
+
+Function = TypeVar("Function", bound=Callable)
 
 
 class SimulationError(RuntimeError):
@@ -19,25 +45,38 @@ def _suffix(unit: str) -> str:
     return f" {unit}" if unit else ""
 
 
-def number(name: str, value: Any, unit: str = "") -> float:
-    """Return ``value`` as a finite float, or raise ValueError naming argument, rule and value."""
+def shown(value: Any) -> str:
+    """A value of whatever kind, fit for a message: its text in one short line."""
+    try:
+        text = repr(value)
+    except ValueError:  # of a whole number with thousands of digits
+        text = f"a {type(value).__name__} too long to write"
+    return line(text)[:SHOWN]
+
+
+def number(name: str, value: Any, unit: str = "", *, reach: float = REACH) -> float:
+    """Return ``value`` as a float no larger than ``reach``, or raise ValueError naming argument, rule and value."""
     scalar = isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "iuf"
     if isinstance(value, bool) or not (scalar or isinstance(value, (int, float, np.integer, np.floating))):
-        raise ValueError(f"{name} must be a number{f' in {unit}' if unit else ''}, got {value!r:.80}")
+        raise ValueError(f"{name} must be a number{f' in {unit}' if unit else ''}, got {shown(value)}")
     try:
         result = float(value)
     except OverflowError:
         raise ValueError(f"{name} must be finite, got an integer beyond the range of a float") from None
     if not math.isfinite(result):
         raise ValueError(f"{name} must be finite, got {result}{_suffix(unit)}")
+    if abs(result) > reach:
+        raise ValueError(f"{name} must not exceed {reach:g}{_suffix(unit)} in size, got {result:g}{_suffix(unit)}")
     return result
 
 
-def positive(name: str, value: Any, unit: str = "") -> float:
-    """Return ``value`` as a finite float above zero."""
-    result = number(name, value, unit)
+def positive(name: str, value: Any, unit: str = "", *, reach: float = REACH) -> float:
+    """Return ``value`` as a float above zero, no smaller than the reciprocal of ``reach`` and no larger than it."""
+    result = number(name, value, unit, reach=reach)
     if result <= 0.0:
         raise ValueError(f"{name} must be positive, got {result:g}{_suffix(unit)}")
+    if result < 1.0 / reach:
+        raise ValueError(f"{name} must be at least {1.0 / reach:g}{_suffix(unit)}, got {result:g}{_suffix(unit)}")
     return result
 
 
@@ -51,35 +90,139 @@ def non_negative(name: str, value: Any, unit: str = "") -> float:
 
 def between(name: str, value: Any, low: float, high: float, unit: str = "") -> float:
     """Return ``value`` as a float with ``low <= value <= high``."""
-    result = number(name, value, unit)
+    result = number(name, value, unit, reach=math.inf)
     if not low <= result <= high:
         raise ValueError(f"{name} must lie between {low:g} and {high:g}{_suffix(unit)}, got {result:g}{_suffix(unit)}")
     return result
 
 
-def count(name: str, value: Any, low: int = 1) -> int:
-    """Return ``value`` as an int of at least ``low``."""
+def count(name: str, value: Any, low: int = 1, high: int = MOST) -> int:
+    """Return ``value`` as an int from ``low`` to ``high``."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise ValueError(f"{name} must be a whole number, got {value!r:.80}")
+        raise ValueError(f"{name} must be a whole number, got {shown(value)}")
     if value < low:
-        raise ValueError(f"{name} must be at least {low}, got {value}")
+        raise ValueError(f"{name} must be at least {low}, got {shown(value)}")
+    if value > high:
+        raise ValueError(f"{name} must be at most {high}, got {shown(value)}")
     return int(value)
 
 
-def array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "") -> np.ndarray:
-    """Return a new float array of the given shape (None: any length), or raise ValueError; every entry finite."""
+def flag(name: str, value: Any) -> bool:
+    """Return ``value`` if it is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{name} must be True or False, got {shown(value)}")
+    return bool(value)
+
+
+def instance(name: str, value: Any, *kinds: type) -> None:
+    """Raise ValueError unless ``value`` is of one of the kinds; the message says where such a thing comes from."""
+    if not isinstance(value, kinds):
+        wanted = " or ".join(f"a {kind.__name__} of {SOURCES.get(kind.__name__, 'fem_impact')}" for kind in kinds)
+        raise ValueError(f"{name} must be {wanted}, got {shown(value)}")
+
+
+def several(name: str, value: Any, kind: type) -> tuple:
+    """Return ``value`` as a tuple, or raise ValueError where it is no list or tuple of one or more of a kind."""
+    if not isinstance(value, (list, tuple)) or not value:
+        raise ValueError(f"{name} must be a list of {kind.__name__}, got {shown(value)}")
+    for i, item in enumerate(value):
+        instance(f"{name}[{i}]", item, kind)
+    return tuple(value)
+
+
+def path(name: str, value: Any) -> Path:
+    """Return ``value`` as a path, or raise ValueError where no file can have such a name."""
+    text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
     try:
-        result = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be numbers{f' in {unit}' if unit else ''}, got {value!r:.80}") from None
+        if isinstance(text, str) and "\0" not in text and 0 < len(os.fsencode(text)) <= LONGEST_PATH:
+            return Path(text)
+    except UnicodeEncodeError:
+        pass
+    raise ValueError(f"{name} must be the path of a file, got {shown(value)}")
+
+
+def typed(function: Function) -> Function:
+    """Let a function refuse what is not of the kind its signature states: classes of this package, paths and flags."""
+    tests: dict[str, Callable[[Any], Any]] = {}
+    parameters = inspect.signature(function).parameters
+    for name, parameter in parameters.items():
+        stated = parameter.annotation
+        kinds = get_args(stated) if isinstance(stated, UnionType) else (stated,)
+        ours = tuple(kind for kind in kinds if getattr(kind, "__module__", "").startswith(f"{__package__}."))
+        if Path in kinds:
+            tests[name] = functools.partial(_path_or, name, (*ours, NoneType) if NoneType in kinds else ours)
+        elif stated is bool:
+            tests[name] = functools.partial(flag, name)
+        elif ours:
+            tests[name] = functools.partial(_instance_or_none if NoneType in kinds else _instance, name, ours)
+
+    @functools.wraps(function)
+    def tested(*given: Any, **named: Any) -> Any:
+        for name, value in chain(zip(parameters, given), named.items()):
+            if name in tests:
+                tests[name](value)
+        return function(*given, **named)
+
+    return tested  # type: ignore[return-value]
+
+
+def _path_or(name: str, kinds: tuple[type, ...], value: Any) -> None:
+    if not isinstance(value, kinds):
+        path(name, value)
+
+
+def _instance(name: str, kinds: tuple[type, ...], value: Any) -> None:
+    instance(name, value, *kinds)
+
+
+def _instance_or_none(name: str, kinds: tuple[type, ...], value: Any) -> None:
+    if value is not None:
+        instance(name, value, *kinds)
+
+
+def array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "", *, lift: bool = False) -> np.ndarray:
+    """Return a new float array of the given shape (None: any length), or raise ValueError; every entry finite.
+
+    With ``lift``, dimensions that are missing are put in front: one number or point is a row of one.
+    """
+    result = numbers(name, value, unit)
+    if lift and result.ndim < len(shape):
+        result = result.reshape((1,) * (len(shape) - result.ndim) + result.shape)
     if result.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, result.shape)):
         wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
         raise ValueError(f"{name} must have shape {wanted}, got {result.shape}")
-    if not np.isfinite(result).all():
-        where = np.argwhere(~np.isfinite(result))[0]
-        index = ", ".join(str(i) for i in where)
-        raise ValueError(f"{name} must be finite, got {result[tuple(where)]} at index {index}")
+    return finite(name, result, unit)
+
+
+def finite(name: str, result: np.ndarray, unit: str = "") -> np.ndarray:
+    """Return a float array whose entries are no larger than `REACH`, or raise ValueError."""
+    good = np.abs(result) <= REACH
+    if not good.all():
+        where = np.argwhere(~good)[0]
+        index, entry = ", ".join(str(i) for i in where), result[tuple(where)]
+        rule = f"not exceed {REACH:g}{_suffix(unit)} in size" if math.isfinite(entry) else "be finite"
+        raise ValueError(f"{name} must {rule}, got {entry} at index {index}")
     return result
+
+
+def numbers(name: str, value: Any, unit: str = "") -> np.ndarray:
+    """Return a new float array of any shape, or raise ValueError."""
+    try:
+        raw = np.asarray(value)
+        if raw.dtype.kind in "iufO":
+            return np.array(raw, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ValueError(f"{name} must be numbers{f' in {unit}' if unit else ''}, got {shown(value)}")
+
+
+def field(name: str, function: Any, points: np.ndarray, unit: str = "") -> np.ndarray:
+    """Values (n_points,) of a user's function of points (n_points, ...), or ValueError where it returns no such."""
+    try:
+        values = np.broadcast_to(numbers(name, function(points), unit), (len(points),))
+    except (TypeError, ValueError, IndexError) as error:
+        raise ValueError(f"{name} must be a function that returns numbers of shape ({len(points)},): {error}") from None
+    return array(name, values, (None,), unit)
 
 
 def ascending(name: str, value: Any, unit: str = "") -> np.ndarray:
@@ -104,7 +247,7 @@ def one_of(name: str, value: Any, allowed: Iterable[str]) -> str:
     words = list(allowed)
     if isinstance(value, str) and value in words:
         return value
-    raise ValueError(f"{name} must be one of {', '.join(words)}, got {value!r:.80}{nearest(value, words)}")
+    raise ValueError(f"{name} must be one of {', '.join(words)}, got {shown(value)}{nearest(value, words)}")
 
 
 def nearest(word: Any, known: Iterable[str]) -> str:

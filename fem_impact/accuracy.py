@@ -15,6 +15,7 @@ SERIES_SHARE = 0.1  # [-] residual compliance times contact stiffness above whic
 BAND = 4.0  # [-] kept modes reach at least this multiple of the contact frequency, whatever the target weighs
 
 
+@_check.typed
 def contact_duration(contact: Contact, mass: float, speed: float) -> float:
     """Duration [s] of the blow of a rigid mass [kg] at a speed [m/s] on a rigid wall, loss left out.
 
@@ -29,6 +30,7 @@ def contact_duration(contact: Contact, mass: float, speed: float) -> float:
     return float(2.0 * np.sqrt(np.pi) * special.gamma(1.0 + q) / special.gamma(0.5 + q) * indentation / speed)
 
 
+@_check.typed
 def cutoff_frequency(modes: Modes, at: Any, *, contact: Contact, mass: float, speed: float, tolerance: float) -> float:
     """Frequency [Hz] up to which modes are kept so that leaving out the rest errs by less than a tolerance.
 
@@ -55,6 +57,7 @@ def cutoff_frequency(modes: Modes, at: Any, *, contact: Contact, mass: float, sp
     return float(max(BAND * omega_0, by_error, by_share)) / (2.0 * np.pi)
 
 
+@_check.typed
 def truncation_error(
     modes: Modes, at: Any, max_frequency: float, *, contact: Contact, mass: float, speed: float
 ) -> float:
@@ -96,7 +99,7 @@ def _order(exponent: Any) -> tuple[Any, Any]:
 def _density(modes: Modes, at: Any, contact: Contact, mass: float, speed: float) -> tuple[float, float, float, float]:
     """Contact frequency [rad/s], stiffness [N/m], factor A and exponent s of the squared shapes per omega left out."""
     omega_0 = np.pi / contact_duration(contact, mass, speed)
-    point = modes.points("at", at)[:1]
+    point = modes.point("at", at)
     rest = max(0.0, float(modes.residual_compliance(point)[0, 0]))
     s = 0.5 if modes.dimension == 1 else 0.0
     return omega_0, mass * omega_0**2, (1.0 + s) * rest * modes.omega[-1] ** (1.0 + s), s

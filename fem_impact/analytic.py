@@ -6,16 +6,20 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy import optimize, special
+from scipy import special
+from scipy.optimize import elementwise
 
 from . import _check
 from .modal import Damping, Modes, damping_ratios
+from .section import Beam, Plate
 
 LEVY_TERMS = 4000  # [-] sum over sines across a hinged plate: with its tail corrected, 1e-11 of the compliance
 COTH_ONE = 19.0  # [-] argument from which coth is 1 to rounding: exp(-38) is 3e-17
 DISK_TERMS = 100_000  # [-] cap for points at the very edge of a disk, where terms fall as n**-3 only: 5e-11
-MOST_PAIRS = 30_000_000  # [-] half-wave numbers of a plate looked at: about 2 GB
-MOST_MODES = 50_000  # [-] that may be asked for: minutes, and a matrix of the static compliance that fills the memory
+MOST_MODES = 1_000_000  # [-] that may be asked for: some seconds
+MOST_OF_DISK = 50_000  # [-] likewise, where each takes the search for a root
+MOST_PAIRS = 4 * MOST_MODES  # [-] half-wave numbers of a plate looked at: twice what MOST_MODES take on any
+DISK_SCAN = 0.5  # [-] steps of z = k radius in which roots of one order, pi apart about, are looked for
 ENDS = ("clamped", "hinged", "free")
 
 
@@ -28,28 +32,41 @@ def _finished(
     damping_ratio: Damping,
 ) -> Modes:
     """Modes of unit mass and rigidity from values = omega**2, brought to a section or to mass and first frequency."""
-    if physical is not None and mass is None and first_frequency is None:
+    if physical is not None:
         mass, factor = physical
-    elif physical is None and mass is not None and first_frequency is not None:
+    else:
         mass = _check.positive("mass", mass, "kg")
         first = _check.positive("first_frequency", first_frequency, "Hz")
         factor = 2.0 * np.pi * first / np.sqrt(values[values > 0.0][0])
-    else:
-        raise ValueError("give either section, or both mass [kg] and first_frequency [Hz]")
     omega = np.sqrt(values)
     unit = Modes(omega, np.zeros(len(omega)), shapes, mass=1.0)
     scaled = unit.scaled(mass=mass, first_frequency=factor * unit.frequencies[omega > 0.0][0])
     return scaled.damped(damping_ratios(damping_ratio, scaled.omega))
 
 
-def _enough(n_modes: int | None, max_frequency: float | None, per_unit: Callable[[float], float]) -> tuple[int, float]:
+def _check_scale(section: Any, kind: type, mass: float | None, first_frequency: float | None) -> None:
+    """Raise ValueError unless exactly one of the two ways to state mass and stiffness is taken."""
+    given = mass is not None, first_frequency is not None
+    if (section is None and not all(given)) or (section is not None and any(given)):
+        raise ValueError("give either section, or both mass [kg] and first_frequency [Hz]")
+    if section is not None:
+        _check.instance("section", section, kind)
+
+
+def _check_number(about: float, most: int = MOST_MODES) -> None:
+    """Raise ValueError where a frequency asks for too many modes."""
+    if about > most:
+        raise ValueError(f"max_frequency must leave at most {most} modes of this body, got some {about:.2g}")
+
+
+def _enough(
+    n_modes: int | None, max_frequency: float | None, per_unit: Callable[[float], float], most: int = MOST_MODES
+) -> tuple[int, float]:
     """The number of modes wanted (or no limit) and the unit omega they must reach (or no limit)."""
     if (n_modes is None) == (max_frequency is None):
         raise ValueError("give either n_modes or max_frequency [Hz]")
     if n_modes is not None:
-        if _check.count("n_modes", n_modes) > MOST_MODES:
-            raise ValueError(f"n_modes must be at most {MOST_MODES}, got {n_modes}")
-        return n_modes, np.inf
+        return _check.count("n_modes", n_modes, high=most), np.inf
     return 10**9, per_unit(_check.positive("max_frequency", max_frequency, "Hz"))
 
 
@@ -174,6 +191,7 @@ def rectangle(
     Leissa (1969), Vibration of plates, NASA SP-160, eq. 4.20; Timoshenko and Woinowsky-Krieger, art. 35 (static sum).
     """
     length, width = _check.positive("length", length, "m"), _check.positive("width", width, "m")
+    _check_scale(section, Plate, mass, first_frequency)
     physical = _plate_scale(section, length * width)
     # With unit mass and unit D the areal density is 1 / area, so omega = wavenumber**2 * sqrt(area).
     root_area = np.sqrt(length * width)
@@ -187,6 +205,7 @@ def rectangle(
         while _lattice(length, width, reach / root_area, count)[0].size < count:
             reach *= 1.3
     m, n = _lattice(length, width, reach / root_area, count)
+    _check_number(min(len(m), count))
     order = np.lexsort((n, m, omega(m, n)))[:count]
     if not order.size:
         raise ValueError(f"max_frequency must reach the first mode, got {max_frequency:g} Hz")
@@ -200,9 +219,7 @@ def _lattice(length: float, width: float, wavenumber_squared: float, most: int) 
     limit = wavenumber_squared * (1.0 + 1e-12)
     size = [int(min(most, side * np.sqrt(limit) / np.pi + 1.0)) for side in (length, width)]
     if size[0] * size[1] > MOST_PAIRS:
-        raise ValueError(
-            f"max_frequency must leave fewer than {MOST_PAIRS:g} modes to look at, got {size[0] * size[1]:g}"
-        )
+        _check_number(size[0] * size[1])
     m, n = (grid.ravel() for grid in np.meshgrid(*(np.arange(1, k + 1) for k in size), indexing="ij"))
     keep = np.pi**2 * ((m / length) ** 2 + (n / width) ** 2) <= limit
     return m[keep], n[keep]
@@ -357,14 +374,16 @@ def beam(
     Bishop and Johnson (1960), The mechanics of vibration, ch. 7.
     """
     length = _check.positive("length", length, "m")
-    if isinstance(ends, str) or len(ends) != 2:
-        raise ValueError(f"ends must be two words, one for each end, got {ends!r:.80}")
+    if not isinstance(ends, (list, tuple)) or len(ends) != 2:
+        raise ValueError(f"ends must be two words, one for each end, got {_check.shown(ends)}")
     pair = (_check.one_of("ends", ends[0], ENDS), _check.one_of("ends", ends[1], ENDS))
     rigid = _beam_rigid(pair)
+    _check_scale(section, Beam, mass, first_frequency)
     physical = _beam_scale(section, length)
     first = float(_beam_roots(pair, 1)[0] ** 2)
     count, reach = _enough(n_modes, max_frequency, _unit_omega(physical, first_frequency, first))
     if np.isfinite(reach):
+        _check_number(np.sqrt(reach) / np.pi)
         count = len(rigid) + int(np.count_nonzero(_beam_roots(pair, int(np.sqrt(reach) / np.pi) + 2) ** 2 <= reach))
     if count <= len(rigid):
         raise ValueError(f"n_modes must exceed the {len(rigid)} rigid motions (max_frequency reach a flexible mode)")
@@ -414,7 +433,7 @@ def _beam_scale(section: Any, length: float) -> tuple[float, float] | None:
     return mass, float(np.sqrt(section.stiffness(middle)[0] / (mass * length**3)))
 
 
-def _bessel(n: int, z: Any) -> tuple[Any, ...]:
+def _bessel(n: Any, z: Any) -> tuple[Any, ...]:
     """J, J', I exp(-z), I' exp(-z) of order n at z."""
     j, dj = special.jv(n, z), special.jvp(n, z)
     i = special.ive(n, z)
@@ -422,7 +441,7 @@ def _bessel(n: int, z: Any) -> tuple[Any, ...]:
     return j, dj, i, di
 
 
-def _disk_rows(edge: str, nu: float, n: int, z: Any) -> tuple[Any, ...]:
+def _disk_rows(edge: str, nu: float, n: Any, z: Any) -> tuple[Any, ...]:
     """The two edge conditions on J and on I exp(-z): (first_j, first_i, second_j, second_i)."""
     j, dj, i, di = _bessel(n, z)
     moment_j = -(1 - nu) * z * dj + ((1 - nu) * n**2 - z**2) * j
@@ -436,23 +455,34 @@ def _disk_rows(edge: str, nu: float, n: int, z: Any) -> tuple[Any, ...]:
     return moment_j / z**2, moment_i / z**2, shear_j / z**3, shear_i / z**3
 
 
-def _disk_roots(edge: str, nu: float, reach: float) -> list[tuple[float, int, float]]:
-    """All (z, n, weight of I exp(-z)) with z = k radius up to reach; shape J(z r) + weight I(z r) exp(-z)."""
+def _disk_roots(edge: str, nu: float, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All z = k radius up to reach in ascending order, their n and weights of I exp(-z), (n_roots,) each.
+
+    The shape is J(z r) + weight I(z r) exp(-z).
+    """
+
+    def determinant(z, n):
+        a, b, c, d = _disk_rows(edge, nu, n, z)
+        return a * d - b * c
+
     found = []
     for n in range(int(reach) + 3):
+        low = max(0.3, 0.5 * n)  # below, no root exists and J underflows
+        scan = np.linspace(low, reach, 16 + int(max(0.0, reach - low) / DISK_SCAN))
+        values = determinant(scan, n)
+        turns = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
+        found.append(np.column_stack([scan[turns], scan[turns + 1], np.full(len(turns), n)]))
+    low, high, order = np.vstack(found).T
+    z = elementwise.find_root(determinant, (low, high), args=(order,)).x
+    a, b, c, d = _disk_rows(edge, nu, order, z)
+    weight = np.where(np.abs(b) > np.abs(d), -a / b, -c / d)
+    rank = np.lexsort((order, z))
+    return z[rank], order[rank], weight[rank]
 
-        def determinant(z, n=n):
-            a, b, c, d = _disk_rows(edge, nu, n, z)
-            return a * d - b * c
 
-        # Roots of one order lie about pi apart; below z = n / 2 none exists and J underflows.
-        scan = np.linspace(max(0.3, 0.5 * n), reach, max(16, int(8 * reach)))
-        values = determinant(scan)
-        for i in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0):
-            z = optimize.brentq(determinant, scan[i], scan[i + 1], xtol=1e-14, rtol=8.9e-16)
-            a, b, c, d = _disk_rows(edge, nu, n, z)
-            found.append((z, n, float(-a / b if abs(b) > abs(d) else -c / d)))
-    return sorted(found)
+def _disk_count(z: np.ndarray, order: np.ndarray, reach: float = np.inf) -> int:
+    """Modes that roots up to a reach stand for: two for each but those without nodal diameters."""
+    return int(np.sum(np.where(order == 0, 1, 2)[z <= reach]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -595,38 +625,42 @@ def disk(
     _check.one_of("edge", edge, ENDS)
     if section is not None and nu is not None:
         raise ValueError("give nu or section, not both: the section's material has its own nu")
+    _check_scale(section, Plate, mass, first_frequency)
     physical = _plate_scale(section, np.pi * radius**2)
     ratio = section.material.nu if section is not None else 0.3 if nu is None else _check.between("nu", nu, -0.99, 0.5)
     n_rigid = 3 if edge == "free" else 0
     root_area = np.sqrt(np.pi)
     first = _disk_roots(edge, ratio, 5.0)[0][0] ** 2 * root_area
-    count, reach = _enough(n_modes, max_frequency, _unit_omega(physical, first_frequency, first))
+    count, reach = _enough(n_modes, max_frequency, _unit_omega(physical, first_frequency, first), MOST_OF_DISK)
     if np.isfinite(reach):
-        roots = _disk_roots(edge, ratio, max(5.0, np.sqrt(reach / root_area)))
-        count = n_rigid + sum(1 if n == 0 else 2 for z, n, _ in roots if z**2 * root_area <= reach)
+        limit = np.sqrt(reach / root_area)
+        _check_number(0.25 * limit**2, MOST_OF_DISK)  # Weyl
+        z, n, weight = _disk_roots(edge, ratio, max(5.0, limit))
+        count = n_rigid + _disk_count(z, n, limit)
     else:
         limit = 2.0 * np.sqrt(count) + 5.0  # Weyl's count z**2 / 4 and its edge term
-        roots = _disk_roots(edge, ratio, limit)
-        while n_rigid + sum(1 if n == 0 else 2 for _, n, _ in roots) < count:
+        z, n, weight = _disk_roots(edge, ratio, limit)
+        while n_rigid + _disk_count(z, n) < count:
             limit *= 1.2
-            roots = _disk_roots(edge, ratio, limit)
+            z, n, weight = _disk_roots(edge, ratio, limit)
     if count <= n_rigid:
         raise ValueError(f"n_modes must exceed the {n_rigid} rigid motions (max_frequency reach a flexible mode)")
-    rows = [(0.0, 0, 0.0, 0.0), (0.0, 1, 0.0, 0.0), (0.0, 1, 0.0, np.pi / 2)][:n_rigid]
-    for z, n, weight in roots:
-        rows += [(z, n, weight, phase) for phase in ((0.0,) if n == 0 else (0.0, np.pi / 2))]
-    wavenumber, order, weights, phases = np.array(rows[:count]).T
-    bare = DiskShapes(1.0, edge, ratio, wavenumber, order, weights, phases, np.ones(count))
-    shapes = replace(bare, radius=radius, scale=_disk_norm(bare))
+    rigid = np.array([(0.0, 0, 0.0, 0.0), (0.0, 1, 0.0, 0.0), (0.0, 1, 0.0, np.pi / 2)][:n_rigid]).reshape(-1, 4)
+    twice = np.repeat(np.arange(len(z)), np.where(n == 0, 1, 2))
+    second = np.append(False, twice[1:] == twice[:-1])
+    rows = np.column_stack([z[twice], n[twice], weight[twice], np.where(second, np.pi / 2, 0.0)])
+    wavenumber, order, weights, phases = np.vstack([rigid, rows])[:count].T.copy()
+    scale = np.concatenate(
+        [[1.0, 2.0, 2.0][:n_rigid], _disk_norm(*(x[n_rigid:] for x in (wavenumber, order, weights)))]
+    )
+    shapes = DiskShapes(radius, edge, ratio, wavenumber, order, weights, phases, scale)
     return _finished(shapes, (wavenumber**2 * root_area) ** 2, mass, first_frequency, physical, damping_ratio)
 
 
-def _disk_norm(bare: DiskShapes) -> np.ndarray:
-    """Factors that make the shapes of unit mass orthonormal, by Gauss quadrature along the radius, (n_modes,)."""
-    node, weight = np.polynomial.legendre.leggauss(48 + int(bare.z.max()))  # two points a half wave and reserve
-    r, w = 0.5 * (node + 1.0), 0.5 * weight
-    z, n = bare.z, bare.order
-    radial = special.jv(n, np.outer(r, z)) + bare.weight * special.ive(n, np.outer(r, z)) * np.exp(np.outer(r - 1, z))
-    radial = np.where(z == 0.0, np.where(n == 0, 1.0, r[:, None]), radial)
-    angular = np.where(n == 0, 2.0, 1.0)  # mean over the circle times 2
-    return 1.0 / np.sqrt(angular * ((w * r) @ radial**2))
+def _disk_norm(z: np.ndarray, n: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Factors that make flexible shapes of unit mass orthonormal, (n_modes,): Lommel's integrals of their squares."""
+    j, dj, i, di = _bessel(n, z)
+    i, di = weight * i, weight * di
+    ring = (n / z) ** 2
+    square = 0.5 * (dj**2 + (1.0 - ring) * j**2 + (1.0 + ring) * i**2 - di**2) + (j * di - i * dj) / z
+    return 1.0 / np.sqrt(np.where(n == 0, 2.0, 1.0) * square)  # mean over the circle times 2

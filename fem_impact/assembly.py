@@ -132,6 +132,7 @@ class System:
         return full @ self.expand
 
 
+@_check.typed
 def assemble(
     mesh: Mesh,
     section: Plate | Beam,
@@ -169,11 +170,9 @@ def assemble(
     ValueError
         Where section and mesh disagree, an edge does not exist or a support is not known.
     """
-    if not isinstance(mesh, Mesh):
-        raise ValueError(f"mesh must be made by fi.mesh, got {type(mesh).__name__}")
     kinds = ("argyris", "morley") if mesh.dimension == 2 else ("hermite",)
     element = kinds[0] if element is None else _check.one_of("element", element, kinds)
-    supports = supports or {}
+    supports = {} if supports is None else supports
     if mesh.dimension == 1 and isinstance(section, Beam):
         made = _assemble_beam(mesh, section, supports)
     elif isinstance(section, Plate) and element == "morley":
@@ -182,13 +181,15 @@ def assemble(
         order, unresolved, fine = around_corners(mesh, _kinds(support_of_facets(mesh, supports)), section.material.nu)
         fine = fine if graded else mesh
         if near is not None:
-            near = _check.array("near", np.atleast_2d(near), (None, 2), "m")
+            near = _check.array("near", near, (None, 2), "m", lift=True)
             fine = towards_points(fine, near, POINT_RINGS)
         made = _assemble_plate(fine, section, supports)
         made = replace(made, mesh=mesh, graded=graded, order=order, near=near, unresolved=unresolved)
     else:
         wanted = "Plate" if mesh.dimension == 2 else "Beam"
-        raise ValueError(f"section must be a {wanted} on a mesh of dimension {mesh.dimension}, got {section!r:.80}")
+        raise ValueError(
+            f"section must be a {wanted} on a mesh of dimension {mesh.dimension}, got {_check.shown(section)}"
+        )
     masses = check_masses(point_masses, mesh.dimension)
     return _reduced(made if not masses else _loaded(made, masses))
 
@@ -204,7 +205,7 @@ def reassemble(system: System, mesh: Mesh) -> System:
 def support_of_facets(mesh: Mesh, supports: dict) -> list[str | Elastic]:
     """The support of each facet."""
     if not isinstance(supports, dict):
-        raise ValueError(f"supports must be a dict of edge name -> support, got {supports!r:.80}")
+        raise ValueError(f"supports must be a dict of edge name -> support, got {_check.shown(supports)}")
     for name, kind in supports.items():
         if name not in mesh.edges:
             raise ValueError(

@@ -31,6 +31,7 @@ PICTURED = {  # layers drawn where there are two axes, and what they are called 
 RESONANCES = tuple(m * 10.0**e for e in range(6) for m in (1, 2, 5))  # [Hz] contours drawn
 
 
+@_check.typed
 def map_scene(
     scene: Scene,
     *,
@@ -298,6 +299,7 @@ def write(folder: Path, table: xarray.Dataset, form: str = "nc") -> list[str]:
     return names
 
 
+@_check.typed
 def hammers_for(scene: Scene, bandwidth: float, masses: Any, *, drop: float = 10.0) -> tuple[hammers.Hammer, ...]:
     """What each hammer can do at the strike point of a scene's body, whatever strikes it in the scene."""
     at, first = scene.blow.values["at"], scene.modes(FIRST_LOOK)

@@ -52,11 +52,11 @@ def beam_springs(dofs: list[tuple[int, int]], held: list[Elastic], frame: Any, n
 def check_masses(point_masses: Any, dimension: int) -> list[tuple[np.ndarray, float]]:
     """Points (dimension,) [m] and masses [kg] from a sequence of pairs."""
     if isinstance(point_masses, (str, dict)) or not isinstance(point_masses, Sequence):
-        raise ValueError(f"point_masses must be a list of (point, mass) pairs, got {point_masses!r:.80}")
+        raise ValueError(f"point_masses must be a list of (point, mass) pairs, got {_check.shown(point_masses)}")
     result = []
     for i, entry in enumerate(point_masses):
         if not isinstance(entry, Sequence) or len(entry) != 2:
-            raise ValueError(f"point_masses[{i}] must be a pair (point in m, mass in kg), got {entry!r:.80}")
-        point = _check.array(f"point of point_masses[{i}]", np.atleast_1d(entry[0]), (dimension,), "m")
+            raise ValueError(f"point_masses[{i}] must be a pair (point in m, mass in kg), got {_check.shown(entry)}")
+        point = _check.array(f"point of point_masses[{i}]", entry[0], (dimension,), "m", lift=True)
         result.append((point, _check.positive(f"mass of point_masses[{i}]", entry[1], "kg")))
     return result

@@ -40,7 +40,7 @@ def read(source: Any, unit: str | None) -> tuple[Outline, list[str]]:
     """Outline [m] and what was assumed, from a file name, a shapely polygon or points (n, 2)."""
     notes: list[str] = []
     if isinstance(source, (str, Path)):
-        path = Path(source)
+        path = _check.path("source", source)
         if not path.is_file():
             raise ValueError(f"source must name an .svg or .dxf file, got {str(source)!r}; there is no such file")
         readers = {".svg": _svg, ".dxf": _dxf}
@@ -54,7 +54,8 @@ def read(source: Any, unit: str | None) -> tuple[Outline, list[str]]:
         rings = [source.exterior.coords, *(ring.coords for ring in source.interiors)]
     else:
         rings = [source]
-    loops = [_smoothed(np.asarray(ring, float)[..., :2] * scale, notes) for ring in rings]
+    rings = [_check.array("source", ring, (None, None), "m") for ring in rings]
+    loops = [_smoothed(ring[:, :2] * scale, notes) for ring in rings]
     return _nested("source", loops), notes
 
 

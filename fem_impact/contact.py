@@ -10,6 +10,8 @@ from . import _check
 
 LOWEST_EXPONENT, HIGHEST_EXPONENT = 0.5, 100.0  # [-] below, the force is no longer a spring's; above, it is a wall
 
+STIFFEST = 1e200  # [N/m**exponent] and its reciprocal: a high power of a small approach has a huge factor
+
 
 @dataclass(frozen=True)
 class Contact:
@@ -30,7 +32,7 @@ class Contact:
     gap: float = 0.0  # [m] free way before the bodies touch
 
     def __post_init__(self) -> None:
-        _check.positive("stiffness", self.stiffness, "N/m**exponent")
+        _check.positive("stiffness", self.stiffness, "N/m**exponent", reach=STIFFEST)
         _check.between("exponent", self.exponent, LOWEST_EXPONENT, HIGHEST_EXPONENT)
         _check.non_negative("loss", self.loss, "s/m")
         _check.number("gap", self.gap, "m")
@@ -80,7 +82,7 @@ class Contact:
         """
         for name in ("material", "radius"):
             if getattr(sphere, name, None) is None:
-                raise ValueError(f"sphere must be made by Striker.sphere, got {sphere!r:.60}, which has no {name}")
+                raise ValueError(f"sphere must be made by Striker.sphere, got {_check.shown(sphere)} without {name}")
         flat = getattr(plate, "material", plate)
         compliance = sum(
             (1.0 - nu**2) / E for E, nu in (_isotropic("sphere", sphere.material), _isotropic("plate", flat))
@@ -89,14 +91,24 @@ class Contact:
 
     def force(self, approach: Any, rate: Any = 0.0) -> np.ndarray:
         """Contact force [N] at an approach [m] and its rate [m/s]; never pulls."""
-        pressed = np.maximum(np.asarray(approach, float), 0.0)
-        return np.maximum(self.stiffness * pressed**self.exponent * (1.0 + self.loss * np.asarray(rate)), 0.0)
+        pressed = np.maximum(_check.numbers("approach", approach, "m"), 0.0)
+        rates = _check.numbers("rate", rate, "m/s")
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                force = self.stiffness * pressed**self.exponent * (1.0 + self.loss * rates)
+        except ValueError:
+            raise ValueError(f"rate must have the shape of approach, {pressed.shape}, got {rates.shape}") from None
+        if not np.isfinite(force).all():
+            raise ValueError("approach and rate must be finite and give a finite force")
+        return np.maximum(force, 0.0)
 
 
 def _isotropic(name: str, material: Any) -> tuple[float, float]:
     E, nu = getattr(material, "E", None), getattr(material, "nu", None)
     if not isinstance(E, (int, float)) or not isinstance(nu, (int, float)):
-        raise ValueError(f"{name} must be of an isotropic material (E, nu), got {material!r:.60}; give Contact.hertz")
+        raise ValueError(
+            f"{name} must be of an isotropic material (E, nu), got {_check.shown(material)}; give Contact.hertz"
+        )
     return float(E), float(nu)
 
 

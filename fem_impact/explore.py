@@ -17,6 +17,7 @@ LARGEST_REQUEST = 64 * 1024  # [byte] of a request and of a message: a slider's 
 LARGEST_HEADER = 16 * 1024  # [byte]
 
 
+@_check.typed
 def serve(
     scene: Scene, *, port: int = 0, ready: Callable[[str], None] | None = None, watch: Watch | None = None
 ) -> None:

@@ -37,9 +37,11 @@ PACKAGES = ("fem-impact", "numpy", "scipy", "scikit-fem", "netgen-mesher", "numb
 WARP = 0.1  # [-] largest deflection of the ready-made warp vector over the body's extent
 CELL_TYPE = {1: 1, 2: 3, 3: 5}  # VTK's numbers for a vertex, a line and a triangle, by their number of points
 KIND = {"f": "Float64", "i": "Int64", "u": "UInt8"}
+MOST_FRAMES = 1000  # [-] of an animation: 0.2 GB
 DISTINCT = 1e-9  # [-] equal frequencies are spread by this much as time values: a collection drops equal times
 
 
+@_check.typed
 def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, times: Any = None) -> None:
     """Write mode shapes, or the motion after a strike, for ParaView and pyvista.
 
@@ -61,7 +63,7 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
     ValueError
         Where the path has another ending, or times are missing.
     """
-    path = Path(path)
+    path = _check.path("path", path)
     suffix = vtk_ending(path)
     points, cells = drawing.grid(modes)
     if response is None:
@@ -70,7 +72,7 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
     else:
         if times is None:
             raise ValueError("times must be given with response, in s")
-        stamps = np.atleast_1d(_check.array("times", np.atleast_1d(times), (None,), "s"))
+        stamps = _check.array("times", times, (None,), "s", lift=True)
         parts = _motion_parts(response, points, stamps)
     if suffix == ".pvd":
         _write_collection(path, points, cells, parts, stamps)
@@ -83,6 +85,7 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
         raise ValueError(f"times must be one time for a .vtu, got {len(parts)}; write a .pvd")
 
 
+@_check.typed
 def write_animation(path: str | Path, modes: Modes, mode: int, *, frames: int = 24) -> None:
     """Write one period of a mode's vibration for ParaView and pyvista to play.
 
@@ -99,7 +102,7 @@ def write_animation(path: str | Path, modes: Modes, mode: int, *, frames: int = 
     ValueError
         Where the path has another ending, or the mode does not exist or is a rigid motion.
     """
-    path = Path(path)
+    path = _check.path("path", path)
     if vtk_ending(path) != ".pvd":
         raise ValueError(f"path must end in .pvd to hold several times, got {str(path)!r}")
     if _check.count("mode", mode) > modes.n_modes:
@@ -107,7 +110,7 @@ def write_animation(path: str | Path, modes: Modes, mode: int, *, frames: int = 
     frequency = float(modes.frequencies[mode - 1])
     if frequency == 0.0:
         raise ValueError(f"mode must vibrate; mode {mode} is a rigid motion")
-    turns = np.arange(_check.count("frames", frames, low=2)) / frames
+    turns = np.arange(_check.count("frames", frames, low=2, high=MOST_FRAMES)) / frames
     points, cells = drawing.grid(modes)
     arrays, fields = _mode_parts(modes, points)[mode - 1]
     parts = [({"warp": np.cos(2.0 * np.pi * turn) * arrays["warp"]}, fields) for turn in turns]
@@ -116,9 +119,10 @@ def write_animation(path: str | Path, modes: Modes, mode: int, *, frames: int = 
 
 def vtk_ending(path: str | Path) -> str:
     """The ending of a path that `write_vtk` takes; ValueError for any other."""
-    return _check.one_of("path ending", Path(path).suffix, (".vtu", ".pvd"))
+    return _check.one_of("path ending", _check.path("path", path).suffix, (".vtu", ".pvd"))
 
 
+@_check.typed
 def write_uff(path: str | Path, modes: Modes) -> None:
     """Write mode shapes as a universal file for modal-test programs: nodes (15, 2411), cells (2412), shapes (55).
 
@@ -132,6 +136,7 @@ def write_uff(path: str | Path, modes: Modes) -> None:
         uff.write(temporary, modes.frequencies, modes.damping_ratio, modes.shape_at(points), points, cells)
 
 
+@_check.typed
 def write_wav(
     path: str | Path, response: Response, at: Any = None, *, listener: Any = None, **options: Any
 ) -> sound.Sound:
@@ -149,6 +154,7 @@ def write_wav(
     return heard
 
 
+@_check.typed
 def write_force(path: str | Path, response: Response) -> None:
     """Write the force history as CSV: a header with units, then one row per instant, every digit kept."""
     with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
@@ -157,6 +163,7 @@ def write_force(path: str | Path, response: Response) -> None:
         writer.writerows(zip(response.time.tolist(), response.force.tolist()))
 
 
+@_check.typed
 def write_json(path: str | Path, data: dict[str, Any]) -> None:
     """Write plain data as JSON that any reader accepts: no NaN, no infinity (see `plain`)."""
     with replacing(path) as temporary:
@@ -166,6 +173,7 @@ def write_json(path: str | Path, data: dict[str, Any]) -> None:
 ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "sensitivity", "total", "resolvable")
 
 
+@_check.typed
 def numbers(response: Response) -> dict[str, Any]:
     """Every scalar of a response, by name, in SI units, and its impacts."""
     error = response.error

@@ -191,7 +191,7 @@ def _work(grid: Any, block: int, size: int, solve: Solve, path: str | None) -> t
     """One block, on a worker; nothing where a store has it or takes it."""
     if path is None:
         return solve(grid, block * size, min((block + 1) * size, grid.n_cases))
-    store = Store(Path(path))
+    store = Store(_check.path("store", path))
     if block not in store.missing():  # a worker died between keeping it and saying so
         return None
     store.write(block, *solve(grid, *store.bounds(block)))

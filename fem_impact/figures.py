@@ -52,14 +52,16 @@ def _styled(width: float, height: float) -> Iterator[Figure]:
         yield Figure(figsize=(width, height), layout="constrained")
 
 
+@_check.typed
 def save(path: str | Path, figure: Figure) -> None:
     """Write a figure; the ending of the path says how (.png, .pdf, .svg)."""
     endings = [f".{name}" for name in figure.canvas.get_supported_filetypes()]
-    _check.one_of("path ending", Path(path).suffix.lower(), endings)
+    _check.one_of("path ending", _check.path("path", path).suffix.lower(), endings)
     with matplotlib.rc_context(STYLE), replacing(path) as temporary:
         figure.savefig(temporary)
 
 
+@_check.typed
 def force(response: Response, *, band: tuple[float, float] = SPECTRUM_BAND) -> Figure:
     """Contact force over time, and the size of its spectrum over frequency.
 
@@ -117,6 +119,7 @@ def _draw_force(axes: Any, response: Response) -> None:
     axes.yaxis.set_major_formatter(EngFormatter(unit="N", sep=" "))
 
 
+@_check.typed
 def energies(response: Response) -> Figure:
     """Where the energy is during the blow: in the striker, in the struck body, and between them or lost."""
     end = (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
@@ -137,6 +140,7 @@ def energies(response: Response) -> Figure:
     return figure
 
 
+@_check.typed
 def mode_energies(response: Response) -> Figure:
     """Energy each mode of the struck body holds when the striker leaves it, over its frequency."""
     end = response.impacts[-1].end if response.impacts else 0.0
@@ -154,6 +158,7 @@ def mode_energies(response: Response) -> Figure:
     return figure
 
 
+@_check.typed
 def mobility(modes: Modes, at: Any, to: Any = None, *, band: tuple[float, float] | None = None) -> Figure:
     """Size and phase of the velocity at ``to`` per force at ``at``, over frequency.
 
@@ -187,6 +192,7 @@ def mobility(modes: Modes, at: Any, to: Any = None, *, band: tuple[float, float]
     return figure
 
 
+@_check.typed
 def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
     """The first shapes as a grid of small pictures, nodal lines drawn, frequencies above.
 

@@ -49,6 +49,7 @@ def bandwidth_of(hit: Response, drop: float) -> float:
     return float(frequencies[first - 1] + share * (frequencies[first] - frequencies[first - 1]))
 
 
+@_check.typed
 def highest_frequency(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float = 10.0) -> float:
     """Frequency [Hz] up to which modes are needed to choose a hammer; a few modes are enough to tell."""
     centre = _centre(bandwidth, drop)
@@ -62,17 +63,17 @@ def highest_frequency(modes: Modes, at: Any, bandwidth: float, masses: Any, *, d
 
 
 def _checked(masses: Any) -> np.ndarray:
-    masses = _check.array("masses", np.atleast_1d(masses), (None,), "kg")
-    return np.array([_check.between("masses", _check.positive("masses", mass, "kg"), *MASSES, "kg") for mass in masses])
+    masses = _check.array("masses", masses, (None,), "kg", lift=True)
+    return np.array([_check.between("masses", mass, *MASSES, "kg") for mass in masses])
 
 
 def _centre(bandwidth: float, drop: float) -> float:
     """Contact resonance [Hz] at which a half sine has a bandwidth."""
     drop = _check.between("drop", drop, 1.0, 40.0, "dB")
-    bandwidth = _check.positive("bandwidth", bandwidth, "Hz")
     return _check.between("bandwidth", bandwidth, *BANDWIDTHS, "Hz") / _half_sine_reach(drop)
 
 
+@_check.typed
 def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float = 10.0) -> tuple[Hammer, ...]:
     """What each hammer can do: rigid, with a linear tip, struck with a row of tips from soft to hard.
 

@@ -60,6 +60,12 @@ class Touch:
     first_at: Any = None  # point on the first body [m]
     second_at: Any = None  # point on the second body [m]
 
+    def __post_init__(self) -> None:
+        _check.instance("law", self.law, Contact)
+        _check.count("first", self.first, low=0)
+        if self.second is not None:
+            _check.count("second", self.second, low=0)
+
 
 @dataclass(frozen=True, eq=False)
 class _System:
@@ -118,6 +124,7 @@ class _Part:
     points: np.ndarray  # (n_ends, dimension) [m] of its contacts
 
 
+@_check.typed
 def strike(
     modes: Modes,
     striker: Striker,
@@ -179,7 +186,7 @@ def strike(
     forces = [
         _check.number(name, x, "N") for name, x in (("striker_force", striker_force), ("target_force", target_force))
     ]
-    point = modes.points("at", at)[:1]
+    point = modes.point("at", at)
     options = _Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
     touch = Touch(contact, 0, 1, striker.at[None] if striker.modes.dimension else None, point)
     whole = striker.compliance if residual and striker.modes.dimension else None
@@ -191,6 +198,7 @@ def strike(
     return _follow((striker.modes, modes), [touch], [arriving, struck], speed, options, striker, point[0])
 
 
+@_check.typed
 def collide(
     bodies: Sequence[Modes],
     contacts: Sequence[Touch],
@@ -227,7 +235,7 @@ def collide(
     Response
     """
     options = _Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
-    bodies, contacts = tuple(bodies), tuple(contacts)
+    bodies, contacts = _check.several("bodies", bodies, Modes), _check.several("contacts", contacts, Touch)
     parts, arriving = _parts(bodies, contacts, speeds, states, forces, residual)
     return _follow(bodies, contacts, parts, arriving, options)
 
@@ -264,8 +272,12 @@ def _dip(part: _Part, system: _System) -> Dip | None:
 
 def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Part], float]:
     """Return every body as the engine sees it, and the speed of the first that moves."""
-    if not bodies or not contacts:
-        raise ValueError(f"bodies and contacts must not be empty, got {len(bodies)} and {len(contacts)}")
+    if states is not None:
+        wrong = not isinstance(states, (list, tuple)) or len(states) != len(bodies)
+        if wrong or any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in states):
+            raise ValueError(
+                f"states must be a pair (q, p) for each of {len(bodies)} bodies, got {_check.shown(states)}"
+            )
     speeds = np.zeros(len(bodies)) if speeds is None else _check.array("speeds", speeds, (len(bodies),), "m/s")
     forces = np.zeros(len(bodies)) if forces is None else _check.array("forces", forces, (len(bodies),), "N")
     ends: list[list] = [[] for _ in bodies]  # (contact, sign, point) on each body
@@ -275,7 +287,7 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Pa
                 continue
             if not 0 <= body < len(bodies):
                 raise ValueError(f"contacts must join bodies 0 to {len(bodies) - 1}, got {body}")
-            ends[body].append((i, sign, bodies[body].points("at", at)[:1]))
+            ends[body].append((i, sign, bodies[body].point("at", at)))
     parts, arriving = [], 0.0
     for body, modes in enumerate(bodies):
         points = np.vstack([point for _, _, point in ends[body]] or [np.zeros((0, modes.dimension))])
@@ -283,7 +295,7 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Pa
         whole = modes.shapes.compliance(points) if residual and modes.dimension and ends[body] else None
         part = _part(modes, tuple((i, sign) for i, sign, _ in ends[body]), points, rows, whole, float(forces[body]))
         if states is not None:
-            q, p = (_check.array("states", value, (modes.n_modes,)) for value in states[body])
+            q, p = (_check.array(f"states[{body}]", value, (modes.n_modes,)) for value in states[body])
             part = replace(part, q=q, p=p)
         speed = float(speeds[body])
         if speed != 0.0:

@@ -81,7 +81,7 @@ class Case:
     def changed(self, name: str, value: Any) -> "Case":
         """The same blow with one parameter of `AXES` replaced."""
         if name == "at":
-            return replace(self, at=self.modes.points("at", value)[0])
+            return replace(self, at=self.modes.point("at", value)[0])
         if name == "speed":
             return replace(self, speed=_check.positive("speed", value, "m/s"))
         if name in ("stiffness", "exponent", "loss", "gap"):
@@ -182,6 +182,7 @@ def _sampled(modes: Modes, points: np.ndarray) -> Modes:
     return replace(modes, shapes=SampledShapes(points, modes.shape_at(points), static))
 
 
+@_check.typed
 def sweep(
     modes: Modes,
     striker: Striker,
@@ -247,7 +248,7 @@ def sweep(
         Where an axis is unknown, a value cannot be, or the map is too large.
     """
     tolerance = _check.between("tolerance", tolerance, 1e-12, 1.0)
-    base = Case(modes, striker, contact, modes.points("at", at)[0], _check.positive("speed", speed, "m/s"))
+    base = Case(modes, striker, contact, modes.point("at", at)[0], _check.positive("speed", speed, "m/s"))
     band = None if max_frequency is None else _check.positive("max_frequency", max_frequency, "Hz")
     workers = None if workers is None else _check.count("workers", workers)
     grid = Grid(base, checked_axes(base, over), tolerance, residual, band, dict(layers or {}))
@@ -369,7 +370,7 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
 def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Checked values of every axis under its proper name."""
     if not isinstance(over, Mapping) or not over:
-        raise ValueError(f"over must name at least one axis, such as {{'mass': [...]}}, got {over!r:.80}")
+        raise ValueError(f"over must name at least one axis, such as {{'mass': [...]}}, got {_check.shown(over)}")
     axes: dict[str, np.ndarray] = {}
     for given, values in over.items():
         name = ALIASES.get(given, given)

@@ -15,6 +15,7 @@ from .triangulation import triangulate
 
 LONG_DIVISIONS = 64  # [-] likewise along a strip, whose elements are then longer than wide
 MOST_CELLS = 200_000  # [-] elements: several times what `find_modes` can solve
+SMALLEST_HOLE = 1e-6  # [-] radius of a hole over the disk's: smaller ones are points to rounding
 DEFAULT_DIVISIONS = 8  # [-] elements across the shorter side where no size is stated; find_modes refines on its own
 
 
@@ -185,6 +186,8 @@ def disk(radius: float, hole: float = 0.0, *, size: float | None = None) -> Mesh
     hole = _check.non_negative("hole", hole, "m")
     if hole >= radius:
         raise ValueError(f"hole must be smaller than radius = {radius:g} m, got {hole:g} m")
+    if 0.0 < hole < SMALLEST_HOLE * radius:
+        raise ValueError(f"hole must be zero or at least {SMALLEST_HOLE:g} of radius = {radius:g} m, got {hole:g} m")
     inner = (circle((0.0, 0.0), hole, "inner"),) if hole else ()
     return fill(Outline.around(circle((0.0, 0.0), radius, "outer"), inner), size=size)
 
@@ -208,6 +211,8 @@ def polygon(corners: Any, holes: Sequence[Any] = (), *, size: float | None = Non
         whole outer rim, "boundary" everything.
     """
     outer = straight_loop("corners", corners, "edge{}")
+    if not isinstance(holes, (list, tuple, np.ndarray)):
+        raise ValueError(f"holes must be a list of corners of each hole, got {_check.shown(holes)}")
     inner = [straight_loop(f"holes[{i}]", hole, f"hole{i}") for i, hole in enumerate(holes)]
     return fill(Outline.around(outer, tuple(inner)), size=size)
 
@@ -298,6 +303,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     return replace(made, recipe=partial(_divided, made))
 
 
+@_check.typed
 def save(path: Any, mesh: Mesh) -> None:
     """Write a plate's mesh with its named edges to a Gmsh file (.msh) that `load` and other programs read."""
     if not isinstance(mesh, Mesh) or mesh.dimension != 2:

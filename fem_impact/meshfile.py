@@ -34,7 +34,7 @@ def read(path: Any, unit: str | None) -> tuple[np.ndarray, np.ndarray, dict, dic
     names : dict, edge name -> set of sorted pairs of vertices
     notes : list of str, what was mended
     """
-    path = Path(path)
+    path = _check.path("path", path)
     data = _meshread.read(path)
     raw, notes = _plane_points(path, data, unit)
     cells, nodes = _triangles(path, data)
@@ -300,7 +300,7 @@ def write(path: Path, points, cells, facets, middles, curved, edges: dict[str, n
     points, cells, facets, middles, edges : as in a `Mesh`
     curved : ndarray, shape (n_facets,), bool
     """
-    path = Path(path)
+    path = _check.path("path", path)
     if path.suffix != ".msh":
         raise ValueError(f"path must end in .msh, got {path.name!r}")
     own = [name for name in edges if name not in ("boundary", "outer")] or ["boundary"]

@@ -11,6 +11,7 @@ from . import _check, pointload, spectrum, svg, uff
 from .assembly import System
 from .eigen import Flexibility
 
+HIGHEST = 1e74  # [Hz] that a frequency may be scaled to, see `_check.REACH`
 SHOWN = 10  # [-] modes listed in a notebook
 
 
@@ -249,14 +250,12 @@ class Modes:
     def points(self, name: str, points: Any) -> np.ndarray:
         """Return points as (n_points, dimension) [m]; raise ValueError where one is not on the body."""
         if self.dimension == 0:
-            return np.zeros((1, 0)) if points is None else np.zeros((max(1, np.atleast_2d(points).shape[0]), 0))
-        try:
-            raw = np.array(points, dtype=float)
-        except (TypeError, ValueError):
-            raise ValueError(f"{name} must be coordinates in m, got {points!r:.80}") from None
+            n_points = 1 if points is None else len(np.atleast_2d(_check.numbers(name, points, "m")))
+            return np.zeros((max(1, n_points), 0))
+        raw = _check.numbers(name, points, "m")
         if self.dimension == 1 and (raw.ndim < 2 or raw.shape[-1] != 1):
             raw = raw.reshape(-1, 1)
-        array = _check.array(name, np.atleast_2d(raw), (None, self.dimension), "m")
+        array = _check.array(name, raw, (None, self.dimension), "m", lift=True)
         inside = self.shapes.contains(array)
         if not inside.all():
             lost = ", ".join(f"{x:g}" for x in array[~inside][0])
@@ -270,12 +269,19 @@ class Modes:
         """Mass-normalised shapes at points on the body, (n_points, n_modes) [kg**-0.5]."""
         return self.shapes.at(self.points("points", points))
 
+    def point(self, name: str, at: Any) -> np.ndarray:
+        """Return one point as (1, dimension) [m]; raise ValueError where it is not on the body, or not one."""
+        found = self.points(name, at)
+        if len(found) != 1:
+            raise ValueError(f"{name} must be one point, got {len(found)}")
+        return found
+
     def rigid_motion(self, at: Any) -> np.ndarray:
         """Modal velocities (n_modes,) [kg**0.5] of a rigid motion that carries the point ``at`` [m] at unit speed.
 
         Straight where the body is free to move so; else turning about its hinge.
         """
-        point = self.points("at", at)[:1]
+        point = self.point("at", at)
         result = np.zeros(self.n_modes)
         rigid = self.shapes.take(self.n_rigid) if self.n_rigid else None
         if rigid is None or not rigid.at(point).any():
@@ -308,7 +314,11 @@ class Modes:
             if not flexible.size:
                 raise ValueError("first_frequency needs a flexible mode; these modes are rigid")
             ratio = _check.positive("first_frequency", first_frequency, "Hz") / flexible[0]
-        shapes = ScaledShapes(self.shapes, float((self.mass / mass) ** 0.5), float(ratio))
+            if flexible[-1] * ratio > HIGHEST:
+                raise ValueError(
+                    f"first_frequency must leave the last below {HIGHEST:g} Hz, got {first_frequency:g} Hz"
+                )
+        shapes = ScaledShapes(self.shapes, float(self.mass**0.5 / mass**0.5), float(ratio))
         bounds = None if self.bounds is None else self.bounds * ratio
         return replace(self, omega=self.omega * ratio, shapes=shapes, mass=mass, bounds=bounds)
 
@@ -344,12 +354,11 @@ def damping_ratios(damping_ratio: Any, omega: np.ndarray) -> np.ndarray:
     result = np.zeros(len(omega))
     flexible = omega > 0.0
     if callable(damping_ratio):
-        values = np.broadcast_to(damping_ratio(omega[flexible] / (2.0 * np.pi)), (int(flexible.sum()),))
-        result[flexible] = _check.array("damping_ratio", values, (int(flexible.sum()),))
-    elif np.ndim(damping_ratio) == 0:
-        result[flexible] = _check.non_negative("damping_ratio", damping_ratio)
-    else:
+        result[flexible] = _check.field("damping_ratio", damping_ratio, omega[flexible] / (2.0 * np.pi))
+    elif isinstance(damping_ratio, (list, tuple)) or (isinstance(damping_ratio, np.ndarray) and damping_ratio.ndim):
         result = _check.array("damping_ratio", damping_ratio, omega.shape)
+    else:
+        result[flexible] = _check.non_negative("damping_ratio", damping_ratio)
         result[~flexible] = 0.0
     if (result < 0.0).any():
         raise ValueError(f"damping_ratio must not be negative, got {result.min():g}")
@@ -403,6 +412,7 @@ class FieldShapes:
         return self.system.mesh.points, self.system.mesh.cells
 
 
+@_check.typed
 def find_modes(
     system: System,
     *,
@@ -444,8 +454,6 @@ def find_modes(
     SimulationError
         Where the number of modes found disagrees with the inertia of the factorised matrix.
     """
-    if not isinstance(system, System):
-        raise ValueError(f"system must come from fi.assemble, got {type(system).__name__}")
     if (n_modes is None) == (max_frequency is None):
         raise ValueError("find_modes needs either n_modes or max_frequency")
     if n_modes is not None:

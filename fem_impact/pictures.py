@@ -28,6 +28,7 @@ WINDOW = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
 SIZE = (720, 480)  # [px] of a frame
 TILE = (320, 250)  # [px] of one mode shape
 FRAMES = 48  # [-] of an animation: four seconds
+MOST_FRAMES = 1000  # [-] minutes of work
 RATE = 12  # [1/s] frames
 HEIGHT = 0.12  # [-] largest deflection drawn over the body's extent
 LIFT = 0.0015  # [-] of lines above the surface over their extent
@@ -47,6 +48,7 @@ def can_render() -> bool:
     return run.returncode == 0
 
 
+@_check.typed
 def mode_shapes(path: str | Path, modes: Modes, *, count: int = 12, columns: int = 4) -> str:
     """Write the first mode shapes as a grid of warped surfaces with nodal lines.
 
@@ -85,6 +87,7 @@ def mode_shapes(path: str | Path, modes: Modes, *, count: int = 12, columns: int
     return ""
 
 
+@_check.typed
 def wave(path: str | Path, response: Response, *, time: float | None = None) -> str:
     """Write the struck body at one instant, warped by its displacement, the striker above it.
 
@@ -108,6 +111,7 @@ def wave(path: str | Path, response: Response, *, time: float | None = None) -> 
     return "" if can_render() else REMEDY
 
 
+@_check.typed
 def animation(path: str | Path, response: Response, *, frames: int = FRAMES) -> str:
     """Write the wave leaving the strike point as an animated GIF, the striker included and the time shown.
 
@@ -123,7 +127,7 @@ def animation(path: str | Path, response: Response, *, frames: int = FRAMES) -> 
         As in `wave`.
     """
     _ending(path, ".gif")
-    times = np.linspace(0.0, drawing.end_of(response), _check.count("frames", frames, low=2))
+    times = np.linspace(0.0, drawing.end_of(response), _check.count("frames", frames, low=2, high=MOST_FRAMES))
     pictures = list(_frames(response, times))
     colours = _mosaic(pictures[:: max(1, len(pictures) // 8)]).quantize(255)  # one palette, so that nothing flickers
     first, *rest = (picture.quantize(palette=colours, dither=Image.Dither.NONE) for picture in pictures)
@@ -140,7 +144,7 @@ def _mosaic(pictures: list[Image.Image]) -> Image.Image:
 
 
 def _ending(path: str | Path, ending: str) -> None:
-    _check.one_of("path ending", Path(path).suffix.lower(), (ending,))
+    _check.one_of("path ending", _check.path("path", path).suffix.lower(), (ending,))
 
 
 def _frames(response: Response, times: np.ndarray) -> Iterator[Image.Image]:

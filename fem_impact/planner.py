@@ -236,7 +236,7 @@ def _outside(scene: Any, blow: _Blow, stages: Stages) -> _Outside | None:
         modes = first.scaled(**scale)
         stretch = modes.frequencies[-1] / first.frequencies[-1]
         with scene.blame("strike"):
-            at = modes.points("at", blow.values["at"])[0]
+            at = modes.point("at", blow.values["at"])[0]
         most = modes.frequencies[-1] * (MOST_LOOKED_AT / FIRST_LOOK) ** (2.0 / modes.dimension)
         limit = min(LOOK * 0.5 / duration, most)
         if limit > modes.frequencies[-1]:
@@ -251,7 +251,7 @@ def _outside(scene: Any, blow: _Blow, stages: Stages) -> _Outside | None:
     with scene.blame("supports"):
         free = "free" in support_of_facets(body, dict(scene.supports.values))
     with scene.blame("strike"):
-        at = _check.array("at", np.atleast_1d(blow.values["at"]), (2,), "m")
+        at = _check.array("at", blow.values["at"], (2,), "m", lift=True)
     view = idealisation.Surroundings.seen(body, at)
     if view is None:
         return None
@@ -286,7 +286,7 @@ def _modal(
         first = find(FIRST_LOOK) if first is None else first
     modes = first.scaled(**scale)
     with scene.blame("strike"):
-        modes.points("at", blow.values["at"])
+        modes.point("at", blow.values["at"])
     allowed = SHARE * blow.tolerance / (CAUTION * margin) / (LOSSY if blow.contact.loss else 1.0)
     law = {"contact": blow.contact, "speed": blow.values["speed"]}
     needed = accuracy.cutoff_frequency(modes, blow.values["at"], mass=blow.striker.felt_mass, tolerance=allowed, **law)

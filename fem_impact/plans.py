@@ -40,20 +40,22 @@ def asked_for(quantity: Any) -> Mapping[str, float | None]:
 
 def _listed(quantity: Any) -> Sequence[Any]:
     if not isinstance(quantity, Sequence):
-        raise ValueError(f"quantity must be names of {', '.join(QUANTITIES)}, got {quantity!r:.80}")
+        raise ValueError(f"quantity must be names of {', '.join(QUANTITIES)}, got {_check.shown(quantity)}")
     return quantity
 
 
 def _pair(item: Any) -> tuple[str, float | None]:
     if not isinstance(item, str):
-        raise ValueError(f"quantity must be names of {', '.join(QUANTITIES)}, got {item!r:.80}")
+        raise ValueError(f"quantity must be names of {', '.join(QUANTITIES)}, got {_check.shown(item)}")
     name, equals, limit = item.partition("=")
     if not equals:
         return name.strip(), None
     try:
         return name.strip(), float(limit)
     except ValueError:
-        raise ValueError(f"frequency of {name.strip()} must be a number in Hz, got {limit.strip()!r:.80}") from None
+        raise ValueError(
+            f"frequency of {name.strip()} must be a number in Hz, got {_check.shown(limit.strip())}"
+        ) from None
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,7 @@ MOST_POINTS = 4  # [-] observation points that get a player
 WEB = Path(__file__).parent / "web"
 
 
+@_check.typed
 def read(path: str | Path) -> Scene:
     """The scene of a TOML file, or of what `fem-impact strike` wrote: response.json or the folder that holds it.
 
@@ -42,7 +43,7 @@ def read(path: str | Path) -> Scene:
     ``web`` is not installed: better known before the work than after it.
     """
     _tools()
-    path = Path(path)
+    path = _check.path("path", path)
     if path.is_dir():
         path = path / "response.json"
     if path.suffix.lower() != ".json":
@@ -60,6 +61,7 @@ def _tools() -> list[Any]:
     return [_check.extra(module, "web", "a report") for module in ("jinja2", "plotly.offline")]
 
 
+@_check.typed
 def write(path: str | Path, scene: Scene, run: Run) -> None:
     """Write the page of a strike.
 

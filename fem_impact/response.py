@@ -286,7 +286,7 @@ class Response:
 
         Exact for the sampled force taken as straight between its samples.
         """
-        omega = 2.0 * np.pi * _check.array("frequencies", np.atleast_1d(frequencies), (None,), "Hz")
+        omega = 2.0 * np.pi * _check.array("frequencies", frequencies, (None,), "Hz", lift=True)
         total = np.zeros(len(omega), complex)
         t, h, f0, f1 = self._pieces()
         for block in np.array_split(np.arange(len(omega)), max(1, len(omega) * len(h) // 2**20)):
@@ -343,7 +343,9 @@ class Response:
         -------
         q, p : ndarray, shape (n_times, n_modes) [m kg**0.5], [m kg**0.5/s]
         """
-        times = _check.array("times", np.atleast_1d(times), (None,), "s")
+        n = len(self.bodies)
+        _check.count("body", body, low=-n, high=n - 1)
+        times = _check.array("times", times, (None,), "s", lift=True)
         if times.size and times.min() < 0.0:
             raise ValueError(f"times must not lie before the blow at 0 s, got {times.min():g} s")
         order = np.argsort(times, kind="stable")
@@ -359,6 +361,7 @@ class Response:
         n_modes = self.bodies[body].n_modes
         return q[back, part][:, :n_modes], p[back, part][:, :n_modes]
 
+    @_check.typed
     def displacement(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
         """Displacement [m] of the target at points and times, (n_times, n_points); positive along the blow.
 
@@ -377,6 +380,7 @@ class Response:
         motion = q @ self.bodies[body].shape_at(points).T  # (n_times, n_modes) @ (n_modes, n_points)
         return motion + self._dip(points, times, body)[0] if residual else motion
 
+    @_check.typed
     def velocity(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
         """Velocity [m/s] of the target at points and times, (n_times, n_points); parameters as in `displacement`."""
         _, p = self.modal_state(times, body=body)
@@ -389,7 +393,7 @@ class Response:
         if dip is None:
             return 0.0, 0.0
         modes, n_ends = self.bodies[body], len(dip.points)
-        times = _check.array("times", np.atleast_1d(times), (None,), "s")
+        times = _check.array("times", times, (None,), "s", lift=True)
         found = [self.history.force_at(times, i) for i, _ in dip.touched]
         sign = np.array([sign for _, sign in dip.touched])
         force, rate = (-sign * np.stack([pair[k] for pair in found], axis=1) for k in (0, 1))  # (n_times, n_ends)

@@ -314,6 +314,7 @@ class Scene:
             raise fault(self.path, f"[{table}] has numbers too large or too small to reckon with") from None
 
 
+@_check.typed
 def load_scene(path: str | Path) -> Scene:
     """Read a scene from TOML and check its tables and keys.
 
@@ -334,7 +335,7 @@ def load_scene(path: str | Path) -> Scene:
     OSError
         Where the file cannot be read.
     """
-    path = Path(path)
+    path = _check.path("path", path)
     return scene_of(read_tables(path), path, folder=path.parent)
 
 
@@ -343,7 +344,7 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
     tables = dict(tables)
     title = tables.pop("title", "")
     if not isinstance(title, str):
-        raise fault(path, f"title must be text, got {title!r:.80}")
+        raise fault(path, f"title must be text, got {_check.shown(title)}")
     title = "".join(c if c.isprintable() else " " for c in title)  # it is printed to terminals, which obey some
     for name, table in tables.items():
         if name not in TABLES:
@@ -359,6 +360,7 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
     return scene
 
 
+@_check.typed
 def plan(scene: Scene | str | Path, **changes: Any) -> Plan:
     """Decide how a scene, or the file it is in, will be modelled, without striking (see `Scene.plan`)."""
     return (scene if isinstance(scene, Scene) else load_scene(scene)).plan(**changes)

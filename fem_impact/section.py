@@ -70,6 +70,8 @@ class Material:
         angle : float [rad]
             Direction of the grain, anticlockwise from the x axis.
         """
+        for name, value in (("E_along", E_along), ("E_across", E_across), ("G", G)):
+            _check.positive(name, value, "Pa")
         return cls(E_along, nu, rho, E_across, G, angle)
 
     @property
@@ -89,17 +91,12 @@ class Material:
 
 def evaluate(name: str, value: Varying, points: np.ndarray, unit: str) -> np.ndarray:
     """Return a positive field at points (n_points, dimension), (n_points,): from a number or a function of points."""
+    points = _check.array("points", points, (None, None), "m")
     if not callable(value):
         return np.full(len(points), _check.positive(name, value, unit))
-    try:
-        field = np.broadcast_to(np.asarray(value(points), float), (len(points),))
-    except (TypeError, ValueError, IndexError) as error:
-        raise ValueError(
-            f"{name} must be a number in {unit} or a function of points (n_points, {points.shape[1]}) "
-            f"returning (n_points,): {error}"
-        ) from None
-    worst = int(np.argmin(np.where(np.isfinite(field), field, -np.inf)))
-    if not (np.isfinite(field[worst]) and field[worst] > 0.0):
+    field = _check.field(name, value, points, unit)
+    worst = int(np.argmin(field))
+    if field[worst] <= 0.0:
         where = ", ".join(f"{x:g}" for x in points[worst])
         raise ValueError(f"{name} must be positive everywhere, got {field[worst]:g} {unit} at ({where}) m")
     return field
@@ -122,6 +119,7 @@ class Plate:
     tension: float = 0.0
 
     def __post_init__(self) -> None:
+        _check.instance("material", self.material, Material)
         if not callable(self.thickness):
             _check.positive("thickness", self.thickness, "m")
         _check.non_negative("tension", self.tension, "N/m")
@@ -174,6 +172,8 @@ class Beam:
     round: bool = False
 
     def __post_init__(self) -> None:
+        _check.instance("material", self.material, Material)
+        _check.flag("round", self.round)
         for name, value in (("width", self.width), ("height", self.height)):
             if not callable(value):
                 _check.positive(name, value, "m")
@@ -186,6 +186,8 @@ class Beam:
     @classmethod
     def circular(cls, material: Material, *, diameter: Varying) -> "Beam":
         """Round beam."""
+        if not callable(diameter):
+            _check.positive("diameter", diameter, "m")
         return cls(material, diameter, diameter, round=True)
 
     def stiffness(self, points: np.ndarray) -> np.ndarray:

@@ -14,6 +14,8 @@ LOUDEST = 200.0  # [Pa] the pressure written as 1.0: 140 dB, far above any struc
 REFERENCE = {"m/s": (1e-9, "1 nm/s"), "Pa": (20e-6, "20 µPa")}  # what 0 dB stands for in acoustics, ISO 1683
 AIR = (1.204, 343.2)  # [kg/m^3], [m/s] density and speed of sound at 20 degrees C
 OVERSAMPLING = 8  # [-] instants per sample while the first waves arrive: differences err by 0.5 % at 10 kHz
+HIGHEST_RATE = 1_000_000  # [Hz] far above what any device plays
+MOST_SAMPLES = 10_000_000  # [-] three minutes at 48 kHz: some ten seconds of work
 SHORTEST, LONGEST = 0.5, 5.0  # [s] bounds of the length chosen when none is given
 DECAY = np.log(1e3)  # [-] 60 dB: how far the slowest mode has decayed at the end, if that is not too long
 BLOCK = 4096  # [-] samples propagated from one modal state; bounds the memory, not the result
@@ -49,6 +51,7 @@ class Sound:
         return f"{self.level:.1f} dB re {REFERENCE[self.unit][1]}".replace("-", "−")
 
 
+@_check.typed
 def synthesise(
     response: Response, at: Any = None, *, duration: float | None = None, rate: int = RATE, normalise: bool = False
 ) -> Sound:
@@ -76,16 +79,17 @@ def synthesise(
     above ``rate / 2`` (they would alias) are left out. It is the motion of the surface, not the radiated pressure.
     """
     modes = response.target
-    point: Any = response.at if at is None else at
+    point: Any = modes.point("at", response.at if at is None else at)
     rate, heard = _audible(response, rate)
     times = response.time[0] + np.arange(_length(response, heard, duration, rate)) / rate
-    shape = modes.shape_at(np.atleast_2d(point))[0]  # (n_modes,)
+    shape = modes.shape_at(point)[0]  # (n_modes,)
     n_blow = int(np.searchsorted(times, response.time[-1], side="right"))
     blow = response.modal_state(times[:n_blow])[1][:, heard] @ shape[heard]
     free = _ring(response, times[n_blow:], heard, shape[None, heard] + 0j, 1) if n_blow < len(times) else np.zeros(0)
     return _scaled(np.concatenate([blow, free]), rate, FULL_SCALE, "m/s", normalise)
 
 
+@_check.typed
 def radiate(
     response: Response,
     listener: Any,
@@ -150,7 +154,7 @@ def beside(listener: Any) -> np.ndarray:
 
 
 def _audible(response: Response, rate: int) -> tuple[int, np.ndarray]:
-    rate = _check.count("rate", rate)
+    rate = _check.count("rate", rate, high=HIGHEST_RATE)
     return rate, (response.target.omega > 0.0) & (response.target.omega < np.pi * rate)
 
 
@@ -159,7 +163,8 @@ def _length(response: Response, heard: np.ndarray, duration: float | None, rate:
     if duration is None:
         slowest = float((response.target.damping_ratio * response.target.omega)[heard].min(initial=np.inf))
         duration = float(np.clip(DECAY / slowest, SHORTEST, LONGEST)) if slowest > 0.0 else LONGEST
-    return max(1, round(_check.positive("duration", duration, "s") * rate))
+    duration = _check.between("duration", _check.positive("duration", duration, "s"), 0.0, MOST_SAMPLES / rate, "s")
+    return max(1, round(duration * rate))
 
 
 def _scaled(signal: np.ndarray, rate: int, full_scale: float, unit: str, normalise: bool) -> Sound:

@@ -8,6 +8,7 @@ from . import _check
 from .modal import Modes
 
 
+@_check.typed
 def mobility(modes: Modes, at: Any, to: Any, frequencies: Any) -> np.ndarray:
     """Velocity at ``to`` per unit force at ``at``, over frequency.
 
@@ -26,10 +27,10 @@ def mobility(modes: Modes, at: Any, to: Any, frequencies: Any) -> np.ndarray:
     Sum over the kept modes plus i omega times the residual compliance of the rest; reciprocal in ``at`` and ``to``.
     Infinite at the frequency of an undamped mode. Valid below the last kept mode.
     """
-    frequency = _check.array("frequencies", np.atleast_1d(frequencies), (None,), "Hz")
+    frequency = _check.array("frequencies", frequencies, (None,), "Hz", lift=True)
     if (frequency <= 0.0).any():
         raise ValueError(f"frequencies must be positive, got {frequency.min():g} Hz")
-    force, place = modes.points("at", at)[:1], modes.points("to", to)[:1]
+    force, place = modes.point("at", at), modes.point("to", to)
     product = modes.shape_at(force)[0] * modes.shape_at(place)[0]  # (n_modes,)
     rest = modes.residual_compliance(np.vstack([force, place]))[0, 1]
     omega = 2.0 * np.pi * frequency[:, None]  # (n_frequencies, 1)
@@ -55,8 +56,9 @@ def half_sine_spectrum(frequencies: Any, contact_frequency: float) -> np.ndarray
     ----------
     Euphonics 2.2.6 and 12.1.
     """
-    x = np.asarray(frequencies, float) / _check.positive("contact_frequency", contact_frequency, "Hz")
+    frequency = _check.finite("frequencies", _check.numbers("frequencies", frequencies, "Hz"), "Hz")
+    x = frequency / _check.positive("contact_frequency", contact_frequency, "Hz")
     near = np.abs(x - 1.0) < 1e-4  # cos and 1 - x**2 vanish together: their ratio to second order
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         far = np.abs(np.cos(0.5 * np.pi * x) / (1.0 - x**2))
     return np.where(near, 0.25 * np.pi * (1.0 - 0.5 * (x - 1.0)), far)

@@ -11,7 +11,8 @@ from .assembly import assemble
 from .modal import Modes, find_modes
 from .section import Beam, Material
 
-LARGEST_SPHERE = 1e9  # [m] beyond, the mass of a sphere leaves the range of floating point in what follows
+SPHERES = 1e-9, 1e9  # [m] radii: from some atoms to a star
+MOST_MODES = 1000  # [-] of a stick: where they are as short as it is thick it is no slender beam any more
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,12 +29,17 @@ class Striker:
     radius: float | None = None  # [m] of a sphere
 
     def __post_init__(self) -> None:
+        _check.instance("modes", self.modes, Modes)
+        if self.material is not None:
+            _check.instance("material", self.material, Material)
+        if self.radius is not None:
+            _check.positive("radius", self.radius, "m")
         if self.modes.n_rigid == 0:
             raise ValueError(
                 f"striker must be able to move rigidly, but its lowest mode is at {self.modes.frequencies[0]:g} Hz; "
                 "support it by at most a hinge"
             )
-        at = self.modes.points("at", self.at)[0]
+        at = self.modes.point("at", self.at)[0]
         object.__setattr__(self, "at", at)
         shape = self.modes.shape_at(at[None] if self.modes.dimension else None)[0]
         if not (shape[: self.modes.n_rigid] != 0.0).any():
@@ -48,11 +54,9 @@ class Striker:
     @classmethod
     def sphere(cls, material: Material, radius: float) -> "Striker":
         """A rigid solid sphere of a material, radius in m; `Contact.between` gives its Hertz stiffness."""
-        radius = _check.between("radius", _check.positive("radius", radius, "m"), 0.0, LARGEST_SPHERE, "m")
-        rho = material.rho
-        if not isinstance(rho, (int, float)):
-            raise ValueError(f"material must have one density, got {rho!r:.60}")
-        return cls(Modes.rigid(4.0 / 3.0 * np.pi * radius**3 * rho), np.zeros(0), material, radius)
+        _check.instance("material", material, Material)
+        radius = _check.between("radius", radius, *SPHERES, "m")
+        return cls(Modes.rigid(4.0 / 3.0 * np.pi * radius**3 * material.rho), np.zeros(0), material, radius)
 
     @classmethod
     def stick(cls, mass: float, first_frequency: float, *, n_modes: int = 8) -> "Striker":
@@ -70,7 +74,9 @@ class Striker:
         mass = _check.positive("mass", mass, "kg")
         first_frequency = _check.positive("first_frequency", first_frequency, "Hz")
         beam = Beam.rectangular(Material(E=1.0, nu=0.0, rho=1.0), width=1.0, height=1.0)
-        line = mesh.line(1.0, size=0.2 / (1 + _check.count("n_modes", n_modes)))  # five elements per half wave
+        line = mesh.line(
+            1.0, size=0.2 / (1 + _check.count("n_modes", n_modes, high=MOST_MODES))
+        )  # five elements per half wave
         system = assemble(line, beam, supports={"left": "hinged"})
         modes = find_modes(system, n_modes=1 + n_modes)
         return cls(modes.scaled(mass=mass, first_frequency=first_frequency), np.ones(1))

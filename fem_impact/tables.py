@@ -58,7 +58,7 @@ def _observe(*, points: Any = None, listener: Any = None) -> None:
     if points is None and listener is None:
         raise ValueError("points or listener must be given, or the table left out")
     if points is not None and (not isinstance(points, list) or not points):
-        raise ValueError(f"points must be a list of points such as [[0.1, 0.2]], got {points!r:.80}")
+        raise ValueError(f"points must be a list of points such as [[0.1, 0.2]], got {_check.shown(points)}")
     if listener is not None:
         sound.beside(listener)
 
@@ -66,7 +66,7 @@ def _observe(*, points: Any = None, listener: Any = None) -> None:
 def map_values(*, over: Any, max_frequency: Any = None) -> dict[str, Any]:
     """The table [map], checked: values along each axis, and the band of the spectral centroid [Hz]."""
     if not isinstance(over, dict) or not over:
-        raise ValueError(f'over must be a table of axes such as "striker.mass" = [0.05, 0.1], got {over!r:.80}')
+        raise ValueError(f'over must be a table of axes such as "striker.mass" = [0.05, 0.1], got {_check.shown(over)}')
     band = None if max_frequency is None else _check.positive("max_frequency", max_frequency, "Hz")
     return {"over": {name: _along(name, values) for name, values in over.items()}, "max_frequency": band}
 
@@ -77,12 +77,10 @@ def _along(name: str, values: Any) -> np.ndarray:
         return np.array(values)
     if not isinstance(values, dict) or not {"from", "to", "count"} <= set(values) <= {"from", "to", "count", "scale"}:
         raise ValueError(
-            f"{name} must be a list or {{ from, to, count, scale = 'linear' or 'log' }}, got {values!r:.80}"
+            f"{name} must be a list or {{ from, to, count, scale = 'linear' or 'log' }}, got {_check.shown(values)}"
         )
     low, high = _check.number(f"{name}.from", values["from"]), _check.number(f"{name}.to", values["to"])
-    count = _check.count(f"{name}.count", values["count"])
-    if count > MOST_VALUES:
-        raise ValueError(f"{name}.count must be at most {MOST_VALUES} along one axis, got {count}")
+    count = _check.count(f"{name}.count", values["count"], high=MOST_VALUES)
     if _check.one_of(f"{name}.scale", values.get("scale", "linear"), ("linear", "log")) == "linear":
         return np.linspace(low, high, count)
     return np.geomspace(_check.positive(f"{name}.from", low), _check.positive(f"{name}.to", high), count)
@@ -131,7 +129,7 @@ PATHS = ("source", "path")  # keys that name a file, relative to the scene
 
 def fault(path: Path, text: str) -> ValueError:
     """One line naming the file, whatever a key or a value holds: a scene may come from anyone."""
-    return ValueError(f"{path}: {_check.line(text)}")
+    return ValueError(f"{_check.line(str(path))}: {_check.line(text)}")
 
 
 def read_tables(path: Path) -> dict[str, Any]:
@@ -176,7 +174,7 @@ def read_part(path: Path, table: str, values: dict[str, Any], folder: Path) -> P
     if table == "supports":
         for edge, support in values.items():
             if support not in SUPPORTS:
-                raise wrong(f"{edge} must be one of {', '.join(SUPPORTS)}, got {support!r:.80}")
+                raise wrong(f"{edge} must be one of {', '.join(SUPPORTS)}, got {_check.shown(support)}")
         return Part("", MappingProxyType(values))
     selector, makers = MAKERS[table]
     values = dict(values)
@@ -205,7 +203,7 @@ def _check_keys(selector: str, kind: str, values: dict[str, Any], maker: Callabl
             raise ValueError(f"{key} is missing" + (f" for {selector} = {kind!r}" if selector else ""))
     for key in PATHS:
         if key in values and selector == "shape" and not isinstance(values[key], str):
-            raise ValueError(f"{key} must be the name of a file, got {values[key]!r:.80}")
+            raise ValueError(f"{key} must be the name of a file, got {_check.shown(values[key])}")
 
 
 def _not_finite(value: Any, name: str = "") -> tuple[str, float] | None:

@@ -13,6 +13,7 @@ STEP = 1.01  # [-] ratio of the search from low frequencies: lobes of the pulse'
 SETTLED = 40.0  # [-] frequency over contact frequency beyond which cos**2 is replaced by its mean: 1e-7 of the sum
 
 
+@_check.typed
 def required_energy(modes: Modes, at: Any, contact_frequency: float) -> float:
     """Twice the energy a half-sine pulse of unit impulse leaves in the body [1/kg].
 
@@ -33,7 +34,7 @@ def required_energy(modes: Modes, at: Any, contact_frequency: float) -> float:
 
 def _participation(modes: Modes, at: Any) -> tuple[np.ndarray, np.ndarray, float, float]:
     """Kept omega and squared shapes, and the density A omega**-s [1/(kg rad/s)] of the squared shapes beyond."""
-    point = modes.points("at", at)[:1]
+    point = modes.point("at", at)
     squared = modes.shape_at(point)[0] ** 2
     exponent = {1: 0.5}.get(modes.dimension, 0.0)
     rest = max(0.0, float(modes.residual_compliance(point)[0, 0]))
@@ -59,6 +60,7 @@ def _energy(omega: np.ndarray, squared: np.ndarray, density: float, exponent: fl
     return total + density * omega_c ** (1.0 - exponent) * tail
 
 
+@_check.typed
 def threshold_frequency(modes: Modes, at: Any, mass: float) -> float | None:
     """Lowest contact resonance at which the struck body takes all the energy of a rigid hammer.
 

@@ -31,7 +31,7 @@ def write(path: Any, frequencies, damping_ratio, shapes, points, cells) -> None:
     points : ndarray, shape (n_points, dimension) [m]
     cells : ndarray, shape (n_cells, 2, 3 or 4), numbers of points
     """
-    pyuff, path = _pyuff(), Path(path)
+    pyuff, path = _pyuff(), _check.path("path", path)
     n_points = len(points)
     place = np.column_stack([points, np.zeros((n_points, 3 - points.shape[1]))])
     node = np.arange(1, n_points + 1)
@@ -96,7 +96,9 @@ def read(path: Any, direction: str) -> dict[str, np.ndarray]:
     dict
         frequencies (n_modes,), damping_ratio (n_modes,), shapes (n_points, n_modes), points (n_points, 1 or 2)
     """
-    return _apart.read(Path(path), "a universal file", "uff:arrays", _check.one_of("direction", direction, DIRECTIONS))
+    return _apart.read(
+        _check.path("path", path), "a universal file", "uff:arrays", _check.one_of("direction", direction, DIRECTIONS)
+    )
 
 
 def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:

@@ -17,7 +17,7 @@ def test_duration_on_a_rigid_wall():
     assert_allclose(accuracy.contact_duration(fi.Contact.linear(88.6e3), 0.1, 3.0), np.pi * np.sqrt(0.1 / 88.6e3))
     hertz = 3.2180654597 * (0.1**2 / (695e3**2 * 3.0)) ** 0.2
     assert_allclose(accuracy.contact_duration(fi.Contact.hertz(695e3), 0.1, 3.0), hertz, rtol=1e-10)
-    assert np.isfinite(accuracy.contact_duration(fi.Contact.hertz(1e300), 1e-12, 1e6))
+    assert np.isfinite(accuracy.contact_duration(fi.Contact.hertz(1e200), 1e-12, 1e6))
 
 
 @functools.cache

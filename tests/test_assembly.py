@@ -98,7 +98,7 @@ def test_triangles_shrink_towards_a_point(at):
         (lambda: assemble(mesh.rectangle(1, 1), PLATE, {"lft": "hinged"}), "edge 'lft'.*did you mean 'left'"),
         (lambda: assemble(mesh.rectangle(1, 1), PLATE, {"left": "hinge"}), "one of clamped, hinged, free.*hinged"),
         (lambda: assemble(mesh.line(1), PLATE), "section must be a Beam"),
-        (lambda: assemble("plate.msh", PLATE), "mesh must be made by fi.mesh"),
+        (lambda: assemble("plate.msh", PLATE), "mesh must be a Mesh of fi.mesh"),
         (lambda: assemble(mesh.rectangle(1, 1), PLATE, near=(2.0, 0.5)), r"near must lie on the body.*\(2, 0.5\) m"),
         (
             lambda: assemble(mesh.rectangle(1, 1), PLATE, element="morly"),

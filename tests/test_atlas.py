@@ -90,7 +90,7 @@ def test_too_large_a_map_is_refused_and_a_costly_one_says_so(tmp_path, capsys, s
         "7.2e+04 GB of memory; give fewer values, or a max_cells of more than 1e+08" in told
     )  # seven layers and two more numbers of 8 byte
     assert cli.main(["map", scene_of_size(tmp_path, 10**12), "--out", str(tmp_path / "out")]) == 2
-    assert "stiffness.count must be at most 1000000 along one axis" in " ".join(capsys.readouterr().err.split())
+    assert "stiffness.count must be at most 1000000, got" in " ".join(capsys.readouterr().err.split())
     with pytest.raises(ValueError, match="over asks for 6 cells"):
         atlas.map_scene(scene, over=OVER, max_cells=5)
     said = []
@@ -145,9 +145,9 @@ def test_hammer_at_the_prompt(capsys):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (["--bandwidth", "0"], "bandwidth must be positive, got 0 Hz"),
+        (["--bandwidth", "0"], "bandwidth must lie between 0.001 and 1e+09 Hz, got 0 Hz"),
         (["--bandwidth", "inf"], "bandwidth must be finite, got inf Hz"),
-        (["--bandwidth", "500", "--masses", "0"], "masses must be positive, got 0 kg"),
+        (["--bandwidth", "500", "--masses", "0"], "masses must lie between 1e-06 and 1e+06 kg, got 0 kg"),
         (["--bandwidth", "500", "--masses", "0.01", "nan"], "masses must be finite"),
         (["--bandwidth", "500", "--drop", "60"], "drop must lie between 1 and 40 dB, got 60 dB"),
     ],
@@ -166,7 +166,7 @@ def test_a_bandwidth_beyond_every_tip_has_no_hammer():
 @pytest.mark.parametrize(
     ("bandwidth", "masses", "text"),
     [
-        (800.0, [1e308, 0.2], r"masses must lie between 1e-06 and 1e\+06 kg, got 1e\+308 kg"),
+        (800.0, [1e30, 0.2], r"masses must lie between 1e-06 and 1e\+06 kg, got 1e\+30 kg"),
         (800.0, [5e-324], "masses must lie between"),
         (1e300, [0.1], r"bandwidth must lie between 0.001 and 1e\+09 Hz"),
     ],

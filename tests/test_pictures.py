@@ -80,7 +80,7 @@ def test_other_endings_are_refused(hit, tmp_path, name):
 
 def test_strike_writes_them_when_asked(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(pictures, "can_render", lambda: False)
-    monkeypatch.setitem(pictures.animation.__kwdefaults__, "frames", 3)
+    monkeypatch.setitem(pictures.animation.__wrapped__.__kwdefaults__, "frames", 3)
     (tmp_path / "small.toml").write_text(TEXT)
     out = tmp_path / "out"
     assert cli.main(["strike", str(tmp_path / "small.toml"), "--out", str(out), "--pictures", "--vtk"]) == 0
