@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from itertools import chain
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args, get_origin
 
 import numpy as np
 
@@ -142,19 +142,24 @@ def path(name: str, value: Any) -> Path:
 
 
 def typed(function: Function) -> Function:
-    """Let a function refuse what is not of the kind its signature states: classes of this package, paths and flags."""
+    """Let a function refuse what is not of the kind that its signature states, wherever that is one of ours."""
     tests: dict[str, Callable[[Any], Any]] = {}
     parameters = inspect.signature(function).parameters
     for name, parameter in parameters.items():
         stated = parameter.annotation
         kinds = get_args(stated) if isinstance(stated, UnionType) else (stated,)
-        ours = tuple(kind for kind in kinds if getattr(kind, "__module__", "").startswith(f"{__package__}."))
+        ours = tuple(kind for kind in kinds if isinstance(kind, type) and kind.__name__ in SOURCES)
         if Path in kinds:
-            tests[name] = functools.partial(_path_or, name, (*ours, NoneType) if NoneType in kinds else ours)
-        elif stated is bool:
-            tests[name] = functools.partial(flag, name)
+            test: Callable[..., Any] = functools.partial(_path_or, name, ours)
+        elif any(get_origin(kind) is Callable for kind in kinds):
+            test = functools.partial(_function, name)
         elif ours:
-            tests[name] = functools.partial(_instance_or_none if NoneType in kinds else _instance, name, ours)
+            test = functools.partial(_instance, name, ours)
+        elif stated is bool:
+            test = functools.partial(flag, name)
+        else:
+            continue
+        tests[name] = functools.partial(_unless_none, test) if NoneType in kinds else test
 
     @functools.wraps(function)
     def tested(*given: Any, **named: Any) -> Any:
@@ -166,6 +171,16 @@ def typed(function: Function) -> Function:
     return tested  # type: ignore[return-value]
 
 
+def _unless_none(test: Callable[..., Any], value: Any) -> None:
+    if value is not None:
+        test(value)
+
+
+def _function(name: str, value: Any) -> None:
+    if not callable(value):
+        raise ValueError(f"{name} must be a function, got {shown(value)}")
+
+
 def _path_or(name: str, kinds: tuple[type, ...], value: Any) -> None:
     if not isinstance(value, kinds):
         path(name, value)
@@ -173,11 +188,6 @@ def _path_or(name: str, kinds: tuple[type, ...], value: Any) -> None:
 
 def _instance(name: str, kinds: tuple[type, ...], value: Any) -> None:
     instance(name, value, *kinds)
-
-
-def _instance_or_none(name: str, kinds: tuple[type, ...], value: Any) -> None:
-    if value is not None:
-        instance(name, value, *kinds)
 
 
 def array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "", *, lift: bool = False) -> np.ndarray:
@@ -192,6 +202,14 @@ def array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "", 
         wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
         raise ValueError(f"{name} must have shape {wanted}, got {result.shape}")
     return finite(name, result, unit)
+
+
+def band(name: str, value: Any, unit: str) -> tuple[float, float]:
+    """Return ``value`` as a pair of positive floats, the second the larger."""
+    low, high = (positive(name, end, unit) for end in array(name, value, (2,), unit))
+    if low >= high:
+        raise ValueError(f"{name} must ascend, got {low:g} before {high:g} {unit}")
+    return low, high
 
 
 def finite(name: str, result: np.ndarray, unit: str = "") -> np.ndarray:

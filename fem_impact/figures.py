@@ -75,7 +75,7 @@ def force(response: Response, *, band: tuple[float, float] = SPECTRUM_BAND) -> F
     matplotlib.figure.Figure
         Contacts are shaded and numbered; ticks along the spectrum's foot are the struck body's modes.
     """
-    low, high = _check.positive("band[0]", band[0], "Hz"), _check.positive("band[1]", band[1], "Hz")
+    low, high = _check.band("band", band, "Hz")
     with _styled(7.0, 6.0) as figure:
         above, below = figure.subplots(2, 1)
         _draw_force(above, response)
@@ -178,7 +178,7 @@ def mobility(modes: Modes, at: Any, to: Any = None, *, band: tuple[float, float]
         if not flexible.size:
             raise ValueError("band must be given for a body without flexible modes, in Hz")
         band = (0.5 * float(flexible[0]), float(flexible[-1]))
-    low, high = _check.positive("band[0]", band[0], "Hz"), _check.positive("band[1]", band[1], "Hz")
+    low, high = _check.band("band", band, "Hz")
     grid = np.geomspace(low, high, SPECTRUM_POINTS)
     frequencies = np.union1d(grid, flexible[(flexible > low) & (flexible < high)] * (1.0 + 1e-6))  # no peak is missed
     value = spectra.mobility(modes, at, at if to is None else to, frequencies)

@@ -58,6 +58,7 @@ class Scene:
         found = self.finder(Stages(), planner.tolerance_of(self))(count)
         return found.scaled(**self.scale).damped(self.damping_ratio)
 
+    @_check.typed
     def plan(self, *, watch: Watch | None = None, **changes: Any) -> Plan:
         """Decide how to model the blow, without striking.
 
@@ -77,6 +78,7 @@ class Scene:
         """
         return planner.make(self, changes, Stages(watch))
 
+    @_check.typed
     def run(
         self,
         watch: Watch | None = None,

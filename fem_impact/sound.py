@@ -129,7 +129,7 @@ def radiate(
     if modes.dimension != 2:
         raise ValueError(f"response must be that of a plate, got a body of dimension {modes.dimension}")
     place = beside(listener)
-    density, speed = _check.positive("air[0]", air[0], "kg/m^3"), _check.positive("air[1]", air[1], "m/s")
+    density, speed = (_check.positive("air", x) for x in _check.array("air", air, (2,)))
     rate, heard = _audible(response, rate)
     points, cells = drawing.grid(modes)
     weights = density / (2.0 * np.pi) * np.sign(place[2]) * _areas(points, cells)
