@@ -151,7 +151,7 @@ def typed(function: Function) -> Function:
         ours = tuple(kind for kind in kinds if isinstance(kind, type) and kind.__name__ in SOURCES)
         if Path in kinds:
             test: Callable[..., Any] = functools.partial(_path_or, name, ours)
-        elif any(get_origin(kind) is Callable for kind in kinds):
+        elif all(get_origin(kind) is Callable or kind is NoneType for kind in kinds):
             test = functools.partial(_function, name)
         elif ours:
             test = functools.partial(_instance, name, ours)
