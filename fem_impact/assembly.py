@@ -26,7 +26,7 @@ from .elements import (
     segments,
     triangles,
 )
-from .mesh import Mesh
+from .mesh import Mesh, aligned
 from .section import Beam, Elastic, Plate
 from .supports import Rim, cells_of_facets, constrain
 
@@ -173,6 +173,8 @@ def assemble(
     kinds = ("argyris", "morley") if mesh.dimension == 2 else ("hermite",)
     element = kinds[0] if element is None else _check.one_of("element", element, kinds)
     supports = {} if supports is None else supports
+    if callable(getattr(section, "thickness", None)):
+        mesh = aligned(mesh)
     if mesh.dimension == 1 and isinstance(section, Beam):
         made = _assemble_beam(mesh, section, supports)
     elif isinstance(section, Plate) and element == "morley":

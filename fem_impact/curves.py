@@ -1,6 +1,7 @@
 """Boundary facets as graphs over their chords, exact in ends, middle, tangents and curvatures."""
 
 import numpy as np
+from scipy.special import comb
 
 HALVING = 12  # [-] steps to the middle of a facet; each gains two digits where it turns by less than 0.25
 
@@ -60,6 +61,16 @@ class Curves:
         second = (-2.0 * p + 2.0 * slope * dp + bump * d2p) / length**2
         stretch = np.hypot(1.0, lean)
         return point, (self.along + lean * self.out) / stretch, (-second / stretch**3)[:, 0]
+
+    def controls(self) -> np.ndarray:
+        """The curves as Bezier pieces of degree six, (n, 7, 2) control points."""
+        a, b, chord = self.p, np.zeros((len(self.p), 1)), self.along * self.length[:, None]
+        rise = np.concatenate([b, a, b], axis=1) - np.concatenate([b, b, a], axis=1)  # s (1 - s) p, ascending powers
+        power = rise[:, :, None] * self.out[:, None]  # (n, 7, 2)
+        power[:, 0] += self.centre - 0.5 * chord
+        power[:, 1] += chord
+        k = np.arange(7)
+        return np.einsum("ik,nkd->nid", comb(k[:, None], k) / comb(6, k), power)
 
     def halfway(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """Points (n, 2) on the perpendicular bisectors of the chords between two shares (n,) of the chords."""

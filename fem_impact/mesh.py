@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 
 from . import _check, boundary, cad, meshfile, svg
-from .curves import divided
-from .outline import Outline, circle, crossed, extent, polyline, signed_area, straight_loop
+from .curves import Curves, divided
+from .outline import Bezier, Outline, circle, crossed, extent, polyline, signed_area, straight_loop
 from .triangulation import triangulate
 
 LONG_DIVISIONS = 64  # [-] likewise along a strip, whose elements are then longer than wide
 MOST_CELLS = 200_000  # [-] elements: several times what `find_modes` can solve
 SMALLEST_HOLE = 1e-6  # [-] radius of a hole over the disk's: smaller ones are points to rounding
+OVERSHOOT = 1.45  # [-] triangles of a file are divided where that makes them no smaller than this times as asked for
+LONGEST = 1.5  # [-] longest side of a mesh over the size it was made for: 1.4 to 1.6 on rectangles, disks, a guitar
 DEFAULT_DIVISIONS = 8  # [-] elements across the shorter side where no size is stated; find_modes refines on its own
 
 
@@ -261,6 +263,9 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
         Physical groups of lines, cell sets and numbered line cells become named edges ("edge7" for number 7 without a
         name); "outer", "hole0" ... are the loops of the rim and "boundary" all of it. `Mesh.notes` says what was mended
         or assumed: where a rim turns by little at each vertex it is taken as the smooth curve through them.
+        Where the modes need smaller triangles these are divided in four, or the rim is filled anew where that takes
+        fewer; so it is with larger ones where the mesh is much finer than needed. Under a thickness that varies, whose
+        steps they may follow, they are only ever divided.
 
     Raises
     ------
@@ -296,11 +301,19 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
         curve.middles,
         curve.tangents,
         curve.curvatures,
-        size=float(longest.max()),
+        size=float(longest.max()) / LONGEST,
         size_stated=False,
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
     )
-    return replace(made, recipe=partial(_divided, made))
+    return replace(made, recipe=partial(_resized, made))
+
+
+@_check.typed
+def aligned(mesh: Mesh) -> Mesh:
+    """The mesh, its triangles never replaced by larger ones: those of a file may follow a step of the thickness."""
+    recipe = mesh.recipe
+    refilled = isinstance(recipe, partial) and recipe.func is _resized
+    return replace(mesh, recipe=partial(_divided, mesh)) if refilled else mesh
 
 
 @_check.typed
@@ -311,13 +324,38 @@ def save(path: Any, mesh: Mesh) -> None:
     meshfile.write(path, mesh.points, mesh.cells, mesh.facets, mesh.middles, mesh.curved, mesh.edges)
 
 
+def _resized(mesh: Mesh, *, size: float) -> Mesh:
+    """A mesh from a file with triangles of about a size [m]: divided in four, or new ones within the same rim."""
+    ratio = mesh.size / size
+    if ratio >= 1.0 - 1e-9 and 2.0 ** np.ceil(np.log2(ratio) - 1e-9) < OVERSHOOT * ratio:
+        return replace(_divided(mesh, size=size), recipe=partial(_resized, mesh))
+    names = [str(i) for i in range(len(mesh.facets))]
+    ends = mesh.points[mesh.facets]
+    control = list(Curves(ends, mesh.middles, mesh.tangents, mesh.curvatures).controls())
+    pieces = [Bezier(curve if bent else end, name) for curve, bent, end, name in zip(control, mesh.curved, ends, names)]
+    start = {int(facet[0]): piece for facet, piece in zip(mesh.facets, pieces)}
+    loops = [tuple(start[vertex] for vertex in loop) for loop in meshfile.loops_of(mesh.facets)]
+    around = Outline(loops[0], tuple(loops[1:]))
+    _check_affordable(2.0 * mesh.area / size / size, size)
+    try:
+        arrays = None if crossed(around) else triangulate(around, size)
+    except _check.SimulationError:
+        arrays = None
+    if arrays is None:  # its own triangles do as well, only slower
+        return replace(_divided(mesh, size=size), recipe=partial(_divided, mesh))
+    parts = arrays["edges"]
+    edges = {name: np.concatenate([parts[names[i]] for i in numbers]) for name, numbers in mesh.edges.items()}
+    recipe = partial(_resized, mesh)
+    return Mesh(**{**arrays, "edges": edges}, recipe=recipe, size=size, notes=mesh.notes)
+
+
 def _divided(mesh: Mesh, *, size: float) -> Mesh:
     """The mesh with its triangles divided in four until they are no larger than a size [m]."""
     _check_affordable(len(mesh.cells) * (mesh.size / size) ** 2, size)
     fine = mesh
     for _ in range(max(0, int(np.ceil(np.log2(mesh.size / size) - 1e-9)))):
         fine = _quartered(fine)
-    return replace(fine, size=size, size_stated=True, recipe=partial(_divided, mesh))
+    return replace(fine, size_stated=True, recipe=partial(_divided, mesh))
 
 
 def _quartered(mesh: Mesh) -> Mesh:

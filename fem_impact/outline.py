@@ -12,6 +12,8 @@ SLENDER = 1e4  # [-] area over square of the half width: the mesher is quick up 
 FINEST = 16  # [-] widths looked at, each a quarter of the one before: down to rounding
 TURN = 0.25  # [rad] most that an edge turns within one facet: 26 facets on a circle
 MOST_PIECES = 2000  # [-] of an outline: several times what tracing programs write
+HALVINGS = 60  # [-] at most: a parameter then is exact to the last digit
+HERE = 1e-15  # [-] steps of a parameter that end the search
 SAMPLES = 256  # [-] points per piece on which its length and turning are integrated
 
 
@@ -148,12 +150,18 @@ def crossing(piece: Piece, start: np.ndarray, end: np.ndarray, share: np.ndarray
     a, b = piece.at(start), piece.at(end)
     chord = b - a
     wanted = a + share[:, None] * chord
-    low, high = start.copy(), end.copy()
-    for _ in range(60):  # bisection: certain, and each step is one evaluation of all facets together
-        t = 0.5 * (low + high)
-        short = ((piece.at(t) - wanted) * chord).sum(axis=1) < 0.0
-        low, high = np.where(short, t, low), np.where(short, high, t)
-    return 0.5 * (low + high)
+    low, high, t, moved = start.copy(), end.copy(), start + share * (end - start), end - start
+    for _ in range(HALVINGS):  # Newton's steps, halved where they leave the bracket or do not shrink
+        ahead = ((piece.at(t) - wanted) * chord).sum(axis=1)
+        low, high = np.where(ahead < 0.0, t, low), np.where(ahead < 0.0, high, t)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            better = t - ahead / (piece.at(t, 1) * chord).sum(axis=1)
+        good = (better >= low) & (better <= high) & (np.abs(better - t) <= 0.5 * moved)
+        better = np.where(good, better, 0.5 * (low + high))
+        moved, t = np.abs(better - t), better
+        if moved.max(initial=0.0) <= HERE:
+            break
+    return t
 
 
 def polyline(loop: Loop, size: float) -> np.ndarray:

@@ -146,7 +146,7 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
     """
     plan = run.plan
     finer: dict[str, Any] = {"tolerance": max(FINEST, plan.tolerance / NOTCH), "target": "modal"}
-    if plan.size is not None and plan.scene.mesh.kind != "file":
+    if plan.size is not None:
         finer["size"] = plan.size / 1.5
     finer.update({name: None for name in ("n_modes", "max_frequency", "n_striker_modes", "dt") if name in plan.changes})
     try:

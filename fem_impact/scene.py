@@ -201,7 +201,8 @@ class Scene:
         if size is None:
             return self._body
         if self.mesh.kind == "file":
-            raise fault(self.path, "[mesh] size cannot be chosen for a mesh from a file")
+            with self.blame("mesh"):
+                return self._body.refined(self._body.size / _check.positive("size", size, "m"))
         return self._make("mesh", Part(self.mesh.kind, {**self.mesh.values, "size": size}))
 
     @cached_property

@@ -174,7 +174,9 @@ def fine_enough(system: System, n_modes: int | None, max_frequency: float | None
     size = size_for(system, n_modes, max_frequency, tolerance)
     if system.mesh.size_stated or size >= system.mesh.size:
         return system
-    return reassemble(system, system.mesh.refined(system.mesh.size / size))
+    finer = system.mesh.refined(system.mesh.size / size)
+    # triangles of a file are not all as large as the longest of them
+    return reassemble(system, finer) if len(finer.cells) > len(system.mesh.cells) else system
 
 
 def resolves(system: System, max_frequency: float) -> bool:
@@ -204,19 +206,19 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         raise ValueError(
             "tolerance needs a mesh that can be refined; make it with fi.mesh or load it with fi.mesh.load"
         )
-    start = fine_enough(system, n_modes, max_frequency, tolerance)
+    start = _affordable(system, n_modes, max_frequency, tolerance)
     if max_frequency is not None:  # from here on by number, so that all meshes give the same ones
         n_modes = len(solve(start, None, max_frequency).omega)
     history: list[Spectrum] = []
     for candidate in (reassemble(system, start.mesh.refined(1.0 / STEP)), start):
-        if candidate is not start and (start.mesh.size_stated or candidate.n_dofs >= start.n_dofs):
+        if candidate is not start and (start.mesh.size_stated or _step(candidate.mesh, start.mesh) < LEAST_STEP):
             continue  # the user's own mesh, or one that cannot be coarsened
         if candidate.n_dofs > 2 * (n_modes or 0):
             history.append(solve(candidate, n_modes, None))
     while True:
         mesh = history[-1].system.mesh if history else start.mesh
         finer = mesh.refined(STEP)
-        if len(finer.cells) <= len(mesh.cells):
+        if _step(mesh, finer) < LEAST_STEP:  # the size meant its longest side, the others are finer already
             finer = mesh.refined(2.0)
         history.append(solve(reassemble(system, finer), n_modes, None))
         cells = [len(found.system.mesh.cells) for found in history[-2:]]
@@ -235,15 +237,28 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
             )
 
 
+def _affordable(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> System:
+    """The system on a mesh to begin with: as fine as the waves need, and no mesh of a file much finer than that."""
+    mesh, size = system.mesh, size_for(system, n_modes, max_frequency, tolerance)
+    if not mesh.size_stated and len(mesh.cells) > CHEAP_CELLS and size > STEP * mesh.size:
+        coarse = mesh.refined(mesh.size / size)
+        if _step(coarse, mesh) > LEAST_STEP:
+            return reassemble(system, coarse)
+    return fine_enough(system, n_modes, max_frequency, tolerance)
+
+
+def _step(coarse: Mesh, fine: Mesh) -> float:
+    """How much smaller [-] the elements of one mesh are than those of another."""
+    return (len(fine.cells) / len(coarse.cells)) ** (1.0 / fine.dimension)
+
+
 def _estimate(history: list[Spectrum]) -> tuple[np.ndarray, np.ndarray]:
     """Relative error (n_modes,) of the last spectrum from its difference to those before, and the order they show.
 
     Of two spectra only, on meshes far apart, the order is taken as TWO_LEVEL_ORDER or that of the corners.
     """
     fine, medium = history[-1].omega, history[-2].omega
-    cells = [len(s.system.mesh.cells) for s in history]
-    power = 1.0 / history[0].system.mesh.dimension
-    steps = [max((b / a) ** power, LEAST_STEP) for a, b in pairwise(cells)]
+    steps = [max(_step(a.system.mesh, b.system.mesh), LEAST_STEP) for a, b in pairwise(history)]
     second, most = steps[-1], min(MOST_ORDER, history[-1].system.order)
     flexible = fine > 0.0
     scale = np.where(flexible, fine, 1.0)

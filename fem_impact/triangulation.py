@@ -78,9 +78,11 @@ def _follow(
         ends = points[facets[mine]]  # (n, 2, 2)
         a, b = piece.at(low), piece.at(high)
         along = ((ends - a[:, None]) * (b - a)[:, None]).sum(axis=2) / ((b - a) ** 2).sum(axis=1)[:, None]
-        t = np.stack([crossing(piece, low, high, along[:, 0]), crossing(piece, low, high, along[:, 1])], axis=1)
-        for end, exact in ((0, low), (1, high)):
-            t[:, end] = np.where(np.abs(along[:, end] - end) < 1e-9, exact, t[:, end])
+        t = np.stack([low, high], axis=1)
+        for end in (0, 1):
+            cut = np.abs(along[:, end] - end) >= 1e-9  # the mesher divided the chord
+            if cut.any():
+                t[cut, end] = crossing(piece, low[cut], high[cut], along[cut, end])
             place[facets[mine, end]] = piece.at(t[:, end])
         middles[mine] = piece.at(crossing(piece, t[:, 0], t[:, 1], np.full(len(mine), 0.5)))
         if is_straight(piece):

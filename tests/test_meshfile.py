@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from fem_impact import mesh
+from fem_impact._check import SimulationError
 from fem_impact.assembly import assemble
 from fem_impact.modal import find_modes
 from fem_impact.section import Material, Plate
@@ -71,6 +72,62 @@ def test_a_smooth_rim_that_is_no_circle_is_followed(tmp_path):
     exact = 1.0 / (a**2 * b**2 * (x**2 / a**4 + y**2 / b**4) ** 1.5)
     assert_allclose(plate.curvatures[:, 0], exact, rtol=0.01)  # quartics through five points 0.13 apart
     assert any("smooth curves" in note for note in plate.notes)
+
+
+def test_a_mesh_far_finer_than_the_modes_need_is_filled_anew_within_its_rim(tmp_path):
+    mesh.save(tmp_path / "fine.msh", mesh.disk(1.0, 0.2, size=0.07))
+    plate = mesh.load(tmp_path / "fine.msh")
+    supports = {"outer": "clamped", "inner": "free"}
+    modes = find_modes(assemble(plate, PLATE, supports), n_modes=6, tolerance=1e-3)
+    used = modes.shapes.system.mesh
+    assert len(used.cells) < 0.7 * len(plate.cells)
+    assert set(used.edges) == set(plate.edges)
+    for name in plate.edges:
+        one, two = (m.facets[m.edges[name]] for m in (used, plate))
+        assert_allclose(sorted(used.points[one].tolist()), sorted(plate.points[two].tolist()), rtol=0, atol=1e-12)
+    order = [np.lexsort(np.round(m.middles, 9).T) for m in (used, plate)]
+    for field in ("middles", "curvatures"):  # 1e-6: curvatures come from second differences of the curve
+        one, two = (getattr(m, field)[rows] for m, rows in zip((used, plate), order))
+        assert_allclose(one, two, rtol=0, atol=1e-6)
+    in_full = find_modes(assemble(plate, PLATE, supports), n_modes=6)
+    assert_allclose(modes.omega, in_full.omega, rtol=1e-3)  # the tolerance
+
+
+def test_triangles_under_a_varying_thickness_are_kept():
+    plate = mesh.load(MESHES / "guitar.msh")
+    stepped = Plate(PLATE.material, lambda points: np.where(points[:, 0] < 0.2, 2e-3, 3e-3))
+    used = assemble(plate, stepped, {"body": "clamped"}).mesh
+    assert_allclose(used.refined(0.5).cells, plate.cells)
+    fine = used.refined(2.0)
+    assert len(fine.cells) == 4 * len(plate.cells)
+    assert_allclose(fine.points[: len(plate.points)], plate.points, rtol=0, atol=0)
+    assert len(plate.refined(0.5).cells) < len(plate.cells)
+
+
+def test_where_the_mesher_fails_the_mesh_is_used_as_it_is(monkeypatch):
+    def fail(*_):
+        raise SimulationError("the mesher could not fill the outline")
+
+    plate = mesh.load(MESHES / "guitar.msh")
+    monkeypatch.setattr(mesh, "triangulate", fail)
+    assert_allclose(plate.refined(0.5).cells, plate.cells)
+    assert len(plate.refined(1.3).cells) == 4 * len(plate.cells)
+
+
+@pytest.mark.parametrize("factor", [1.3, 2.0, 2.6])
+def test_smaller_triangles_fill_the_same_rim(factor):
+    plate = mesh.load(MESHES / "guitar.msh")
+    fine = plate.refined(factor)
+    assert fine.size <= plate.size / factor * (1.0 + 1e-9)
+    assert set(fine.edges) == set(plate.edges)
+    # a divided facet is off the curve it was cut from by the sixth power of its length: 1e-6 of 20 mm
+    around, inside = (fine.points[fine.facets[fine.edges[name]][:, 0]] for name in ("body", "hole0"))
+    assert_allclose(np.hypot(*(inside - [0.335, 0.0]).T), 0.045, rtol=1e-6)
+    gap = np.linalg.norm(plate.points[plate.facets[plate.edges["body"]][:, 0]][:, None] - around[None], axis=2)
+    assert gap.min(axis=1).max() < 1e-12
+    corners = fine.points[fine.cells]
+    assert (np.linalg.det(corners[:, 1:] - corners[:, :1]) > 0.0).all()
+    assert_allclose(fine.area, plate.area, rtol=5e-3)  # within the chords, which come nearer to the curve
 
 
 def spoil_inverted():
