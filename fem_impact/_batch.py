@@ -4,8 +4,10 @@ import numpy as np
 from numba import njit
 
 LOOSE = {"reassoc", "contract"}  # sums may be reordered to run in parallel lanes; NaN and infinity keep their meaning
-N_KERNELS = 6  # rows of a kernel, in the order of `kernel_rows`
-LEVELS = 4  # [-] lengths of a look ahead in flight: 1, 2, 4 and 8 steps
+END, END_RAMP, RATE, RATE_RAMP, MEAN, MEAN_RAMP = (np.uintp(row) for row in range(6))  # rows of a kernel
+N_KERNELS = 6
+LEVELS = 5  # [-] lengths of a look ahead in flight: 1, 2, 4, 8 and 16 steps
+SPLITS = 2  # [-] halvings of a step in flight where the whole leaves a doubt
 DONE, DOUBTFUL, AWKWARD, LONG = 0, 1, 2, 3  # how a blow ended: proved apart; with something that the steps may have
 # missed; with no contact at all after the first step; longer than the kernel
 SETTLED = 1e-12  # [-] of the approach: change at which the unknown of a step has converged
@@ -14,60 +16,30 @@ SAMPLES = 6.0  # [-] of the force per period of a spectrum's highest frequency: 
 PARTS = 2.0  # [-] and per step, at least
 LOOKS = 8  # [-] parts of a look ahead judged apart where the whole leaves a doubt
 PIECES = 6  # [-] of the step in which a contact opens, integrated by themselves: order 4
-FEWEST = 3.0  # [-] steps of a contact at least; briefer ones are looked at closer
+FEWEST = 1.0  # [-] steps of a contact at least; briefer ones are looked at closer
 DIP = 0.2  # [-] of the lesser approach at a step's ends: one that dips lower in between is looked at closer
 
 
-@njit(cache=True, error_model="numpy", fastmath=LOOSE, nogil=True)
-def kernel_rows(table, squared, out_rows):
-    """Approach caused by a unit force held for one step, at the ends of that step and of all later ones.
+@njit(cache=True, error_model="numpy", nogil=True)
+def orbit(table, q, p, out_states):
+    """States after 0, 1, 2, ... steps, (n_steps, 2, n_modes), of modes that start from q and p and move freely.
 
-    Parameters: table (12, n_modes) of `_kernels.step_table`; squared (n_modes,) the squared shapes; out_rows
-    (6, n_steps): end value for a constant force and for the ramp t/h - 1/2; mean over the step for both; rate at its
-    end for both.
+    Parameters: table (4 or more, n_modes): a11, a12, a21, a22 of one step as in `_kernels.step_table`.
     """
-    q0 = table[4].copy()
-    p0 = table[5].copy()
-    q1 = table[6].copy()
-    p1 = table[7].copy()
-    mean0 = table[10].copy()
-    mean1 = table[11].copy()
-    for m in range(out_rows.shape[1]):
-        s0 = 0.0
-        s1 = 0.0
-        s2 = 0.0
-        s3 = 0.0
-        s4 = 0.0
-        s5 = 0.0
-        for n in range(squared.size):
-            u = squared[n]
-            s0 += u * q0[n]
-            s1 += u * q1[n]
-            s2 += u * mean0[n]
-            s3 += u * mean1[n]
-            s4 += u * p0[n]
-            s5 += u * p1[n]
-            mean0[n] = table[8, n] * q0[n] + table[9, n] * p0[n]
-            mean1[n] = table[8, n] * q1[n] + table[9, n] * p1[n]
-            x = table[0, n] * q0[n] + table[1, n] * p0[n]
-            p0[n] = table[2, n] * q0[n] + table[3, n] * p0[n]
-            q0[n] = x
-            y = table[0, n] * q1[n] + table[1, n] * p1[n]
-            p1[n] = table[2, n] * q1[n] + table[3, n] * p1[n]
-            q1[n] = y
-        out_rows[0, m] = s0
-        out_rows[1, m] = s1
-        out_rows[2, m] = s2
-        out_rows[3, m] = s3
-        out_rows[4, m] = s4
-        out_rows[5, m] = s5
+    out_states[0, 0] = q
+    out_states[0, 1] = p
+    for m in range(1, out_states.shape[0]):
+        x, y = out_states[m - 1]
+        for n in range(q.size):
+            out_states[m, 0, n] = table[0, n] * x[n] + table[1, n] * y[n]
+            out_states[m, 1, n] = table[2, n] * x[n] + table[3, n] * y[n]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def flight_bounds(omega, zeta, squared, h, out_bounds):
     """What cubics through both ends of a look ahead miss of a body's free motion, at unit mass.
 
-    Parameters: out_bounds (LEVELS + 1, 2, 2), for looks of 1, 2, 4, ... and finally half a step: of the approach and of
+    Parameters: out_bounds (SPLITS + LEVELS, 2, 2), for looks of 1/4, 1/2, 1, 2, 4, ... steps: of the approach and of
     its slope over the look H, after a force of unit jumps and one of unit bends (changes of its slope). A jump leaves
     a mode with the velocity u**2 / omega at most, a bend with u**2 / omega**2. The cubic misses H**4 / 384 and
     sqrt(3) / 216 H**4 times the fourth derivative, or no more than the motion itself.
@@ -78,8 +50,8 @@ def flight_bounds(omega, zeta, squared, h, out_bounds):
         if w == 0.0:
             continue
         size = squared[n] * np.sqrt(1.0 + 4.0 * z * z) / (w * w)
-        for level in range(LEVELS + 1):
-            angle = w * h * (0.5 if level == LEVELS else 2.0**level)
+        for level in range(SPLITS + LEVELS):
+            angle = w * h * 2.0 ** (level - SPLITS)
             steep = (angle * (1.0 + 2.0 * z)) ** 4
             missed = size * min(steep / 384.0, 2.0 + 0.25 * angle)
             missed_rate = size * min(np.sqrt(3.0) / 216.0 * steep, 3.0 + 2.0 * angle)
@@ -274,7 +246,7 @@ def turning(d0, v0, d1, v1):
 
 @njit(cache=True, error_model="numpy")
 def opening(d0, e, ea, own, k, a, c):
-    """Part of a step after which a pressed contact opens.
+    """Part of a step after which a pressed contact opens, and the approach's change per step at that moment.
 
     The step's own force is integrated against the law, not held to one slope: the struck surface answers at once, so
     that the way the force ends sets the moment to second order. Free motion and kernel within the step are parabolas
@@ -285,6 +257,8 @@ def opening(d0, e, ea, own, k, a, c):
     start = d0 + swift * spring(d0, k, a, c - swift)[1]
     first = -4.0 * start - 2.0 * e + 6.0 * ea
     second = 3.0 * (start + e) - 6.0 * ea
+    if a == 1.0:  # the two springs in series as one: no division below
+        k, c = k / (1.0 + k * c), 0.0
     fast = 6.0 * (own[2] - swift) - 2.0 * (own[0] - swift)
     slow = 3.0 * (own[0] - swift) - 6.0 * (own[2] - swift)
     dt = 1.0 / PIECES
@@ -308,10 +282,11 @@ def opening(d0, e, ea, own, k, a, c):
             push += weight * f
         after = d + change
         if after <= 0.0:
-            return (piece + crossing(d, dt * rate0, after, dt * rate)) * dt
+            part = crossing(d, dt * rate0, after, dt * rate)
+            return (piece + part) * dt, cubic(d, dt * rate0, after, dt * rate, part)[1] / dt
         d = after
         impulse += push
-    return 1.0
+    return 1.0, rate
 
 
 @njit(cache=True, error_model="numpy")
@@ -352,65 +327,68 @@ def parted(d0, v0, d1, v1, error, rate_error):
 
 
 @njit(cache=True, error_model="numpy", fastmath=LOOSE)
-def weighed(first, second, force, ramp):
-    """Sum of two arrays weighed by forces and ramps; slices, because only loops from zero run in parallel lanes."""
-    total = 0.0
-    for j in range(force.size):
-        total += first[j] * force[j] + second[j] * ramp[j]
-    return total
+def convolve(rows, n, known, segments, n_segments, force, ramp):
+    """Approach at the end of step n, mean and rate, caused by the forces before step ``known``; rows run backwards.
 
-
-@njit(cache=True, error_model="numpy", fastmath=LOOSE)
-def weighed_all(a, b, c, d, e, f, force, ramp):
-    """Three such sums at once."""
-    one = 0.0
-    two = 0.0
-    three = 0.0
-    for j in range(force.size):
-        one += a[j] * force[j] + b[j] * ramp[j]
-        two += c[j] * force[j] + d[j] * ramp[j]
-        three += e[j] * force[j] + f[j] * ramp[j]
-    return one, two, three
-
-
-@njit(cache=True, error_model="numpy")
-def convolve(rows, n, segments, n_segments, force, ramp):
-    """Approach at the end of step n, mean and rate, caused by all earlier forces; rows run backwards in time."""
+    Indices without sign, here and below: loops over signed ones do not run in parallel lanes.
+    """
     end = 0.0
     mean = 0.0
     rate = 0.0
     shift = rows.shape[1] - 1 - n
     for i in range(n_segments):
-        low, high = segments[i, 0], min(segments[i, 1], n)
+        low, high = segments[i, 0], min(segments[i, 1], known)
         if low < high:
-            first, last = shift + low, shift + high
-            one, two, three = weighed_all(
-                rows[0, first:last], rows[1, first:last], rows[2, first:last], rows[3, first:last],
-                rows[4, first:last], rows[5, first:last], force[low:high], ramp[low:high],
-            )  # fmt: skip
-            end += one
-            mean += two
-            rate += three
+            first, start = np.uintp(shift + low), np.uintp(low)
+            for j in range(np.uintp(high - low)):
+                f = force[start + j]
+                s = ramp[start + j]
+                end += rows[END, first + j] * f + rows[END_RAMP, first + j] * s
+                mean += rows[MEAN, first + j] * f + rows[MEAN_RAMP, first + j] * s
+                rate += rows[RATE, first + j] * f + rows[RATE_RAMP, first + j] * s
     return end, mean, rate
 
 
-@njit(cache=True, error_model="numpy")
-def midway(kernel, row, n, segments, n_segments, force, ramp):
-    """One row of the same half way through step n, from a kernel of half steps and forces given by half steps."""
-    total = 0.0
+@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+def convolve_flight(rows, n, segments, n_segments, force, ramp):
+    """The same after all forces: approach and rate."""
+    end = 0.0
+    rate = 0.0
+    shift = rows.shape[1] - 1 - n
     for i in range(n_segments):
-        low, high = 2 * segments[i, 0], 2 * min(segments[i, 1], n)
-        first, last = 2 * n - high + 1, 2 * n - low + 1
-        even, odd = kernel[row, first:last], kernel[row + 1, first:last]
-        total += weighed(even[::-1], odd[::-1], force[low:high], ramp[low:high])
-    return total
+        low, high = segments[i, 0], min(segments[i, 1], n)
+        if low < high:
+            first, start = np.uintp(shift + low), np.uintp(low)
+            for j in range(np.uintp(high - low)):
+                f = force[start + j]
+                s = ramp[start + j]
+                end += rows[END, first + j] * f + rows[END_RAMP, first + j] * s
+                rate += rows[RATE, first + j] * f + rows[RATE_RAMP, first + j] * s
+    return end, rate
+
+
+@njit(cache=True, error_model="numpy", fastmath=LOOSE)
+def within(kernel, n, segments, n_segments, force, ramp):
+    """Approach and rate within step n caused by all earlier forces, from a kernel later by a part of a step."""
+    end = 0.0
+    rate = 0.0
+    for i in range(n_segments):
+        low, high = segments[i, 0], min(segments[i, 1], n)
+        if low < high:
+            first, start = np.uintp(n - 1 - low), np.uintp(low)
+            for j in range(np.uintp(high - low)):
+                f = force[start + j]
+                s = ramp[start + j]
+                end += kernel[END, first - j] * f + kernel[END_RAMP, first - j] * s
+                rate += kernel[RATE, first - j] * f + kernel[RATE_RAMP, first - j] * s
+    return end, rate
 
 
 @njit(cache=True, error_model="numpy", fastmath=LOOSE)
 def combine(target, striker, share, own, start, out_rows):
     """Kernel of both bodies, reversed in time, from delay ``start`` on."""
     n_steps = out_rows.shape[1]
-    for r in range(N_KERNELS):
+    for r in range(out_rows.shape[0]):
         backwards = out_rows[r, : n_steps - start][::-1]
         first, second = target[r, start:n_steps], striker[r, start:n_steps]
         for m in range(backwards.size):
@@ -511,32 +489,59 @@ def centroid(contacts, n_contacts, n_steps, h, ends, rates, k, a, c, limit):
     return top / bottom * limit / (n - 1)
 
 
+@njit(cache=True, error_model="numpy")
+def cleared(d0, v0, d1, v1, h, n, errors, slack, later, shares, segments, n_segments, force, ramp):
+    """Whether step n of a flight surely has no touch but one that lasts, looked at in halves and then in quarters."""
+    for split in range(1, SPLITS + 1):
+        parts = 2**split
+        dt = h / parts
+        error, rate_error = errors[SPLITS - split, 0], errors[SPLITS - split, 1]
+        sure = True
+        left, slope = d0, v0
+        for i in range(1, parts + 1):
+            right, steep = d1, v1
+            if i < parts:
+                right, steep = (n + i / parts) * h, 1.0
+                for kernel, share in zip(later, shares):
+                    end, rate = within(kernel[i * 2 ** (SPLITS - split) - 1], n, segments, n_segments, force, ramp)
+                    right -= share * end
+                    steep -= share * rate
+            sure = sure and parted(left, slope * dt, right, steep * dt, error + slack, rate_error)
+            if right > 0.0:
+                sure = sure and d1 > 0.0
+                break
+            left, slope = right, steep
+        if sure:
+            return True
+    return False
+
+
 @njit(cache=True, error_model="numpy", nogil=True)
 def run(
-    cells, h, target, striker, target_bounds, striker_bounds, half_target, half_striker,
-    certify, shares, law, rigid, static, band, out,
+    cells, h, target, striker, target_bounds, striker_bounds, target_later, striker_later,
+    certify, shares, law, rigid, static, slack, band, out,
 ):  # fmt: skip
     """Follow the blows of some cells, all at unit speed, with one step length and kernel.
 
-    Parameters: cells (n,) rows of the other arrays; h: step; target, striker (6, n_steps) of `kernel_rows`; bounds of
-    both (LEVELS + 1, 2, 2): what a unit of the force's jumps and of its bends adds at most to the errors of `parted`
-    for looks of 1, 2, 4, ... and finally half a step; half_target, half_striker: kernels of half the step, twice as
-    many, or none, where a doubt in flight ends a blow as if it were too long; certify: whether flights are to be proved
-    free of touches, or only sampled; shares (2, n_cells) [-] of both kernels; law (3, n_cells): stiffness, exponent,
-    compliance in series; rigid (n_cells,) [1/kg] squared shapes of all rigid motions; static (n_cells,)
-    [m/N] static compliance of all flexible ones; band: of the centroid, 0 for none. out (7, n_cells): impacts, time
-    in contact, impulse, peak force, centroid, how it ended, and how far the peak was mended (relative).
+    Parameters: cells (n,) rows of the other arrays; h: step; target, striker (6, n_steps) kernels of both; bounds of
+    both (SPLITS + LEVELS, 2, 2): what a unit of the force's jumps and of its bends adds at most to the errors of
+    `parted` for looks of 1/4, 1/2, 1, 2, 4, ... steps; target_later, striker_later (2**SPLITS - 1, 4, n_steps): the
+    kernels 1/4, 2/4, ... of a step later, or empty, where a doubt in flight ends a blow as if it were too long;
+    certify: whether flights are to be proved free of touches, or only sampled; shares (2, n_cells) [-] of both
+    kernels; law (3, n_cells): stiffness, exponent, compliance in series; rigid (n_cells,) [1/kg] squared shapes of all
+    rigid motions; static (n_cells,) [m/N] static compliance of all flexible ones; slack (n_cells,): part of the deepest
+    approach that a touch or a gap must exceed to be sure; band: of the centroid, 0 for none. out (9, n_cells): impacts,
+    time in contact, impulse, peak force, centroid, how it ended, how far the peak was mended (relative), steps needed,
+    and the relative change of the time in contact per relative change of the approach.
     """
     n_steps = target.shape[1]
-    rows = np.empty((N_KERNELS, n_steps))
+    per_step = 1.0 / h
+    rows = np.empty((6, n_steps))
     force = np.zeros(n_steps)
     ramp = np.zeros(n_steps)
     ends = np.zeros(n_steps + 1)
     rates = np.zeros(n_steps + 1)
-    errors = np.empty((LEVELS + 1, 2))
-    n_halves = half_target.shape[1]
-    half_force = np.zeros(n_halves)
-    half_ramp = np.zeros(n_halves)
+    errors = np.zeros((SPLITS + LEVELS, 2))
     segments = np.zeros((n_steps + 1, 2), np.int64)
     contacts = np.zeros((n_steps + 1, 2))
     for cell in cells:
@@ -545,12 +550,20 @@ def run(
         known = min(32, n_steps)
         combine(target[:, :known], striker[:, :known], share, mine, 0, rows[:, n_steps - known :])
         last = n_steps - 1
-        own = (rows[0, last], rows[1, last], rows[2, last], rows[3, last], rows[4, last], rows[5, last])
+        own = (
+            rows[END, last], rows[END_RAMP, last], rows[MEAN, last],
+            rows[MEAN_RAMP, last], rows[RATE, last], rows[RATE_RAMP, last],
+        )  # fmt: skip
+        once = last - 1
+        end_once, end_ramp_once, mean_once = rows[END, once], rows[END_RAMP, once], rows[MEAN, once]
+        mean_ramp_once, rate_once, rate_ramp_once = rows[MEAN_RAMP, once], rows[RATE, once], rows[RATE_RAMP, once]
+        end_ahead = mean_ahead = rate_ahead = f = s = 0.0
         kk = k / (1.0 + k * c)  # a linear contact pressed all along: everything is straight in the end approach y
         lever = kk / (1.0 + kk * own[2])
         turn = lever * own[3] * kk
         over = 1.0 / (1.0 - own[0] * turn + own[1] * kk)
         swift = own[0] + 12.0 * own[3]
+        stiff = 1.0 / (1.0 + kk * swift)
         swift_rate = own[4] + (12.0 * own[2] - 6.0 * own[0]) / h
         d0, x0, f0, v0, rate = 0.0, 0.0, 0.0, 0.0, 1.0
         ends[0] = 0.0
@@ -558,8 +571,10 @@ def run(
         pressed = True
         began = touched = impulse = moment = deepest = mended = 0.0
         jumps = bends = held = sloped = 0.0
+        high = low = swing = 0.0  # farthest approaches of this contact and gap; sum of 1 / rate at their ends
+        margin = needed = 0.0
         count = 0
-        level = 0
+        level = -1
         n_segments = 1
         segments[0, 0] = 0
         segments[0, 1] = n_steps
@@ -567,63 +582,77 @@ def run(
         ending = DONE
         n = 0
         while n < n_steps:
-            if not pressed and level > 0 and n + 2**level > n_steps:
-                level = 0
-                continue
-            jump = 1 if pressed else 2**level
-            while n + jump > known:
+            jump = 1
+            if not pressed:
+                if level < 0:  # the longest look that might leave no doubt
+                    level = LEVELS - 1
+                    while level > 0:
+                        span = 2.0**level * h
+                        error, rate_error = errors[SPLITS + level, 0], errors[SPLITS + level, 1]
+                        if n + 2**level <= n_steps and (
+                            d0 + max(0.0, rate * span) + error < 0.0 or rate * span + rate_error < 0.0
+                        ):
+                            break
+                        level -= 1
+                jump = 2**level
+            while n + jump + 1 > known and known < n_steps:
                 more = min(2 * known, n_steps)
                 combine(target[:, :more], striker[:, :more], share, mine, known, rows[:, n_steps - more :])
                 known = more
-            end, mean, turned = convolve(rows, n + jump - 1, segments, n_segments, force, ramp)
+            if pressed:
+                end = end_ahead + end_once * f + end_ramp_once * s
+                mean = mean_ahead + mean_once * f + mean_ramp_once * s
+                turned = rate_ahead + rate_once * f + rate_ramp_once * s
+            else:
+                mean = 0.0
+                end, turned = convolve_flight(rows, n + jump - 1, segments, n_segments, force, ramp)
             e = (n + jump) * h - end
             vf = 1.0 - turned
             if not pressed:
                 span = jump * h
-                if (e > 0.0 and jump > 1) or not parted(
-                    d0, rate * span, e, vf * span, errors[level, 0], errors[level, 1]
-                ):
+                error, rate_error = errors[SPLITS + level, 0], errors[SPLITS + level, 1]
+                if (e > 0.0 and jump > 1) or not parted(d0, rate * span, e, vf * span, error + margin, rate_error):
                     if level > 0:
                         level -= 1
                         continue
-                    sure = False
-                    if certify:
-                        if n_halves == 0:
-                            status = LONG
-                            break
-                        middle = (n + 0.5) * h
-                        middle -= share * midway(half_target, 0, n, segments, n_segments, half_force, half_ramp)
-                        middle -= mine * midway(half_striker, 0, n, segments, n_segments, half_force, half_ramp)
-                        passing = 1.0 - share * midway(half_target, 4, n, segments, n_segments, half_force, half_ramp)
-                        passing -= mine * midway(half_striker, 4, n, segments, n_segments, half_force, half_ramp)
-                        half = 0.5 * h
-                        sure = parted(d0, rate * half, middle, passing * half, errors[LEVELS, 0], errors[LEVELS, 1])
-                        if sure and middle <= 0.0:
-                            sure = parted(middle, passing * half, e, vf * half, errors[LEVELS, 0], errors[LEVELS, 1])
-                        else:
-                            sure = sure and e > 0.0
-                    if not sure:
+                    if certify and target_later.shape[2] == 0:
+                        break
+                    if not certify or not cleared(
+                        d0, rate, e, vf, h, n, errors, margin, (target_later, striker_later), (share, mine),
+                        segments, n_segments, force, ramp,
+                    ):  # fmt: skip
                         ending = DOUBTFUL
+                level = -1
                 if e <= 0.0:
                     n += jump
                     ends[n] = d0 = x0 = e
                     rates[n] = rate = vf
-                    level = min(level + 1, LEVELS - 1)
+                    low = min(low, e)
                     gone = 1.0 - impulse * rigid[cell]
                     place = n * h - rigid[cell] * (impulse * n * h - moment)
                     energy = max(0.0, impulse * (1.0 - 0.5 * impulse * rigid[cell]))
-                    if gone < 0.0 and place + np.sqrt(2.0 * energy * static[cell]) < 0.0:
+                    reach = place + np.sqrt(2.0 * energy * static[cell])  # beyond the farthest the surface can come
+                    if gone < 0.0 and reach < 0.0:
                         status = ending
+                        needed = max(needed, n - reach / (gone * h))
                         break
                     continue
-                began = (n + crossing(d0, rate * h, e, vf * h)) * h
+                if low > -margin:
+                    ending = DOUBTFUL
+                part = crossing(d0, rate * h, e, vf * h)
+                began = (n + part) * h
+                swing += h / abs(cubic(d0, rate * h, e, vf * h, part)[1])
+                high = 0.0
                 pressed = True
                 segments[n_segments, 0] = n
                 segments[n_segments, 1] = n_steps
                 n_segments += 1
+                _, mean, _ = convolve(rows, n, n, segments, n_segments, force, ramp)
+            if n + 1 < n_steps:  # of all but this step's force, which is not known yet: found while that is
+                end_ahead, mean_ahead, rate_ahead = convolve(rows, n + 1, n, segments, n_segments, force, ramp)
             ea = (n + 0.5) * h - mean
             y = -1.0
-            f = s = x1 = f1 = v1 = 0.0
+            x1 = f1 = v1 = 0.0
             if a == 1.0 and d0 >= 0.0:
                 top = lever * (ea + own[3] * kk * d0)
                 y = over * (e - own[0] * top + own[1] * kk * d0)
@@ -638,53 +667,56 @@ def run(
             rate1 = vf - own[4] * f - own[5] * s
             force[n] = f
             ramp[n] = s
-            if n_halves > 0:
-                half_force[2 * n] = f - 0.25 * s
-                half_force[2 * n + 1] = f + 0.25 * s
-                half_ramp[2 * n] = half_ramp[2 * n + 1] = 0.5 * s
             jumps += abs(f - 0.5 * s - held)
-            bends += abs(s / h - sloped)
+            slope = s * per_step
+            bends += abs(slope - sloped)
             held = f + 0.5 * s
-            sloped = s / h
+            sloped = slope
             impulse += f * h
             moment += f * h * (n + 0.5) * h + s * h * h / 12.0
-            if y > 0.0:
-                if rate < 0.0 < rate1 and d0 > 0.0 and turning(d0, rate * h, y, rate1 * h) < DIP * min(d0, y):
-                    ending = DOUBTFUL
-            elif n == 0 or d0 <= 0.0:
+            if y <= 0.0 and (n == 0 or d0 <= 0.0):
                 status = AWKWARD
                 break
-            elif rate1 >= 0.0:
+            dips = rate < 0.0 < rate1 and d0 > 0.0 and y > 0.0
+            if dips and turning(d0, rate * h, y, rate1 * h) < max(DIP * min(d0, y), margin):
                 ending = DOUBTFUL
             d, r = ends[n], rates[n]
             missed = 0.0  # by the straight force of the scheme at the step's end
             if y > 0.0:
-                missed = (f1 - f - 0.5 * s) / (1.0 + f1 * a / y * swift)
+                missed = (f1 - f - 0.5 * s) * (stiff if a == 1.0 else 1.0 / (1.0 + f1 * a / y * swift))
             ends[n + 1] = y - missed * swift
             rates[n + 1] = rate1 - missed * swift_rate
             if ends[n + 1] > deepest:
                 deepest = ends[n + 1]
                 mended = a * abs(missed * swift) / deepest
+            high = max(high, ends[n + 1])
             if r > 0.0 and rates[n + 1] < 0.0:
-                deepest = max(deepest, turning(d, r * h, ends[n + 1], rates[n + 1] * h))
+                high = max(high, turning(d, r * h, ends[n + 1], rates[n + 1] * h))
+                deepest = max(deepest, high)
+            margin = slack[cell] * deepest
             if y <= 0.0:
-                now = (n + opening(d, e, ea, own, k, a, c)) * h
-                if now - began < FEWEST * h:
+                part, speed = opening(d, e, ea, own, k, a, c)
+                now = (n + part) * h
+                if now - began < FEWEST * h or high < margin:
                     ending = DOUBTFUL
+                needed = n + 2.0
+                low = turning(d0, rate * h, y, rate1 * h) if rate < 0.0 < rate1 else y
+                swing += h / abs(speed)
                 touched += now - began
                 contacts[count, 0] = began
                 contacts[count, 1] = now
                 count += 1
                 pressed = False
-                level = 0
+                level = -1
                 segments[n_segments - 1, 1] = n + 1
                 jumps += abs(held)
                 bends += abs(sloped)
                 held = sloped = 0.0
-                for i in range(LEVELS + 1):
-                    for j in range(2):
-                        errors[i, j] = jumps * (share * target_bounds[i, j, 0] + mine * striker_bounds[i, j, 0])
-                        errors[i, j] += bends * (share * target_bounds[i, j, 1] + mine * striker_bounds[i, j, 1])
+                if certify:
+                    for i in range(SPLITS + LEVELS):
+                        for j in range(2):
+                            errors[i, j] = jumps * (share * target_bounds[i, j, 0] + mine * striker_bounds[i, j, 0])
+                            errors[i, j] += bends * (share * target_bounds[i, j, 1] + mine * striker_bounds[i, j, 1])
             d0, x0, f0, v0, rate = y, x1, f1, v1, rate1
             n += 1
         out[0, cell] = count
@@ -694,5 +726,7 @@ def run(
         out[4, cell] = 0.0
         out[5, cell] = status
         out[6, cell] = mended
+        out[7, cell] = n if status == LONG else needed
+        out[8, cell] = deepest * swing / touched if touched > 0.0 else np.inf
         if band > 0.0 and status in (DONE, DOUBTFUL):
             out[4, cell] = centroid(contacts, count, n, h, ends, rates, k, a, c, band)

@@ -1,10 +1,11 @@
 """Many blows at once: modes collapsed into kernels, steps chosen by contact time, every blow held to the tolerance."""
 
+import math
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields
+from functools import partial
 
 import numpy as np
 from scipy import special
@@ -13,16 +14,20 @@ from . import _batch, _kernels
 from .modal import Modes
 from .striker import Striker
 
-STEPS = 12.0  # [-] per contact at a tolerance of 1e-3, up to sqrt(2) times as many
+STEPS = 12.0  # [-] per contact at a tolerance of 1e-3, up to sqrt(2) times as many; half of them in a first look
 STEP_ORDER = 3.5  # [-] of the error in the step: 3 linear, 4 Hertz
-REFINEMENTS = 4  # [-] how often the step is halved before a blow goes to the modal engine
-RICHARDSON = 3.0  # [-] difference of two runs over the error of the finer: order 2 assumed, 3 and more measured
-ALLOWED = 2.0  # [-] times the tolerance, of that difference
+REFINEMENTS = 6  # [-] how often the step is cut before a blow goes to the modal engine
+ORDER = 2.0  # [-] assumed of the difference between two runs in the step; 3 and more was measured
+ALLOWED = 0.5  # [-] of the tolerance: error estimated so
+MILD = 8.0  # [-] times that, of an error for which 1/sqrt(2) of the step will do instead of 1/2
+MENDED = 3.0  # [-] error of the peak over how far it was mended: up to that was measured
 YIELD = 0.02  # [-] error of the peak over that part of the indentation by which badly sampled top modes yield: measured
 ALIAS = (4.0, 8.0)  # [-] omega times step at which they are badly sampled; beyond, they follow the force statically
-LENGTHS = (48, 384, 3072)  # [-] steps a blow may take, tried in turn
-PIECE = 4096  # [-] blows handed to a thread at once
-FEW = 1024  # [-] blows not worth a second thread
+LENGTHS = (48, 192, 768, 3072)  # [-] steps a blow may take, tried in turn
+SLACK = 2.0  # [-] times the tolerance and the deepest approach: a touch or a gap must exceed that to be counted
+MODES = 4096  # [-] of a body whose kernel is found at once: bounds the memory, some 20 MB
+PIECE = 2**14  # [-] blows a thread follows at once, at most: their numbers stay near the processor
+FEW = 1024  # [-] blows not worth a second thread, nor a piece of their own
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +72,71 @@ class Family:
         """Kernels of both bodies at unit mass, (6, n_steps) each, and what bounds their motion in flight."""
         found = []
         for omega, zeta, squared in zip(self.omega, self.zeta, self.squared):
-            table = np.empty((_kernels.N_TABLE, len(omega)))
-            _kernels.step_table(omega, zeta, h, table)
-            rows = np.empty((_batch.N_KERNELS, n_steps))
-            _batch.kernel_rows(table, squared, rows)
-            bounds = np.empty((_batch.LEVELS + 1, 2, 2))
+            bounds = np.empty((_batch.SPLITS + _batch.LEVELS, 2, 2))
             _batch.flight_bounds(omega, zeta, squared, h, bounds)
-            found.append((rows, bounds))
+            found.append((kernel_rows(omega, zeta, squared, h, n_steps)[0], bounds))
         return found[0][0], found[1][0], found[0][1], found[1][1]
+
+    def later(self, h: float, n_steps: int) -> tuple[np.ndarray, np.ndarray]:
+        """The same kernels 1/4, 2/4, ... of a step later, (2**SPLITS - 1, 4, n_steps) each: those without the mean."""
+        parts = np.arange(1, 2**_batch.SPLITS) / 2**_batch.SPLITS
+        first, second = (kernel_rows(*body, h, n_steps, parts) for body in zip(self.omega, self.zeta, self.squared))
+        return first, second
+
+
+def kernel_rows(
+    omega: np.ndarray, zeta: np.ndarray, squared: np.ndarray, h: float, n_steps: int, parts: np.ndarray | None = None
+) -> np.ndarray:
+    """Approach caused by a unit force held for one step of a body of unit mass, in that step and all later ones.
+
+    Parameters
+    ----------
+    omega, zeta, squared : ndarray, shape (n_modes,)
+        Modes and their squared shapes.
+    h : float [s]
+    n_steps : int
+    parts : ndarray, shape (n_parts,) [-], optional
+        Times after the ends of the steps.
+
+    Returns
+    -------
+    ndarray, shape (1, 6, n_steps) or (n_parts, 4, n_steps)
+        At the ends of the steps, for a constant force and for the ramp t/h - 1/2; its rate there for both; and its mean
+        over the steps for both, which is left out where ``parts`` are given.
+
+    Notes
+    -----
+    The state after ``i stride + j`` steps is looked at as the functional carried back by j steps sees the state after
+    ``i stride``: a product of two matrices instead of a walk through all steps.
+    """
+    stride = 2 ** math.ceil(0.5 * math.log2(n_steps))
+    n_strides = -(-n_steps // stride)
+    looks = 3 if parts is None else 2
+    rows: np.ndarray = np.zeros((1 if parts is None else len(parts), looks, 2, n_strides * stride))
+    for start in range(0, len(omega), MODES):
+        some = slice(start, start + MODES)
+        w, z, u = omega[some], zeta[some], squared[some]
+        one, many, part = np.empty((3, _kernels.N_TABLE, len(w)))
+        _kernels.step_table(w, z, h, one)
+        _kernels.step_table(w, z, stride * h, many)
+        seen = np.empty((looks, stride, 2, len(w)))
+        for look, (q, p) in zip(seen, ((u, 0.0 * u), (0.0 * u, u), (u * one[8], u * one[9]))):
+            _batch.orbit(one[[0, 2, 1, 3]], q, p, look)
+        states = np.empty((len(rows), 2, n_strides, 2, len(w)))
+        for i, places in enumerate(states):
+            for place, q, p in zip(places, one[4:8:2], one[5:8:2]):
+                if parts is not None:
+                    _kernels.step_table(w, z, parts[i] * h, part)
+                    q, p = part[0] * q + part[1] * p, part[2] * q + part[3] * p
+                _batch.orbit(many, q, p, place)
+        product = seen.reshape(looks * stride, -1) @ states.reshape(-1, 2 * len(w)).T
+        product = product.reshape(looks, stride, len(rows), 2, n_strides).transpose(2, 0, 3, 4, 1)
+        if parts is None:
+            rows[0, 2, :, 0] += one[10:12] @ u
+        ends, means = product[:, :2], product[:, 2:]
+        rows[:, :2] += ends.reshape(rows[:, :2].shape)
+        rows[:, 2:, :, 1:] += means.reshape(rows[:, 2:].shape)[..., :-1]
+    return np.ascontiguousarray(rows.reshape(len(rows), 2 * looks, -1)[..., :n_steps])
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +155,12 @@ class Blows:
     def n_cases(self) -> int:
         return len(self.family)
 
+    def pieces(self, size: int) -> "list[Blows]":
+        """The same blows, no more than ``size`` at once."""
+        columns = [getattr(self, field.name) for field in fields(self)[1:]]
+        starts = range(0, self.n_cases, size)
+        return [Blows(self.families, *(column[start : start + size] for column in columns)) for start in starts]
+
 
 @dataclass(frozen=True, eq=False)
 class Bounces:
@@ -108,9 +176,9 @@ class Bounces:
     done: np.ndarray  # bool: met the tolerance and proved apart
 
 
-Kernels = dict[tuple[int, int], tuple[np.ndarray, ...]]  # by family and step, as long as was needed
+Kernels = dict[tuple[int, int, int, bool], tuple[np.ndarray, ...]]  # by family, step, length and whether later
 KEPT = 128e6  # [byte] of kernels at most from one call to the next
-NO_KERNELS = np.empty((_batch.N_KERNELS, 0)), np.empty((_batch.N_KERNELS, 0))
+NO_KERNELS = (np.empty((0, 4, 0)),) * 2
 
 
 def bounce(
@@ -140,15 +208,25 @@ def bounce(
     grow by v.
     """
     workers = workers or os.cpu_count() or 1
-    if blows.n_cases < FEW:
-        workers = 1
-    with ThreadPoolExecutor(workers) as pool:
-        engine = _Engine(blows, band, pool.submit if workers > 1 else None, {} if kernels is None else kernels)
-        final, error = _refined(engine, tolerance)
-    if kernels is not None and sum(part.nbytes for parts in kernels.values() for part in parts) > KEPT:
+    kernels = {} if kernels is None else kernels
+    follow = partial(_follow, tolerance=tolerance, band=band, kernels=kernels)
+    size = min(PIECE, max(FEW, -(-blows.n_cases // (4 * workers))))
+    if workers == 1 or blows.n_cases <= size:
+        found = [follow(part) for part in blows.pieces(PIECE)]
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            found = list(pool.map(follow, blows.pieces(size)))
+    if sum(part.nbytes for parts in kernels.values() for part in parts) > KEPT:
         kernels.clear()
+    return Bounces(*(np.concatenate(columns) for columns in zip(*found)))
+
+
+def _follow(blows: Blows, tolerance: float, band: float, kernels: Kernels) -> tuple[np.ndarray, ...]:
+    """The columns of `Bounces` for some blows."""
+    engine = _Engine(blows, band, kernels)
+    final, error = _refined(engine, tolerance)
     v = blows.speed
-    return Bounces(
+    return (
         final[0], final[1], final[2] * engine.own_rigid - 1.0, final[2] * v, final[3] * v, error, final[4],
         ~np.isnan(error),
     )  # fmt: skip
@@ -156,32 +234,34 @@ def bounce(
 
 def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarray]:
     """What `_Engine.run` finds once steps are short enough, and its error; not a number where they never are."""
-    blows = engine.blows
-    everyone = np.arange(blows.n_cases)
-    step = engine.first_step(tolerance)
-    coarse = engine.run(everyone, step - 2, sure=False)
-    error = np.full(blows.n_cases, np.nan)
+    n = engine.blows.n_cases
+    first = step = engine.first_step(tolerance)
+    finer = np.full(n, 2)  # [half-octaves]
+    todo = np.arange(n)
+    coarse = engine.run(todo, step - finer)
+    error = np.full(n, np.nan)
     final = np.full_like(coarse, np.nan)
-    todo = everyone
     for _ in range(REFINEMENTS):
-        fine = engine.run(todo, step[todo])
-        change = engine.difference(coarse, fine, todo)
-        met = change <= ALLOWED * tolerance
+        ratio = 2.0 ** (0.5 * finer)
+        slack = SLACK * tolerance * 2.0 ** (0.5 * STEP_ORDER * (first[todo] - step))
+        fine = engine.run(todo, step, slack, ratio * coarse[7])
+        found = engine.error(coarse, fine, todo, ratio)
+        met = found <= ALLOWED * tolerance
         final[:, todo[met]] = fine[:, met]
-        error[todo[met]] = change[met] / RICHARDSON
+        error[todo[met]] = found[met]
         coarse, todo = fine[:, ~met], todo[~met]
-        step[todo] += 2
         if not todo.size:
             break
+        finer = np.where(found[~met] < MILD * ALLOWED * tolerance, 1, 2)
+        step = step[~met] + finer
     return final, error
 
 
 class _Engine:
     """Kernels by family and step, and the numbers all runs share."""
 
-    def __init__(self, blows: Blows, band: float, submit: Any, kernels: Kernels) -> None:
-        self.blows, self.band, self.submit, self.kernels = blows, band, submit, kernels
-
+    def __init__(self, blows: Blows, band: float, kernels: Kernels) -> None:
+        self.blows, self.band, self.kernels = blows, band, kernels
         self.keys, self.which = np.unique(blows.family, return_inverse=True)
         self.shares = np.array([1.0 / blows.target_mass, 1.0 / blows.striker_mass])
         rigid, static, rest = (
@@ -223,59 +303,60 @@ class _Engine:
             step[blind] += np.ceil(2.0 * np.log2(angle[blind] / ALIAS[0])).astype(int)
         return step
 
-    def run(self, cells: np.ndarray, step: np.ndarray, sure: bool = True) -> np.ndarray:
-        """Follow blows with their steps; return what `_batch.run` writes, (7, n_cells).
+    def run(
+        self, cells: np.ndarray, step: np.ndarray, slack: np.ndarray | None = None, length: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Follow blows with their steps; return what `_batch.run` writes, (9, n_cells).
 
-        Unless ``sure``, flights are sampled and not proved free of touches: enough for a run to compare with.
+        Without a ``slack``, flights are sampled and not proved free of touches: enough for a run to compare with. Blows
+        are expected to take ``length`` steps.
         """
-        out = np.full((7, self.blows.n_cases), np.nan)
-        todo = cells
-        for length in LENGTHS:
-            self._run(todo, step, out, length, sure)
-            again = out[5, todo] == _batch.LONG
-            todo, step = todo[again], step[again]
-            if not todo.size:
+        out = np.full((9, self.blows.n_cases), np.nan)
+        slacks = np.zeros(self.blows.n_cases)
+        if slack is not None:
+            slacks[cells] = slack
+        todo = np.ones(len(cells), bool)
+        for limit in LENGTHS:
+            now = todo if length is None or limit == LENGTHS[-1] else todo & (length < limit)
+            self._run(cells[now], step[now], slacks, slack is not None, limit, out)
+            todo &= ~(now & (out[5, cells] != _batch.LONG))
+            if not todo.any():
                 break
         return out[:, cells]
 
-    def kernel(self, family: int, step: int, length: int) -> tuple[np.ndarray, ...]:
-        """Kernels of a family, found once."""
-        known = self.kernels.get((family, step), (np.empty((0, 0)),))
-        if known[0].shape[1] < length:
-            known = self.kernels[family, step] = self.blows.families[family].kernels(2.0 ** (-0.5 * step), length)
-        return known[0][:, :length], known[1][:, :length], *known[2:]
+    def kernel(self, family: int, step: int, length: int, later: bool) -> tuple[np.ndarray, ...]:
+        """Kernels of a family, found once for each length: what a blow meets does not depend on its neighbours."""
+        key = family, step, length, later
+        if key not in self.kernels:
+            find = Family.later if later else Family.kernels
+            self.kernels[key] = find(self.blows.families[family], 2.0 ** (-0.5 * step), length)
+        return self.kernels[key]
 
-    def _run(self, cells: np.ndarray, step: np.ndarray, out: np.ndarray, length: int, sure: bool) -> None:
+    def _run(
+        self, cells: np.ndarray, step: np.ndarray, slack: np.ndarray, sure: bool, length: int, out: np.ndarray
+    ) -> None:
         group = np.stack([self.blows.family[cells], step])
         order = np.lexsort(group)
         edges = np.flatnonzero(np.any(np.diff(group[:, order], axis=1) != 0, axis=0)) + 1
-        jobs = []
-        for part in np.split(order, edges):
+        for part in np.split(order, edges) if cells.size else ():
             family, exponent = int(group[0, part[0]]), int(step[part[0]])
-            h = 2.0 ** (-0.5 * exponent)
-            kernels = self.kernel(family, exponent, length)
-            halves: tuple[np.ndarray, ...] = NO_KERNELS
-            if sure and length > LENGTHS[0]:
-                halves = self.kernel(family, exponent + 2, 2 * length)[:2]
-            jobs += [
-                (cells[part[i : i + PIECE]], h, *kernels, *halves, sure, self.shares, self.law, self.rigid, self.static,
-                 self.band, out)
-                for i in range(0, len(part), PIECE)
-            ]  # fmt: skip
-        if self.submit is None:
-            for job in jobs:
-                _batch.run(*job)
-            return
-        for result in [self.submit(_batch.run, *job) for job in jobs]:
-            result.result()
+            kernels = self.kernel(family, exponent, length, False)
+            later = self.kernel(family, exponent, length, True) if sure and length > LENGTHS[0] else NO_KERNELS
+            about = self.shares, self.law, self.rigid, self.static, slack, self.band
+            _batch.run(*(cells[part], 2.0 ** (-0.5 * exponent), *kernels, *later, sure, *about, out))
 
-    def difference(self, coarse: np.ndarray, fine: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """Largest difference of two runs in what the tolerance speaks of; infinite where they ended differently."""
+    def error(self, coarse: np.ndarray, fine: np.ndarray, cells: np.ndarray, ratio: np.ndarray) -> np.ndarray:
+        """Largest error of the finer of two runs in what the tolerance speaks of; infinite where they ended otherwise.
+
+        The ends of a contact are known as well as the approach, divided by its rate there.
+        """
         with np.errstate(divide="ignore", invalid="ignore"):
-            relative = np.abs(coarse[1:4] / fine[1:4] - 1.0).max(axis=0)
+            relative = np.abs(coarse[1:4] / fine[1:4] - 1.0)
+            change = relative.max(axis=0)
+            change = np.maximum(change, fine[8] * relative[1:].max(axis=0))
             if self.band:
-                relative = np.maximum(relative, np.abs(coarse[4] / fine[4] - 1.0))
-        relative = np.maximum(relative, RICHARDSON * fine[6])
+                change = np.maximum(change, np.abs(coarse[4] / fine[4] - 1.0))
         absolute = np.abs(coarse[2] - fine[2]) * self.own_rigid[cells]
         same = (coarse[0] == fine[0]) & (coarse[5] <= _batch.DOUBTFUL) & (fine[5] == _batch.DONE)
-        return np.where(same, np.fmax(relative, absolute), np.inf)
+        found = np.maximum(np.fmax(change, absolute) / (ratio**ORDER - 1.0), MENDED * fine[6])
+        return np.where(same, found, np.inf)

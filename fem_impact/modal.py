@@ -13,6 +13,7 @@ from .eigen import Flexibility
 
 HIGHEST = 1e74  # [Hz] that a frequency may be scaled to, see `_check.REACH`
 SHOWN = 10  # [-] modes listed in a notebook
+REMEMBERED = 16  # [-] single points whose shapes are kept: a blow asks for them again and again
 
 
 class Shapes(Protocol):
@@ -385,6 +386,7 @@ class FieldShapes:
     vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
     flexibility: Flexibility
     _static: dict[bytes, np.ndarray] = field(default_factory=dict, repr=False)  # compliance by point, found once
+    _single: dict[bytes, np.ndarray] = field(default_factory=dict, init=False, repr=False)  # shapes at the last points
 
     def __post_init__(self) -> None:
         _check.lock_arrays(self)
@@ -394,7 +396,16 @@ class FieldShapes:
         return self.system.mesh.dimension
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        return self.system.interpolate(points) @ self.vectors * self.system.frame.mass**-0.5
+        key = points.tobytes() if len(points) == 1 else b""
+        if key and key in self._single:
+            return self._single[key]
+        shapes = self.system.interpolate(points) @ self.vectors * self.system.frame.mass**-0.5
+        if key:
+            if len(self._single) >= REMEMBERED:
+                self._single.clear()
+            shapes.flags.writeable = False
+            self._single[key] = shapes
+        return shapes
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         return self.system.contains(points)

@@ -36,14 +36,21 @@ def test_kernel_is_the_modal_propagation(damping_ratio):
     squared, h = modes.shape_at(AT)[0] ** 2, 1e-4
     table = np.empty((_kernels.N_TABLE, modes.n_modes))
     _kernels.step_table(np.array(modes.omega), np.array(modes.damping_ratio), h, table)
-    rows = np.empty((_batch.N_KERNELS, 12))
-    _batch.kernel_rows(table, squared, rows)
+    modal = np.array(modes.omega), np.array(modes.damping_ratio), squared, h
+    rows, parts = bounces.kernel_rows(*modal, 12)[0], np.array([0.25, 0.8])
+    later = bounces.kernel_rows(*modal, 12, parts)
     q, p = table[4].copy(), table[5].copy()
     for m in range(12):
+        size = np.abs(squared * p).sum()  # of what the sums of a rate may cancel
         assert_allclose(rows[0, m], squared @ q, rtol=1e-12)  # the same sums in another order
         if m < 11:
-            assert_allclose(rows[2, m + 1], squared @ (table[8] * q + table[9] * p), rtol=1e-11)
-        assert_allclose(rows[4, m], squared @ p, rtol=1e-11)
+            assert_allclose(rows[4, m + 1], squared @ (table[8] * q + table[9] * p), rtol=1e-11)
+        assert_allclose(rows[2, m], squared @ p, rtol=1e-11, atol=1e-13 * size)
+        for rest, part in zip(later, parts):
+            small = np.empty_like(table)
+            _kernels.step_table(*modal[:2], part * h, small)
+            assert_allclose(rest[0, m], squared @ (small[0] * q + small[1] * p), rtol=1e-11)
+            assert_allclose(rest[2, m], squared @ (small[2] * q + small[3] * p), rtol=1e-11, atol=1e-13 * size)
         q, p = table[0] * q + table[1] * p, table[2] * q + table[3] * p
 
 
@@ -110,7 +117,7 @@ def test_estimate_covers_the_error():
 @pytest.mark.parametrize("n_modes", [30, 300])
 def test_steps_do_not_grow_with_the_modes(n_modes):
     modes = fi.analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=100.0, n_modes=n_modes)
-    engine = bounces._Engine(many(modes, fi.Striker.stick(0.1, 10e3), [1e5]), 0.0, None, {})
+    engine = bounces._Engine(many(modes, fi.Striker.stick(0.1, 10e3), [1e5]), 0.0, {})
     assert engine.first_step(1e-3)[0] == 26  # h = 2**-13 s whatever the modes: 15 for 1.8 ms
 
 
@@ -145,8 +152,8 @@ def test_looks_ahead_miss_no_more_of_a_flight_than_is_claimed(zeta):
     for f, s in zip(force, ramp):
         q, p = table[0] * q + table[1] * p, table[2] * q + table[3] * p
         q, p = q + table[4] * f + table[6] * s, p + table[5] * f + table[7] * s
-    claimed = family.kernels(h, 1)[2] @ [jumps, bends]  # (LEVELS + 1, 2)
-    for (error, rate_error), steps in zip(claimed, (1.0, 2.0, 4.0, 8.0, 0.5)):
+    claimed = family.kernels(h, 1)[2] @ [jumps, bends]  # (SPLITS + LEVELS, 2)
+    for (error, rate_error), steps in zip(claimed, (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)):
         span, parts = steps * h, 200
         small = np.empty((_kernels.N_TABLE, 30))
         _kernels.step_table(omega, np.full(30, zeta), span / parts, small)
@@ -202,3 +209,28 @@ def test_moments_between_the_steps_are_not_lost():
         assert hit.n_impacts == found.n_impacts[i]
         assert_allclose(found.contact_time[i], hit.contact_time, rtol=1.1e-3)  # 1e-3, and 1e-4 of the single blow
         assert_allclose(found.restitution[i], hit.restitution, atol=1.1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("frequency", [600.0, 2e3, 10e3])
+def test_nearly_all_cells_of_a_light_plate_meet_the_tolerance(frequency):
+    """A stick on a plate of its own mass: touches that barely part, where errors are amplified, are rare and small.
+
+    Of 10 000 cells up to 30 were off by more than 1e-3, the worst by 2.8e-3, and 3 had another number of impacts, all
+    from gaps or touches of some us; nearly twice that is allowed for.
+    """
+    rng = np.random.default_rng(3)
+    modes = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    mass, stiffness = rng.uniform(0.01, 0.2, 4000), 10.0 ** rng.uniform(4.0, 6.0, 4000)
+    blows = many(modes, fi.Striker.stick(0.1, frequency), stiffness, mass=mass)
+    found, fine = bounces.bounce(blows, tolerance=1e-3), bounces.bounce(blows, tolerance=1e-5)
+    both = found.done & fine.done
+    assert both.mean() > 0.99
+    same = found.n_impacts[both] == fine.n_impacts[both]
+    assert same.mean() > 0.997
+    off = np.abs(found.restitution - fine.restitution)
+    for name in ("contact_time", "peak_force"):
+        off = np.maximum(off, np.abs(getattr(found, name) / getattr(fine, name) - 1.0))
+    off = off[both][same]
+    assert (off > 1e-3).mean() < 0.005
+    assert off.max() < 1e-2

@@ -161,10 +161,8 @@ def test_endless_beam_kernel_grows_with_the_root_of_time():
     beam = fi.analytic.beam(length, ends=("hinged", "hinged"), mass=mass, first_frequency=first, n_modes=6000)
     stiffness = (2.0 * np.pi * first * length**2 / np.pi**2) ** 2 * mass / length  # E I from the first frequency
     at, n, h = np.array([[0.4837]]), 30, 2.5e-5
-    table = np.empty((_kernels.N_TABLE, beam.n_modes))
-    _kernels.step_table(np.array(beam.omega), np.array(beam.damping_ratio), h, table)
-    rows = np.empty((_batch.N_KERNELS, n))
-    _batch.kernel_rows(table, beam.shape_at(at)[0] ** 2, rows)
+    modal = np.array(beam.omega), np.array(beam.damping_ratio), beam.shape_at(at)[0] ** 2
+    rows = bounces.kernel_rows(*modal, h, n)[0]
     t = h * np.arange(1, n + 1)
     factor = 1.0 / (np.sqrt(2.0 * np.pi) * (mass / length) ** 0.75 * stiffness**0.25)
     wanted = factor * 2.0 / 3.0 * (t**1.5 - (t - h) ** 1.5)  # of a unit force held over the step
@@ -259,13 +257,13 @@ def test_kernel_form_is_the_modal_form(exponent, n_steps, damping_ratio):
     modes = np.array(plate.omega), np.array(plate.damping_ratio)
     impulse = modal_blow(*modes, squared, mass, stiffness, exponent, h, 3 * n_steps)
     family = bounces.Family.of(plate, np.array([0.465, 0.3]), fi.Striker.rigid(mass), False)
-    out = np.empty((7, 1))
+    out = np.empty((9, 1))
     column = np.ones(1)
     _batch.run(
-        np.zeros(1, int), h, *family.kernels(h, 512), *family.kernels(0.5 * h, 1024)[:2], True,
+        np.zeros(1, int), h, *family.kernels(h, 512), *family.later(h, 512), True,
         np.array([column / 2.0, column / mass]),
         np.array([column * stiffness, column * exponent, 0.0 * column]), column / mass,
-        column * family.static(0) / 2.0, 0.0, out,
+        column * family.static(0) / 2.0, 0.0 * column, 0.0, out,
     )  # fmt: skip
     assert out[5, 0] == _batch.DONE
     assert out[0, 0] == 1
