@@ -359,12 +359,14 @@ def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> d
     if run.verified is not None:
         extra["verified"] = run.verified
     changes = {name: value for name, value in run.plan.changes.items() if name in ("tolerance", "quantity")}
+    tables, copies = scene.kept(folder, **changes)
+    files += copies
     data = fi.export.plain(
         {
             **fi.export.numbers(response),
             **extra,
             "plan": run.plan.data(),
-            "scene": scene.data(**changes),
+            "scene": tables,
             "seconds": dict(run.seconds),
             "notes": list(run.notes),
             "versions": fi.export.versions(),

@@ -19,7 +19,7 @@ from ._files import replacing
 from .prose import place, power, si, words
 from .response import Response
 from .scene import Run, Scene, load_scene, scene_of
-from .tables import fault, read_bytes
+from .tables import PATHS, fault, read_bytes
 
 BAND = (10.0, 20e3)  # [Hz] of the spectrum shown: about what is heard, or more where the blow is shorter
 LOBES = 3.0  # [-] the spectrum reaches at least so many times the reciprocal of the shortest impact
@@ -39,8 +39,8 @@ WEB = Path(__file__).parent / "web"
 def read(path: str | Path) -> Scene:
     """The scene of a TOML file, or of what `fem-impact strike` wrote: response.json or the folder that holds it.
 
-    File names in a result are taken as they stand, relative to where the strike was run. ValueError where the extra
-    ``web`` is not installed: better known before the work than after it.
+    File names are relative to the file that names them: a strike leaves its mesh or drawing beside its
+    numbers. ValueError where the extra ``web`` is not installed: better known before the work than after it.
     """
     _tools()
     path = _check.path("path", path)
@@ -51,10 +51,18 @@ def read(path: str | Path) -> Scene:
     try:
         data = json.loads(read_bytes(path).decode("utf-8", "replace"))
         if isinstance(data, dict) and isinstance(data.get("scene"), dict):
-            return scene_of(data["scene"], path, folder=Path())
+            return _whole(scene_of(data["scene"], path, folder=path.parent))
     except (json.JSONDecodeError, RecursionError):  # the latter where lists nest without end
         pass
     raise fault(path, "not a result of `fem-impact strike`; give its response.json, or the scene's TOML file")
+
+
+def _whole(scene: Scene) -> Scene:
+    """The scene of a result, if what it was struck on is still there."""
+    for source in (scene.mesh.values[key] for key in PATHS if key in scene.mesh.values):
+        if not Path(source).is_file():
+            raise fault(scene.path, f"the body it struck is gone: put {source} back, or give the scene's TOML file")
+    return scene
 
 
 def _tools() -> list[Any]:

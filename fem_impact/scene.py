@@ -1,5 +1,6 @@
 """A strike as a text file: a TOML scene is checked as a whole, then built with the public functions and struck."""
 
+import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ from .plans import Plan
 from .response import Response
 from .section import Beam, Material, Plate
 from .striker import Striker
-from .tables import MAKERS, REQUIRED, TABLES, Part, fault, read_part, read_tables, target_values
+from .tables import MAKERS, PATHS, REQUIRED, TABLES, Part, fault, read_part, read_tables, target_values
 
 WORST_FREQUENCY = 0.1  # [-] error of a frequency that `find_modes` accepts at most
 NOTHING = Part()  # a table left out
@@ -164,6 +165,17 @@ class Scene:
                 tables[table] = {**({selector: part.kind} if selector else {}), **part.values}
         tables["strike"] |= changes
         return tables
+
+    def kept(self, folder: str | Path, **changes: Any) -> tuple[dict[str, Any], list[str]]:
+        """As `data`, with the mesh or drawing it reads copied into a folder; and the names of the copies."""
+        tables, names = self.data(**changes), []
+        for key in PATHS:
+            if key in self.mesh.values:
+                source = Path(self.mesh.values[key])
+                shutil.copyfile(source, Path(folder) / source.name)
+                tables["mesh"][key] = source.name
+                names.append(source.name)
+        return tables, names
 
     @property
     def source(self) -> str:

@@ -117,6 +117,8 @@ def test_listener_of_the_command_is_the_one_of_the_scene(scene, tmp_path, capsys
     again = json.loads((tmp_path / "two" / "response.json").read_text())
     assert again["radiated"] == said and again["scene"]["observe"] == {"listener": [0.5, 0.3, 1.0]}
     assert "radiated.wav" in again["files"]
+    heard = fi.report._sounds(fi.load_scene(scene).heard_from([0.5, 0.3, 1.0]), fi.load_scene(scene).strike())
+    assert "Sound radiated to (0.5, 0.3, 1)\N{NO-BREAK SPACE}m" in [player.name for player in heard]
     assert cli.main(["strike", str(scene), *place[:3], "0"]) == 2
     assert "[observe] listener must lie off the plate's plane" in capsys.readouterr().err
 

@@ -82,6 +82,24 @@ def test_result_of_a_strike_gives_the_same_blow(page, tmp_path):
         assert again.strike().impulse == report.read(scene).strike().impulse
 
 
+def test_result_carries_its_mesh_wherever_it_goes(tmp_path, capsys, monkeypatch):
+    text = TEXT.replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', 'shape = "file"\npath = "plate.msh"')
+    (tmp_path / "scene.toml").write_text(text.replace('"analytic"', '"fe"').replace("1e-2", "1e-1"))
+    fi.mesh.save(tmp_path / "plate.msh", fi.mesh.rectangle(0.465, 0.3, size=0.1))
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["strike", "scene.toml", "--out", "out"]) == 0
+    assert "plate.msh" in json.loads((tmp_path / "out" / "response.json").read_text())["files"]
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "out").rename(tmp_path / "elsewhere" / "moved")
+    (tmp_path / "plate.msh").unlink()
+    monkeypatch.chdir("/")
+    moved = tmp_path / "elsewhere" / "moved"
+    assert report.read(moved).body().points.max() == 0.465
+    (moved / "plate.msh").unlink()
+    assert cli.main(["report", str(moved), "--out", str(tmp_path / "report.html")]) == 2
+    assert f"the body it struck is gone: put {moved / 'plate.msh'} back" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     "text",
     [
