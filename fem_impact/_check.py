@@ -75,17 +75,17 @@ def positive(name: str, value: Any, unit: str = "", *, reach: float = REACH) -> 
     result = number(name, value, unit, reach=reach)
     if result <= 0.0:
         raise ValueError(f"{name} must be positive, got {result:g}{_suffix(unit)}")
-    if result < 1.0 / reach:
+    if result * reach < 0.999:  # the reciprocal is rounded
         raise ValueError(f"{name} must be at least {1.0 / reach:g}{_suffix(unit)}, got {result:g}{_suffix(unit)}")
     return result
 
 
 def non_negative(name: str, value: Any, unit: str = "") -> float:
-    """Return ``value`` as a finite float, zero or more."""
+    """Return ``value`` as a float that is zero or `positive`."""
     result = number(name, value, unit)
     if result < 0.0:
         raise ValueError(f"{name} must not be negative, got {result:g}{_suffix(unit)}")
-    return result
+    return positive(name, result, unit) if result else result
 
 
 def between(name: str, value: Any, low: float, high: float, unit: str = "") -> float:

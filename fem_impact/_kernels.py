@@ -1430,7 +1430,7 @@ def run_energy(
     pressed = np.zeros(m, np.bool_)
     bracket = np.empty(6)
     flights = np.empty((GLIDES + 1, N_LANE, n_modes))
-    flown = np.zeros(GLIDES)
+    flown = np.zeros(GLIDES + 1)
     done = np.zeros(m)
     steps = np.zeros((64, 3 + 5 * m))
     n_steps = ZERO
@@ -1482,7 +1482,7 @@ def run_energy(
             else:
                 continue
         if events > EVENT_LIMIT:
-            pause = time + respite
+            pause = max(time + respite, np.nextafter(time, np.inf))  # or a late step would never be blind
             respite *= 2.0
             events = 0
         blind = time < pause
@@ -1838,7 +1838,7 @@ def run_collocation(
     vector = np.empty(s * m)
     pressed = np.zeros(m, np.bool_)
     flights = np.empty((GLIDES + 1, N_LANE, n_modes))
-    flown = np.zeros(GLIDES)
+    flown = np.zeros(GLIDES + 1)
     done = np.zeros(m)
     coefficients = np.empty(s)
     stride = 3 + s
@@ -2165,7 +2165,7 @@ def run_secular(
     x = np.empty(n_groups)
     v = np.empty(n_groups)
     flights = np.empty((GLIDES + 1, N_LANE, n_modes))
-    flown = np.zeros(GLIDES)
+    flown = np.zeros(GLIDES + 1)
     stride = 3 + s
     steps = np.zeros((64, 3 + stride))
     now = np.zeros((5, 1))

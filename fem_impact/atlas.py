@@ -88,7 +88,7 @@ def map_scene(
         for name, value in zip(slow, chosen):
             changed = changed_scene(changed, name, value)
         own = store if store is None or not slow else Path(store).with_name(f"{Path(store).name}-{number}")
-        pieces.append(_quick_map(changed, quick, band, limit, {**wanted, "store": own, "max_cells": math.inf}))
+        pieces.append(_quick_map(changed, quick, band, limit, {**wanted, "store": own, "max_cells": _check.REACH}))
     result = _joined(pieces, slow)
     result.attrs["scene"] = json.dumps(
         {**scene.data(), "map": {name: list(map(_plain, v)) for name, v in over.items()}}

@@ -249,6 +249,7 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> R
             "duration or max_impacts must be given where a constant force keeps pressing the bodies together"
         )
     pace = _pace(system)
+    _check_way(system, pace[0] * pace[1], options.tolerance)
     last = options.horizon, options.n_max
     differ = partial(_difference, options.quantities)
     history, step_error, ran, coarse, size = _controlled(
@@ -260,6 +261,16 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> R
     laws = tuple(touch.law for touch in contacts)
     dips = tuple(_dip(part, system) for part in parts)
     return Response(tuple(bodies), laws, history, speed, options.tolerance, ran, error, striker, at, dips)
+
+
+def _check_way(system: _System, depth: float, tolerance: float) -> None:
+    """Raise ValueError where rounding of the way to a contact would spoil the approach, about ``depth`` [m], in it."""
+    way = float(np.abs(system.offset).max())
+    if np.finfo(float).eps * way > tolerance * depth:
+        raise ValueError(
+            f"gap must be smaller: beside {way:.3g} m, an approach of {depth:.3g} m is not resolved to {tolerance:g}; "
+            "start nearer"
+        )
 
 
 def _dip(part: _Part, system: _System) -> Dip | None:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -197,7 +198,7 @@ def sweep(
     residual: bool = True,
     workers: int | None = None,
     client: Any = None,
-    store: Any = None,
+    store: str | Path | None = None,
     watch: Watch | None = None,
     max_cells: float = MOST_CELLS,
     tell: Tell | None = None,
@@ -251,7 +252,11 @@ def sweep(
     base = Case(modes, striker, contact, modes.point("at", at)[0], _check.positive("speed", speed, "m/s"))
     band = None if max_frequency is None else _check.positive("max_frequency", max_frequency, "Hz")
     workers = None if workers is None else _check.count("workers", workers)
-    grid = Grid(base, checked_axes(base, over), tolerance, residual, band, dict(layers or {}))
+    max_cells = _check.number("max_cells", max_cells)
+    layers = {} if layers is None else layers
+    if not isinstance(layers, Mapping) or not all(isinstance(name, str) and callable(layers[name]) for name in layers):
+        raise ValueError(f"layers must map names to functions of a Response, got {_check.shown(layers)}")
+    grid = Grid(base, checked_axes(base, over), tolerance, residual, band, dict(layers))
     admit(grid.n_cases, len(grid.layers), max_cells, quick=not grid.extra and not grid.lossy, tell=tell)
     fewer = grid.without_speed()
     numbers, texts = _solve_all(fewer or grid, workers, client, store, watch)
