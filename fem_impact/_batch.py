@@ -15,7 +15,7 @@ SOLVES = 30  # [-] iterations of one step at most
 SAMPLES = 6.0  # [-] of the force per period of a spectrum's highest frequency: the rule errs by (2 pi / 6)**4 / 720
 PARTS = 2.0  # [-] and per step, at least
 LOOKS = 8  # [-] parts of a look ahead judged apart where the whole leaves a doubt
-PIECES = 6  # [-] of the step in which a contact opens, integrated by themselves: order 4
+PIECES = 3  # [-] of the step in which a contact opens, integrated by themselves: order 4
 FEWEST = 1.0  # [-] steps of a contact at least; briefer ones are looked at closer
 DIP = 0.2  # [-] of the lesser approach at a step's ends: one that dips lower in between is looked at closer
 
@@ -228,7 +228,7 @@ def crossing(d0, v0, d1, v1):
         new = t - value / slope if slope != 0.0 else 0.5 * (low + high)
         if not low < new < high:
             new = 0.5 * (low + high)
-        if abs(new - t) < 1e-13:
+        if abs(new - t) < 1e-9:  # the next would change it by the square of that
             return new
         t = new
     return t
@@ -490,12 +490,23 @@ def centroid(contacts, n_contacts, n_steps, h, ends, rates, k, a, c, limit):
 
 
 @njit(cache=True, error_model="numpy")
-def cleared(d0, v0, d1, v1, h, n, errors, slack, later, shares, segments, n_segments, force, ramp):
+def doubt(level, jumps, bends, shares, bounds):
+    """What a look ahead of that level misses at most of the approach and of its slope over the look."""
+    error = 0.0
+    rate_error = 0.0
+    for share, bound in zip(shares, bounds):
+        error += share * (jumps * bound[level, 0, 0] + bends * bound[level, 0, 1])
+        rate_error += share * (jumps * bound[level, 1, 0] + bends * bound[level, 1, 1])
+    return error, rate_error
+
+
+@njit(cache=True, error_model="numpy")
+def cleared(d0, v0, d1, v1, h, n, jumps, bends, slack, later, bounds, shares, segments, n_segments, force, ramp):
     """Whether step n of a flight surely has no touch but one that lasts, looked at in halves and then in quarters."""
     for split in range(1, SPLITS + 1):
         parts = 2**split
         dt = h / parts
-        error, rate_error = errors[SPLITS - split, 0], errors[SPLITS - split, 1]
+        error, rate_error = doubt(SPLITS - split, jumps, bends, shares, bounds)
         sure = True
         left, slope = d0, v0
         for i in range(1, parts + 1):
@@ -541,7 +552,8 @@ def run(
     ramp = np.zeros(n_steps)
     ends = np.zeros(n_steps + 1)
     rates = np.zeros(n_steps + 1)
-    errors = np.zeros((SPLITS + LEVELS, 2))
+    bounds, later = (target_bounds, striker_bounds), (target_later, striker_later)
+    loud = 1.0 if certify else 0.0
     segments = np.zeros((n_steps + 1, 2), np.int64)
     contacts = np.zeros((n_steps + 1, 2))
     for cell in cells:
@@ -588,7 +600,7 @@ def run(
                     level = LEVELS - 1
                     while level > 0:
                         span = 2.0**level * h
-                        error, rate_error = errors[SPLITS + level, 0], errors[SPLITS + level, 1]
+                        error, rate_error = doubt(SPLITS + level, jumps, bends, (share, mine), bounds)
                         if n + 2**level <= n_steps and (
                             d0 + max(0.0, rate * span) + error < 0.0 or rate * span + rate_error < 0.0
                         ):
@@ -610,7 +622,7 @@ def run(
             vf = 1.0 - turned
             if not pressed:
                 span = jump * h
-                error, rate_error = errors[SPLITS + level, 0], errors[SPLITS + level, 1]
+                error, rate_error = doubt(SPLITS + level, jumps, bends, (share, mine), bounds)
                 if (e > 0.0 and jump > 1) or not parted(d0, rate * span, e, vf * span, error + margin, rate_error):
                     if level > 0:
                         level -= 1
@@ -618,7 +630,7 @@ def run(
                     if certify and target_later.shape[2] == 0:
                         break
                     if not certify or not cleared(
-                        d0, rate, e, vf, h, n, errors, margin, (target_later, striker_later), (share, mine),
+                        d0, rate, e, vf, h, n, jumps, bends, margin, later, bounds, (share, mine),
                         segments, n_segments, force, ramp,
                     ):  # fmt: skip
                         ending = DOUBTFUL
@@ -667,9 +679,9 @@ def run(
             rate1 = vf - own[4] * f - own[5] * s
             force[n] = f
             ramp[n] = s
-            jumps += abs(f - 0.5 * s - held)
+            jumps += loud * abs(f - 0.5 * s - held)
             slope = s * per_step
-            bends += abs(slope - sloped)
+            bends += loud * abs(slope - sloped)
             held = f + 0.5 * s
             sloped = slope
             impulse += f * h
@@ -709,14 +721,9 @@ def run(
                 pressed = False
                 level = -1
                 segments[n_segments - 1, 1] = n + 1
-                jumps += abs(held)
-                bends += abs(sloped)
+                jumps += loud * abs(held)
+                bends += loud * abs(sloped)
                 held = sloped = 0.0
-                if certify:
-                    for i in range(SPLITS + LEVELS):
-                        for j in range(2):
-                            errors[i, j] = jumps * (share * target_bounds[i, j, 0] + mine * striker_bounds[i, j, 0])
-                            errors[i, j] += bends * (share * target_bounds[i, j, 1] + mine * striker_bounds[i, j, 1])
             d0, x0, f0, v0, rate = y, x1, f1, v1, rate1
             n += 1
         out[0, cell] = count
