@@ -186,7 +186,7 @@ def numbers(response: Response) -> dict[str, Any]:
             "restitution": response.restitution,
             "speed": response.speed,
             "spectral_centroid": {
-                "value": response.spectral_centroid(CENTROID_BAND) if response.impacts else None,
+                "value": _centroid(response),
                 "max_frequency": CENTROID_BAND,
             },
             "energies": response.energies,
@@ -205,6 +205,14 @@ def numbers(response: Response) -> dict[str, Any]:
             for hit in response.impacts
         ],
     }
+
+
+def _centroid(response: Response) -> float | None:
+    """The spectral centroid; None where nothing touched, or a blow lasts too long for a band up to CENTROID_BAND."""
+    try:
+        return response.spectral_centroid(CENTROID_BAND)
+    except ValueError:
+        return None
 
 
 def versions() -> dict[str, str]:

@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy import fft, special
 
 from . import _batch, _check, _kernels, svg
 from .contact import Contact
@@ -15,6 +16,10 @@ CHAOTIC = 1e3  # [-] growth of small differences from which a blow is called cha
 TOUCH = 1e-12  # [-] of the fastest approach: bodies that touch and hardly move press from the first push on
 LEAST_SAMPLES = 800.0  # [-] of an impact: its spectrum is right to 1e-3 up to thirty lobes
 PEAK_LOOKS = 16  # [-] looks per step for the peak force before a parabola refines it: (pi/11/16)**2/8 of it at worst
+MOST_TERMS = 2 * 10**7  # [-] pieces times frequencies of a spectrum that are summed: three seconds
+MOST_PERIODS = 2.0**18  # [-] of the highest frequency within a blow: a transform of half a gigabyte
+GRID = 8  # [-] cells in half a period of the highest frequency of a long blow's spectrum
+WINDOW, BETA = 6, 28.1  # [-] half width and shape of the window for a transform of twice the cells: 1e-11
 DIP_BLOCK = 8  # [-] points whose static compliance is asked for at once: each is a load, and pairs are its cost
 
 
@@ -286,9 +291,12 @@ class Response:
 
         Exact for the sampled force taken as straight between its samples.
         """
-        omega = 2.0 * np.pi * _check.array("frequencies", frequencies, (None,), "Hz", lift=True)
-        total = np.zeros(len(omega), complex)
+        asked = _check.array("frequencies", frequencies, (None,), "Hz", lift=True)
         t, h, f0, f1 = self._pieces()
+        if len(t) * len(asked) > MOST_TERMS and 0.0 < np.abs(asked).max() * (t[-1] + h[-1]) < MOST_PERIODS:
+            return self._long_spectrum(asked, t[-1] + h[-1])
+        omega = 2.0 * np.pi * asked
+        total = np.zeros(len(omega), complex)
         for block in np.array_split(np.arange(len(omega)), max(1, len(omega) * len(h) // 2**20)):
             x = omega[block, None] * h  # (n_block, n_pieces)
             small = np.abs(x) < 1e-2
@@ -315,15 +323,40 @@ class Response:
         span = max((impact.end for impact in self.impacts), default=0.0)
         if span == 0.0:
             raise ValueError("spectral_centroid needs a contact; nothing touched")
+        if limit * span > MOST_PERIODS:
+            raise ValueError(f"max_frequency must be at most {MOST_PERIODS / span:.4g} Hz for a blow of {span:.4g} s")
         frequencies = np.linspace(0.0, limit, int(np.clip(32.0 * limit * span, 512, 65536)))
-        if _kernels.COMPILED:
+        t, h, f0, f1 = self._pieces()
+        if _kernels.COMPILED and len(t) * len(frequencies) <= MOST_TERMS:
             spectrum = np.zeros(len(frequencies), complex)
-            t, h, f0, f1 = self._pieces()
             _batch.straight_spectrum(2.0 * np.pi * frequencies[1], t, h, f0, f1, spectrum)
         else:
             spectrum = self.spectrum(frequencies)
         size = np.abs(spectrum)
         return float(np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies))
+
+    def _long_spectrum(self, frequencies: np.ndarray, span: float) -> np.ndarray:
+        """The spectrum of a blow of many pieces, (n_frequencies,): the sum over them would take minutes.
+
+        The impulses in equal cells of time, exact, fold little into a band that ends far below the rate of the cells;
+        their transform at any frequency is interpolated from that at even ones with a Kaiser-Bessel window.
+        """
+        t, h, f0, f1 = self._pieces()
+        before = np.concatenate([[0.0], np.cumsum(0.5 * h * (f0 + f1))])
+        step = min(0.5 / (GRID * np.abs(frequencies).max()), span / LEAST_SAMPLES)
+        edges = step * np.arange(int(span / step) + 2)
+        row = np.clip(np.searchsorted(t, edges, side="right") - 1, 0, None)
+        part = np.clip((edges - t[row]) / h[row], 0.0, 1.0)
+        impulse = np.diff(before[row] + h[row] * part * (f0[row] + 0.5 * (f1 - f0)[row] * part))
+        middle, length = 0.5 * (len(impulse) - 1), fft.next_fast_len(2 * len(impulse))
+        root = np.sqrt(BETA**2 - (2.0 * np.pi * WINDOW / length * (np.arange(len(impulse)) - middle)) ** 2)
+        even = fft.fft(impulse * root / (2.0 * WINDOW * np.sinh(root)), length)
+        place = frequencies * step * length
+        near = np.floor(place).astype(int)[:, None] + np.arange(1 - WINDOW, WINDOW + 1)  # (n_frequencies, 2 WINDOW)
+        weight = special.i0(BETA * np.sqrt(np.clip(1.0 - ((place[:, None] - near) / WINDOW) ** 2, 0.0, None)))
+        turn = np.exp(2j * np.pi * middle / length * near)
+        found = (weight * turn * even[near % length]).sum(axis=1)
+        return found * np.exp(-2j * np.pi * frequencies * step * (middle + 0.5)) / np.sinc(frequencies * step)
 
     def body_slice(self, body: int) -> slice:
         """Where the modes of a body stand in the history's arrays."""

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
+from fem_impact import response
 
 
 @pytest.fixture(scope="module")
@@ -20,6 +21,21 @@ def test_spectrum_is_that_of_a_half_sine(half_sine):
     # |F| = cos(pi x / 2) / (1 - x**2), pi / 4 at x = 1: Euphonics 2.2.6; the samples follow it to the tolerance
     wanted = [1.0, np.cos(np.pi / 4) / 0.75, np.pi / 4, 10.0 ** (-3.0 / 20.0), 1.0 / 3.0, 0.0]
     assert_allclose(size, wanted, atol=5e-4)
+
+
+@pytest.mark.parametrize("highest", [1.0, 2e3, 2e4])
+def test_spectrum_of_many_pieces_is_the_same_by_transform(half_sine, monkeypatch, highest):
+    frequencies = np.append(np.linspace(-highest, highest, 501), 0.123 * highest)
+    summed = half_sine.spectrum(frequencies)
+    monkeypatch.setattr(response, "MOST_TERMS", 0)
+    # impulses in cells fold the kinks at both ends into the band: 2e-6 was measured at most, on blows with more of them
+    assert_allclose(half_sine.spectrum(frequencies), summed, rtol=0, atol=1e-5 * np.abs(summed).max())
+    assert_allclose(half_sine.spectrum([0.0]), [half_sine.impulse], rtol=1e-5)  # by the sum: a transform has no band
+
+
+def test_centroid_of_a_blow_of_too_many_periods_is_refused(half_sine):
+    with pytest.raises(ValueError, match=r"max_frequency must be at most .* Hz for a blow of 0\.00314 s"):
+        half_sine.spectral_centroid(1e12)
 
 
 def test_spectral_centroid_states_its_band(half_sine):
