@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import xarray
+from matplotlib.ticker import EngFormatter
 
 from . import _check, accuracy, charts, figures, hammers, maps, threshold
 from .contact import Contact
@@ -216,8 +217,26 @@ def _joined(pieces: Sequence[xarray.Dataset], slow: Mapping[str, Sequence[Any]])
     return rows[0]
 
 
-def draw(table: xarray.Dataset, layer: str, marks: Sequence[charts.Mark] = ()) -> Any:
+def draw(
+    table: xarray.Dataset,
+    layer: str,
+    marks: Sequence[charts.Mark] = (),
+    *,
+    limits: tuple[float | None, float | None] = (None, None),
+    **wanted: Any,
+) -> Any:
     """One layer of a map with two axes in colour, with contours of contact resonance and threshold.
+
+    Parameters
+    ----------
+    table : xarray.Dataset
+        From `map_scene` or `with_theory`; its title is the picture's.
+    layer : str
+    marks : sequence of Mark
+    limits : (low, high), optional
+        Values at the ends of the colours, instead of the layer's own.
+    **wanted
+        Arguments of `charts.colour_map` instead of those chosen here.
 
     Returns
     -------
@@ -226,27 +245,34 @@ def draw(table: xarray.Dataset, layer: str, marks: Sequence[charts.Mark] = ()) -
     values = table[layer]
     if values.ndim != 2:
         raise ValueError(f"layer must have two axes to be drawn, got {', '.join(map(str, values.dims))}; select some")
-    across, up = _axis(table, values.dims[1]), _axis(table, values.dims[0])
     size = np.asarray(values, float)
     size = size[np.isfinite(size) & (size > 0.0)]
     log = layer != "n_impacts" and size.size == values.size and size.max() > 5.0 * size.min()
+    label = PICTURED.get(layer, layer)
+    if "max_frequency" in values.attrs:
+        label += f" up to {EngFormatter(unit='Hz', sep=' ')(values.max_frequency)}"
+    chosen: dict[str, Any] = {
+        "x": _axis(table, values.dims[1]),
+        "y": _axis(table, values.dims[0]),
+        "colour": charts.Axis(label, _unit(values), log=bool(log), limits=limits),
+        "contours": _contours(table, values),
+        "marks": marks,
+        "title": str(table.attrs.get("title", "")),
+    }
+    return charts.colour_map(_in_grams(values.where(table.n_impacts >= 0)), **{**chosen, **wanted})
+
+
+def _contours(table: xarray.Dataset, values: xarray.DataArray) -> list[Any]:
+    """Lines of equal contact resonance, and where it is the threshold, as far as they cross the map."""
     resonance = table.contact_resonance.broadcast_like(values).transpose(*values.dims)
-    contours: list[Any] = []
-    if np.ptp(resonance.values) > 0.0:
-        shown = [f for f in RESONANCES if resonance.min() < f < resonance.max()]
-        contours.append((resonance, shown, "Hz", "contact resonance"))
-        limit = (resonance / table.threshold).transpose(*values.dims)
-        if float(limit.min()) < 1.0 < float(limit.max()):
-            contours.append((limit, [1.0], "", "threshold: the body stops the striker"))
-    return charts.colour_map(
-        _in_grams(values.where(table.n_impacts >= 0)),
-        x=across,
-        y=up,
-        colour=charts.Axis(PICTURED.get(layer, layer), _unit(values), log=bool(log)),
-        contours=contours,
-        marks=marks,
-        title=str(table.attrs.get("title", "")),
-    )
+    if np.ptp(resonance.values) == 0.0:
+        return []
+    shown = [f for f in RESONANCES if resonance.min() < f < resonance.max()]
+    found: list[Any] = [(resonance, shown, "Hz", "contact resonance")]
+    limit = (resonance / table.threshold).transpose(*values.dims)
+    if float(limit.min()) < 1.0 < float(limit.max()):
+        found.append((limit, [1.0], "", "threshold: the body stops the striker"))
+    return found
 
 
 def _axis(table: xarray.Dataset, name: Any) -> charts.Axis:

@@ -12,11 +12,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
+from scipy.interpolate import RegularGridInterpolator
 
 from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, _styled
 
 BLACK, GREY = "#222222", "#777777"
 PALETTE = "cividis"  # even in lightness and for every colour vision
+FINER = 8  # [-] parts of a pixel between which contours are straight
 FEW = 10  # [-] whole numbers that get a colour each
 HALO = withStroke(linewidth=2.2, foreground=BLACK)  # behind white lines, which bright colours would swallow
 RIM = withStroke(linewidth=4.0, foreground="white")  # behind circles, on dark colours
@@ -57,6 +59,8 @@ class Curve:
     label: str = ""
     color: str = BLUE
     style: str = "-"
+    width: float = 1.5  # [pt]
+    panel: str = ""  # name of the pair of axes, one below the other, it belongs to
 
 
 @dataclass(frozen=True)
@@ -72,25 +76,29 @@ class Mark:
 def curves(
     drawn: Sequence[Curve], *, x: Axis, y: Axis, title: str = "", filled: Curve | None = None, between: Any = None
 ) -> Figure:
-    """Curves over one pair of axes; ``filled`` is shaded down to zero, ``between`` (x, low, high) from low to high.
+    """Curves over one pair of axes for each panel; ``filled`` is shaded down to zero, ``between`` (x, low, high).
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    with _styled(6.4, 3.8) as figure:
-        axes = figure.subplots()
-        if filled is not None:
-            axes.fill_between(filled.x, filled.y, color=filled.color, alpha=0.3, lw=0)
-        if between is not None:
-            axes.fill_between(*between, color=GREEN, alpha=0.25, lw=0)
-        for curve in drawn:
-            axes.plot(curve.x, curve.y, curve.style, color=curve.color, label=curve.label or None)
-        axes.set_title(title)
-        x.apply(axes, "x")
-        y.apply(axes, "y")
-        if any(curve.label for curve in drawn):
-            axes.legend(loc="best")
+    panels = list(dict.fromkeys(curve.panel for curve in drawn))
+    with _styled(6.4, 3.8 if len(panels) == 1 else 2.2 * len(panels)) as figure:
+        all_axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
+        for axes, panel in zip(all_axes, panels):
+            if filled is not None:
+                axes.fill_between(filled.x, filled.y, color=filled.color, alpha=0.3, lw=0)
+            if between is not None:
+                axes.fill_between(*between, color=GREEN, alpha=0.25, lw=0)
+            mine = [curve for curve in drawn if curve.panel == panel]
+            for curve in mine:
+                axes.plot(curve.x, curve.y, curve.style, color=curve.color, lw=curve.width, label=curve.label or None)
+            x.apply(axes, "x")
+            y.apply(axes, "y")
+            axes.label_outer()
+            if any(curve.label for curve in mine):
+                axes.legend(loc="best", title=panel or None, alignment="left")
+        all_axes[0].set_title(title)
     return figure
 
 
@@ -141,7 +149,8 @@ def colour_map(
             axes.pcolormesh(*edges, shown, cmap=ListedColormap([paint]), vmin=0.0, vmax=1.0, rasterized=True)
             handles.append(Patch(facecolor=paint, edgecolor=GREY, label=name))
         for (data, levels, unit, name), (paint, style) in zip(contours, _LINES):
-            lines = axes.contour(along_x, along_y, data, levels=levels, colors=paint, linewidths=1.0, linestyles=style)
+            finer = _finer(along_x, along_y, np.asarray(data, float))
+            lines = axes.contour(*finer, levels=levels, colors=paint, linewidths=1.0, linestyles=style)
             if unit:
                 axes.clabel(lines, fmt={level: EngFormatter(unit=unit, sep=" ")(level) for level in levels}, fontsize=8)
             for part in (lines, *lines.labelTexts):
@@ -174,6 +183,15 @@ def colour_map(
 
 
 _LINES = (("white", "solid"), ("white", "dashed"), ("white", "dotted"))  # of contours, in order
+
+
+def _finer(x: np.ndarray, y: np.ndarray, data: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positive data (n_y, n_x) on a finer grid, along straight lines between logarithms, as power laws are."""
+    if min(x.min(), y.min(), np.nanmin(data)) <= 0.0 or min(data.shape) < 2:
+        return x, y, data
+    read = RegularGridInterpolator((np.log(y), np.log(x)), np.log(data))
+    x, y = (np.interp(np.arange(0, len(v) - 1 + 1e-9, 1 / FINER), np.arange(len(v)), np.log(v)) for v in (x, y))
+    return np.exp(x), np.exp(y), np.exp(read(tuple(np.meshgrid(y, x, indexing="ij"))))
 
 
 def _edges(centres: np.ndarray, log: bool) -> np.ndarray:

@@ -21,7 +21,7 @@ BLOWS = {  # name: mass of the stick [kg], stiffness of the Hertz contact [N/m^1
     "single": (0.1, 7e5),
     "double": (0.1, 2e7),
 }
-COLOURS = (charts.BLUE, charts.VERMILION, charts.SKY, charts.ORANGE, charts.GREEN, charts.PURPLE)
+PANELS = {"head": ("soft", "hard"), "stick": ("light", "heavy"), "impact": ("single", "double")}
 THIRD = 2.0 ** (1.0 / 6.0)  # [-] half a third of an octave: from the middle of a band to its edge
 BANDS = 50.0 * 2.0 ** (np.arange(25) / 3.0)  # [Hz] middles
 RING = 0.05  # [s] after which no blow touches any more, and the decay is measured
@@ -72,11 +72,15 @@ def draw(heard):
     columns = {"frequency_Hz": BANDS}
     for name, (_, sound) in heard.items():
         columns[f"{name}_dB"] = bands(sound.samples, sound.rate)
-    curves = [charts.Curve(BANDS, columns[f"{name}_dB"], name, paint) for name, paint in zip(heard, COLOURS)]
+    curves = [
+        charts.Curve(BANDS, columns[f"{name}_dB"], name, paint, panel=panel)
+        for panel, names in PANELS.items()
+        for name, paint in zip(names, (charts.BLUE, charts.VERMILION))
+    ]
     figure = charts.curves(
         curves,
         x=charts.Axis("frequency", "Hz", log=True),
-        y=charts.Axis("level re 10 m/s", "dB", limits=(-120.0, -10.0)),
+        y=charts.Axis("level re 10 m/s", "dB", limits=(-120.0, -25.0)),
         title="Sounds of one plate, in thirds of an octave",
     )
     return figure, columns

@@ -10,15 +10,14 @@ from fem_impact.integrator import Touch
 MASS, STIFFNESS = 0.1 / 3.0, 88.6e3  # [kg], [N/m]
 
 
-def compute():
-    """The blow of a mass on a rigid wall."""
-    return fi.collide([fi.Modes.rigid(MASS)], [Touch(fi.Contact.linear(STIFFNESS), 0, None)], speeds=[source.SPEED])
+def compute(mass=MASS, stiffness=STIFFNESS, speed=source.SPEED):
+    """The blow of a mass on a rigid wall; all three are chosen here, the source gives no numbers."""
+    return fi.collide([fi.Modes.rigid(mass)], [Touch(fi.Contact.linear(stiffness), 0, None)], speeds=[speed])
 
 
-def sticky(time):
+def sticky(time, mass=MASS, stiffness=STIFFNESS, speed=source.SPEED):
     """Force [N] if the two could not part."""
-    omega = np.sqrt(STIFFNESS / MASS)
-    return source.SPEED * np.sqrt(STIFFNESS * MASS) * np.sin(omega * time)
+    return speed * np.sqrt(stiffness * mass) * np.sin(np.sqrt(stiffness / mass) * time)
 
 
 def draw(hit):

@@ -8,20 +8,25 @@ from fem_impact import charts
 from fem_impact.integrator import Touch
 
 RESONANCES = {300.0: charts.VERMILION, 1500.0: charts.BLACK}  # [Hz]
-MASS = 0.05  # [kg] does not matter
+MASS, SPEED = 0.05, 1.0  # [kg], [m/s] chosen
 FREQUENCIES = np.linspace(0.0, 8e3, 1601)  # [Hz]
 
 
-def compute():
+def compute(mass=MASS, speed=SPEED):
     """Level [dB] of the computed pulse's spectrum for each contact resonance, and that of the formula."""
     result = {}
     for resonance in RESONANCES:
-        law = fi.Contact.linear(MASS * (2.0 * np.pi * resonance) ** 2)
-        hit = fi.collide([fi.Modes.rigid(MASS)], [Touch(law, 0, None)], speeds=[1.0], tolerance=1e-6)
+        law = fi.Contact.linear(mass * (2.0 * np.pi * resonance) ** 2)
+        hit = fi.collide([fi.Modes.rigid(mass)], [Touch(law, 0, None)], speeds=[speed], tolerance=1e-6)
         with np.errstate(divide="ignore"):
             formula = 20.0 * np.log10(fi.spectra.half_sine_spectrum(FREQUENCIES, resonance))
         result[resonance] = source.decibels(hit.spectrum(FREQUENCIES)), formula
     return result
+
+
+def reach(level, drop):
+    """Frequency [Hz] at which a level first falls ``drop`` [dB]."""
+    return FREQUENCIES[np.argmax(level < -drop)]
 
 
 def draw(result):

@@ -2,8 +2,6 @@
 
 import source_scenes as source
 
-from fem_impact import charts
-
 
 def compute(**wanted):
     """Stick masses and linear springs on the plate of 500 t."""
@@ -12,14 +10,7 @@ def compute(**wanted):
 
 def draw(table):
     """The map with contours of the contact resonance."""
-    figure = source.draw_map(
-        table,
-        "contact_time",
-        charts.Axis("contact time", "s", log=True),
-        title="Contact time, plate of 500 t, linear spring",
-        marks=[source.mark(source.MARKED, "figures 8 and 9")],
-    )
-    return figure, source.table_columns(table, "contact_time", "n_impacts")
+    return source.draw_map(table, "contact_time", "Contact time, plate of 500 t, linear spring", source.FIGURES_8_9)
 
 
 if __name__ == "__main__":

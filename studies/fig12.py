@@ -2,8 +2,6 @@
 
 import source_scenes as source
 
-from fem_impact import charts
-
 
 def compute(**wanted):
     """Stick masses and Hertz springs on the plate of 500 t."""
@@ -12,15 +10,9 @@ def compute(**wanted):
 
 def draw(table):
     """The map with contours of the contact resonance."""
-    figure = source.draw_map(
-        table,
-        "contact_time",
-        charts.Axis("contact time", "s", log=True),
-        title="Contact time, plate of 500 t, Hertz spring",
-        marks=[source.mark(source.MARKED_HERTZ, "figures 8 and 9")],
-        hertz=True,
+    return source.draw_map(
+        table, "contact_time", "Contact time, plate of 500 t, Hertz spring", source.FIGURES_8_9_HERTZ
     )
-    return figure, source.table_columns(table, "contact_time", "n_impacts")
 
 
 if __name__ == "__main__":

@@ -2,8 +2,6 @@
 
 import source_scenes as source
 
-from fem_impact import charts
-
 
 def compute(**wanted):
     """Stick masses and linear springs on the plate of 200 g."""
@@ -12,14 +10,7 @@ def compute(**wanted):
 
 def draw(table):
     """The map with contours of the contact resonance."""
-    figure = source.draw_map(
-        table,
-        "contact_time",
-        charts.Axis("contact time", "s", log=True),
-        title="Contact time, plate of 200 g, linear spring",
-        marks=[source.mark(source.MARKED, "figure 21"), source.mark(source.STIFF, "figure 22", charts.BLACK)],
-    )
-    return figure, source.table_columns(table, "contact_time", "n_impacts")
+    return source.draw_map(table, "contact_time", "Contact time, plate of 200 g, linear spring", source.FIGURES_21_22)
 
 
 if __name__ == "__main__":

@@ -20,14 +20,14 @@ def compute():
 
 
 def draw(result, frequencies=FREQUENCIES, title="Spectra of the pulses of figure 21"):
-    """Levels over frequency."""
+    """Levels over frequency, the ragged one thin and behind the others."""
     drawn = [
-        charts.Curve(frequencies, level, f"plate of {name}", source.PLATE_COLORS[name])
-        for name, level in result.items()
+        charts.Curve(frequencies, level, f"plate of {name}", source.PLATE_COLORS[name], width=width)
+        for (name, level), width in zip(result.items(), (1.5, 1.5, 0.9))
     ]
     axis = charts.Axis("frequency", "Hz", limits=(0.0, frequencies[-1]))
     columns = {"frequency [Hz]": frequencies} | {f"level, {name} [dB]": level for name, level in result.items()}
-    return charts.curves(drawn, x=axis, y=source.LEVEL, title=title), columns
+    return charts.curves(drawn[::-1], x=axis, y=source.LEVEL, title=title), columns
 
 
 if __name__ == "__main__":

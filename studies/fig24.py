@@ -5,7 +5,7 @@ import fig23
 import numpy as np
 import source_scenes as source
 
-FREQUENCIES = np.linspace(0.0, 8e3, 2001)  # [Hz]
+FREQUENCIES = np.linspace(0.0, 5e3, 1251)  # [Hz]
 
 
 def compute():

@@ -6,14 +6,15 @@ Hertz spring, so that the two marked springs stay in contact equally long), no d
 """
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.signal import find_peaks
 
 import fem_impact as fi
-from fem_impact import charts
+from fem_impact import atlas, charts, maps
 
 LENGTH, WIDTH = 1.55, 1.0  # [m] only their ratio is stated
 AT = (0.3 * LENGTH, 0.3 * WIDTH)  # [m] chosen
@@ -30,13 +31,13 @@ HERTZ_STIFFNESSES = np.logspace(5, 7, 20)  # [N/m**1.5]
 BAND = 5e3  # [Hz] of every spectral centroid; the source does not state its own
 N_MODES = 300  # [-] of a plate, up to 20 kHz
 TOLERANCE = 1e-3  # [-]
+RISE = 0.005  # [-] of the peak by which the force must fall and rise again for another hump: five tolerances
+LINEAR, HERTZ = fi.Contact.linear(MARKED[1]), fi.Contact.hertz(MARKED_HERTZ[1])
 
 TIME = charts.Axis("time", "s")
 FORCE = charts.Axis("contact force", "N", limits=(0.0, None))
 LEVEL = charts.Axis("force spectrum", "dB", limits=(-60.0, 3.0))
-MASS = charts.Axis("mass of the stick", "g")
-STIFFNESS = charts.Axis("contact stiffness", "N/m", log=True)
-HERTZ_STIFFNESS = charts.Axis("contact stiffness", "N/m$^{1.5}$", log=True)
+SCALES = {"contact_time": (0.2e-3, 10e-3), "centroid": (0.1e3, 2.5e3)}  # [s], [Hz] of the colours
 
 
 def plate(mass: float, *, n_modes: int = N_MODES, damping_ratio: float = 0.0) -> fi.Modes:
@@ -59,8 +60,13 @@ def marked_blow(plate_mass: float, stiffness: float = MARKED[1], *, tolerance: f
 
 def marked_hertz_blow(*, tolerance: float = 1e-4) -> fi.Response:
     """The blow of the 100 g stick on the plate of 500 t through the Hertz spring."""
-    law = fi.Contact.hertz(MARKED_HERTZ[1])
-    return fi.strike(plate(5e5), stick(), law, at=AT, speed=HERTZ_SPEED, tolerance=tolerance)
+    return fi.strike(plate(5e5), stick(), HERTZ, at=AT, speed=HERTZ_SPEED, tolerance=tolerance)
+
+
+def humps(hit: fi.Response) -> np.ndarray:
+    """Times [s] and heights [N] of the maxima of the force between which it falls by RISE of its peak, (n, 2)."""
+    top, _ = find_peaks(np.pad(hit.force, 1), prominence=RISE * hit.peak_force)
+    return np.column_stack([hit.time[top - 1], hit.force[top - 1]])
 
 
 def linear_map(
@@ -68,53 +74,38 @@ def linear_map(
     masses: Any = MASSES,
     stiffnesses: Any = STIFFNESSES,
     *,
+    law: fi.Contact = LINEAR,
     damping_ratio: float = 0.0,
     **wanted: Any,
 ) -> Any:
-    """All blows of a grid of sticks and linear springs on one plate; ``wanted`` replaces arguments of `fi.sweep`."""
+    """All blows of a grid of sticks and springs on one plate; ``wanted`` replaces arguments of `fi.sweep`."""
     arguments = {"at": AT, "speed": SPEED, "tolerance": TOLERANCE, "max_frequency": BAND, **wanted}
-    over = {"stiffness": stiffnesses, "mass": masses}
+    over = {"stiffness": np.asarray(stiffnesses), "mass": np.asarray(masses)}
     modes = plate(plate_mass, damping_ratio=damping_ratio)
-    return fi.sweep(modes, stick(), fi.Contact.linear(1e5), over=over, **arguments)
+    table = fi.sweep(modes, stick(), law, over=over, **arguments)
+    case = maps.Case(modes, stick(), law, np.asarray(arguments["at"]), arguments["speed"])
+    return atlas.with_theory(table, case, over)
 
 
 def hertz_map(plate_mass: float, masses: Any = MASSES, stiffnesses: Any = HERTZ_STIFFNESSES, **wanted: Any) -> Any:
     """All blows of a grid of sticks and Hertz springs on one plate."""
-    arguments = {"at": AT, "speed": HERTZ_SPEED, "tolerance": TOLERANCE, "max_frequency": BAND, **wanted}
-    over = {"stiffness": stiffnesses, "mass": masses}
-    return fi.sweep(plate(plate_mass), stick(), fi.Contact.hertz(1e6), over=over, **arguments)
+    return linear_map(plate_mass, masses, stiffnesses, **{"law": HERTZ, "speed": HERTZ_SPEED, **wanted})
 
 
-def contact_resonance(table: Any, exponent: float = 1.0, speed: float = SPEED) -> np.ndarray:
-    """Half the reciprocal of the time a rigid stick touches a rigid wall [Hz], (n_stiffnesses, n_masses)."""
-    return np.array(
-        [
-            [
-                0.5 / fi.accuracy.contact_duration(fi.Contact.power(k, exponent), mass / 3.0, speed)
-                for mass in table.mass.values
-            ]
-            for k in table.stiffness.values
-        ]
-    )
-
-
-def draw_map(table: Any, layer: str, colour: charts.Axis, *, hertz: bool = False, **wanted: Any) -> Any:
-    """One layer of a map of sticks in colour, with contours of the contact resonance."""
-    resonance = contact_resonance(table, 1.5 if hertz else 1.0, HERTZ_SPEED if hertz else SPEED)
-    levels = [50.0, 100.0, 200.0, 400.0, 800.0, 1600.0]
-    return charts.colour_map(
-        table[layer].assign_coords(mass=1e3 * table.mass),
-        x=MASS,
-        y=HERTZ_STIFFNESS if hertz else STIFFNESS,
-        colour=colour,
-        contours=[(resonance, levels, "Hz", "contact resonance")],
-        **wanted,
-    )
+def draw_map(table: Any, layer: str, title: str, marks: Sequence[charts.Mark]) -> tuple[Any, dict[str, np.ndarray]]:
+    """One layer of a map, on one scale in all figures that show it, and its data."""
+    figure = atlas.draw(table.assign_attrs(title=title), layer, marks, limits=SCALES[layer])
+    return figure, table_columns(table, layer, "n_impacts")
 
 
 def mark(case: tuple[float, float], label: str, color: str = charts.GREEN) -> charts.Mark:
     """A circle around a case (mass, stiffness) of a map."""
     return charts.Mark(1e3 * case[0], case[1], label, color)
+
+
+FIGURES_8_9 = [mark(MARKED, "figures 8 and 9")]
+FIGURES_8_9_HERTZ = [mark(MARKED_HERTZ, "figures 8 and 9")]
+FIGURES_21_22 = [mark(MARKED, "figure 21"), mark(STIFF, "figure 22", charts.BLACK)]
 
 
 def decibels(spectrum: np.ndarray) -> np.ndarray:
