@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import xarray
-from matplotlib.ticker import EngFormatter
 
 from . import _check, accuracy, charts, figures, hammers, maps, threshold
 from .contact import Contact
@@ -250,7 +249,7 @@ def draw(
     log = layer != "n_impacts" and size.size == values.size and size.max() > 5.0 * size.min()
     label = PICTURED.get(layer, layer)
     if "max_frequency" in values.attrs:
-        label += f" up to {EngFormatter(unit='Hz', sep=' ')(values.max_frequency)}"
+        label += f" up to {values.max_frequency:g} Hz"
     chosen: dict[str, Any] = {
         "x": _axis(table, values.dims[1]),
         "y": _axis(table, values.dims[0]),
