@@ -264,12 +264,12 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> R
 
 
 def _check_way(system: _System, depth: float, tolerance: float) -> None:
-    """Raise ValueError where rounding of the way to a contact would spoil the approach, about ``depth`` [m], in it."""
+    """Raise ValueError where rounding of the way to a contact would spoil the approach in it, about ``depth`` [m]."""
     way = float(np.abs(system.offset).max())
     if np.finfo(float).eps * way > tolerance * depth:
         raise ValueError(
-            f"gap must be smaller: beside {way:.3g} m, an approach of {depth:.3g} m is not resolved to {tolerance:g}; "
-            "start nearer"
+            f"gap and constant forces must be smaller: beside {way:.3g} m, an approach of {depth:.3g} m is not "
+            f"resolved to {tolerance:g}; start nearer"
         )
 
 

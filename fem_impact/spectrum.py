@@ -109,11 +109,11 @@ def kept(system: System, n_modes: int | None, max_frequency: float | None, path:
             if str(file["key"]) == key:
                 flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
                 return Spectrum(system, flexibility, *(file[name] for name in names))
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError):
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError, MemoryError):
         pass  # none there, of another kind, or damaged: found anew and written over
     found = solve(system, n_modes, max_frequency)
-    with replacing(path) as temporary:
-        np.savez(temporary, key=key, **{name: getattr(found, name) for name in names})
+    with replacing(path) as temporary, open(temporary, "wb") as file:  # savez adds an ending to a name without one
+        np.savez(file, key=key, **{name: getattr(found, name) for name in names})
     return found
 
 

@@ -10,6 +10,7 @@ from .modal import Modes
 from .spectra import half_sine_spectrum
 
 STEP = 1.01  # [-] ratio of the search from low frequencies: lobes of the pulse's spectrum are far wider
+HARDEST = np.log(1e70)  # [-] of a contact's frequency [rad/s]: none is too hard for a striker as light as that
 SETTLED = 40.0  # [-] frequency over contact frequency beyond which cos**2 is replaced by its mean: 1e-7 of the sum
 
 
@@ -99,7 +100,10 @@ def threshold_frequency(modes: Modes, at: Any, mass: float) -> float | None:
         low -= 1.0
     high = low
     while excess(high) <= 0.0:
-        low, high = high, high + np.log(STEP)
+        if high > HARDEST:
+            return float("inf")
+        # the spectrum of a shorter pulse has all modes in its first lobe and only rises
+        low, high = high, high + np.log(STEP if high < np.log(omega[-1]) else 2.0)
     return float(np.exp(optimize.brentq(excess, low, high, xtol=1e-13)) / (2.0 * np.pi))
 
 
