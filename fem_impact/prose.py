@@ -1,6 +1,7 @@
 """A scene in sentences, and numbers as a person writes them."""
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,10 @@ from .scene import Scene
 
 PREFIX = "fpnµm kMGT"
 NBSP = "\N{NO-BREAK SPACE}"  # keeps a number and its unit on one line
+NUMBER = re.compile(  # with a unit, or with an exponent; others are counts and names, and stay
+    r"(?<![\w.])(\d+(?:\.\d+)?(?:e[+-]?\d+)?) (Hz|s|m|kg|m/\(N s\))(?![\w/])"
+    r"|(?<![\w.])(\d+(?:\.\d+)?e[+-]?\d+)(?![\w.])"
+)
 RAISED = str.maketrans("-.0123456789", "⁻·⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -23,7 +28,8 @@ def si(value: float, unit: str, digits: int = 4) -> str:
         value, unit = 1e-3 * value, "t"
     if not value or not math.isfinite(value):
         return f"{value:g}{NBSP}{unit}".replace("inf", "∞")
-    power = 0 if unit == "kg" else int(np.clip(math.floor(math.log10(abs(value)) / 3.0 + 1e-12), -5, 4))
+    rounded = abs(float(f"{value:.{digits}g}"))  # 0.99996 is 1, not 1000 m
+    power = 0 if unit == "kg" else int(np.clip(math.floor(math.log10(rounded) / 3.0 + 1e-12), -5, 4))
     return f"{value * 10.0 ** (-3 * power):.{digits}g}{NBSP}{PREFIX[power + 5].strip()}{unit}".replace("-", "−")
 
 
@@ -34,6 +40,16 @@ def power(value: float) -> str:
     digits, exponent = f"{value:.1e}".split("e")
     size = f"10{str(int(exponent)).translate(RAISED)}"
     return size if digits == "1.0" else f"{digits.removesuffix('.0')} · {size}"
+
+
+def tidy(text: str) -> str:
+    """A sentence with its numbers as a person writes them: 1.34e+04 Hz becomes 13.4 kHz, 4.5e-03 becomes 4.5 · 10⁻³."""
+
+    def written(found: re.Match) -> str:
+        number, unit, bare = found.groups()
+        return power(float(bare)) if bare else si(float(number), unit)
+
+    return NUMBER.sub(written, text)
 
 
 def place(point: Any) -> str:
@@ -91,7 +107,8 @@ def _single_or_multiple(response: Response, law: Contact) -> str:
     if math.isinf(limit):
         return said + "By the kinetic-energy criterion no contact is too hard to rebound."
     side = "below" if resonance < limit else "above"
+    times = f"{resonance / limit:.2g}" if resonance > 0.01 * limit else power(resonance / limit)
     return said + (
         f"By the kinetic-energy criterion the body stops the striker above {si(limit, 'Hz', 3)}; this blow lies {side} "
-        f"that, at {resonance / limit:.2g} times the threshold."
+        f"that, at {times} times the threshold."
     )

@@ -16,7 +16,7 @@ from scipy.io import wavfile
 
 from . import _check, drawing, export, sound, svg
 from ._files import replacing
-from .prose import place, power, si, words
+from .prose import place, power, si, tidy, words
 from .response import Response
 from .scene import Run, Scene, load_scene, scene_of
 from .tables import PATHS, fault, read_bytes
@@ -100,7 +100,7 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
         tiles=_tiles(response),
         error=_errors(response),
         modelled=_modelled(response, run),
-        reasons=(*run.plan.reasons, *run.notes),
+        reasons=map(tidy, (*run.plan.reasons, *run.notes)),
         impacts=response.impacts,
         energies=_shares(response),
         sounds=_sounds(scene, response),

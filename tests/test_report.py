@@ -150,6 +150,7 @@ def test_beams_and_balls_have_a_page_too(tmp_path):
         (0.0, "N", "0 N"),
         (-2e-7, "m", "−200 nm"),
         (1000.0, "Hz", "1 kHz"),
+        (0.00099998, "N s", "1 mN s"),
         (float("inf"), "Hz", "∞ Hz"),
     ],
 )
@@ -199,6 +200,28 @@ def test_view_turns_with_the_keyboard_and_plays_when_asked(opened):
     tab.locator("#wave-play").press("Enter")
     shown.until(f"document.getElementById('wave-time').value !== '{still}'")
     assert tab.locator("#wave-play").inner_text() == "Pause"
+
+
+def test_paper_is_light_and_shows_the_views(opened):
+    shown = opened(color_scheme="dark")
+    if shown.tab.evaluate("!document.createElement('canvas').getContext('webgl')"):
+        pytest.skip("this browser has no WebGL, so there are no views to print")
+    shown.tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    shown.tab.emulate_media(media="print", color_scheme="dark")
+    shown.until("[...document.querySelectorAll('.view .printed')].filter(i => i.naturalWidth > 100).length === 2")
+    # a view that had been wiped would be of one colour
+    colours = """() => [...document.querySelectorAll('.view .printed')].map(image => {
+        const canvas = document.createElement('canvas');
+        [canvas.width, canvas.height] = [image.naturalWidth, image.naturalHeight];
+        const pen = canvas.getContext('2d');
+        pen.drawImage(image, 0, 0);
+        return new Set(new Uint32Array(pen.getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size;
+    })"""
+    assert min(shown.tab.evaluate(colours)) > 50
+    paper = shown.tab.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert min(map(int, re.findall(r"\d+", paper)[:3])) > 230
+    assert shown.tab.evaluate("getComputedStyle(document.querySelector('nav')).display") == "none"
+    assert shown.errors == []
 
 
 def test_sounds_load(desktop):

@@ -4,6 +4,7 @@
   const $ = (id) => document.getElementById(id);
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   const still = matchMedia("(prefers-reduced-motion: reduce)");
+  const letter = parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;   // who reads large has plots so too
   const config = { responsive: true, displaylogo: false, displayModeBar: false };
 
   const PREFIX = ["f", "p", "n", "µ", "m", "", "k", "M", "G", "T"];
@@ -11,7 +12,7 @@
   // Numbers with SI prefixes.
   const si = (value, unit) => {
     if (!value) return `0 ${unit}`;
-    const power = Math.max(-5, Math.min(4, Math.floor(Math.log10(Math.abs(value)) / 3 + 1e-12)));
+    const power = Math.max(-5, Math.min(4, Math.floor(Math.log10(Math.abs(value.toPrecision(4))) / 3 + 1e-12)));
     return `${+(value / 10 ** (3 * power)).toPrecision(4)} ${PREFIX[power + 5]}${unit}`;
   };
 
@@ -25,7 +26,7 @@
   };
 
   const axis = (title, more) => ({
-    title: { text: title, font: { size: 12 }, standoff: 8 }, automargin: true,
+    title: { text: title, font: { size: 12 * letter }, standoff: 8 }, automargin: true,
     gridcolor: colour("rule"), linecolor: colour("rule"), zeroline: false, ...more,
   });
   // A linear axis counts in the unit that suits its largest value; a logarithmic one writes a prefix at each decade.
@@ -35,16 +36,18 @@
     const scale = 10 ** (-3 * power), name = `${PREFIX[power + 5]}${unit}`;
     return { scale, name, of: (list) => list.map((v) => v * scale), axis: axis(`${title} [${name}]`, more) };
   };
-  const decades = (title, unit, more) => axis(`${title} [${unit}]`, { type: "log", dtick: 1, tickformat: "~s", ...more });
+  const decades = (title, unit, more, values = []) => axis(`${title} [${unit}]`, {
+    type: "log", tickformat: "~s", dtick: values.length && Math.max(...values) < 30 * Math.min(...values) ? "D2" : 1, ...more,
+  });
   const layout = (title, x, y, more) => ({
-    title: { text: title, x: 0, xref: "paper", xanchor: "left", y: 0.985, yanchor: "top", font: { size: 14 } },
-    margin: { l: 60, r: 12, t: 34, b: 48 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-    font: { family: getComputedStyle(document.body).fontFamily, color: colour("ink"), size: 12 },
+    title: { text: title, x: 0, xref: "paper", xanchor: "left", y: 0.985, yanchor: "top", font: { size: 14 * letter } },
+    margin: { l: 60, r: 12, t: 34 * letter, b: 48 * letter }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+    font: { family: getComputedStyle(document.body).fontFamily, color: colour("ink"), size: 12 * letter },
     hoverlabel: { bgcolor: colour("card"), bordercolor: colour("grey"), font: { color: colour("ink") } },
     ...(x && { xaxis: x, yaxis: y }), hovermode: "closest", showlegend: false, dragmode: "zoom", ...more,
   });
-  const line = (x, y, paint, hover, name) => ({
-    type: "scatter", mode: "lines", x, y, name, line: { color: colour(paint), width: 1.8, simplify: false }, hovertemplate: `${hover}<extra></extra>`,
+  const line = (x, y, paint, hover, name, dash) => ({
+    type: "scatter", mode: "lines", x, y, name, line: { color: colour(paint), width: 1.8, simplify: false, dash }, hovertemplate: `${hover}<extra></extra>`,
   });
 
   const flat = {
@@ -73,14 +76,14 @@
     },
     "plot-energy": () => {
       const t = linear("time", "s", data.energy.x), e = linear("energy", "J", data.energy.striker.concat(data.energy.body));
-      const parts = [["striker", "striker", "blue"], ["body", "struck body", "vermilion"], ["rest", "contact, losses", "orange"]];
+      const parts = [["striker", "striker", "blue"], ["body", "struck body", "vermilion"], ["rest", "contact, losses", "orange", "dash"]];
       const x = t.of(data.energy.x);
       return [
-        parts.map(([key, name, paint]) =>
-          line(x, e.of(data.energy[key]), paint, `${name}, %{y:.4g} ${e.name} at %{x:.4g} ${t.name}`, name)),
+        parts.map(([key, name, paint, dash]) =>
+          line(x, e.of(data.energy[key]), paint, `${name}, %{y:.4g} ${e.name} at %{x:.4g} ${t.name}`, name, dash)),
         layout("Energy during the blow", t.axis, e.axis, {
           showlegend: true, legend: { orientation: "h", x: 0, y: -0.22, yanchor: "top", bgcolor: "rgba(0,0,0,0)" },
-          margin: { l: 60, r: 12, t: 34, b: 84 },
+          margin: { l: 60, r: 12, t: 34 * letter, b: 84 * letter },
         }),
       ];
     },
@@ -95,7 +98,7 @@
           },
           hovertemplate: "%{y:.4s}J at %{x:.5s}Hz<extra></extra>",
         }],
-        layout("Energy of each mode after the blow", decades("natural frequency", "Hz"),
+        layout("Energy of each mode after the blow", decades("natural frequency", "Hz", {}, data.modal.x),
           decades("energy", "J", { range: [top - 7, top + 0.4] })),
       ];
     },
@@ -107,7 +110,8 @@
   const side = (values) => Math.max(0.08, (Math.max(...values) - Math.min(...values)) / span);
   const largest = Math.max(...wave.map((row) => row.reduce((most, v) => Math.max(most, Math.abs(v)), 0))) || 1;
   const down = (row) => row.map((v) => -v);   // the blow comes from above
-  const far = matchMedia("(max-width: 30rem)").matches ? 1.35 : 1;   // a narrow view shows less beside the middle
+  // a narrow view shows less beside the middle, and a broad body needs more of it
+  const far = (matchMedia("(max-width: 30rem)").matches ? 1.3 : 1) * (1 + 0.25 * Math.min(side(view.x), side(view.y)));
   const camera = () => ({ eye: { x: 0.75 * far, y: -1.2 * far, z: 0.75 * far }, center: { x: 0, y: 0, z: -0.08 } });
   const surface = (z, limit, unit) => ({  // with a unit, hovering tells the deflection
     type: "mesh3d", x: view.x, y: view.y, z, i: view.cells[0], j: view.cells[1], k: view.cells[2], intensity: z,
@@ -229,5 +233,16 @@
   $("scale-high").textContent = "up " + si(largest, "m");
   setWave(view.first);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  matchMedia("print").addEventListener("change", draw);   // on paper everything is light
+  addEventListener("beforeprint", () => {   // what a view shows is gone by the time it is printed
+    for (const id of Object.keys(solid)) {
+      const plot = $(id)._fullLayout.scene._scene.glplot;
+      plot.redraw();
+      const image = $(id).querySelector(".printed") || $(id).appendChild(new Image());
+      image.className = "printed";
+      image.alt = "";
+      image.src = plot.canvas.toDataURL();
+    }
+  });
   document.documentElement.dataset.ready = "true";
 })();
