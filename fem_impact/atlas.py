@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 import xarray
 
-from . import _check, accuracy, charts, figures, hammers, maps, threshold
+from . import _check, accuracy, charts, figures, hammers, maps, planner, threshold
 from .contact import Contact
-from .planner import SHARE
 from .scene import Scene
 from .tables import MAKERS, Part
 
 FIRST_LOOK = 40  # [-] modes found first, from which those a map needs are estimated
 MOST_MODES = 300  # [-] a hammer is chosen on at most so many; the residual compliance stands for the rest
 FORMATS = ("nc", "zarr")
+FILES = (".nc", ".zarr", ".csv", ".png")  # endings no folder has
 MOST_ROWS = 10**6  # [-] of a CSV file
 PICTURED = {  # layers drawn where there are two axes, and what they are called there
     "n_impacts": "number of impacts",
@@ -68,7 +68,9 @@ def map_scene(
     limit = scene.blow.values.get("tolerance", maps.TOLERANCE) if tolerance is None else tolerance
     limit = _check.between("tolerance", limit, 1e-12, 1.0)
     if not over:
-        raise ValueError(f"{scene.path}: [map] is missing; it names the axes of the map")
+        raise ValueError(
+            f'{scene.path}: [map] is missing; it names the axes, as in over = {{ "striker.mass" = [0.01, 0.1] }}'
+        )
     quick = {name: values for name, values in over.items() if maps.ALIASES.get(name, name) in maps.AXES}
     slow = {name: list(values) for name, values in over.items() if name not in quick}
     for name in slow:
@@ -130,7 +132,13 @@ def _quick_map(
     )
     modes = case.modes
     if needed > modes.frequencies[-1]:
-        modes = scene.modes(number_of_modes(modes, needed))
+        number, most = number_of_modes(modes, needed), planner.MOST_MODES[scene.source]
+        if number > most:
+            raise _check.SimulationError(
+                f"{scene.path}: the briefest blow of the map needs some {number} modes, at most are {most}; allow a "
+                "larger tolerance, or leave out the stiffest contacts and the lightest strikers"
+            )
+        modes = scene.modes(number)
     case = replace(case, modes=modes)
     table = maps.sweep(
         modes, striker, law, at=blow["at"], speed=blow["speed"], over=over, tolerance=tolerance, max_frequency=band,
@@ -153,7 +161,7 @@ def needed_frequency(case: maps.Case, tolerance: float) -> float:
     """Frequency [Hz] up to which a blow needs modes."""
     return accuracy.cutoff_frequency(
         case.modes, case.at, contact=case.contact, mass=case.striker.felt_mass, speed=case.speed,
-        tolerance=SHARE * tolerance,
+        tolerance=planner.SHARE * tolerance,
     )  # fmt: skip
 
 
@@ -295,8 +303,13 @@ def _unit(values: xarray.DataArray) -> str:
     return {"1": "", "kg": "g"}.get(unit, unit.replace(f"**{power}", f"$^{{{power}}}$") if power else unit)
 
 
-def can_write(form: str) -> str:
-    """The format of a map's file, if it can be written here; better known before the work than after it."""
+def can_write(form: str, folder: Path | None = None) -> str:
+    """The format of a map's file, if it can be written there; better known before the work than after it."""
+    if folder is not None and folder.suffix.lower() in FILES:
+        raise ValueError(
+            f"--out names the folder for map.nc, map.csv and pictures, got {folder}; give {folder.with_suffix('')}, "
+            "and --format zarr for map.zarr"
+        )
     if _check.one_of("format", form, FORMATS) == "zarr":
         _check.extra("zarr", "cluster", "format zarr")
     return form

@@ -16,7 +16,7 @@ import textwrap
 import threading
 import time
 import webbrowser
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterator, MutableMapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
@@ -167,13 +167,22 @@ def _printable(text: str) -> str:
 class _Parser(argparse.ArgumentParser):
     """Says in one line what is wrong with a command, and the nearest word that would be right."""
 
+    given: Sequence[str] = ()
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        self.given = sys.argv[1:] if args is None else args
+        return super().parse_known_args(args, namespace)
+
     def error(self, message: str) -> NoReturn:
-        found = re.search(r"(?:invalid choice: '|unrecognized arguments: )([^' ]+)", message)
+        found = re.findall(r"(?:invalid choice: '|unrecognized arguments: )([^' ]+)", message)
         verbs = [action.choices for action in self._actions if isinstance(action.choices, dict)]
         parsers = [self, *(verb for choices in verbs for verb in choices.values())]
         known = [word for each in parsers for action in each._actions for word in action.option_strings]
         known += [word for action in self._actions for word in action.choices or ()]
-        close = difflib.get_close_matches(found[1], known, n=1) if found else []
+        if "required" in message:  # because its name has a slip, perhaps
+            words = [word.partition("=")[0] for word in self.given if word.startswith("--")]
+            found = [word for word in words if word not in known]
+        close = difflib.get_close_matches(found[0], known, n=1) if found else []
         hint = f"did you mean {close[0]}?" if close else f"see {self.prog} --help"
         sys.exit(_complain(f"{message:.300}; {hint}", BAD_INPUT))
 
@@ -219,9 +228,14 @@ def _parser() -> argparse.ArgumentParser:
     chart.add_argument(
         "scene", metavar="SCENE", type=Path, help="a TOML file, such as studies/scenes/drumstick_map.toml"
     )
-    chart.add_argument("--out", metavar="DIR", type=Path, help="where the files go (default: out/NAME-OF-SCENE)")
+    chart.add_argument(
+        "--out", metavar="DIR", type=Path,
+        help="where map.nc, map.csv and, of two axes, a PNG of each layer go (default: out/NAME-OF-SCENE)",
+    )  # fmt: skip
     chart.add_argument("--tolerance", metavar="T", type=float, help="largest error accepted, instead of the scene's")
-    chart.add_argument("--format", choices=("nc", "zarr"), default="nc", help="map.nc or map.zarr (default: nc)")
+    chart.add_argument(
+        "--format", choices=("nc", "zarr"), default="nc", help="of the numbers: map.nc, or map.zarr (default: nc)"
+    )
     chart.add_argument("--workers", metavar="N", type=int, help="threads (default: one for each core)")
     chart.add_argument("--cluster", metavar="ADDRESS", help="strike on the Dask cluster whose scheduler is there")
     chart.add_argument(
@@ -232,12 +246,16 @@ def _parser() -> argparse.ArgumentParser:
     hammer = verbs.add_parser("hammer", help="choose a hammer: bandwidth without a double hit")
     hammer.set_defaults(run=_hammer)
     hammer.add_argument("scene", metavar="SCENE", type=Path, help="a TOML file; its body and strike point are used")
-    hammer.add_argument("--bandwidth", metavar="F", type=float, required=True, help="wanted [Hz]")
+    hammer.add_argument("--bandwidth", metavar="F", type=float, required=True, help="to be reached [Hz]")
     hammer.add_argument(
-        "--drop", metavar="D", type=float, default=10.0, help="of the spectrum there, in dB (default: 10)"
+        "--drop",
+        metavar="D",
+        type=float,
+        default=10.0,
+        help="how far the spectrum may fall till there, dB (default: 10)",
     )
     hammer.add_argument("--masses", metavar="KG", type=float, nargs="+", help="of the hammers (default: 1 g to 1 kg)")
-    hammer.add_argument("--out", metavar="FILE", type=Path, help="write the picture there")
+    hammer.add_argument("--out", metavar="FILE", type=Path, help="write a picture there: .png, .pdf or .svg")
     hammer.add_argument("--json", action="store_true", help="print the numbers as JSON")
 
     report = verbs.add_parser("report", help="strike a scene; write one page that holds everything about the blow")
@@ -401,7 +419,7 @@ def _plan(options: argparse.Namespace) -> None:
 
 def _map(options: argparse.Namespace) -> None:
     began = time.perf_counter()
-    fi.atlas.can_write(options.format)
+    fi.atlas.can_write(options.format, options.out)
     scene = fi.load_scene(options.scene)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:

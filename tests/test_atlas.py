@@ -117,6 +117,34 @@ def test_map_at_the_prompt(tmp_path, capsys):
     assert "[map] is missing" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["map", "drumstick_map.toml", "--out", "map.png"], "--out names the folder for map.nc, map.csv and pictures"),
+        (["map", "marked_linear.toml"], "[map] is missing; it names the axes, as in over = {"),
+        (["hammer", "drumstick_map.toml", "--bandwith", "500"], "did you mean --bandwidth?"),
+        (["hammer", "drumstick_map.toml"], "see fem-impact hammer --help"),
+    ],
+)
+def test_slips_at_the_prompt_are_told_before_the_work(given, message, capsys):
+    verb, name, *rest = given
+    try:
+        status = cli.main([verb, str(SCENES / name), *rest])
+    except SystemExit as left:
+        status = left.code
+    assert status == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_map_that_needs_too_many_modes_says_what_to_leave_out():
+    found = scene_of(
+        {**PIECES["plate"], "contact": {"kind": "linear", "stiffness": 1e5}}, Path("plate.toml"), folder=Path()
+    )
+    over = {"striker.mass": [1e-4, 0.1], "contact.stiffness": [1e3, 1e9]}
+    with pytest.raises(fi.SimulationError, match=r"needs some \d+ modes, at most are 2000; allow a larger tolerance"):
+        atlas.map_scene(found, over=over, tolerance=1e-3)
+
+
 def test_a_chosen_hammer_does_what_was_asked():
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=200)
     light, heavy = hammers.choose(plate, (0.465, 0.3), 500.0, [2e-3, 0.2])

@@ -207,3 +207,48 @@ def test_random_cells_over_four_axes_of_random_scenes(seed):
         assert_allclose(float(cell.restitution), hit.restitution, atol=1.1e-3)  # 1e-3, and 1e-4 of the single blow
         for layer in ("contact_time", "impulse", "peak_force"):
             assert_allclose(float(cell[layer]), getattr(hit, layer), rtol=1.1e-3)
+
+
+STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
+L_SHAPE = [(0.0, 0.0), (0.4, 0.0), (0.4, 0.15), (0.2, 0.15), (0.2, 0.3), (0.0, 0.3)]  # [m]
+BODIES = {  # mesh, section, supports, modes kept, point struck
+    "L-shaped plate": lambda: (fi.mesh.polygon(L_SHAPE), fi.Plate(STEEL, 1.5e-3), "boundary=hinged", 100, (0.1, 0.12)),
+    "free plate": lambda: (fi.mesh.rectangle(0.3, 0.2), fi.Plate(STEEL, 3e-3), "boundary=free", 100, (0.13, 0.08)),
+    "free bar": lambda: (
+        fi.mesh.line(0.35), fi.Beam.rectangular(STEEL, width=0.05, height=0.02), "left=free right=free", 30, (0.11,)
+    ),
+    "cantilever": lambda: (
+        fi.mesh.line(0.35), fi.Beam.rectangular(STEEL, width=0.02, height=0.003), "left=clamped right=free", 30, (0.3,)
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_cells_on_finite_element_modes_are_single_strikes(body, exponent):
+    """From the outline to the map: hammers of 0.1 to 100 g, springs over six decades, chatter among them."""
+    mesh, section, edges, n_modes, at = BODIES[body]()
+    system = fi.assemble(mesh, section, supports=dict(edge.split("=") for edge in edges.split()))
+    modes = fi.find_modes(system, n_modes=n_modes)
+    over = {
+        "mass": np.geomspace(1e-4, 0.5, 9),
+        "stiffness": np.geomspace(1e3, 1e9, 13) * 10.0 ** (4.0 * exponent - 4.0),
+    }
+    law, tolerance = fi.Contact.power(1.0, exponent), 1e-3
+    table = fi.sweep(modes, fi.Striker.rigid(0.01), law, at=at, speed=1.0, over=over, tolerance=tolerance)
+    rng, apart = np.random.default_rng(7), []
+    for place in rng.integers((9, 13), size=(12, 2)):
+        cell = table.isel(dict(zip(over, place)))
+        striker, spring = fi.Striker.rigid(float(cell.mass)), fi.Contact.power(float(cell.stiffness), exponent)
+        if str(cell.failure.values):  # chatter whose digits are lost
+            with pytest.raises(fi.SimulationError, match="the step error stays"):
+                fi.strike(modes, striker, spring, at=at, speed=1.0, tolerance=tolerance)
+            continue
+        hit = fi.strike(modes, striker, spring, at=at, speed=1.0, tolerance=tolerance)
+        assert int(cell.n_impacts) == hit.n_impacts
+        layers = ("contact_time", "peak_force", "impulse")
+        relative = [float(cell[layer]) / getattr(hit, layer) - 1.0 for layer in layers]
+        apart.append(np.abs([float(cell.restitution) - hit.restitution, *relative]).max() / tolerance)
+    assert max(apart) < 2.0  # each within one tolerance of the truth
+    assert np.mean(np.array(apart) < 1.0) > 0.9  # two of 1300 cells were more than one apart, by 1.3
