@@ -9,7 +9,7 @@ N_KERNELS = 6
 LEVELS = 5  # [-] lengths of a look ahead in flight: 1, 2, 4, 8 and 16 steps
 SPLITS = 2  # [-] halvings of a step in flight where the whole leaves a doubt
 DONE, DOUBTFUL, AWKWARD, LONG = 0, 1, 2, 3  # how a blow ended: proved apart; with something that the steps may have
-# missed; with no contact at all after the first step; longer than the kernel
+# missed; in a way not followed here; longer than the kernel
 SETTLED = 1e-12  # [-] of the approach: change at which the unknown of a step has converged
 SOLVES = 30  # [-] iterations of one step at most
 SAMPLES = 6.0  # [-] of the force per period of a spectrum's highest frequency: the rule errs by (2 pi / 6)**4 / 720
@@ -17,6 +17,8 @@ PARTS = 2.0  # [-] and per step, at least
 LOOKS = 8  # [-] parts of a look ahead judged apart where the whole leaves a doubt
 PIECES = 3  # [-] of the step in which a contact opens, integrated by themselves: order 4
 FEWEST = 1.0  # [-] steps of a contact at least; briefer ones are looked at closer
+LETTING_GO = 0.9  # [-] loss times rate of parting from which a blow is left to the modal engine: at 1 it stops pushing
+TINY = 1e-15  # [-] curvature of a straight line
 DIP = 0.2  # [-] of the lesser approach at a step's ends: one that dips lower in between is looked at closer
 
 
@@ -140,18 +142,22 @@ def spring(d, k, a, c):
 
 
 @njit(cache=True, error_model="numpy")
-def constant_force(d0, x0, f0, v0, e, b, k, a, c):
-    """Scheme A: end approach y and force G(d0, y) >= 0 with y = e - b G; the root is unique and bracketed."""
+def constant_force(d0, x0, f0, v0, e, b, k, a, c, loss):
+    """Scheme A: end approach y and force F >= 0 with y = e - b F; the root is unique and bracketed.
+
+    ``loss`` is the Hunt-Crossley factor over the step [1/m]; F = G(d0, y) + loss (V(y) - V(d0)), never below zero.
+    """
     x, f1, v1 = spring(e, k, a, c)
     g, _ = slopes(d0, x0, f0, v0, e, x, f1, v1, k, a, c)
     high = e
-    low = e - b * g
+    low = e - b * max(0.0, g + loss * (v1 - v0))
     y = high
     f = 0.0
     for _ in range(200):
         y = 0.5 * (low + high)
         x, f1, v1 = spring(y, k, a, c)
-        f, _ = slopes(d0, x0, f0, v0, y, x, f1, v1, k, a, c)
+        g, _ = slopes(d0, x0, f0, v0, y, x, f1, v1, k, a, c)
+        f = max(0.0, g + loss * (v1 - v0))
         if y - e + b * f > 0.0:
             high = y
         else:
@@ -162,13 +168,13 @@ def constant_force(d0, x0, f0, v0, e, b, k, a, c):
 
 
 @njit(cache=True, error_model="numpy")
-def press(guess, d0, x0, f0, v0, e, ea, own, k, a, c):
+def press(guess, h, d0, x0, f0, v0, rate0, e, ea, vf, own, k, a, c, loss):
     """One step of scheme A4, or of scheme A where that has no solution: end approach, mean force and its slope.
 
     ``own`` holds what the step's own force does to it: end, mean and rate for a constant force and for a ramp; the
     iteration starts from the compression ``guess``.
     """
-    b0, c0, b1, c1, _, _ = own
+    b0, c0, b1, c1, b2, c2 = own
     scale = max(abs(e), abs(d0))
     x = guess if guess > -scale else 0.5 * e
     old_x = 0.0
@@ -184,11 +190,20 @@ def press(guess, d0, x0, f0, v0, e, ea, own, k, a, c):
             y = x
             v1 = 0.0
         g, d = slopes(d0, x0, f0, v0, y, x, f1, v1, k, a, c)
+        right = g + d * (ea - 0.5 * (d0 + y))
         s = f1 - f0
-        f = (g + d * (ea - c1 * s - 0.5 * (d0 + y))) / (1.0 + d * b1)
+        if loss == 0.0:
+            f = (right - d * c1 * s) / (1.0 + d * b1)
+        else:  # mean and slope of the loss depend on the force's own: two equations
+            right += loss * (v1 - v0) / h
+            top = s + loss * (f1 * vf - f0 * rate0)
+            part = loss * f1
+            f = (right * (1.0 + part * c2) - d * c1 * top) / ((1.0 + d * b1) * (1.0 + part * c2) - d * c1 * part * b2)
+            s = (top - part * b2 * f) / (1.0 + part * c2)
         r = y - e + b0 * f + c0 * s
         if settled or r == 0.0:
-            if f >= 0.0:
+            lost = f * (y - d0) + s * (0.5 * (d0 + y) - (ea - b1 * f - c1 * s)) - (v1 - v0)
+            if f >= 0.0 and (loss == 0.0 or lost >= 0.0):
                 return y, f, s
             break
         rate = 1.0 + 0.5 * b0 * d if iteration == 0 else (r - old_r) / (x - old_x)
@@ -201,7 +216,7 @@ def press(guess, d0, x0, f0, v0, e, ea, own, k, a, c):
         if not abs(step) < 1e3 * scale:
             break
         settled = abs(step) <= SETTLED * scale or x == old_x
-    y, f = constant_force(d0, x0, f0, v0, e, b0, k, a, c)
+    y, f = constant_force(d0, x0, f0, v0, e, b0, k, a, c, loss / h)
     return y, f, 0.0
 
 
@@ -245,12 +260,12 @@ def turning(d0, v0, d1, v1):
 
 
 @njit(cache=True, error_model="numpy")
-def opening(d0, e, ea, own, k, a, c):
+def opening(d0, e, ea, own, k, a, c, loss):
     """Part of a step after which a pressed contact opens, and the approach's change per step at that moment.
 
     The step's own force is integrated against the law, not held to one slope: the struck surface answers at once, so
     that the way the force ends sets the moment to second order. Free motion and kernel within the step are parabolas
-    but for the fastest modes, whose static compliance joins that of the contact.
+    but for the fastest modes, whose static compliance joins that of the contact. ``loss`` is over the step [1/m].
     """
     swift = own[0] + 12.0 * own[3]
     c += swift
@@ -273,8 +288,10 @@ def opening(d0, e, ea, own, k, a, c):
         for stage in range(4):
             part = 0.0 if stage == 0 else dt if stage == 3 else 0.5 * dt
             pushed = impulse + part * f
-            f = spring(d + part * rate, k, a, c)[1]
-            rate = first + 2.0 * second * (piece * dt + part) - fast * f - 2.0 * slow * pushed
+            elastic = spring(d + part * rate, k, a, c)[1]
+            free = first + 2.0 * second * (piece * dt + part) - 2.0 * slow * pushed
+            f = elastic * (1.0 + loss * free) / (1.0 + fast * elastic * loss)
+            rate = free - fast * f
             if stage == 0:
                 rate0 = rate
             weight = dt / 6.0 if stage in (0, 3) else dt / 3.0
@@ -447,7 +464,7 @@ def straight_spectrum(step, time, length, first, last, out_spectrum):
 
 
 @njit(cache=True, error_model="numpy")
-def centroid(contacts, n_contacts, n_steps, h, ends, rates, k, a, c, limit):
+def centroid(contacts, n_contacts, n_steps, h, ends, rates, k, a, c, loss, limit):
     """Mean frequency of the magnitude of the force spectrum from zero to ``limit``.
 
     Trapezoidal sums over each contact, with the Euler-Maclaurin term for a force that starts with a slope. Approaches
@@ -467,8 +484,8 @@ def centroid(contacts, n_contacts, n_steps, h, ends, rates, k, a, c, limit):
         for i in range(1, count):
             t = (start + i * dt) / h
             j = min(int(t), n_steps - 1)
-            d, _ = cubic(ends[j], h * rates[j], ends[j + 1], h * rates[j + 1], t - j)
-            f = spring(d, k, a, c)[1]
+            d, rate = cubic(ends[j], h * rates[j], ends[j + 1], h * rates[j + 1], t - j)
+            f = spring(d, k, a, c)[1] * (1.0 + loss * rate / h)
             if f > 0.0:
                 add_wave(f * dt, start + i * dt, step, real, imag)
                 if i == 1:
@@ -527,6 +544,20 @@ def cleared(d0, v0, d1, v1, h, n, jumps, bends, slack, later, bounds, shares, se
     return False
 
 
+@njit(cache=True, error_model="numpy")
+def lossy_peak(d0, v0, d1, v1, k, a, c, loss):
+    """Largest force on the cubic through both ends of a step, its slopes and the loss factor over the step's length."""
+    values = np.empty(LOOKS + 1)
+    for look in range(LOOKS + 1):
+        d, rate = cubic(d0, v0, d1, v1, look / LOOKS)
+        values[look] = spring(d, k, a, c)[1] * (1.0 + loss * rate)
+    best = int(np.argmax(values))
+    if best in (0, LOOKS):
+        return values[best]
+    left, right = values[best - 1], values[best + 1]
+    return values[best] - 0.125 * (left - right) ** 2 / min(left - 2.0 * values[best] + right, -TINY * values[best])
+
+
 @njit(cache=True, error_model="numpy", nogil=True)
 def run(
     cells, h, target, striker, target_bounds, striker_bounds, target_later, striker_later,
@@ -539,11 +570,11 @@ def run(
     `parted` for looks of 1/4, 1/2, 1, 2, 4, ... steps; target_later, striker_later (2**SPLITS - 1, 4, n_steps): the
     kernels 1/4, 2/4, ... of a step later, or empty, where a doubt in flight ends a blow as if it were too long;
     certify: whether flights are to be proved free of touches, or only sampled; shares (2, n_cells) [-] of both
-    kernels; law (3, n_cells): stiffness, exponent, compliance in series; rigid (n_cells,) [1/kg] squared shapes of all
-    rigid motions; static (n_cells,) [m/N] static compliance of all flexible ones; slack (n_cells,): part of the deepest
-    approach that a touch or a gap must exceed to be sure; band: of the centroid, 0 for none. out (9, n_cells): impacts,
-    time in contact, impulse, peak force, centroid, how it ended, how far the peak was mended (relative), steps needed,
-    and the relative change of the time in contact per relative change of the approach.
+    kernels; law (4, n_cells): stiffness, exponent, compliance in series, loss factor; rigid (n_cells,) [1/kg] squared
+    shapes of all rigid motions; static (n_cells,) [m/N] static compliance of all flexible ones; slack (n_cells,): part
+    of the deepest approach that a touch or a gap must exceed to be sure; band: of the centroid, 0 for none.
+    out (9, n_cells): impacts, time in contact, impulse, peak force, centroid, how it ended, how far the peak was mended
+    (relative), steps needed, and the relative change of the time in contact per relative change of the approach.
     """
     n_steps = target.shape[1]
     per_step = 1.0 / h
@@ -557,7 +588,7 @@ def run(
     segments = np.zeros((n_steps + 1, 2), np.int64)
     contacts = np.zeros((n_steps + 1, 2))
     for cell in cells:
-        k, a, c = law[0, cell], law[1, cell], law[2, cell]
+        k, a, c, loss = law[0, cell], law[1, cell], law[2, cell], law[3, cell]
         share, mine = shares[0, cell], shares[1, cell]
         known = min(32, n_steps)
         combine(target[:, :known], striker[:, :known], share, mine, 0, rows[:, n_steps - known :])
@@ -570,6 +601,7 @@ def run(
         end_once, end_ramp_once, mean_once = rows[END, once], rows[END_RAMP, once], rows[MEAN, once]
         mean_ramp_once, rate_once, rate_ramp_once = rows[MEAN_RAMP, once], rows[RATE, once], rows[RATE_RAMP, once]
         end_ahead = mean_ahead = rate_ahead = f = s = 0.0
+        straight = a == 1.0 and loss == 0.0
         kk = k / (1.0 + k * c)  # a linear contact pressed all along: everything is straight in the end approach y
         lever = kk / (1.0 + kk * own[2])
         turn = lever * own[3] * kk
@@ -581,7 +613,7 @@ def run(
         ends[0] = 0.0
         rates[0] = 1.0
         pressed = True
-        began = touched = impulse = moment = deepest = mended = 0.0
+        began = touched = impulse = moment = deepest = mended = peak = 0.0
         jumps = bends = held = sloped = 0.0
         high = low = swing = 0.0  # farthest approaches of this contact and gap; sum of 1 / rate at their ends
         margin = needed = 0.0
@@ -665,7 +697,7 @@ def run(
             ea = (n + 0.5) * h - mean
             y = -1.0
             x1 = f1 = v1 = 0.0
-            if a == 1.0 and d0 >= 0.0:
+            if straight and d0 >= 0.0:
                 top = lever * (ea + own[3] * kk * d0)
                 y = over * (e - own[0] * top + own[1] * kk * d0)
                 f = top - turn * y
@@ -674,7 +706,8 @@ def run(
                 x1 = y - c * f1
                 v1 = 0.5 * f1 * y
             if y <= 0.0 or f < 0.0:
-                y, f, s = press(x0 + rate * h if d0 > 0.0 else 0.5 * e, d0, x0, f0, v0, e, ea, own, k, a, c)
+                guess = x0 + rate * h if d0 > 0.0 else 0.5 * e
+                y, f, s = press(guess, h, d0, x0, f0, v0, rate, e, ea, vf, own, k, a, c, loss)
                 x1, f1, v1 = spring(y, k, a, c)
             rate1 = vf - own[4] * f - own[5] * s
             force[n] = f
@@ -695,7 +728,8 @@ def run(
             d, r = ends[n], rates[n]
             missed = 0.0  # by the straight force of the scheme at the step's end
             if y > 0.0:
-                missed = (f1 - f - 0.5 * s) * (stiff if a == 1.0 else 1.0 / (1.0 + f1 * a / y * swift))
+                missed = f1 * (1.0 + loss * rate1) - f - 0.5 * s
+                missed *= stiff if straight else 1.0 / (1.0 + f1 * (a / y * swift + loss * swift_rate))
             ends[n + 1] = y - missed * swift
             rates[n + 1] = rate1 - missed * swift_rate
             if ends[n + 1] > deepest:
@@ -705,9 +739,17 @@ def run(
             if r > 0.0 and rates[n + 1] < 0.0:
                 high = max(high, turning(d, r * h, ends[n + 1], rates[n + 1] * h))
                 deepest = max(deepest, high)
+            if loss > 0.0:
+                top = lossy_peak(d, r * h, ends[n + 1], rates[n + 1] * h, k, a, c, loss / h)
+                if top > peak:
+                    peak = top
+                    mended = abs(missed) / peak
+                if loss * rates[n + 1] < -LETTING_GO:
+                    status = AWKWARD
+                    break
             margin = slack[cell] * deepest
             if y <= 0.0:
-                part, speed = opening(d, e, ea, own, k, a, c)
+                part, speed = opening(d, e, ea, own, k, a, c, loss / h)
                 now = (n + part) * h
                 if now - began < FEWEST * h or high < margin:
                     ending = DOUBTFUL
@@ -729,11 +771,11 @@ def run(
         out[0, cell] = count
         out[1, cell] = touched
         out[2, cell] = impulse
-        out[3, cell] = spring(deepest, k, a, c)[1]
+        out[3, cell] = peak if loss > 0.0 else spring(deepest, k, a, c)[1]
         out[4, cell] = 0.0
         out[5, cell] = status
         out[6, cell] = mended
         out[7, cell] = n if status == LONG else needed
         out[8, cell] = deepest * swing / touched if touched > 0.0 else np.inf
         if band > 0.0 and status in (DONE, DOUBTFUL):
-            out[4, cell] = centroid(contacts, count, n, h, ends, rates, k, a, c, band)
+            out[4, cell] = centroid(contacts, count, n, h, ends, rates, k, a, c, loss, band)

@@ -11,6 +11,7 @@ import numpy as np
 from scipy import special
 
 from . import _batch, _kernels
+from .integrator import RESOLVED, REST_ABOVE
 from .modal import Modes
 from .striker import Striker
 
@@ -21,6 +22,9 @@ ORDER = 2.0  # [-] assumed of the difference between two runs in the step; 3 and
 ALLOWED = 0.5  # [-] of the tolerance: error estimated so
 MILD = 8.0  # [-] times that, of an error for which 1/sqrt(2) of the step will do instead of 1/2
 MENDED = 3.0  # [-] error of the peak over how far it was mended: up to that was measured
+HEARD = (
+    3.0  # [-] times the tolerance: share of the force that unresolved ringing may have, of which the rules miss a part
+)
 YIELD = 0.02  # [-] error of the peak over that part of the indentation by which badly sampled top modes yield: measured
 ALIAS = (4.0, 8.0)  # [-] omega times step at which they are badly sampled; beyond, they follow the force statically
 LENGTHS = (48, 192, 768, 3072)  # [-] steps a blow may take, tried in turn
@@ -40,14 +44,20 @@ class Family:
     rest: tuple[float, float]  # [kg m/N] residual compliance times the body's mass
 
     @classmethod
-    def of(cls, modes: Modes, at: np.ndarray, striker: Striker, residual: bool) -> "Family":
-        """The family of a blow."""
+    def of(cls, modes: Modes, at: np.ndarray, striker: Striker, residual: bool, lossy: bool = False) -> "Family":
+        """The family of a blow; where its contact has loss, a residual compliance is one mode more, as in `strike`."""
         parts = []
         for body, point in ((modes, at), (striker.modes, striker.at)):
             place = point[None] if body.dimension else None
             rest = float(body.residual_compliance(place)[0, 0]) if residual and body.dimension else 0.0
+            rest = max(0.0, rest) * body.mass
+            omega, zeta = np.array(body.omega), np.array(body.damping_ratio)
             squared = body.shape_at(place)[0] ** 2 * body.mass
-            parts.append((np.array(body.omega), np.array(body.damping_ratio), squared, max(0.0, rest) * body.mass))
+            if lossy and rest > 0.0:
+                above = REST_ABOVE[min(body.dimension, 2)] * omega[-1]
+                omega, zeta = np.append(omega, above), np.append(zeta, zeta[-1])
+                squared, rest = np.append(squared, rest * above**2), 0.0
+            parts.append((omega, zeta, squared, rest))
         return cls(*zip(*parts))
 
     def rigid(self, body: int) -> float:
@@ -67,6 +77,13 @@ class Family:
         """Static compliance of the modes in the upper half of the band, times the mass [kg m/N]."""
         high = (self.omega[body] > 0.0) & (self.omega[body] > 0.5 * self.edge(body))
         return float((self.squared[body][high] / self.omega[body][high] ** 2).sum())
+
+    def heard(self, body: int, compliance: np.ndarray) -> np.ndarray:
+        """Lowest frequency [rad/s] such that the modes from there on yield no more than some compliances; 0 for all."""
+        omega = np.sort(self.omega[body][self.omega[body] > 0.0])[::-1]
+        squared = self.squared[body][self.omega[body] > 0.0][np.argsort(-self.omega[body][self.omega[body] > 0.0])]
+        above = np.cumsum(squared / omega**2)
+        return np.append(omega, 0.0)[np.searchsorted(above, compliance)]
 
     def kernels(self, h: float, n_steps: int) -> tuple[np.ndarray, ...]:
         """Kernels of both bodies at unit mass, (6, n_steps) each, and what bounds their motion in flight."""
@@ -150,6 +167,7 @@ class Blows:
     stiffness: np.ndarray  # [N/m**exponent]
     exponent: np.ndarray  # [-]
     speed: np.ndarray  # [m/s]
+    loss: np.ndarray  # [s/m]
 
     @property
     def n_cases(self) -> int:
@@ -275,7 +293,7 @@ class _Engine:
             rest.sum(axis=0),
         )
         stiffness = blows.stiffness * blows.speed ** (blows.exponent - 1.0)
-        self.law = np.array([stiffness, blows.exponent, rest])
+        self.law = np.array([stiffness, blows.exponent, rest, blows.loss * blows.speed])
 
     def of_family(self, number: Callable[[Family, int], float], body: int) -> np.ndarray:
         """A number of one of the bodies of each blow's family, (n_cases,)."""
@@ -285,9 +303,10 @@ class _Engine:
         """Step of each blow as half-octaves: h = 2**(-step / 2), at least STEPS per contact with a rigid wall.
 
         A step close to the period of a body's highest modes samples them so that two runs may agree on a wrong peak;
-        where these modes yield enough to matter, the step is shorter.
+        where these modes yield enough to matter, the step is shorter. So it is where modes ring in the force of a
+        contact with loss, which hangs on the rate of approach.
         """
-        stiffness, exponent, rest = self.law
+        stiffness, exponent, rest, loss = self.law
         q = 1.0 / (exponent + 1.0)
         deepest = np.exp(q * np.log(0.5 / (q * stiffness * self.rigid)))
         duration = 2.0 * np.sqrt(np.pi) * special.gamma(1.0 + q) / special.gamma(0.5 + q) * deepest
@@ -301,6 +320,16 @@ class _Engine:
                 (YIELD * yields * self.shares[body] * stiffness > tolerance) & (angle > ALIAS[0]) & (angle < ALIAS[1])
             )
             step[blind] += np.ceil(2.0 * np.log2(angle[blind] / ALIAS[0])).astype(int)
+            if loss.any():
+                rung = loss * (np.pi / duration) ** 2 / self.rigid * self.shares[body]  # times compliance: of the force
+                heard = np.zeros(len(step))
+                for i, key in enumerate(self.keys):
+                    cells = (self.which == i) & (loss > 0.0)
+                    heard[cells] = self.blows.families[int(key)].heard(body, HEARD * tolerance / rung[cells])
+                ringing = heard > 0.0
+                step[ringing] = np.maximum(
+                    step[ringing], np.ceil(2.0 * np.log2(2.0 * heard[ringing] / RESOLVED)).astype(int)
+                )
         return step
 
     def run(

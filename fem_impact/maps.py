@@ -218,8 +218,8 @@ def sweep(
         Adds the layer ``centroid``, the spectral centroid from zero to this frequency, which the layer states. There is
         none without: the mean frequency of a pulse grows with the end of its band beyond all limits.
     layers : mapping of name to function of a Response, optional
-        More scalars to keep, in threads. Every cell is then struck one by one, as are cells with loss or an exponent
-        below 1: some hundred times slower than the others, see ``studies/map_speed.py``.
+        More scalars to keep, in threads. Every cell is then struck one by one, as are cells with an exponent below
+        1: some hundred times slower than the others, see ``studies/map_speed.py``.
     residual : bool
         As in `strike`.
     workers : int, optional
@@ -257,7 +257,7 @@ def sweep(
     if not isinstance(layers, Mapping) or not all(isinstance(name, str) and callable(layers[name]) for name in layers):
         raise ValueError(f"layers must map names to functions of a Response, got {_check.shown(layers)}")
     grid = Grid(base, checked_axes(base, over), tolerance, residual, band, dict(layers))
-    admit(grid.n_cases, len(grid.layers), max_cells, quick=not grid.extra and not grid.lossy, tell=tell)
+    admit(grid.n_cases, len(grid.layers), max_cells, quick=not grid.extra, tell=tell)
     fewer = grid.without_speed()
     numbers, texts = _solve_all(fewer or grid, workers, client, store, watch)
     failures = np.full((fewer or grid).n_cases, "", dtype=f"<U{max(map(len, texts.values()), default=1)}")
@@ -335,22 +335,23 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
             ("gap", law.gap),
         )
     }
-    quick = (column["exponent"] >= 1.0) & (column["loss"] == 0.0) & (column["gap"] >= 0.0) & (not grid.extra)
+    quick = (column["exponent"] >= 1.0) & (column["gap"] >= 0.0) & (not grid.extra)
     cells = np.flatnonzero(quick)
     if cells.size:
         kind = np.zeros(stop - start, int)
         for name in FAMILY_AXES:
             if name in place:
                 kind = kind * len(grid.axes[name]) + place[name]
+        kind = 2 * kind + (column["loss"] > 0.0)
         kinds, first, family = np.unique(kind[cells], return_index=True, return_inverse=True)
         families = {}
         for which, i in zip(kinds, cells[first]):
             case = grid.case(start + i)
-            families[int(which)] = bounces.Family.of(case.modes, case.at, case.striker, grid.residual)
+            families[int(which)] = bounces.Family.of(case.modes, case.at, case.striker, grid.residual, bool(which % 2))
         blows = bounces.Blows(
             families,
             kinds[family],
-            *(column[name][cells] for name in ("target_mass", "mass", "stiffness", "exponent", "speed")),
+            *(column[name][cells] for name in ("target_mass", "mass", "stiffness", "exponent", "speed", "loss")),
         )
         found = bounces.bounce(
             blows, tolerance=grid.tolerance, band=grid.band or 0.0, workers=workers, kernels=grid.kernels

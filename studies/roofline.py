@@ -119,7 +119,7 @@ def batch_time(n_blows: int) -> float:
     spread = 10.0 ** np.random.default_rng(3).uniform(-0.5, 0.5, (3, n_blows))
     one = np.ones(n_blows)
     blows = bounces.Blows(
-        {0: family}, np.zeros(n_blows, int), 2.0 * spread[0], 0.02 * spread[1], 1e5 * spread[2], one, one
+        {0: family}, np.zeros(n_blows, int), 2.0 * spread[0], 0.02 * spread[1], 1e5 * spread[2], one, one, 0.0 * one
     )
     return best(lambda: bounces.bounce(blows, tolerance=1e-3, workers=1), 5)
 

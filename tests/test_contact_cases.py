@@ -262,7 +262,7 @@ def test_kernel_form_is_the_modal_form(exponent, n_steps, damping_ratio):
     _batch.run(
         np.zeros(1, int), h, *family.kernels(h, 512), *family.later(h, 512), True,
         np.array([column / 2.0, column / mass]),
-        np.array([column * stiffness, column * exponent, 0.0 * column]), column / mass,
+        np.array([column * stiffness, column * exponent, 0.0 * column, 0.0 * column]), column / mass,
         column * family.static(0) / 2.0, 0.0 * column, 0.0, out,
     )  # fmt: skip
     assert out[5, 0] == _batch.DONE
@@ -278,7 +278,7 @@ def many(n_cases, seed=3, mass=2.0):
     return bounces.Blows(
         {0: bounces.Family.of(plate, np.array([0.465, 0.3]), stick, True)}, np.zeros(n_cases, int),
         mass * 10.0 ** rng.uniform(-0.5, 0.5, n_cases), 0.1 * 10.0 ** rng.uniform(-0.5, 0.5, n_cases),
-        10.0 ** rng.uniform(4.0, 6.0, n_cases), np.ones(n_cases), np.ones(n_cases),
+        10.0 ** rng.uniform(4.0, 6.0, n_cases), np.ones(n_cases), np.ones(n_cases), np.zeros(n_cases),
     )  # fmt: skip
 
 
@@ -287,7 +287,7 @@ def chosen(blows, cells):
     return bounces.Blows(blows.families, *(np.array(getattr(blows, name)[cells]) for name in COLUMNS))
 
 
-COLUMNS = ("family", "target_mass", "striker_mass", "stiffness", "exponent", "speed")
+COLUMNS = ("family", "target_mass", "striker_mass", "stiffness", "exponent", "speed", "loss")
 RESULTS = ("n_impacts", "contact_time", "restitution", "impulse", "peak_force", "error", "done")
 
 

@@ -15,7 +15,7 @@ import fem_impact
 from fem_impact import _files
 
 ENDS = {signal.SIGINT: (130, -2), signal.SIGTERM: (143, -15)}  # ours, and Python's own before and after our part
-OVER = 'over = { "striker.mass" = { from = 0.01, to = 0.1, count = 8 }, "contact.loss" = [0.0, 0.01] }'
+OVER = 'over = { "striker.mass" = { from = 0.01, to = 0.1, count = 8 }, "contact.exponent" = [0.9, 1.0] }'
 SCENE = QUICK.replace('over = { "striker.mass" = [0.03, 0.05] }', OVER)
 COMMANDS = {  # words, and what is there when they are done
     "strike": ("strike scene.toml --out out", ["force.csv", "force.png", "modes", "modes.pvd", "response.json"]),
