@@ -105,7 +105,7 @@ def main():
     lossy = {"mass": np.linspace(10e-3, 200e-3, 20), "loss": np.linspace(0.01, 0.2, 20)}
     shared = {"at": source.AT, "speed": 1.0, "over": lossy, "tolerance": 1e-3}
     seconds = best(2, lambda: fi.sweep(plates["2 kg"], STICK, fi.Contact.linear(88.6e3), **shared))
-    print(f"with loss, cell by cell: {1e6 * seconds / 400:.0f} us each of 400")
+    print(f"with loss: {1e6 * seconds / 400:.0f} us each of 400")
     for n_modes in (30, 300, 3000):
         seconds = best(2, grid, source.plate(2.0, n_modes=n_modes), 300)
         print(f"{n_modes} modes: {1e6 * seconds / 9e4:.2f} us each of 90 000")
