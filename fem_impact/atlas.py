@@ -284,7 +284,11 @@ def _contours(table: xarray.Dataset, values: xarray.DataArray) -> list[Any]:
 
 def _axis(table: xarray.Dataset, name: Any) -> charts.Axis:
     """An axis as its coordinate asks to be drawn: logarithmic where its values are spaced so."""
-    place = table[name] if name in table.coords else xarray.DataArray(np.arange(table.sizes[name]))
+    if name not in table.coords:  # points of a plate, which no one number names
+        parts = [table[f"{name}_{letter}"].values for letter in "xyz" if f"{name}_{letter}" in table.coords]
+        names = [f"({', '.join(f'{x:.3g}' for x in point)})" for point in zip(*parts)]
+        return charts.Axis("point struck [m]", names=tuple(names or map(str, range(table.sizes[name]))))
+    place = table[name]
     values = np.asarray(place, float)
     steps = np.diff(np.log(values)) if (values > 0.0).all() else np.zeros(0)
     log = len(steps) > 1 and np.allclose(steps, steps[0], rtol=1e-3)

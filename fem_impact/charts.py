@@ -19,6 +19,7 @@ from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, _styled
 BLACK, GREY = "#222222", "#777777"
 PALETTE = "cividis"  # even in lightness and for every colour vision
 FINER = 8  # [-] parts of a pixel between which contours are straight
+MOST_NAMES = 5  # [-] shown along an axis
 FEW = 10  # [-] whole numbers that get a colour each
 HALO = withStroke(linewidth=2.2, foreground=BLACK)  # behind white lines, which bright colours would swallow
 RIM = withStroke(linewidth=4.0, foreground="white")  # behind circles, on dark colours
@@ -34,6 +35,7 @@ class Axis:
     unit: str = ""
     log: bool = False
     limits: tuple[float | None, float | None] = (None, None)
+    names: tuple[str, ...] = ()  # of the values 0, 1, 2 ..., instead of numbers
 
     def apply(self, axes: Any, which: str) -> None:
         """Set label, scale, limits and ticks of matplotlib axes along 'x' or 'y'."""
@@ -47,6 +49,9 @@ class Axis:
             axis.set_major_formatter(EngFormatter(unit=self.unit, sep=" "))
         elif self.log:
             axis.set_major_formatter("{x:g}")
+        if self.names:
+            axis.set_major_locator(MaxNLocator(MOST_NAMES, integer=True))
+            axis.set_major_formatter(lambda x, _: self.names[int(x)] if x in range(len(self.names)) else "")
         getattr(axes, setter["limits"])(*self.limits)
 
 
@@ -134,7 +139,7 @@ def colour_map(
     high = float(field.max()) if high is None and field.count() else high
     norm: Any = LogNorm(low, high) if colour.log else Normalize(low, high)
     whole = field.count() and bool((field == field.round()).all()) and not colour.unit and not colour.log
-    few = whole and low is not None and high is not None and 0.0 < high - low < FEW
+    few = whole and low is not None and high is not None and high - low < FEW
     numbers = [float(n) for n in range(int(low or 0), int(high or 0) + 1)] if few else []
     if few:  # one colour for each number
         norm = BoundaryNorm([number - 0.5 for number in [*numbers, numbers[-1] + 1.0]], colormaps[PALETTE].N)
@@ -142,6 +147,9 @@ def colour_map(
         axes = figure.subplots()
         axes.grid(False)
         edges = _edges(along_x, x.log), _edges(along_y, y.log)
+        x.apply(axes, "x")  # scales first: numbers on contours are placed as the lines run on the page
+        y.apply(axes, "y")
+        axes.set(xlim=(edges[0][0], edges[0][-1]), ylim=(edges[1][0], edges[1][-1]))
         image = axes.pcolormesh(*edges, field, norm=norm, cmap=PALETTE, rasterized=True)
         handles: list[Any] = []
         for mask, paint, name in shades:
@@ -162,9 +170,6 @@ def colour_map(
             axes.plot([mark.x], [mark.y], clip_on=False, **ring)
             handles.append(Line2D([], [], label=mark.label, **ring))
         axes.set_title(title)
-        x.apply(axes, "x")
-        y.apply(axes, "y")
-        axes.set(xlim=(edges[0][0], edges[0][-1]), ylim=(edges[1][0], edges[1][-1]))
         bar = figure.colorbar(image, ax=axes, label=colour.label, pad=0.02)
         if colour.log:
             bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

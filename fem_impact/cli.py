@@ -456,12 +456,15 @@ def _hammer(options: argparse.Namespace) -> None:
         return
     print(_wrapped(scene.title or str(scene.path)))
     print(_wrapped(f"Tips that reach {options.bandwidth:g} Hz (spectrum {options.drop:g} dB down) and hit once:"))
-    print(f"{'mass':>9} {'softest tip':>14} {'hardest tip':>14} {'reach':>11}")
+    print(f"{'mass':>9} {'softest tip':>14} {'hardest tip':>14} {'its reach':>11}")
     for hammer in hammers:
         soft = f"{hammer.softest:10.3g} N/m" if hammer.softest else "none"
         hard = f"{hammer.hardest:10.3g} N/m" if hammer.hardest else "none"
         reach = f"{hammer.reach:8.4g} Hz" if hammer.reach else "-"
         print(f"{1e3 * hammer.mass:7.4g} g {soft:>14} {hard:>14} {reach:>11}")
+    idle = ", ".join(f"{1e3 * hammer.mass:.4g} g" for hammer in hammers if not hammer.works)
+    if idle:
+        print(_wrapped(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; lighter hammers may"))
     if options.out is not None:
         print(_wrapped(f"Files: {options.out}"))
 

@@ -1,4 +1,4 @@
-"""Beyond the source: an impact-hammer test of the plate of 200 g; which masses and tips reach 500 Hz hitting once."""
+"""Beyond the source: in an impact-hammer test of the plate of 200 g hammers of up to 20 g reach 500 Hz hitting once."""
 
 import numpy as np
 import source_scenes as source

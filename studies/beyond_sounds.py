@@ -1,4 +1,4 @@
-"""Beyond the source: how the plate of 200 g sounds under soft and hard, light and heavy sticks, hit once and twice."""
+"""Beyond the source: hard heads, light sticks and second hits sound brighter, heavy sticks louder."""
 
 import sys
 from pathlib import Path

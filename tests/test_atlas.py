@@ -9,7 +9,7 @@ import xarray
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact import atlas, cli, hammers, maps
+from fem_impact import atlas, charts, cli, hammers, maps
 from fem_impact.scene import scene_of
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
@@ -63,6 +63,22 @@ def test_files_say_what_the_map_holds(table, tmp_path):
         assert read.attrs["scene"] == table.attrs["scene"]
     assert len((tmp_path / "map.csv").read_text().splitlines()) == 7
     assert (tmp_path / "restitution.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_pictures_name_points_and_whole_numbers(scene):
+    table = atlas.map_scene(scene, over={"striker.mass": [0.01, 0.02], "strike.at": [[0.4, 0.3], [0.45, 0.31]]})
+    figure = atlas.draw(table.assign(n_impacts=0 * table.n_impacts + 1), "n_impacts")
+    figure.canvas.draw()
+    axes, bar = figure.axes
+    assert [text.get_text() for text in axes.get_xticklabels() if text.get_text()] == ["(0.4, 0.3)", "(0.45, 0.31)"]
+    assert bar.get_yticks().tolist() == [1.0]
+
+
+def test_contours_of_a_power_law_are_where_it_says():
+    x, y = np.linspace(0.01, 0.2, 4), np.geomspace(1e4, 1e6, 3)
+    finer_x, finer_y, data = charts._finer(x, y, np.sqrt(y[:, None] / x))
+    assert data.shape == (17, 25)
+    assert_allclose(data, np.sqrt(finer_y[:, None] / finer_x), rtol=1e-12)  # rounding of logarithms
 
 
 def test_zarr_keeps_why_a_cell_failed(table, tmp_path):
@@ -168,6 +184,8 @@ def test_hammer_at_the_prompt(capsys):
     assert cli.main([*arguments, "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert [hammer["softest"] is not None for hammer in data["hammers"]] == [True, False]
+    assert cli.main(arguments) == 0
+    assert "200 g: no tip reaches 400 Hz and hits once" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(
