@@ -1,4 +1,4 @@
-"""Beyond the source: a stick that bends below the contact resonance, 260 Hz, hits an unyielding plate twice."""
+"""Beyond the source: a stick that bends below 240 Hz, near the contact resonance, hits an unyielding plate twice."""
 
 import numpy as np
 import source_scenes as source
