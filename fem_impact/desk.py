@@ -38,8 +38,8 @@ REST = 200  # [ms] without a change, and the map follows: it takes the time of m
 SLIDER = """
 .bk-slider-title { display: none; }
 .said { display: flex; justify-content: space-between; font-size: 14px; }
-.noUi-target { margin-block: 8px; background: color-mix(in srgb, var(--ink) 14%, transparent); border: 0; }
-.noUi-connects { background: transparent !important; box-shadow: none !important; }
+.noUi-target { margin-block: 8px; background: color-mix(in srgb, var(--ink) 14%, transparent); border: 0; box-shadow: none !important; }
+.noUi-connects { background: transparent !important; box-shadow: none !important; border: 0 !important; }
 .noUi-connect { background: var(--accent) !important; }
 .noUi-handle { border-radius: 50%; width: 24px !important; height: 24px !important; top: -9px !important; }
 .noUi-handle::before, .noUi-handle::after { display: none; }
@@ -66,7 +66,7 @@ class Page:
         self.picture: Picture | None = None
         self.waiting = self.mapping = False
         self.hit: Response | None = None
-        self.refined, self.rest = bench.start.at, bench.residual(bench.start)  # the point of the last exact blow
+        self.refined, self.rest = bench.start.at, bench.residual(bench.start)  # the point where blows are exact
 
     def show(self) -> None:
         """Put everything on the page and strike once."""
@@ -254,9 +254,7 @@ class Page:
         """Strike with the settings and show it."""
         self.waiting = False
         settings = self.settings
-        known = self.drawn is not None and self.drawn.at == settings.at
-        if known and self.refined != settings.at:
-            self.refined, self.rest = settings.at, self.bench.residual(settings)  # known since the map was drawn
+        known = self.refined == settings.at
         case = self.bench.case(settings, None if known else self.rest)
         self._label(settings, case.contact)
         at = settings.at if len(settings.at) > 1 else (*settings.at, 0.0)
@@ -320,6 +318,7 @@ class Page:
         """Draw the map anew where it no longer fits the settings: once the hand rests, and beside what else goes on."""
         if not self.mapping and self._background() != self.drawn:
             self.mapping = True
+            self._entitle_map()
             self.document.add_timeout_callback(self._begin_map, REST)
 
     def _background(self) -> Settings:
@@ -330,6 +329,8 @@ class Page:
         wanted = self._background()
 
         def work() -> None:
+            rest = self.bench.residual(wanted)
+            self.document.add_next_tick_callback(lambda: self._refine(wanted.at, rest))
             try:
                 picture = self.bench.picture(wanted)
             except (SimulationError, ValueError):
@@ -338,12 +339,22 @@ class Page:
 
         self.pool.submit(work)
 
+    def _refine(self, at: tuple[float, ...], rest: float) -> None:
+        """What the modes left out yield at a new strike point is known: its blow is exact from now on."""
+        if self.refined != at:
+            self.refined, self.rest = at, rest
+            self.update()
+
+    def _entitle_map(self) -> None:
+        self.document.get_model_by_name("map").title.text = "Number of impacts" + ", counting …" * self.mapping
+
     def _mapped(self, wanted: Settings, picture: Picture | None) -> None:
         self.mapping, self.drawn, self.picture = False, wanted, picture
         if picture is not None:
             self.sources["cells"].data = _quads(picture)
             self.sources["limit"].data = {"x": picture.mass, "y": picture.limit}
-        self.update()  # exact now at a new strike point; and the map once more, if the hand moved on meanwhile
+        self._entitle_map()
+        self.update()  # and the map once more, if the hand moved on meanwhile
 
     def _listen(self) -> None:
         if self.hit is None:
