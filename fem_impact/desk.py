@@ -38,7 +38,8 @@ REST = 200  # [ms] without a change, and the map follows: it takes the time of m
 SLIDER = """
 .bk-slider-title { display: none; }
 .said { display: flex; justify-content: space-between; font-size: 14px; }
-.noUi-target { margin-block: 8px; background: color-mix(in srgb, var(--ink) 14%, transparent); border: 0; box-shadow: none !important; }
+.noUi-target { margin-block: 8px; background: color-mix(in srgb, var(--ink) 14%, transparent); border: 0; }
+.noUi-target { box-shadow: none !important; }
 .noUi-connects { background: transparent !important; box-shadow: none !important; border: 0 !important; }
 .noUi-connect { background: var(--accent) !important; }
 .noUi-handle { border-radius: 50%; width: 24px !important; height: 24px !important; top: -9px !important; }

@@ -10,10 +10,12 @@ import pyvista
 from numpy.testing import assert_allclose
 from scipy.io import wavfile
 
-from fem_impact import analytic, drawing, export, sound
+from fem_impact import analytic, drawing, export, mesh, sound
+from fem_impact.assembly import assemble
 from fem_impact.contact import Contact
 from fem_impact.integrator import strike
-from fem_impact.modal import Modes
+from fem_impact.modal import Modes, find_modes
+from fem_impact.section import Material, Plate
 from fem_impact.striker import Striker
 
 
@@ -25,6 +27,22 @@ def modes():
 @pytest.fixture(scope="module")
 def hit(modes):
     return strike(modes, Striker.rigid(0.03), Contact.hertz(695e3), at=(0.1395, 0.09), speed=2.0, tolerance=1e-3)
+
+
+def test_motion_of_a_plate_with_a_hole_opens_though_chords_leave_it(tmp_path):
+    plate = Plate(Material(E=70e9, nu=0.33, rho=2700.0), 2e-3)
+    ring = find_modes(assemble(mesh.disk(0.2, 0.05, size=0.06), plate, {"outer": "clamped"}), n_modes=6)
+    hit = strike(ring, Striker.rigid(0.02), Contact.hertz(1e6), at=(0.12, 0.0), speed=1.0, tolerance=1e-1)
+    points, _ = drawing.grid(ring)
+    assert not ring.shapes.contains(points).all()  # the case this is about
+    export.write_vtk(tmp_path / "motion.pvd", ring, hit, [0.0, 1e-4])
+    reader = pyvista.get_reader(tmp_path / "motion.pvd")
+    reader.set_active_time_point(1)
+    grid = reader.read()[0]
+    inside = ring.shapes.contains(points)
+    for name, said in (("displacement", hit.displacement), ("velocity", hit.velocity)):
+        there = said(points[inside], [1e-4], residual=False)[0]
+        assert_allclose(grid.point_data[name][inside, 2], there, rtol=0, atol=1e-12 * np.abs(there).max())
 
 
 def test_collection_opens_in_pyvista_with_frequencies_as_times(tmp_path, modes):
