@@ -2433,6 +2433,32 @@ def pushing(steps, now, law, n_coefficients, row, i):
 
 
 @outer()
+def nearest_turn(steps, now, width):
+    """How near to zero an approach turns back, over the farthest it ever turns; infinity where none does.
+
+    ``width`` numbers of a step belong to each contact, the approach and its rate first.
+    """
+    nearest = np.inf
+    farthest = 0.0
+    for i in range(now.shape[1]):
+        first = 3 + width * i
+        for row in range(steps.shape[0]):
+            d0 = steps[row, first]
+            v0 = steps[row, first + 1]
+            d1 = now[0, i]
+            v1 = now[4, i]
+            if row + 1 < steps.shape[0]:
+                d1 = steps[row + 1, first]
+                v1 = steps[row + 1, first + 1]
+            if (v0 < 0.0 < v1) or (v1 < 0.0 < v0):
+                side = 1.0 if v0 < 0.0 else -1.0
+                turn = side * lowest(side * d0, side * v0, side * d1, side * v1, steps[row, 1])
+                nearest = min(nearest, abs(turn))
+                farthest = max(farthest, turn)
+    return nearest / farthest if farthest > 0.0 else np.inf
+
+
+@outer()
 def find_impacts(steps, now, law, n_coefficients, looks, touch):
     """Every unbroken push, (n_impacts, 5): start, end, peak force, impulse, contact; contact by contact.
 

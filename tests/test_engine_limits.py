@@ -411,3 +411,24 @@ def test_flights_of_any_length_stay_within_their_tables():
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run([sys.executable, "-c", FLIGHTS], env=environment, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+GRAZING = [  # mass [kg] and bending frequency [Hz] of the stick, stiffness [N/m], impacts: gaps of 5 to 15 us
+    (0.04345637583892617, 10e3, 266241.8345392927, 3),
+    (0.04220805369127517, 10e3, 577493.4746952576, 4),
+    (0.18826174496644296, 10e3, 170323.24457873483, 2),
+    (0.1583020134228188, 600.0, 138273.66677129985, 2),
+]
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize(("mass", "frequency", "stiffness", "n_impacts"), GRAZING)
+def test_contacts_that_barely_open_are_told_from_those_that_do_not(mass, frequency, stiffness, n_impacts, tolerance):
+    """Two runs agreed on one contact less, and on a time in contact wrong by 5e-3."""
+    light = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    stick, law = fi.Striker.stick(mass, frequency), fi.Contact.linear(stiffness)
+    blow = {"at": (0.465, 0.3), "speed": 1.0}
+    hit, fine = (fi.strike(light, stick, law, tolerance=t, **blow) for t in (tolerance, 1e-7))
+    assert fine.n_impacts == n_impacts
+    assert hit.n_impacts == n_impacts
+    assert_allclose(hit.contact_time, fine.contact_time, rtol=tolerance)
