@@ -5,8 +5,10 @@ plate is struck, how fast and how much everything is damped. Chosen here: 0.3 of
 Hertz spring, so that the two marked springs stay in contact equally long), no damping.
 """
 
+import csv
 import sys
 from collections.abc import Callable, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -125,11 +127,10 @@ def publish(name: str, figure: Any, columns: dict[str, Any]) -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "out"
     folder.mkdir(parents=True, exist_ok=True)
     fi.figures.save(folder / f"{name}.png", figure)
-    width = max(len(values) for values in columns.values())
-    lines = [",".join(columns)]
-    for i in range(width):
-        lines.append(",".join(_text(values[i]) if i < len(values) else "" for values in columns.values()))
-    (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    with (folder / f"{name}.csv").open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(columns)
+        table.writerows(zip_longest(*([_text(value) for value in values] for values in columns.values())))
     print(f"{folder / name}.png and .csv")
 
 
