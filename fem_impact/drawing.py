@@ -59,6 +59,13 @@ def end_of(response: Response) -> float:
     return AFTER * (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
 
 
+def telling(response: Response, times: np.ndarray) -> int:
+    """Which of some times [s] shows the wave best: the first with half the largest deflection under the striker."""
+    assert response.at is not None
+    deflection = np.abs(response.displacement(response.at[None], times)[:, 0])
+    return int(np.argmax(deflection >= 0.5 * deflection.max()))
+
+
 def _halved(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     sides = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)  # (3 n_cells, 2)
     unique, number = np.unique(sides, axis=0, return_inverse=True)

@@ -96,7 +96,7 @@ def wave(path: str | Path, response: Response, *, time: float | None = None) -> 
     path : path ending in .png
     response : Response of a struck plate or beam
     time : float [s], optional
-        The instant of the largest force by default.
+        Once half of the largest deflection under the striker is reached by default.
 
     Returns
     -------
@@ -104,7 +104,8 @@ def wave(path: str | Path, response: Response, *, time: float | None = None) -> 
         Empty, or what to install for a picture in space where one in the plane had to stand in.
     """
     _ending(path, ".png")
-    instant = response.time[int(np.argmax(response.force))] if time is None else _check.non_negative("time", time, "s")
+    times = np.linspace(0.0, drawing.end_of(response), FRAMES)
+    instant = times[drawing.telling(response, times)] if time is None else _check.non_negative("time", time, "s")
     (frame,) = _frames(response, np.array([instant]))
     with replacing(path) as temporary:
         frame.save(temporary)

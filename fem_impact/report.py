@@ -337,7 +337,7 @@ def _view(response: Response, end: float) -> dict[str, Any]:
         "rim": [[x for a, b in edge[:, :, i].tolist() for x in (a, b, None)] for i in (0, 1)],
         "at": [float(response.at[0]), float(response.at[1]) if modes.dimension == 2 else 0.0],
         "times": _short(times),
-        "first": int(np.searchsorted(times, response.time[np.argmax(response.force)])),
+        "first": drawing.telling(response, times),
         "surface": _short(struck[:, 0]),
         "gap": _short(drawing.gap(response, times)),
         "wave": _packed(wave),

@@ -6,8 +6,11 @@ from numpy.testing import assert_allclose
 
 from fem_impact import analytic, drawing, mesh
 from fem_impact.assembly import assemble
+from fem_impact.contact import Contact
+from fem_impact.integrator import strike
 from fem_impact.modal import Modes, find_modes
 from fem_impact.section import Material, Plate
+from fem_impact.striker import Striker
 
 
 def areas(points, cells):
@@ -40,3 +43,12 @@ def test_beams_and_rigid_masses_are_left_as_they_are():
     for modes in (beam, Modes.rigid(1.0)):
         for drawn, own in zip(drawing.grid(modes), modes.shapes.grid()):
             np.testing.assert_array_equal(drawn, own)
+
+
+def test_the_telling_instant_is_when_the_plate_has_begun_to_yield():
+    plate = analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=30)
+    hit = strike(plate, Striker.rigid(0.03), Contact.hertz(695e3), at=(0.1395, 0.09), speed=2.0, tolerance=1e-2)
+    times = np.linspace(0.0, drawing.end_of(hit), 50)
+    depth = np.abs(hit.displacement([hit.at], times)[:, 0])
+    first = drawing.telling(hit, times)
+    assert depth[first] >= 0.5 * depth.max() > depth[:first].max()

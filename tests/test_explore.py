@@ -12,24 +12,11 @@ from pathlib import Path
 
 import pytest
 from test_cli import TEXT
+from test_studies import study
 
 from fem_impact import cli
 
 FOLLOWS = 0.1  # [s] within which the page follows
-# Turn a slider; how long until the new spectrum is there, in ms.
-TURN = """name => new Promise(done => {
-    const page = Bokeh.documents[0], slider = page.get_model_by_name(name);
-    const signal = page.get_model_by_name('spectrum-data').properties.data.change;
-    const said = page.get_model_by_name('said');
-    const began = performance.now(), before = JSON.stringify(said.data.text);
-    const then = () => {  // an answer to an earlier turn may still be on its way
-        if (JSON.stringify(said.data.text) === before) return;
-        signal.disconnect(then);
-        done(performance.now() - began);
-    };
-    signal.connect(then);
-    slider.value += 0.005 * (slider.end - slider.start);
-})"""
 
 
 def served(scene, *options):
@@ -131,14 +118,14 @@ def test_nothing_fails_and_nothing_is_asked_for_elsewhere(opened, address):
 
 
 def test_sliders_change_the_pictures_in_time(opened):
-    shown = opened()
+    shown, turn = opened(), study("explore_speed").TURN
     shown.tab.wait_for_timeout(1000)  # until the map is there
     for name in ("mass", "stiffness", "exponent", "speed", "bending", "x", "y"):
         before = {plot: shown.tab.locator(f"figure >> nth={i}").screenshot() for plot, i in (("map", 1), ("force", 2))}
-        times = [shown.tab.evaluate(TURN, name)]
+        times = [shown.tab.evaluate(turn, name)]
         while min(times) > 1e3 * FOLLOWS and len(times) < 20:  # the least: other programs run here too
             shown.tab.wait_for_timeout(1000)  # until the map, drawn when the hand rests, is done too
-            times.append(shown.tab.evaluate(TURN, name))
+            times.append(shown.tab.evaluate(turn, name))
         assert min(times) < 1e3 * FOLLOWS, (name, times)
         shown.tab.wait_for_timeout(100)
         assert shown.tab.locator("figure >> nth=2").screenshot() != before["force"]
