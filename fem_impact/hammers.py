@@ -28,7 +28,7 @@ class Hammer:
 
     mass: float  # [kg]
     softest: float | None  # [N/m] tip that just reaches the bandwidth; None: none does without a double hit
-    hardest: float | None  # [N/m] hardest tip up to which all softer ones hit once; None: every tip hits twice
+    hardest: float | None  # [N/m] end of the widest range of tips that all hit once; None: every tip hits twice
     reach: float | None  # [Hz] bandwidth with the hardest
 
     @property
@@ -94,7 +94,8 @@ def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float 
     Notes
     -----
     The blows decide, not the kinetic-energy criterion: several impacts happen well below its threshold. Linear tips
-    make the answer the same at any speed.
+    make the answer the same at any speed. Of several ranges of tips that hit once the widest counts: a heavy hammer
+    on a soft tip may graze the swinging body once more.
     """
     masses = _checked(masses)
     centre = _centre(bandwidth, drop)
@@ -105,9 +106,8 @@ def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float 
         table = maps.sweep(
             modes, striker, Contact.linear(1.0), at=at, speed=1.0, over={"stiffness": tips}, tolerance=TOLERANCE
         )
-        once = table.n_impacts.values == 1
-        n_once = len(once) if once.all() else int(np.argmin(once))
-        if n_once == 0:
+        first, last = _longest_run(table.n_impacts.values == 1)
+        if first == last:
             found.append(Hammer(float(mass), None, None, None))
             continue
 
@@ -115,10 +115,20 @@ def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float 
             hit = strike(modes, striker, Contact.linear(tip), at=at, speed=1.0, tolerance=TOLERANCE)
             return bandwidth_of(hit, drop)
 
-        best = reach(tips[n_once - 1])
-        softest = _softest(reach, tips[0], tips[n_once - 1], bandwidth) if best >= bandwidth else None
-        found.append(Hammer(float(mass), softest, float(tips[n_once - 1]), best))
+        best = reach(tips[last - 1])
+        softest = _softest(reach, tips[first], tips[last - 1], bandwidth) if best >= bandwidth else None
+        found.append(Hammer(float(mass), softest, float(tips[last - 1]), best))
     return tuple(found)
+
+
+def _longest_run(true: np.ndarray) -> tuple[int, int]:
+    """Where the longest run of true values begins and, exclusive, ends; (0, 0) where there is none."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]])))
+    first, last = ends[::2], ends[1::2]
+    if len(first) == 0:
+        return 0, 0
+    longest = int(np.argmax(last - first))
+    return int(first[longest]), int(last[longest])
 
 
 def _softest(reach: Any, low: float, high: float, bandwidth: float) -> float:
