@@ -12,6 +12,7 @@ DONE, DOUBTFUL, AWKWARD, LONG = 0, 1, 2, 3  # how a blow ended: proved apart; wi
 # missed; in a way not followed here; longer than the kernel
 SETTLED = 1e-12  # [-] of the approach: change at which the unknown of a step has converged
 SOLVES = 30  # [-] iterations of one step at most
+MOST_WAVES = 3e8  # [-] samples times frequencies of one centroid; the engine finds those of longer blows by a transform
 SAMPLES = 6.0  # [-] of the force per period of a spectrum's highest frequency: the rule errs by (2 pi / 6)**4 / 720
 PARTS = 2.0  # [-] and per step, at least
 LOOKS = 8  # [-] parts of a look ahead judged apart where the whole leaves a doubt
@@ -468,7 +469,7 @@ def centroid(contacts, n_contacts, n_steps, h, ends, rates, k, a, c, loss, limit
     """Mean frequency of the magnitude of the force spectrum from zero to ``limit``.
 
     Trapezoidal sums over each contact, with the Euler-Maclaurin term for a force that starts with a slope. Approaches
-    between steps are cubics.
+    between steps are cubics. Not a number where the sums would take more than a second.
     """
     span = contacts[n_contacts - 1, 1]
     n = 16 * int(min(max(2.0 * limit * span, 32.0), 4096.0)) + 16
@@ -477,7 +478,10 @@ def centroid(contacts, n_contacts, n_steps, h, ends, rates, k, a, c, loss, limit
     imag = np.zeros(n)
     for contact in range(n_contacts):
         start, end = contacts[contact, 0], contacts[contact, 1]
-        count = int(max(16.0, PARTS * (end - start) / h, SAMPLES * limit * (end - start)))
+        samples = max(16.0, PARTS * (end - start) / h, SAMPLES * limit * (end - start))
+        if n * samples > MOST_WAVES:
+            return np.nan
+        count = int(samples)
         dt = (end - start) / count
         first = 0.0
         last = 0.0

@@ -160,6 +160,8 @@ def by_cluster(
     """
     with _needed("client"):
         from distributed import Client, as_completed
+    if not isinstance(client, (str, Client)):
+        raise ValueError(f"client must be a dask.distributed.Client or an address, got {_check.shown(client)}")
     with _connected(Client, client) as connected:
         store = None if path is None else Store.open(path, grid)
         block = block_size(grid.n_cases)

@@ -49,6 +49,7 @@ ALIASES = {  # the same parameters by their place in a scene file
     "target.damping_ratio": "damping_ratio",
 }
 FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  # that change the kernels
+REACH = 1e30  # [-] size of speeds, masses and frequencies and of their reciprocals: beyond, kernels find no end
 BLOCK = 2**17  # [-] cells struck at once: some 30 MB
 LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
     "n_impacts": ("", "number of unbroken contacts"),
@@ -84,7 +85,7 @@ class Case:
         if name == "at":
             return replace(self, at=self.modes.point("at", value)[0])
         if name == "speed":
-            return replace(self, speed=_check.positive("speed", value, "m/s"))
+            return replace(self, speed=_check.positive("speed", value, "m/s", reach=REACH))
         if name in ("stiffness", "exponent", "loss", "gap"):
             return replace(self, contact=replace(self.contact, **{name: float(value)}))
         if name in ("mass", "striker_frequency"):
@@ -249,7 +250,7 @@ def sweep(
         Where an axis is unknown, a value cannot be, or the map is too large.
     """
     tolerance = _check.between("tolerance", tolerance, 1e-12, 1.0)
-    base = Case(modes, striker, contact, modes.point("at", at)[0], _check.positive("speed", speed, "m/s"))
+    base = Case(modes, striker, contact, modes.point("at", at)[0], _check.positive("speed", speed, "m/s", reach=REACH))
     band = None if max_frequency is None else _check.positive("max_frequency", max_frequency, "Hz")
     workers = None if workers is None else _check.count("workers", workers)
     max_cells = _check.number("max_cells", max_cells)
@@ -358,7 +359,7 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
         )
         for row, name in enumerate(names):
             numbers[row, cells] = getattr(found, name)
-        quick[cells] = found.done
+        quick[cells] = found.done & ~(np.isnan(found.centroid) & (grid.band is not None))
     rest = np.flatnonzero(~quick)
     texts = {}
     with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
@@ -394,7 +395,10 @@ def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
                 base.changed(name, value)
         elif name != "at":
             for value in axes[name]:
-                (_check.non_negative if name == "damping_ratio" else _check.positive)(name, value, AXES[name][0])
+                if name == "damping_ratio":
+                    _check.non_negative(name, value)
+                else:
+                    _check.positive(name, value, AXES[name][0], reach=REACH)
             base.changed(name, axes[name][0])  # where the body cannot change so, any value tells
     return axes
 
