@@ -539,7 +539,7 @@ def _completion(parser: argparse.ArgumentParser) -> str:
     return "\n".join(
         [
             "_fem_impact() {",
-            f"    local words='{' '.join(verbs.choices)} --help --version'",
+            "    local words='--help --version'",
             '    case "${COMP_WORDS[1]}" in',
             *cases,
             "    esac",

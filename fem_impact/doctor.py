@@ -20,6 +20,7 @@ SQUARE = 2.0 * np.pi**2  # [-] omega of a hinged unit square of unit stiffness a
 
 EXTRAS = {  # what each is for, and the modules it needs
     "cad": ("drawings", "svgelements", "ezdxf"),
+    "film": ("films as MP4 files", "imageio_ffmpeg"),
     "uff": ("universal files", "pyuff"),
     "cluster": ("clusters and stores", "distributed", "zarr"),
     "hdf5": ("meshes in HDF5", "h5py"),

@@ -114,11 +114,11 @@ def wave(path: str | Path, response: Response, *, time: float | None = None) -> 
 
 @_check.typed
 def animation(path: str | Path, response: Response, *, frames: int = FRAMES) -> str:
-    """Write the wave leaving the strike point as an animated GIF, the striker included and the time shown.
+    """Write the wave leaving the strike point as an animation, the striker included and the time shown.
 
     Parameters
     ----------
-    path : path ending in .gif
+    path : path ending in .gif, or in .mp4, which needs ``pip install 'fem-impact[film]'``
     response : Response of a struck plate or beam
     frames : int, from the first touch to a third beyond the last contact
 
@@ -127,14 +127,31 @@ def animation(path: str | Path, response: Response, *, frames: int = FRAMES) -> 
     str
         As in `wave`.
     """
-    _ending(path, ".gif")
+    _ending(path, ".gif", ".mp4")
+    film = Path(path).suffix.lower() == ".mp4"
+    encoder = _check.extra("imageio_ffmpeg", "film", "an MP4 file") if film else None
     times = np.linspace(0.0, drawing.end_of(response), _check.count("frames", frames, low=2, high=MOST_FRAMES))
+    if encoder is not None:
+        with replacing(path) as temporary:
+            _encode(encoder, temporary, _frames(response, times))
+        return "" if can_render() else REMEDY
     pictures = list(_frames(response, times))
     colours = _mosaic(pictures[:: max(1, len(pictures) // 8)]).quantize(255)  # one palette, so that nothing flickers
     first, *rest = (picture.quantize(palette=colours, dither=Image.Dither.NONE) for picture in pictures)
     with replacing(path) as temporary:
         first.save(temporary, save_all=True, append_images=rest, duration=1000 // RATE, loop=0)
     return "" if can_render() else REMEDY
+
+
+def _encode(encoder: Any, path: Path, pictures: Iterator[Image.Image]) -> None:
+    """H.264, which every browser and slide program plays; it takes even numbers of pixels only."""
+    first = next(pictures)
+    size = first.width // 2 * 2, first.height // 2 * 2
+    writer = encoder.write_frames(str(path), size, fps=RATE, codec="libx264", macro_block_size=2)
+    writer.send(None)
+    for picture in (first, *pictures):
+        writer.send(np.ascontiguousarray(picture.crop((0, 0, *size))).tobytes())
+    writer.close()
 
 
 def _mosaic(pictures: list[Image.Image]) -> Image.Image:
@@ -144,8 +161,8 @@ def _mosaic(pictures: list[Image.Image]) -> Image.Image:
     return mosaic
 
 
-def _ending(path: str | Path, ending: str) -> None:
-    _check.one_of("path ending", _check.path("path", path).suffix.lower(), (ending,))
+def _ending(path: str | Path, *endings: str) -> None:
+    _check.one_of("path ending", _check.path("path", path).suffix.lower(), endings)
 
 
 def _frames(response: Response, times: np.ndarray) -> Iterator[Image.Image]:

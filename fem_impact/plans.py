@@ -119,7 +119,8 @@ class Plan:
     def cost(self) -> str:
         """Predicted time and memory, in words."""
         time = f"{self.seconds:.1g} s" if self.seconds < 10.0 else f"{self.seconds:.0f} s"
-        return f"about {time} and {self.memory / 1e6:.2g} MB predicted"
+        memory = float(f"{self.memory / 1e6:.2g}")
+        return f"about {time} and {memory:.0f} MB predicted"
 
     def data(self) -> dict[str, Any]:
         """Everything it decides and predicts, by name, in SI units."""

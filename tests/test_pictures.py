@@ -1,5 +1,7 @@
 """Pictures in space where something can render, in the plane where nothing can; both tell the same."""
 
+import sys
+
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
@@ -48,6 +50,20 @@ def test_wave_begins_below_the_striker_and_spreads(hit, tmp_path, renders):
         shares = [coloured(frame)[0] for frame in ImageSequence.Iterator(movie)]
     assert len(shares) == 4
     assert shares[0] < 0.02 < shares[1] < max(shares[2:])  # at the first touch the plate is flat but for the mark
+
+
+def test_film_holds_every_frame(hit, tmp_path):
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="MP4 files are an extra: fem-impact[film]")
+    pictures.animation(tmp_path / "wave.mp4", hit, frames=6)
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "wave.mp4"))
+    assert frames == 6 and abs(seconds - 6 / pictures.RATE) < 0.05
+    assert [path.name for path in tmp_path.iterdir()] == ["wave.mp4"]
+
+
+def test_film_without_its_extra_is_a_sentence(hit, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(ValueError, match=r"an MP4 file needs imageio_ffmpeg: pip install 'fem-impact\[film\]'"):
+        pictures.animation(tmp_path / "wave.mp4", hit)
 
 
 def test_picture_of_one_instant_and_its_time(hit, tmp_path, renders):
