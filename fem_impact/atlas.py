@@ -63,7 +63,9 @@ def map_scene(
         criterion, stops it (not a number where nothing rebounds or nothing stops it).
     """
     table = {} if scene.map is None else scene._make("map", scene.map)
-    over = dict(table.get("over", {}) if over is None else over)
+    over = table.get("over", {}) if over is None else over
+    if not isinstance(over, Mapping) or not all(isinstance(name, str) for name in over):
+        raise ValueError(f"over must map names of axes to their values, got {_check.shown(over)}")
     band = table.get("max_frequency") if max_frequency is None else max_frequency
     limit = scene.blow.values.get("tolerance", maps.TOLERANCE) if tolerance is None else tolerance
     limit = _check.between("tolerance", limit, 1e-12, 1.0)

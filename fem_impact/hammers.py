@@ -17,7 +17,7 @@ from .striker import Striker
 TOLERANCE = 1e-2  # [-] of the blows behind a choice
 TIPS = np.geomspace(0.03, 10.0, 61)  # [-] of the stiffness at which a half sine has the bandwidth: 24 for each decade
 ROUNDS = 7  # [-] halvings of the span between two tips when the softest that reaches the bandwidth is sought
-MASSES = (1e-6, 1e6)  # [kg] of hammers: beyond, a blow takes for ever or leaves the range of numbers
+MASSES = (1e-6, 1e4)  # [kg] of hammers: beyond, a blow takes for ever or leaves the range of numbers
 BANDWIDTHS = (1e-3, 1e9)  # [Hz] likewise
 LOOKS = 400  # [-] frequencies at which a spectrum is searched for where it falls
 
@@ -64,6 +64,8 @@ def highest_frequency(modes: Modes, at: Any, bandwidth: float, masses: Any, *, d
 
 def _checked(masses: Any) -> np.ndarray:
     masses = _check.array("masses", masses, (None,), "kg", lift=True)
+    if not len(masses):
+        raise ValueError("masses must hold at least one mass, got none")
     return np.array([_check.between("masses", mass, *MASSES, "kg") for mass in masses])
 
 

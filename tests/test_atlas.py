@@ -193,7 +193,7 @@ def test_hammer_at_the_prompt(capsys):
     [
         (["--bandwidth", "0"], "bandwidth must lie between 0.001 and 1e+09 Hz, got 0 Hz"),
         (["--bandwidth", "inf"], "bandwidth must be finite, got inf Hz"),
-        (["--bandwidth", "500", "--masses", "0"], "masses must lie between 1e-06 and 1e+06 kg, got 0 kg"),
+        (["--bandwidth", "500", "--masses", "0"], "masses must lie between 1e-06 and 10000 kg, got 0 kg"),
         (["--bandwidth", "500", "--masses", "0.01", "nan"], "masses must be finite"),
         (["--bandwidth", "500", "--drop", "60"], "drop must lie between 1 and 40 dB, got 60 dB"),
     ],
@@ -220,7 +220,7 @@ def test_a_bandwidth_beyond_every_tip_has_no_hammer():
 @pytest.mark.parametrize(
     ("bandwidth", "masses", "text"),
     [
-        (800.0, [1e30, 0.2], r"masses must lie between 1e-06 and 1e\+06 kg, got 1e\+30 kg"),
+        (800.0, [1e30, 0.2], r"masses must lie between 1e-06 and 10000 kg, got 1e\+30 kg"),
         (800.0, [5e-324], "masses must lie between"),
         (1e300, [0.1], r"bandwidth must lie between 0.001 and 1e\+09 Hz"),
     ],

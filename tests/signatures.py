@@ -1,0 +1,441 @@
+"""One valid call of every public function, what spoils an argument, and the judge of what then happens.
+
+    python tests/signatures.py                    # every spoiled call; prints what failed
+    python tests/signatures.py find_modes         # those of one function, with where each failed
+
+A call passes where it gives a result whose numbers are finite, or one error of the package that names the argument.
+"""
+
+import dataclasses
+import dis
+import inspect
+import json
+import math
+import os
+import re
+import resource
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fuzz import PACKAGE, Hang, limited
+from scenes import QUICK
+
+import fem_impact as fi
+from fem_impact.integrator import Touch
+from fem_impact.outline import Outline, circle
+
+PATIENCE = 10.0  # [s] per call
+MEMORY = 2 << 30  # [byte] more than the process has when it begins
+LONGEST = 700  # [-] characters of a message
+
+# --- what is public --------------------------------------------------------------------------------------------------
+
+# Called by the package with what it has checked or made, not by users: plumbing, and results.
+INNER_MODULES = ("maps", "plans", "planner", "drawing", "charts", "doctor")
+INNER = {
+    "Response", "Impact", "Scene", "Plan", "SimulationError",  # made by strike, load_scene and plan
+    "Scene.blame", "Scene.heard_from", "Scene.kept", "Modes.point", "sound.beside", "mesh.aligned",
+     "Scene.body", "Scene.closed_form", "Scene.fault", "Scene.finder", "Scene.make_contact",
+    "Scene.make_section", "Scene.make_striker", "Scene.data",
+    "Plan.data", "Plan.run", "Plan.strike", "Response.body_slice", "Response.summary", "Scene.picture",
+    "mesh.Mesh", "mesh.straight", "mesh.fill", "section.evaluate", "Modes.points",
+    "analytic.RectangleShapes", "analytic.BeamShapes", "analytic.DiskShapes",  # behind the checks of Modes
+    "accuracy.left_out_error", "export.plain", "export.versions", "export.vtk_ending", "figures.snapshot",
+    "figures.in_hertz", "sound.Sound",
+    "atlas.needed_frequency", "atlas.number_of_modes", "atlas.with_theory", "atlas.draw", "atlas.write",
+    "atlas.changed_scene", "atlas.can_write", "hammers.Hammer", "hammers.draw", "hammers.bandwidth_of",
+    "report.Player", "report.audio", "explore.serve",  # serve ends at an interruption only, see test_explore
+    "Modes", "contact.loss_number",
+}  # fmt: skip
+
+
+def public() -> dict[str, Callable[..., Any]]:
+    """Every public function, constructor and method by the name a user types after ``fi.``."""
+    found: dict[str, Callable[..., Any]] = {}
+    seen: set[int] = set()
+
+    def add(name: str, item: Any) -> None:
+        if id(item) in seen or not (inspect.isclass(item) or inspect.isfunction(item)):
+            return
+        seen.add(id(item))
+        found[name] = item
+        if inspect.isclass(item) and not issubclass(item, Exception):
+            for key in vars(item):
+                inner = inspect.getattr_static(item, key)
+                if not key.startswith("_") and isinstance(inner, (classmethod, staticmethod, type(add))):
+                    found[f"{name}.{key}"] = getattr(item, key)
+
+    homes = {name: getattr(fi, name) for name in fi.__all__}
+    for name, item in homes.items():
+        add(name, item)
+    for name, home in homes.items():
+        if inspect.ismodule(home) and name not in INNER_MODULES:
+            for key, item in vars(home).items():
+                if not key.startswith("_") and getattr(item, "__module__", None) == home.__name__:
+                    add(f"{name}.{key}", item)
+    shapes = tuple(f"analytic.{kind}Shapes." for kind in ("Rectangle", "Beam", "Disk"))
+    return {name: item for name, item in found.items() if name not in INNER and not name.startswith(shapes)}
+
+
+# --- one valid call of each ------------------------------------------------------------------------------------------
+
+
+@cache
+def things() -> dict[str, Any]:
+    """What calls need, made once."""
+    metal = fi.Material(E=70e9, nu=0.3, rho=2700.0)
+    plate = fi.Plate(metal, 2e-3)
+    beam = fi.Beam.rectangular(metal, width=0.02, height=0.01)
+    square = fi.mesh.rectangle(0.4, 0.3, size=0.2)
+    modes = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=12)
+    striker, law = fi.Striker.rigid(0.03), fi.Contact.hertz(1e6)
+    folder = Path(tempfile.mkdtemp())
+    path = folder / "scene.toml"
+    path.write_text(QUICK)
+    scene = fi.load_scene(path)
+    uff = folder / "modes.uff"
+    fi.export.write_uff(uff, modes)
+    mesh = folder / "plate.msh"
+    fi.mesh.save(mesh, square)
+    return {
+        "metal": metal, "plate": plate, "beam": beam, "square": square, "modes": modes, "striker": striker, "law": law,
+        "sphere": fi.Striker.sphere(metal, 0.01), "free": fi.Modes.rigid(1.0), "folder": folder, "path": path,
+        "system": fi.assemble(square, plate, {"boundary": "hinged"}), "scene": scene, "uff": uff, "mesh": mesh,
+        "hit": fi.strike(modes, striker, law, at=(0.13, 0.1), speed=1.0, tolerance=1e-2),
+        "outline": Outline.around(circle((0.0, 0.0), 1.0, "rim")),
+        "plan": scene.plan(), "run": scene.run(target="modal"),
+    }  # fmt: skip
+
+
+@cache
+def table() -> dict[str, dict[str, Any]]:
+    """Arguments of valid calls of every public function; a word after its name tells apart several of one."""
+    t = things()
+    at, body = (0.13, 0.1), {"mass": 0.2, "first_frequency": 100.0, "n_modes": 5}
+    blow = {"modes": t["modes"], "striker": t["striker"], "contact": t["law"], "at": at, "speed": 1.0}
+    hit = {"response": t["hit"]}
+    written = {"modes": t["modes"], "response": t["hit"], "times": [0.0, 1e-3]}
+    folder = t["folder"]
+    return {
+        "Material": {"E": 1e9, "nu": 0.3, "rho": 450.0, "E_across": 0.9e9, "G": 0.5e9, "angle": 0.1},
+        "Material.orthotropic": {"E_along": 1e9, "E_across": 9e8, "nu": 0.3, "G": 4e8, "rho": 450.0, "angle": 0.1},
+        "Plate": {"material": t["metal"], "thickness": 2e-3, "tension": 0.0},
+        "Plate.stiffness": {"self": t["plate"], "points": np.zeros((2, 2))},
+        "Plate.inertia": {"self": t["plate"], "points": np.zeros((2, 2))},
+        "Beam": {"material": t["metal"], "width": 0.02, "height": 0.01, "round": False},
+        "Beam.rectangular": {"material": t["metal"], "width": 0.02, "height": 0.01},
+        "Beam.circular": {"material": t["metal"], "diameter": 0.01},
+        "Beam.stiffness": {"self": t["beam"], "points": np.zeros((2, 1))},
+        "Beam.inertia": {"self": t["beam"], "points": np.zeros((2, 1))},
+        "Elastic": {"stiffness": 1e4, "rotation": 1.0},
+        "Contact": {"stiffness": 1e6, "exponent": 1.5, "loss": 0.1, "gap": 1e-4},
+        "Contact.linear": {"stiffness": 1e6, "loss": 0.1, "gap": 1e-4},
+        "Contact.hertz": {"stiffness": 1e6, "loss": 0.1, "gap": 1e-4},
+        "Contact.power": {"stiffness": 1e6, "exponent": 2.0, "loss": 0.1, "gap": 1e-4},
+        "Contact.restituting": {"stiffness": 1e6, "exponent": 1.5, "restitution": 0.8, "speed": 1.0, "gap": 1e-4},
+        "Contact.between": {"sphere": t["sphere"], "plate": t["plate"], "loss": 0.1, "gap": 1e-4},
+        "Contact.force": {"self": t["law"], "approach": [1e-4, 2e-4], "rate": 0.1},
+        "assemble": {
+            "mesh": t["square"], "section": t["plate"], "supports": {"boundary": "hinged"}, "element": "argyris",
+            "point_masses": [((0.1, 0.1), 0.01)], "near": [(0.1, 0.1)], "graded": True,
+        },
+        "Modes.from_arrays": {
+            "frequencies": [0.0, 10.0], "shapes": [[1.0, 0.5], [1.0, -0.5]], "points": [[0.0, 0.0], [0.1, 0.1]],
+            "mass": 1.0, "damping_ratio": 0.01, "compliance": [[1e-3, 0.0], [0.0, 1e-3]],
+        },
+        "Modes.from_uff": {"path": t["uff"], "mass": 0.2, "direction": "z"},
+        "Modes.rigid": {"mass": 1.0},
+        "Modes.shape_at": {"self": t["modes"], "points": [at]},
+        "Modes.rigid_motion": {"self": t["free"], "at": None},
+        "Modes.modal_compliance": {"self": t["modes"], "points": [at]},
+        "Modes.residual_compliance": {"self": t["modes"], "points": [at]},
+        "Modes.scaled": {"self": t["modes"], "mass": 0.3, "first_frequency": 50.0},
+        "Modes.truncated": {"self": t["modes"], "max_frequency": 1e3, "n_modes": 3},
+        "Modes.damped": {"self": t["modes"], "damping_ratio": 0.01},
+        "find_modes": {
+            "system": t["system"], "n_modes": 4, "damping_ratio": 0.01, "tolerance": 1e-2, "bounds": False,
+        },
+        "find_modes bounds": {"system": t["system"], "max_frequency": 3e2, "bounds": True, "keep": None},
+        "assemble beam": {
+            "mesh": fi.mesh.line(1.0, size=0.25), "section": t["beam"], "supports": {"left": fi.Elastic(1e4, 1.0)},
+            "element": None, "point_masses": [(0.5, 0.1)],
+        },
+        "analytic.rectangle section": {
+            "length": 0.4, "width": 0.3, "section": t["plate"], "max_frequency": 1e3, "damping_ratio": 0.01,
+        },
+        "analytic.beam section": {
+            "length": 0.4, "ends": ("free", "clamped"), "section": t["beam"], "max_frequency": 1e3,
+        },
+        "analytic.disk section": {"radius": 0.4, "edge": "free", "section": t["plate"], "max_frequency": 5e2},
+        "strike free": {**blow, "tolerance": 1e-2, "quantity": "spectrum=2000", "residual": True},
+        "strike stick": {
+            **blow, "striker": fi.Striker.stick(0.03, 1e3, n_modes=3), "contact": fi.Contact.hertz(1e6, loss=0.1),
+            "tolerance": 1e-2,
+        },
+        "collide states": {
+            "bodies": [t["free"], t["modes"]], "contacts": [Touch(t["law"], 0, 1, None, at)], "speeds": None,
+            "states": [([0.0], [1.0]), (np.zeros(12), np.zeros(12))], "tolerance": 1e-2, "duration": 0.1,
+        },
+        "sweep cells": {
+            **blow, "over": {"at": [at]}, "tolerance": 1e-1,
+            "layers": {"peak": lambda hit: hit.peak_force}, "store": None, "max_cells": 100.0,
+        },
+        "rayleigh": {"mass_factor": 1.0, "stiffness_factor": 1e-6},
+        "Striker": {"modes": t["free"], "at": np.zeros(0), "material": t["metal"], "radius": 0.01},
+        "Striker.rigid": {"mass": 0.03},
+        "Striker.sphere": {"material": t["metal"], "radius": 0.01},
+        "Striker.stick": {"mass": 0.1, "first_frequency": 1e3, "n_modes": 3},
+        "Striker.flexible": {"modes": t["free"], "at": None},
+        "Response.displacement": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "body": -1, "residual": True},
+        "Response.velocity": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "body": -1, "residual": True},
+        "Response.modal_state": {"self": t["hit"], "times": [0.0, 1e-3], "body": -1},
+        "Response.spectral_centroid": {"self": t["hit"], "max_frequency": 5e3},
+        "Response.spectrum": {"self": t["hit"], "frequencies": [0.0, 1e3]},
+        "mobility": {"modes": t["modes"], "at": at, "to": (0.2, 0.2), "frequencies": [50.0, 60.0]},
+        "spectra.half_sine_spectrum": {"frequencies": [50.0, 60.0], "contact_frequency": 100.0},
+        "threshold_frequency": {"modes": t["modes"], "at": at, "mass": 0.03},
+        "threshold.required_energy": {"modes": t["modes"], "at": at, "contact_frequency": 500.0},
+        "strike": {
+            **blow, "tolerance": 1e-2, "quantity": "restitution", "residual": True, "duration": 0.1, "max_impacts": 3,
+            "scheme": "A4", "dt": 1e-5, "striker_force": 0.0, "target_force": 0.0,
+        },
+        "collide": {
+            "bodies": [t["free"], t["free"]], "contacts": [Touch(t["law"], 0, 1)], "speeds": [1.0, 0.0],
+            "states": None, "tolerance": 1e-2, "quantity": None, "residual": True, "duration": 0.1, "max_impacts": 3,
+            "scheme": "A4", "dt": 1e-5, "forces": [0.0, 0.0],
+        },
+        "Scene.modes": {"self": t["scene"], "count": 5},
+        "Scene.plan": {"self": t["scene"], "watch": None, "tolerance": 1e-1},
+        "Scene.run": {"self": t["scene"], "watch": None, "plan": None, "before": None, "verify": False,
+                      "tolerance": 0.1},
+        "Scene.strike": {"self": t["scene"], "tolerance": 1e-1, "speed": 1.0, "at": at},
+        "load_scene": {"path": t["path"]},
+        "plan": {"scene": t["scene"], "tolerance": 1e-1},
+        "Plan.but": {"self": t["plan"], "tolerance": 1e-1, "target": "modal", "n_modes": 10},
+        "sweep": {
+            **blow, "over": {"mass": [0.02, 0.03]}, "tolerance": 1e-1, "max_frequency": 1e3, "layers": None,
+            "residual": True, "workers": 1, "store": None, "watch": None, "max_cells": 100.0,
+            "tell": None,
+        },
+        "mesh.Mesh.refined": {"self": t["square"], "factor": 2.0},
+        "mesh.rectangle": {"length": 0.4, "width": 0.3, "size": 0.2},
+        "mesh.line": {"length": 0.4, "size": 0.2},
+        "mesh.disk": {"radius": 0.4, "hole": 0.1, "size": 0.2},
+        "mesh.polygon": {
+            "corners": [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], "holes": [[(0.2, 0.2), (0.3, 0.2), (0.2, 0.3)]],
+            "size": 0.3,
+        },
+        "mesh.outline": {"source": [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], "size": 0.3, "unit": "m"},
+        "mesh.load": {"path": t["mesh"], "unit": "m"},
+        "mesh.save": {"path": folder / "saved.msh", "mesh": t["square"]},
+        "analytic.rectangle": {"length": 0.4, "width": 0.3, **body, "damping_ratio": 0.01},
+        "analytic.beam": {"length": 0.4, "ends": ("hinged", "free"), **body, "damping_ratio": 0.01},
+        "analytic.disk": {"radius": 0.4, "edge": "clamped", "nu": 0.3, **body, "damping_ratio": 0.01},
+        "accuracy.contact_duration": {"contact": t["law"], "mass": 0.03, "speed": 1.0},
+        "accuracy.cutoff_frequency": {
+            "modes": t["modes"], "at": at, "contact": t["law"], "mass": 0.03, "speed": 1.0, "tolerance": 1e-2,
+        },
+        "accuracy.truncation_error": {
+            "modes": t["modes"], "at": at, "max_frequency": 1e3, "contact": t["law"], "mass": 0.03, "speed": 1.0,
+        },
+        "export.write_vtk": {"path": folder / "motion.pvd", **written},
+        "export.write_animation": {"path": folder / "mode.pvd", "modes": t["modes"], "mode": 1, "frames": 3},
+        "export.write_uff": {"path": folder / "shapes.uff", "modes": t["modes"]},
+        "export.write_wav": {"path": folder / "hit.wav", **hit, "at": at, "listener": None, "duration": 0.01},
+        "export.write_force": {"path": folder / "force.csv", **hit},
+        "export.write_json": {"path": folder / "data.json", "data": {"a": 1.0}},
+        "export.numbers": hit,
+        "figures.save": {"path": folder / "force.png", "figure": fi.figures.energies(t["hit"])},
+        "figures.force": {**hit, "band": (10.0, 1e3)},
+        "figures.energies": hit,
+        "figures.mode_energies": hit,
+        "figures.mobility": {"modes": t["modes"], "at": at, "to": at, "band": (10.0, 1e3)},
+        "figures.mode_shapes": {"modes": t["modes"], "count": 2, "columns": 2},
+        "sound.synthesise": {**hit, "at": at, "duration": 0.01, "rate": 8000, "normalise": False},
+        "sound.radiate": {
+            **hit, "listener": (0.1, 0.1, 1.0), "duration": 0.01, "rate": 8000, "normalise": False,
+            "air": (1.2, 343.0),
+        },
+        "atlas.map_scene": {"scene": t["scene"], "over": {"mass": [0.02, 0.03]}, "max_frequency": 1e3,
+                            "tolerance": 0.1},
+        "atlas.hammers_for": {"scene": t["scene"], "bandwidth": 300.0, "masses": [0.1], "drop": 10.0},
+        "hammers.highest_frequency": {
+            "modes": t["modes"], "at": at, "bandwidth": 300.0, "masses": [0.1], "drop": 10.0,
+        },
+        "hammers.choose": {"modes": t["modes"], "at": at, "bandwidth": 300.0, "masses": [0.1], "drop": 10.0},
+        "report.read": {"path": t["path"]},
+        "report.write": {"path": folder / "report.html", "scene": t["scene"], "run": t["run"]},
+        "pictures.mode_shapes": {"path": folder / "modes.png", "modes": t["modes"], "count": 2, "columns": 2},
+        "pictures.wave": {"path": folder / "wave.png", **hit, "time": 1e-3},
+        "pictures.animation": {"path": folder / "wave.gif", **hit, "frames": 2},
+    }  # fmt: skip
+
+
+# --- what spoils an argument -----------------------------------------------------------------------------------------
+
+SPOILS: dict[str, Any] = {
+    "None": None, "True": True, "word": "word", "empty": "", "list": [], "dict": {}, "object": object(), "1j": 1j,
+    "nan": math.nan, "inf": math.inf, "-inf": -math.inf, "-1": -1.0, "int -1": -1, "0": 0.0, "int 0": 0,
+    "tiny": 1e-300, "denormal": 5e-324, "huge": 1e300, "great": 1e75, "slight": 1e-75, "great int": 10**30,
+    "billion": 10**9, "million": 10**6, "small": 1e-20, "most": sys.float_info.max, "huge int": 10**400,
+    "large int": 10**12, "bytes": b"bytes", "type": int, "no numbers": np.empty(0), "no points": np.empty((0, 2)),
+    "cube": np.zeros((3, 3, 3)), "words": np.array(["a", "b"]), "objects": np.array([object(), None]),
+    "nans": [math.nan, math.nan], "ragged": [[1.0], [1.0, 2.0]],
+    "complexes": np.array([1j, 2.0]), "infs": [math.inf] * 2,
+    "hugest": [1e308, 1e308], "none": [None, None], "nul": "a\0b", "long": "é" * 5000, "set": {1.0, 2.0},
+    "boolean": np.array([True, False]), "point far": (1e9, 1e9),
+    "generator": range(3), "dates": np.array(["2020"], "M8[Y]"),
+    "function": lambda *_: None, "nan function": lambda x: np.full(len(np.atleast_1d(x)), np.nan),
+    "odd keys": {None: 1.0, 3: "x"}, "one key": {"mass": [math.nan]}, "class instance": Counter(),
+    "surrogate": "\ud800.toml",
+}  # fmt: skip
+
+
+FUNCTIONS = ("function", "nan function", "type")  # what these do where a function is wanted is up to them
+CALLED = ("watch", "before", "tell", "ready")
+
+
+def cases(names: Any = None) -> Iterator[tuple[str, str, str]]:
+    """Call, parameter and spoil of every spoiled call."""
+    for name, arguments in table().items():
+        for parameter in arguments if names is None or name in names else ():
+            if parameter != "self":
+                spoils = [spoil for spoil in SPOILS if parameter not in CALLED or spoil not in FUNCTIONS]
+                yield from ((name, parameter, spoil) for spoil in spoils)
+
+
+# --- the judge -------------------------------------------------------------------------------------------------------
+
+INFINITE = {"threshold_frequency", "mobility"}  # documented to give inf
+ENDLESS = {"order"}  # fields documented to be infinite now and then
+OTHER_NAMES = {  # parameter: words under which an error may speak of it besides its own name
+    **dict.fromkeys(("length", "width", "radius", "factor", "corners", "hole"), ("size", "outline", "max_frequency")),
+    **dict.fromkeys(("frequencies", "points"), ("shapes",)),
+    **dict.fromkeys(("striker_force", "target_force"), ("forces",)),
+    "E_along": ("nu",),
+    "speed": ("loss", "max_frequency"),
+}
+
+
+def call(name: str, **changes: Any) -> Any:
+    """Call a public function validly but for the changes."""
+    function = public()[name.partition(" ")[0]]
+    arguments = {**table()[name], **changes}
+    return function(arguments.pop("self"), **arguments) if "self" in arguments else function(**arguments)
+
+
+def judged(name: str, changes: Mapping[str, Any]) -> str:
+    """'' where a call gives a result or one clear error, else what is wrong."""
+    try:
+        with limited(PATIENCE), warnings.catch_warnings():
+            warnings.simplefilter("error")
+            result = call(name, **changes)
+            broken = not_finite(result)
+            return f"result holds {broken}" if broken and name.partition(" ")[0] not in INFINITE else ""
+    except (ValueError, TypeError, OSError, fi.SimulationError) as error:
+        text = str(error)
+        where = origin(error)
+        if not raised_by_package(error):
+            return f"bare {type(error).__name__} from {where}: {text:.150}"
+        if not text.isprintable() or len(text) > LONGEST:
+            return f"unclear: {type(error).__name__} from {where}: {text!r:.200}"
+        words = [word for parameter in changes for word in (parameter, *OTHER_NAMES.get(parameter, ()))]
+        named = any(re.search(rf"\b{re.escape(word)}\b", text) for word in words) or getattr(error, "filename", None)
+        if not named and not isinstance(error, fi.SimulationError) and not said(changes, text):
+            return f"does not name {', '.join(changes)}: {type(error).__name__} from {where}: {text:.150}"
+        return ""
+    except (Exception, Hang) as error:
+        return f"{type(error).__name__} from {origin(error)}: {error!s:.150}"
+
+
+def said(changes: Mapping[str, Any], text: str) -> bool:
+    """Whether an error quotes a text that was passed, as one does with the name of a file."""
+    return any(isinstance(value, str) and value and value in text for value in changes.values())
+
+
+def origin(error: BaseException) -> str:
+    """The last line of the package that an error came through."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename.startswith(PACKAGE)]
+    return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else "outside"
+
+
+def raised_by_package(error: BaseException) -> bool:
+    """Whether the statement that raised it is a ``raise`` of the package, not a library's or the interpreter's."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    if trace is None or not trace.tb_frame.f_code.co_filename.startswith(PACKAGE):
+        return isinstance(error, OSError)  # the system's own words name the file
+    code = trace.tb_frame.f_code.co_code
+    return dis.opname[code[trace.tb_lasti]] in ("RAISE_VARARGS", "RERAISE")
+
+
+def not_finite(value: Any, name: str = "", depth: int = 3) -> str:
+    """Name and value of the first number in a result that is not finite; '' where all are."""
+    if isinstance(value, (float, complex, np.floating, np.complexfloating)):
+        return "" if np.isfinite(value) else f"{name} = {value}"
+    if isinstance(value, np.ndarray):
+        whole = value.dtype.kind not in "fc" or np.isfinite(value).all()
+        return "" if whole else f"{name} with {value[~np.isfinite(value)].ravel()[0]}"
+    if isinstance(value, (list, tuple)):
+        return next((b for i, x in enumerate(value) if (b := not_finite(x, f"{name}[{i}]", depth))), "")
+    if isinstance(value, Mapping):
+        return next((b for k, x in value.items() if (b := not_finite(x, f"{name}.{k}", depth))), "")
+    if dataclasses.is_dataclass(value) and not isinstance(value, type) and depth:
+        fields = (
+            (f.name, getattr(value, f.name))
+            for f in dataclasses.fields(value)
+            if f.name not in ENDLESS and f.name[0] != "_"
+        )
+        return next((b for k, x in fields if (b := not_finite(x, f"{name}.{k}", depth - 1))), "")
+    return ""
+
+
+@contextmanager
+def confined() -> Iterator[None]:
+    """In an empty folder, with little memory."""
+    here, (soft, hard) = Path.cwd(), resource.getrlimit(resource.RLIMIT_AS)
+    own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY, hard))
+    with tempfile.TemporaryDirectory() as name:
+        os.chdir(name)
+        try:
+            yield
+        finally:
+            os.chdir(here)
+            resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def main() -> int:
+    """Spoil every argument of the calls named, or of all; print what is wrong."""
+    names = sys.argv[1:] or None
+    for name in names or table():
+        call(name)  # compiles, which may take half a minute
+    failed = [f"{name}: {wrong}" for name in names or table() if (wrong := judged(name, {}))]
+    tally: Counter[str] = Counter()
+    with confined():
+        for name, parameter, spoil in cases(names):
+            began = time.monotonic()
+            wrong = judged(name, {parameter: SPOILS[spoil]})
+            tally[name] += 1
+            if wrong:
+                failed.append(f"{name} {parameter}={spoil}: {wrong}")
+                print(failed[-1], flush=True)
+            if (took := time.monotonic() - began) > 2.0:
+                print(f"{took:.1f} s {name} {parameter}={spoil}", flush=True)
+    print(json.dumps({"calls": tally.total(), "functions": len(tally), "failed": failed}))
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
