@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 import fem_impact as fi
 from fem_impact import _check
 
+for extra in ("pyuff", "jinja2", "plotly"):  # the table writes a universal file and a report
+    pytest.importorskip(extra)
 DRAWN = ("pictures.mode_shapes", "pictures.wave", "pictures.animation", "report.write", "atlas.hammers_for")
 QUICK = [case for case in signatures.cases() if case[0] not in DRAWN]  # those render or search for seconds
 
