@@ -24,6 +24,7 @@ COMMANDS = {  # words, and what is there when they are done
     "hammer": ("hammer scene.toml --bandwidth 300 --out out/h.png", ["h.png"]),
     "report": ("report scene.toml --out out/r.html", ["r.html"]),
     "doctor": ("doctor", []),
+    "plan": ("plan scene.toml", []),
 }
 
 
