@@ -1,6 +1,7 @@
 """How fast maps are: the source's grids and a million bounces, beside a plain loop over `strike` and over solve_ivp.
 
     python studies/map_speed.py [--bounces 1000000]
+    python studies/map_speed.py --cluster 10000000      threads beside Dask with two workers of one thread
 
 Stick and hinged plate of the source with 300 modes, tolerance 1e-3; the times are after compilation, best of some runs.
 """
@@ -9,6 +10,7 @@ import argparse
 import os
 import resource
 import time
+from functools import partial
 
 import numpy as np
 import source_scenes as source
@@ -29,10 +31,10 @@ def best(repeats, work, *arguments):
     return min(times)
 
 
-def grid(modes, side):
+def grid(modes, side, **wanted):
     """One map of sticks and linear springs, side times side."""
     over = {"mass": np.linspace(10e-3, 200e-3, side), "stiffness": np.geomspace(1e4, 1e6, side)}
-    return fi.sweep(modes, STICK, fi.Contact.linear(1e5), at=source.AT, speed=1.0, over=over, tolerance=1e-3)
+    return fi.sweep(modes, STICK, fi.Contact.linear(1e5), at=source.AT, speed=1.0, over=over, tolerance=1e-3, **wanted)
 
 
 def beyond(modes, frequency, side=100):
@@ -70,12 +72,30 @@ def by_solve_ivp(plate_mass, mass, stiffness, n_modes=300):
     return solve_ivp(slope, (0.0, 0.1), start, "DOP853", events=parted, rtol=1e-4, atol=1e-9)
 
 
+def by_cluster(bounces):
+    """The same map off the 2 kg plate by threads and by a cluster on this machine, in turns."""
+    from distributed import Client, LocalCluster
+
+    modes, side = source.plate(2.0), round(bounces**0.5)
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+        grid(modes, 300), grid(modes, 300, client=client)
+        for _ in range(3):
+            alone, spread = best(1, grid, modes, side), best(1, partial(grid, client=client), modes, side)
+            print(f"{side**2} bounces: threads {alone:.2f} s, Dask {spread:.2f} s, {spread / alone:.2f} times")
+    print(f"largest memory of this process: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
+
+
 def main():
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--bounces", type=int, default=1_000_000)
-    bounces = parser.parse_args().bounces
+    parser.add_argument("--cluster", type=int, default=0, metavar="BOUNCES")
+    wanted = parser.parse_args()
+    bounces = wanted.bounces
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
+    if wanted.cluster:
+        by_cluster(wanted.cluster)
+        return
     plates = {name: source.plate(mass) for name, mass in source.PLATE_MASSES.items()}
     for name, modes in plates.items():
         grid(modes, 20)
