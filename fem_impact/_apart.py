@@ -16,6 +16,7 @@ from . import _check
 
 PATIENCE = 8.0  # [s] for a small file: no honest one of a megabyte takes a tenth of it
 RATE = 2e5  # [byte/s] and as much longer as its size asks for: a third of the slowest reader's speed
+HEAD = 4096  # [byte] of which one must not be zero: a hole of a gigabyte would be parsed for minutes
 MEMORY = 2 << 30  # [byte] of address space, of which Python and numpy take 0.2 GB
 EXTRAS = {"svgelements": "cad", "ezdxf": "cad", "pyuff": "uff", "h5py": "hdf5"}  # optional libraries, and our extras
 ACTS = ("socket.", "subprocess.", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.fork", "shutil.", "ftplib.")
@@ -38,6 +39,9 @@ def read(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.nd
     """
     if not path.is_file():
         raise ValueError(f"path must name {kind}, got {str(path)!r}; there is no such file")
+    with path.open("rb") as file:
+        if not file.read(HEAD).strip(b"\0"):
+            raise ValueError(f"{path.name} cannot be read as {kind} (it is empty, or begins with nothing but zeros)")
     patience = PATIENCE + path.stat().st_size / RATE
     try:
         status, out, said = run(path, reader, arguments, patience)

@@ -247,6 +247,8 @@ def _slender(whole: shapely.Polygon) -> str:
         return "outline must not be a thousand times longer than wide; widen it"
     for k in range(1, FINEST):
         width = span * 4.0**-k
+        if SLENDER * width**2 >= whole.area:  # no strip of this half width can be that long, and looking would be slow
+            continue
         body = whole.simplify(0.05 * width)  # what is finer does not matter at this width, and costs
         rest = body.difference(body.buffer(-width, quad_segs=1).buffer(1.001 * width, quad_segs=2))
         if rest.area > SLENDER * width**2:  # a strip of this half width and `SLENDER` / 2 times as long

@@ -44,9 +44,18 @@ def test_header_that_claims_more_than_the_memory_is_refused(tmp_path):
 @pytest.mark.parametrize("status", [2, -6, -11])
 def test_reader_that_dies_or_fills_the_memory_is_a_sentence(tmp_path, monkeypatch, status):
     monkeypatch.setattr(_apart, "run", lambda path, reader, arguments, patience: (status, b"", b""))
-    (tmp_path / "plate.msh").write_text("")
+    (tmp_path / "plate.msh").write_text("any")
     with pytest.raises(ValueError, match=r"plate\.msh cannot be read as a mesh \(its reader died or took 2 GB\)"):
         mesh.load(tmp_path / "plate.msh")
+
+
+@pytest.mark.parametrize("name", ["plate.msh", "plate.vtu", "plate.svg", "plate.unv"])
+@pytest.mark.parametrize("size", [0, 2**31])
+def test_holes_are_not_parsed(tmp_path, name, size):
+    with (tmp_path / name).open("wb") as file:
+        file.truncate(size)
+    with pytest.raises(ValueError, match=rf"{name.replace('.', '[.]')} .*(begins with nothing but zeros|empty)"):
+        _apart.read(tmp_path / name, "a mesh", "_meshread:read")
 
 
 def test_memory_of_the_reader_is_limited():
