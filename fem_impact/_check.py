@@ -18,6 +18,7 @@ LONGEST = 500  # [-] characters of a foreign text quoted in a message
 SHOWN = 80  # [-] characters of a value quoted in a message
 REACH = 1e75  # [-] numbers may have this size or its reciprocal: the fourth power of either is still a float
 MOST = 10**9  # [-] that can be counted: more of anything would not fit into memory
+LONGEST_NAME = 255  # [byte] of a file or folder
 LONGEST_PATH = 4000  # [-] characters, about what systems allow
 SOURCES = {  # where what is not a number comes from
     "Contact": "fi.Contact.hertz, linear or power",
@@ -135,7 +136,9 @@ def path(name: str, value: Any) -> Path:
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
     try:
         if isinstance(text, str) and "\0" not in text and 0 < len(os.fsencode(text)) <= LONGEST_PATH:
-            return Path(text)
+            path = Path(text)
+            if all(len(os.fsencode(part)) <= LONGEST_NAME for part in path.parts):
+                return path
     except UnicodeEncodeError:
         pass
     raise ValueError(f"{name} must be the path of a file, got {shown(value)}")

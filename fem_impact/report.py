@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import math
+import os
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -60,7 +61,7 @@ def read(path: str | Path) -> Scene:
 def _whole(scene: Scene) -> Scene:
     """The scene of a result, if what it was struck on is still there."""
     for source in (scene.mesh.values[key] for key in PATHS if key in scene.mesh.values):
-        if not Path(source).is_file():
+        if not os.path.isfile(source):  # unlike Path's, False too for names that no file can have
             raise fault(scene.path, f"the body it struck is gone: put {source} back, or give the scene's TOML file")
     return scene
 

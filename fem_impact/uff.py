@@ -138,8 +138,10 @@ def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:
             f"{path.name} has shapes at {len(result['shapes'])} nodes but names {len(points)}; export it again"
         )
     for what, values in result.items():
-        if not np.isfinite(values).all() or (what == "frequencies" and values.min() < 0.0):
-            raise ValueError(f"{path.name} has {what} that are negative or no numbers; export it again")
+        if not (np.abs(values) <= _check.REACH).all() or (what == "frequencies" and values.min() < 0.0):
+            raise ValueError(
+                f"{path.name} has {what} that are negative, beyond all size or no numbers; export it again"
+            )
     return result
 
 
