@@ -40,8 +40,7 @@ def undo_all() -> bool:
 def replacing(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path beside ``path`` (same suffix); rename it when the block ends well, remove it if not."""
     path = Path(path)
-    if path.is_dir():
-        raise IsADirectoryError(21, "Is a directory", str(path))
+    _placed(path)
     temporary = path.with_name(f"{PARTIAL}{secrets.token_hex(4)}-{path.name}")
     with undoable(lambda: temporary.unlink(missing_ok=True)):
         try:
@@ -91,12 +90,19 @@ def scratch() -> Iterator[Path]:
         yield Path(name)
 
 
+def _placed(path: Path) -> None:
+    """Refuse to put a file where a folder, a device or a pipe is: renaming would take its place."""
+    if path.is_dir():
+        raise IsADirectoryError(21, "Is a directory", str(path))
+    if path.exists() and not path.is_file():
+        raise FileExistsError(17, "Is no file", str(path))
+
+
 def _move(staging: Path, folder: Path) -> None:
     """Rename every file below ``staging`` to the same place below ``folder``."""
     files = sorted(path.relative_to(staging) for path in staging.rglob("*") if path.is_file())
     for name in files:
-        if (folder / name).is_dir():
-            raise IsADirectoryError(21, "Is a directory", str(folder / name))
+        _placed(folder / name)
     for name in files:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         os.replace(staging / name, folder / name)

@@ -117,6 +117,16 @@ def _forget_output() -> None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+def _place(text: str) -> Path:
+    """A path given at the prompt."""
+    from . import _check  # with numpy, which help and version do without
+
+    try:
+        return _check.path("it", text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
 def _prepare(environment: MutableMapping[str, str], once: bool) -> bool:
     """Set what numpy and numba read when they are loaded; whatever the user has set stays.
 
@@ -196,8 +206,10 @@ def _parser() -> argparse.ArgumentParser:
 
     strike = verbs.add_parser("strike", help="strike a scene; write force, spectrum, modes and sound")
     strike.set_defaults(run=_strike)
-    strike.add_argument("scene", metavar="SCENE", type=Path, help="a TOML file, such as studies/scenes/drumstick.toml")
-    strike.add_argument("--out", metavar="DIR", type=Path, help="where the files go (default: out/NAME-OF-SCENE)")
+    strike.add_argument(
+        "scene", metavar="SCENE", type=_place, help="a TOML file, such as studies/scenes/drumstick.toml"
+    )
+    strike.add_argument("--out", metavar="DIR", type=_place, help="where the files go (default: out/NAME-OF-SCENE)")
     _add_choices(strike)
     strike.add_argument("--verify", action="store_true", help="strike again, finer, and print the true differences")
     strike.add_argument(
@@ -212,24 +224,24 @@ def _parser() -> argparse.ArgumentParser:
 
     plan = verbs.add_parser("plan", help="say what would be modelled, why, how well and at which cost; strike nothing")
     plan.set_defaults(run=_plan)
-    plan.add_argument("scene", metavar="SCENE", type=Path, help="a TOML file")
+    plan.add_argument("scene", metavar="SCENE", type=_place, help="a TOML file")
     _add_choices(plan)
     plan.add_argument("--json", action="store_true", help="print the plan as JSON")
 
     modes = verbs.add_parser("modes", help="list the modes of the struck body; write their shapes")
     modes.set_defaults(run=_modes)
-    modes.add_argument("scene", metavar="SCENE", type=Path, help="a TOML file")
+    modes.add_argument("scene", metavar="SCENE", type=_place, help="a TOML file")
     modes.add_argument("--count", metavar="N", type=int, default=12, help="how many modes (default: 12)")
-    modes.add_argument("--vtk", metavar="FILE", type=Path, help="write the shapes to a .pvd or .vtu file")
+    modes.add_argument("--vtk", metavar="FILE", type=_place, help="write the shapes to a .pvd or .vtu file")
     modes.add_argument("--json", action="store_true", help="print the numbers as JSON")
 
     chart = verbs.add_parser("map", help="strike a scene over the axes of its table [map]; write numbers and pictures")
     chart.set_defaults(run=_map)
     chart.add_argument(
-        "scene", metavar="SCENE", type=Path, help="a TOML file, such as studies/scenes/drumstick_map.toml"
+        "scene", metavar="SCENE", type=_place, help="a TOML file, such as studies/scenes/drumstick_map.toml"
     )
     chart.add_argument(
-        "--out", metavar="DIR", type=Path,
+        "--out", metavar="DIR", type=_place,
         help="where map.nc, map.csv and, of two axes, a PNG of each layer go (default: out/NAME-OF-SCENE)",
     )  # fmt: skip
     chart.add_argument("--tolerance", metavar="T", type=float, help="largest error accepted, instead of the scene's")
@@ -239,13 +251,13 @@ def _parser() -> argparse.ArgumentParser:
     chart.add_argument("--workers", metavar="N", type=int, help="threads (default: one for each core)")
     chart.add_argument("--cluster", metavar="ADDRESS", help="strike on the Dask cluster whose scheduler is there")
     chart.add_argument(
-        "--store", metavar="DIR", type=Path, help="keep finished cells there; a killed run goes on from it"
+        "--store", metavar="DIR", type=_place, help="keep finished cells there; a killed run goes on from it"
     )
     chart.add_argument("--max-cells", metavar="N", type=float, default=1e8, help="refuse larger maps (default: 1e8)")
 
     hammer = verbs.add_parser("hammer", help="choose a hammer: bandwidth without a double hit")
     hammer.set_defaults(run=_hammer)
-    hammer.add_argument("scene", metavar="SCENE", type=Path, help="a TOML file; its body and strike point are used")
+    hammer.add_argument("scene", metavar="SCENE", type=_place, help="a TOML file; its body and strike point are used")
     hammer.add_argument("--bandwidth", metavar="F", type=float, required=True, help="to be reached [Hz]")
     hammer.add_argument(
         "--drop",
@@ -255,20 +267,22 @@ def _parser() -> argparse.ArgumentParser:
         help="how far the spectrum may fall till there, dB (default: 10)",
     )
     hammer.add_argument("--masses", metavar="KG", type=float, nargs="+", help="of the hammers (default: 1 g to 1 kg)")
-    hammer.add_argument("--out", metavar="FILE", type=Path, help="write a picture there: .png, .pdf or .svg")
+    hammer.add_argument("--out", metavar="FILE", type=_place, help="write a picture there: .png, .pdf or .svg")
     hammer.add_argument("--json", action="store_true", help="print the numbers as JSON")
 
     report = verbs.add_parser("report", help="strike a scene; write one page that holds everything about the blow")
     report.set_defaults(run=_report)
     report.add_argument(
-        "scene", metavar="SCENE|RESULT", type=Path, help="a TOML file, or the folder that `strike` wrote"
+        "scene", metavar="SCENE|RESULT", type=_place, help="a TOML file, or the folder that `strike` wrote"
     )
-    report.add_argument("--out", metavar="FILE", type=Path, help="where the page goes (default: out/NAME/report.html)")
+    report.add_argument(
+        "--out", metavar="FILE", type=_place, help="where the page goes (default: out/NAME/report.html)"
+    )
     report.add_argument("--tolerance", metavar="T", type=float, help="largest error accepted, instead of the scene's")
 
     explore = verbs.add_parser("explore", help="serve a page on this machine: turn the hammer, click the strike point")
     explore.set_defaults(run=_explore)
-    explore.add_argument("scene", metavar="SCENE", type=Path, help="a TOML file")
+    explore.add_argument("scene", metavar="SCENE", type=_place, help="a TOML file")
     explore.add_argument("--port", metavar="N", type=int, default=0, help="of 127.0.0.1 (default: any that is free)")
     explore.add_argument("--no-open", action="store_true", help="print the address, but do not open it in a browser")
 

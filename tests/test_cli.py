@@ -186,6 +186,8 @@ def test_missing_scene_is_a_sentence_with_the_nearest_name(scene, tmp_path, caps
         (["modes", "SCENE", "--count", "x"], "invalid int value: 'x'; see fem-impact modes --help"),
         (["map", "SCENE", "--format", "zar"], "did you mean zarr?"),
         ([], "required: COMMAND; see fem-impact --help"),
+        (["strike", ""], "argument SCENE: it must be the path of a file, got ''"),
+        (["report", "SCENE", "--out", "x" * 300], "argument --out: it must be the path of a file"),
         (["\x1b[31m"], r"'\x1b[31m'"),
     ],
 )

@@ -1,5 +1,7 @@
 """Files are complete or absent, whatever goes wrong while they are written."""
 
+import os
+
 import pytest
 
 from fem_impact._files import PARTIAL, replacing, staged
@@ -58,3 +60,14 @@ def test_staged_finds_a_place_that_cannot_be_written_to_before_the_work_begins(t
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(NotADirectoryError), staged(tmp_path / "file" / "out"):
         pytest.fail("the block must not run")
+
+
+def test_what_is_no_file_is_not_replaced(tmp_path):
+    """Renaming would put a file in the place of a device or a pipe."""
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OSError, match="Is no file"), replacing(tmp_path / "pipe"):
+        pass
+    with pytest.raises(OSError, match="Is no file"), staged(tmp_path) as staging:
+        (staging / "pipe").write_text("new")
+    assert names(tmp_path) == ["pipe"]
+    assert (tmp_path / "pipe").is_fifo()
