@@ -80,9 +80,9 @@ class Family:
 
     def heard(self, body: int, compliance: np.ndarray) -> np.ndarray:
         """Lowest frequency [rad/s] such that the modes from there on yield no more than some compliances; 0 for all."""
-        omega = np.sort(self.omega[body][self.omega[body] > 0.0])[::-1]
-        squared = self.squared[body][self.omega[body] > 0.0][np.argsort(-self.omega[body][self.omega[body] > 0.0])]
-        above = np.cumsum(squared / omega**2)
+        fastest = np.argsort(-self.omega[body])[: np.count_nonzero(self.omega[body])]
+        omega = self.omega[body][fastest]
+        above = np.cumsum(self.squared[body][fastest] / omega**2)
         return np.append(omega, 0.0)[np.searchsorted(above, compliance)]
 
     def kernels(self, h: float, n_steps: int) -> tuple[np.ndarray, ...]:
@@ -286,14 +286,9 @@ class _Engine:
             np.array([self.of_family(number, body) for body in (0, 1)]) * self.shares
             for number in (Family.rigid, Family.static, lambda family, body: family.rest[body])
         )
-        self.own_rigid, self.rigid, self.static, rest = (
-            rigid[1],
-            rigid.sum(axis=0),
-            static.sum(axis=0),
-            rest.sum(axis=0),
-        )
+        self.own_rigid, self.rigid, self.static = rigid[1], rigid.sum(axis=0), static.sum(axis=0)
         stiffness = blows.stiffness * blows.speed ** (blows.exponent - 1.0)
-        self.law = np.array([stiffness, blows.exponent, rest, blows.loss * blows.speed])
+        self.law = np.array([stiffness, blows.exponent, rest.sum(axis=0), blows.loss * blows.speed])
 
     def of_family(self, number: Callable[[Family, int], float], body: int) -> np.ndarray:
         """A number of one of the bodies of each blow's family, (n_cases,)."""

@@ -208,9 +208,9 @@ def _sounds(scene: Scene, response: Response) -> list[Player]:
     ]
     if response.target.dimension == 2:
         listener = scene.listener or [*np.asarray(response.at).tolist(), DISTANCE]
-        where = f"to {place(listener)}" if scene.listener else f", {DISTANCE:g} m in front of the strike point"
+        where = f" to {place(listener)}" if scene.listener else f", {DISTANCE:g} m in front of the strike point"
         pressure = sound.radiate(response, listener, duration=_duration(response))
-        heard.append((f"Sound radiated {where}".replace(" ,", ","), pressure))
+        heard.append((f"Sound radiated{where}", pressure))
     players = []
     for name, samples in heard:
         level = samples.peak_level

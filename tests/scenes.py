@@ -1,4 +1,4 @@
-"""A scene that strikes at once, as text, for tests of everything around the strike."""
+"""Scenes that strike at once, as text, for tests of everything around the strike."""
 
 QUICK = """
 [mesh]
@@ -24,3 +24,8 @@ tolerance = 1e-2
 [map]
 over = { "striker.mass" = [0.03, 0.05] }
 """
+SMALL = (  # the same through a Hertz spring, damped, with no map
+    QUICK.partition("[map]")[0]
+    .replace("first_frequency = 100.0", "first_frequency = 100.0\ndamping_ratio = 0.01")
+    .replace('"linear"\nstiffness = 1e4', '"hertz"\nstiffness = 695e3')
+)

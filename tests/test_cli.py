@@ -12,36 +12,14 @@ import pyvista
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scenes import SMALL
 from scipy.io import wavfile
 
 import fem_impact as fi
 from fem_impact import cli
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
-TEXT = """
-title = "A small test"
-[mesh]
-shape = "rectangle"
-length = 0.465
-width = 0.3
-[target]
-mass = 0.2
-first_frequency = 100.0
-damping_ratio = 0.01
-source = "analytic"
-[supports]
-boundary = "hinged"
-[striker]
-kind = "rigid"
-mass = 0.03
-[contact]
-kind = "hertz"
-stiffness = 695e3
-[strike]
-at = [0.1395, 0.09]
-speed = 2.0
-tolerance = 1e-2
-"""
+TEXT = 'title = "A small test"' + SMALL
 
 
 @pytest.fixture
