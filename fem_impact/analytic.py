@@ -627,6 +627,8 @@ def disk(
         raise ValueError("give nu or section, not both: the section's material has its own nu")
     _check_scale(section, Plate, mass, first_frequency)
     physical = _plate_scale(section, np.pi * radius**2)
+    if physical is not None:  # the shapes are those of the unit disk
+        physical = physical[0], physical[1] / radius
     ratio = section.material.nu if section is not None else 0.3 if nu is None else _check.between("nu", nu, -0.99, 0.5)
     n_rigid = 3 if edge == "free" else 0
     root_area = np.sqrt(np.pi)

@@ -126,6 +126,26 @@ def test_sections_give_absolute_frequencies():
     assert_allclose(rod.frequencies, [exact], rtol=1e-12)  # the root's printed digits
 
 
+DISK_FIRST = {"clamped": 10.2158262, "hinged": 4.93514904, "free": 5.3583298}  # omega R**2 sqrt(rho h / D), nu = 0.3
+
+
+@pytest.mark.parametrize("edge", analytic.ENDS)
+@pytest.mark.parametrize("radius", [0.01, 0.2, 3.0, 100.0])
+def test_a_disk_of_a_section_has_absolute_frequencies_and_compliance_at_every_size(edge, radius):
+    plate = section.Plate(STEEL, thickness=1e-3 * radius)
+    rigidity, per_area = 210e9 * plate.thickness**3 / (12 * (1 - 0.3**2)), 7850 * plate.thickness
+    n_rigid = 3 if edge == "free" else 0
+    modes = analytic.disk(radius, edge=edge, section=plate, n_modes=n_rigid + 1)
+    exact = DISK_FIRST[edge] / radius**2 * np.sqrt(rigidity / per_area) / (2 * np.pi)
+    assert_allclose(modes.frequencies[-1], exact, rtol=1e-8)  # digits printed
+    within = analytic.disk(radius, edge=edge, section=plate, max_frequency=1.0001 * exact)
+    assert within.n_modes == (5 if edge == "free" else 1)  # three rigid motions and a pair
+    assert_allclose(modes.mass, per_area * np.pi * radius**2, rtol=1e-14)
+    if edge != "free":  # Timoshenko and Woinowsky-Krieger, eq. (92) and its like for the hinged edge, load in the middle
+        centre = {"clamped": 1.0, "hinged": 3.3 / 1.3}[edge] * radius**2 / (16.0 * np.pi * rigidity)
+        assert_allclose(modes.shapes.compliance(np.zeros((1, 2))), [[centre]], rtol=1e-12)
+
+
 def test_sections_a_formula_does_not_cover_are_refused():
     wood = section.Material.orthotropic(E_along=10e9, E_across=1e9, nu=0.3, G=0.8e9, rho=450.0)
     with pytest.raises(ValueError, match="section must be isotropic"):
