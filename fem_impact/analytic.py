@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,13 @@ from . import _check
 from .modal import Damping, Modes, damping_ratios
 from .section import Beam, Plate
 
-LEVY_TERMS = 4000  # [-] sum over sines across a hinged plate: with its tail corrected, 1e-11 of the compliance
-COTH_ONE = 19.0  # [-] argument from which coth is 1 to rounding: exp(-38) is 3e-17
+IMAGES = 6  # [-] of a force in the shorter sides of a hinged plate, on either side: they fade as exp(-2 pi n)
+NEAR_POLE = 1.0  # [-] real part below which polylogarithms are summed as power series, radius of convergence 2 pi
+POWERS = np.append(2, np.arange(3, 60, 2))  # [-] of these series; the others have no weight
+SERIES = (
+    (-1.0) ** POWERS * special.bernoulli(60)[POWERS - 1] / (POWERS - 1.0) / special.factorial(POWERS)
+)  # zeta(2-k)/k!
+POLYLOG_TERMS = 40  # [-] of the direct sum beyond: exp(-40)
 DISK_TERMS = 100_000  # [-] cap for points at the very edge of a disk, where terms fall as n**-3 only: 5e-11
 MOST_MODES = 1_000_000  # [-] that may be asked for: some seconds
 MOST_OF_DISK = 50_000  # [-] likewise, where each takes the search for a root
@@ -102,48 +106,23 @@ class RectangleShapes:
         return np.asarray(inside.all(axis=1))
 
     def compliance(self, points: np.ndarray) -> np.ndarray:
-        """Levy's series: sines along the length, the exact Green's function across."""
-        result = np.empty((len(points), len(points)))
-        for i, load in enumerate(points):
-            for j, place in enumerate(points[: i + 1]):
-                result[i, j] = result[j, i] = self._green(place, load)
-        return result
+        return self.deflection(points, points)
 
-    @cached_property
-    def _levy(self) -> tuple[np.ndarray, np.ndarray, float]:
-        """Wave numbers along the length, what is the same for all points in the sum's terms, and the tail's share."""
-        beta = np.arange(1, LEVY_TERMS + 1) * np.pi / self.length
-        whole = -np.expm1(-2.0 * beta * self.width)
-        tail = 0.5 * (self.length / np.pi) ** 3 / 4.0 / (2.0 * LEVY_TERMS * (LEVY_TERMS + 1.0))  # mean sin**2 = 1/2
-        return beta, np.stack([whole, 1.0 / beta + self.width * (2.0 - whole) / whole, beta**-2.0]), tail
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros(len(points))
 
-    def _sines(self, x: float) -> np.ndarray:
-        """Sines of the wave numbers at a place along the length, products of few rotations, (LEVY_TERMS,)."""
-        turn = 1j * np.pi * x / self.length
-        side = int(LEVY_TERMS**0.5) + 1
-        inner, outer = np.exp(turn * np.arange(side)), np.exp(turn * side * np.arange(side))
-        return (outer.real[:, None] * inner.imag + outer.imag[:, None] * inner.real).ravel()[1 : LEVY_TERMS + 1]
-
-    def _green(self, place: np.ndarray, load: np.ndarray) -> float:
-        beta, (whole, span, inverse), tail = self._levy
-        low, high = min(place[1], load[1]), self.width - max(place[1], load[1])
-        gap = self.width - low - high
-        if min(low, high) <= 0.0:
-            return 0.0
-        fourth = span - (low + high)  # where coth is 1 to the last digit, else:
-        n = np.searchsorted(beta, COTH_ONE / min(low, high))
-        near, far = -np.expm1(-2.0 * low * beta[:n]), -np.expm1(-2.0 * high * beta[:n])
-        # x coth(x beta) is x (2 - t) / t with t = 1 - exp(-2 x beta)
-        fourth[:n] = near * far / whole[:n] * (span[:n] - low * (2.0 - near) / near - high * (2.0 - far) / far)
-        fourth *= inverse
-        sines = self._sines(place[0])
-        sines *= sines if place[0] == load[0] else self._sines(load[0])
-        if gap > 0.0:
-            sines *= np.exp(-gap * beta)
-        total = float(sines @ fourth) / 4.0
-        if gap < 1e-12 * self.width and abs(place[0] - load[0]) < 1e-12 * self.length:
-            total += tail
-        return 2.0 / self.length * total
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Forces and their images in the longer sides on an endless strip, each in closed form (`_strip`)."""
+        sides = np.array([self.length, self.width])
+        across, along = (1, 0) if self.width < self.length else (0, 1)  # the strip runs along the longer sides
+        scale = sides[across]
+        place, load = points[:, None, None] / scale, loads[None, :, None] / scale  # (n_points, n_loads, n_images, 2)
+        images = 2.0 * sides[along] / scale * np.arange(-IMAGES, IMAGES + 1)
+        total = sum(
+            sign * _strip(place[..., along] - sign * load[..., along] + images, place[..., across], load[..., across])
+            for sign in (1.0, -1.0)
+        )
+        return np.where(_inside(points, sides)[:, None] & _inside(loads, sides), scale**2 * total, 0.0)
 
     def take(self, n_modes: int) -> "RectangleShapes":
         return replace(self, numbers=self.numbers[:n_modes])
@@ -154,6 +133,44 @@ class RectangleShapes:
         node = np.arange(x.size).reshape(x.shape)
         a, b, c, d = node[:-1, :-1].ravel(), node[1:, :-1].ravel(), node[1:, 1:].ravel(), node[:-1, 1:].ravel()
         return np.column_stack([x.ravel(), y.ravel()]), np.vstack([np.c_[a, b, c], np.c_[a, c, d]])
+
+
+def _inside(points: np.ndarray, sides: np.ndarray) -> np.ndarray:
+    """Whether points (n, 2) lie off the edges of a rectangle, (n,) bool."""
+    return np.asarray((np.minimum(points, sides - points) > 0.0).all(axis=1))
+
+
+def _strip(shift: np.ndarray, place: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Deflection of an endless hinged strip of unit width and rigidity under forces, summed over the last axis.
+
+    ``shift`` is the distance along it. Each force adds the sum over m of 2 sin(m pi place) sin(m pi load) (1 + z)
+    exp(-z) / (4 (m pi)**3), z = m pi shift: a difference of polylogarithms, whose constant and linear terms cancel.
+    """
+    x = np.pi * np.abs(shift)
+    near, far = np.broadcast_arrays(np.pi * np.abs(place - load), np.pi * (place + load), x)[:2]
+    both = _decaying_cosines(x, near) - _decaying_cosines(x, np.minimum(far, 2.0 * np.pi - far))
+    return both.sum(axis=-1) / (4.0 * np.pi**3)
+
+
+def _decaying_cosines(x: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Sum over m of cos(m angle) (1 + m x) exp(-m x) / m**3 less what does not depend on the angle.
+
+    That is Re Li3(exp(mu)) + x Re Li2(exp(mu)), mu = -x + i angle, angle from 0 to pi, x >= 0.
+
+    References
+    ----------
+    Wood (1992), The computation of polylogarithms, eq. 9.3, for the power series about mu = 0.
+    """
+    result = np.empty(x.shape)
+    near = x < NEAR_POLE
+    gap, u = x[near], -x[near] + 1j * angle[near]
+    log = np.log(np.where(u == 0.0, 1.0, -u))
+    series = (SERIES * (gap[:, None] + u[:, None] / (POWERS + 1.0)) * u[:, None] ** POWERS).sum(axis=1)
+    result[near] = (0.5 * u**2 * (1.5 - log) + gap * u * (1.0 - log) + series).real
+    m = np.arange(1, POLYLOG_TERMS + 1)
+    z = x[~near][:, None] * m
+    result[~near] = (np.exp(-z) * (1.0 + z) * (np.cos(angle[~near][:, None] * m) - 1.0) / m**3).sum(axis=1)
+    return result
 
 
 def rectangle(
@@ -283,11 +300,16 @@ class BeamShapes:
         return np.all((points >= -1e-9 * self.length) & (points <= (1 + 1e-9) * self.length), axis=1)
 
     def compliance(self, points: np.ndarray) -> np.ndarray:
-        """|x - load|**3 / 12 plus the polynomial that meets the ends; inertia relief where the beam can move."""
-        x = points[:, 0] / self.length
-        rigid = _beam_rigid(self.ends)
-        result = np.column_stack([_beam_green(self.ends, rigid, load)(x) for load in x])
+        result = self.deflection(points, points)
         return 0.5 * (result + result.T)
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros(len(points))
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """|x - load|**3 / 12 plus the polynomial that meets the ends; inertia relief where the beam can move."""
+        rigid, x = _beam_rigid(self.ends), points[:, 0] / self.length
+        return np.column_stack([_beam_green(self.ends, rigid, load)(x) for load in loads[:, 0] / self.length])
 
     def take(self, n_modes: int) -> "BeamShapes":
         return replace(self, k=self.k[:n_modes], weights=self.weights[:n_modes])
@@ -512,12 +534,14 @@ class DiskShapes:
         return np.hypot(points[:, 0], points[:, 1]) <= (1 + 1e-9) * self.radius
 
     def compliance(self, points: np.ndarray) -> np.ndarray:
-        x = points / self.radius
-        result = np.empty((len(x), len(x)))
-        for i, load in enumerate(x):
-            for j, place in enumerate(x[: i + 1]):
-                result[i, j] = result[j, i] = _disk_green(self.edge, self.nu, place, load)
-        return result
+        return self.deflection(points, points)
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros(len(points))
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        x, y = points / self.radius, loads / self.radius
+        return np.array([[_disk_green(self.edge, self.nu, place, load) for load in y] for place in x])
 
     def take(self, n_modes: int) -> "DiskShapes":
         kept = {name: getattr(self, name)[:n_modes] for name in ("z", "order", "weight", "phase", "scale")}

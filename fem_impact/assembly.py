@@ -8,36 +8,32 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags
 
-from . import _check
-from .attached import beam_springs, check_masses, plate_springs
-from .corners import around_corners, towards_points
+from . import _check, beam_elements
+from .attached import beam_springs, check_masses, edge_springs, plate_springs
+from .beam_elements import HermiteSpace
+from .corners import around_corners
 from .curves import Curves
 from .elements import (
     Argyris,
     ArgyrisSpace,
     Bent,
     BentMapping,
-    Hermite,
-    HermiteSpace,
     Morley,
     MorleySpace,
     numbering,
     quadrature,
-    segments,
     triangles,
 )
 from .mesh import Mesh, aligned
 from .section import Beam, Elastic, Plate
+from .splitting import towards_points
 from .supports import Rim, cells_of_facets, constrain
 
 KINDS = ("clamped", "hinged", "free")
 MORLEY_ORDER = 4  # [-] likewise for products of quadratics
 MASS_ORDER = 10  # [-] of the quadrature: exact for products of quintics
-BEAM_ORDER = 8  # [-] exact for products of cubics where the height varies linearly
 UNEVEN = 20.0  # [-] largest over smallest triangle from which eigenvalues are taken from the strain energy
-POINT_RINGS = 8  # [-] of triangles towards a point asked for: the innermost are a 256th of the others
-STEP_SEARCH = 8  # [-] parts of each line element in which a step of the section is looked for
-STEP_SIZE = 1e-3  # [-] smallest relative change of the rigidity that counts as one
+SAME_NODE = 1e-9  # [-] of a beam: nodes nearer to each other than this are one
 TINY = 4e-3  # [-] of the extent: likewise for the root of the area of the smallest triangle
 CHUNK = 256  # [-] triangles whose strain is computed together
 RIGID = 1e-9  # [-] share of a rigid motion that supports may suppress by rounding alone
@@ -77,17 +73,25 @@ class Strain:
 
     x: np.ndarray  # (n_cells, n_q, 2) quadrature points
     stiffness: np.ndarray  # (n_cells, n_q, 3, 3) times their weights
+    springs: csc_matrix  # (n_all, n_all) what elastic supports and tension add
 
     def energy(self, system: "System", vectors: np.ndarray) -> np.ndarray:
         """Twice the strain energy (n_modes,) of vectors (n_dofs, n_modes)."""
-        total = np.zeros(vectors.shape[1])
+        return self._sum(system, vectors, "nqik,nqik->k")
+
+    def products(self, system: "System", vectors: np.ndarray) -> np.ndarray:
+        """Twice the strain energy of all pairs of vectors (n_dofs, n), (n, n)."""
+        return self._sum(system, vectors, "nqik,nqil->kl")
+
+    def _sum(self, system: "System", vectors: np.ndarray, pairs: str) -> np.ndarray:
         moved = system.expand @ vectors
+        total = np.einsum(pairs.replace("nqi", "n"), moved, self.springs @ moved)
         for start in range(0, len(self.x), CHUNK):
             cells = np.arange(start, min(start + CHUNK, len(self.x)))
             hessian = system.space.functions(cells, self.x[cells], (2,))[0][:, [0, 2, 1]]
             bend = hessian.transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]  # (n, n_q, 3, n_local)
             curved = bend @ moved[system.element_dofs[:, cells].T][:, None]  # (n, n_q, 3, n_modes)
-            total += np.einsum("nqik,nqik->k", self.stiffness[cells] @ curved, curved)
+            total += np.einsum(pairs, self.stiffness[cells] @ curved, curved)
         return total
 
 
@@ -156,8 +160,8 @@ def assemble(
         a second opinion); on a beam "hermite".
     point_masses : sequence of (point [m], mass [kg])
         Bodies without extent that ride on the plate or beam.
-    near : array_like, shape (n_points, 2) [m], optional
-        Points of a plate, such as the strike point, towards which the triangles shrink.
+    near : array_like, shape (n_points, dimension) [m], optional
+        Points where forces act, such as the strike point: triangles shrink towards them, beams get a node there.
     graded : bool
         Whether rings of ever smaller triangles are put at corners where the supports make the solution singular.
 
@@ -175,16 +179,21 @@ def assemble(
     supports = {} if supports is None else supports
     if callable(getattr(section, "thickness", None)):
         mesh = aligned(mesh)
+    masses = check_masses(point_masses, mesh.dimension)
+    near = None if near is None else _check.array("near", near, (None, mesh.dimension), "m", lift=True)
+    near = None if near is None or not len(near) else near
+    none = np.zeros((0, mesh.dimension))
+    marked = np.vstack([none if near is None else near, none, *(point for point, _ in masses)])  # forces act there
     if mesh.dimension == 1 and isinstance(section, Beam):
-        made = _assemble_beam(mesh, section, supports)
+        made = replace(_assemble_beam(mesh, section, supports, marked[:, 0]), near=near)
     elif isinstance(section, Plate) and element == "morley":
         made = _assemble_morley(mesh, section, supports)
     elif mesh.dimension == 2 and isinstance(section, Plate):
         order, unresolved, fine = around_corners(mesh, _kinds(support_of_facets(mesh, supports)), section.material.nu)
         fine = fine if graded else mesh
-        if near is not None:
-            near = _check.array("near", near, (None, 2), "m", lift=True)
-            fine = towards_points(fine, near, POINT_RINGS)
+        if len(marked):
+            held = np.array([kind != "free" for kind in support_of_facets(fine, supports)])
+            fine = towards_points(fine, marked, held)
         made = _assemble_plate(fine, section, supports)
         made = replace(made, mesh=mesh, graded=graded, order=order, near=near, unresolved=unresolved)
     else:
@@ -192,7 +201,8 @@ def assemble(
         raise ValueError(
             f"section must be a {wanted} on a mesh of dimension {mesh.dimension}, got {_check.shown(section)}"
         )
-    masses = check_masses(point_masses, mesh.dimension)
+    if near is not None:
+        _check_on(made, "near", near)
     return _reduced(made if not masses else _loaded(made, masses))
 
 
@@ -240,7 +250,8 @@ def _scatter(local: np.ndarray, element_dofs: np.ndarray, n_all: int) -> csc_mat
     """Sum element matrices (n_cells, n_local, n_local) into a sparse one (n_all, n_all)."""
     rows = np.broadcast_to(element_dofs.T[:, :, None], local.shape)
     columns = np.broadcast_to(element_dofs.T[:, None, :], local.shape)
-    return coo_matrix((local.ravel(), (rows.ravel(), columns.ravel())), shape=(n_all, n_all)).tocsc()
+    held = local != 0.0  # modes of a beam's elements do not couple
+    return coo_matrix((local[held], (rows[held], columns[held])), shape=(n_all, n_all)).tocsc()
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,19 +293,22 @@ def _interpolation(space: Any, element_dofs: np.ndarray, n_all: int, local: np.n
     return csr_matrix((values.ravel(), (rows, dofs.ravel())), shape=(len(local), n_all))
 
 
+def _check_on(raw: _Raw, name: str, points: np.ndarray) -> None:
+    """Raise ValueError unless every point lies on the body."""
+    inside = raw.space.locate(raw.frame.local(points))[1]
+    if not inside.all():
+        where = ", ".join(f"{x:g}" for x in points[int(np.argmin(inside))])
+        raise ValueError(f"{name} must lie on the body, got ({where}) m")
+
+
 def _loaded(raw: _Raw, masses: list[tuple[np.ndarray, float]]) -> _Raw:
     """The body with point masses on it."""
     points, weights = np.array([point for point, _ in masses]), np.array([mass for _, mass in masses])
-    inside = raw.space.locate(raw.frame.local(points))[1]
-    if not inside.all():
-        i = int(np.argmin(inside))
-        where = ", ".join(f"{x:g}" for x in points[i])
-        raise ValueError(f"point of point_masses[{i}] must lie on the body, got ({where}) m")
+    for i, point in enumerate(points):
+        _check_on(raw, f"point of point_masses[{i}]", point[None])
     rows = raw.interpolate(points)
     M = (raw.M + rows.T @ diags(weights / raw.frame.mass) @ rows).tocsc()
-    # under a force at a point the plate moves as r**2 log r, which elements follow to second order
-    order = min(raw.order, 2.0) if raw.mesh.dimension == 2 else raw.order
-    return replace(raw, M=M, mass=raw.mass + float(weights.sum()), order=order, point_masses=tuple(masses))
+    return replace(raw, M=M, mass=raw.mass + float(weights.sum()), point_masses=tuple(masses))
 
 
 def _rigid(raw: _Raw) -> np.ndarray:
@@ -373,42 +387,43 @@ def _centred(mesh: Mesh) -> tuple[np.ndarray, float, np.ndarray]:
     return centre, length, (mesh.points - centre) / length
 
 
-def _assemble_beam(mesh: Mesh, section: Beam, supports: dict) -> _Raw:
+def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, marked: np.ndarray) -> _Raw:
+    """``marked`` are places (n,) [m] that become nodes, as the shear force jumps there."""
     centre, length, points = _centred(mesh)
-    points, cells = _at_steps(section, centre, length, points, mesh.cells)
-    line = segments(points, cells)
+
+    def fields(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        place = (centre + length * x[:, None]).clip(mesh.points.min(), mesh.points.max())
+        return section.stiffness(place), section.inertia(place)
+
+    nodes = np.sort(points[:, 0])
+    marked = (marked - centre[0]) / length
+    nodes = np.sort(np.append(nodes, marked[np.abs(marked[:, None] - nodes).min(axis=1, initial=np.inf) > SAME_NODE]))
+    nodes = nodes[np.append(True, np.diff(nodes) > SAME_NODE)]
+    line = beam_elements.segments(beam_elements.divisions(fields, nodes))
     space = HermiteSpace(line)
-    element = Hermite(space)
-    x, dx = quadrature(line, element, BEAM_ORDER)  # (n_cells, n_q, 1), (n_cells, n_q)
-    stiffness, inertia = _fields(section, centre + length * x)
+    K, M, stiffness, inertia, dx = beam_elements.integrals(space, fields)
     frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
-    stiffness, inertia = stiffness / frame.stiffness, inertia / frame.inertia
-    value, bend = space.functions(np.arange(len(x)), x, (0, 2))
-    K = np.einsum("eqi,eq,eqj->eij", bend, stiffness * dx, bend)
-    M = np.einsum("eqi,eq,eqj->eij", value, inertia * dx, value)
-    dofs, n_all = numbering(line, element)
+    dofs, n_all = beam_elements.numbering(line, space)
     fixed: list[int] = []
     ends: list[tuple[int, int]] = []
     held: list[Elastic] = []
     for vertex, kind in zip(mesh.facets[:, 0], support_of_facets(mesh, supports)):
-        cell, end = np.argwhere(vertex == line.t.T)[0]
-        deflection, slope = dofs[2 * end : 2 * end + 2, cell].tolist()
+        left = points[vertex, 0] <= points[:, 0].min()
+        deflection, slope = (dofs[:2, 0] if left else dofs[2:4, -1]).tolist()
         if isinstance(kind, Elastic):
             ends, held = [*ends, (deflection, slope)], [*held, kind]
         else:
             fixed += {"clamped": [deflection, slope], "hinged": [deflection], "free": []}[kind]
     free = np.setdiff1d(np.arange(n_all), fixed)
-    if not free.size:
-        raise ValueError("supports leave this mesh nothing to move; refine it")
     expand = csr_matrix((np.ones(len(free)), (free, np.arange(len(free)))), shape=(n_all, len(free)))
     springs = beam_springs(ends, held, frame, n_all)
-    matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), springs.tocsc()
-    mass, softness = float((inertia * dx).sum()) * frame.mass, float((inertia / stiffness).max())
+    matrices = _scatter(K / frame.stiffness, dofs, n_all), _scatter(M / frame.inertia, dofs, n_all), springs.tocsc()
+    softness = float((inertia / stiffness).max()) * frame.stiffness / frame.inertia
     return _Raw(
         mesh,
         section,
         supports,
-        mass,
+        float((inertia * dx).sum()) * length,
         frame,
         *matrices,
         expand,
@@ -418,39 +433,6 @@ def _assemble_beam(mesh: Mesh, section: Beam, supports: dict) -> _Raw:
         softness,
         element="hermite",
     )
-
-
-def _at_steps(
-    section: Beam, centre: np.ndarray, length: float, points: np.ndarray, cells: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Points and cells of a beam with a node wherever its section changes in a step."""
-
-    def rigidity(x: np.ndarray) -> np.ndarray:
-        return section.stiffness(centre + length * x[:, None])
-
-    low, high = points[cells[:, 0], 0], points[cells[:, 1], 0]
-    fine = np.linspace(low, high, STEP_SEARCH + 1)  # (STEP_SEARCH + 1, n_cells)
-    low, high = fine[:-1].ravel(), fine[1:].ravel()
-    before, after = rigidity(low), rigidity(high)
-    jump = np.abs(after - before)
-    suspect = jump > STEP_SIZE * np.maximum(before, after)
-    low, high, before, after, jump = (a[suspect] for a in (low, high, before, after, jump))
-    for _ in range(50 if low.size else 0):
-        middle = 0.5 * (low + high)
-        value = rigidity(middle)
-        left = np.abs(value - before) > np.abs(after - value)  # the step is in the half that changes more
-        low, before = np.where(left, low, middle), np.where(left, before, value)
-        high, after = np.where(left, middle, high), np.where(left, value, after)
-    steps = 0.5 * (low + high)[np.abs(after - before) > 0.5 * jump]
-    steps = steps[np.abs(steps[:, None] - points[:, 0]).min(axis=1, initial=np.inf) > 1e-9]
-    for step in steps:
-        first, last = points[cells[:, 0], 0], points[cells[:, 1], 0]
-        holds = int(np.flatnonzero((np.minimum(first, last) < step) & (step < np.maximum(first, last)))[0])
-        new = len(points)
-        points = np.vstack([points, [[step]]])
-        cells = np.vstack([cells, [[new, cells[holds, 1]]]])
-        cells[holds, 1] = new
-    return points, cells
 
 
 def _fields(section, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -497,15 +479,15 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
         K[cells] = bend.reshape(shape).transpose(0, 2, 1) @ moment.reshape(shape)
         M[cells] = (value * (inertia * dx)[cells, :, None]).transpose(0, 2, 1) @ value
     held = support_of_facets(mesh, supports)
-    rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, _kinds(held))
+    elastic = edge_springs(held, frame)
+    rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, _kinds(held), elastic)
     expand, project, dofs = constrain(rim, space.vertices, *numbering(plane, element))
     n_all = expand.shape[0]
     springs = csc_matrix((n_all, n_all))
-    on = np.flatnonzero([isinstance(kind, Elastic) for kind in held])
+    on = np.flatnonzero(elastic.any(axis=1))
     if on.size:
         cells = cells_of_facets(mesh.facets[on], space.vertices)[0]
-        elastic = [kind for kind in held if isinstance(kind, Elastic)]
-        springs = _scatter(plate_springs(space, mesh.facets[on], cells, elastic, frame), dofs[:, cells], n_all)
+        springs = _scatter(plate_springs(space, mesh.facets[on], cells, elastic[on]), dofs[:, cells], n_all)
     if section.tension:
         if "free" in held:
             raise ValueError("tension needs every edge supported, as a free edge cannot be pulled")
@@ -517,8 +499,8 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
     mass = float((inertia * dx).sum()) * frame.mass
     made = _Raw(mesh, section, supports, mass, frame, *matrices, expand, project, dofs, space, softness, rim)
     area = np.abs(np.linalg.det(space.jacobian))
-    uneven = area.min() < max(area.max() / UNEVEN**2, TINY**2) and not springs.nnz
-    return replace(made, strain=Strain(x, stiffness * dx[..., None, None])) if uneven else made
+    uneven = area.min() < max(area.max() / UNEVEN**2, TINY**2)
+    return replace(made, strain=Strain(x, stiffness * dx[..., None, None], springs.tocsc())) if uneven else made
 
 
 def _assemble_morley(mesh: Mesh, section: Plate, supports: dict) -> _Raw:

@@ -29,14 +29,19 @@ def along_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.
     return x, np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * 0.5 * weight[:, None]
 
 
-def plate_springs(space: Any, facets: np.ndarray, cells: np.ndarray, held: list[Elastic], frame: Any) -> np.ndarray:
-    """Stiffness (n, 21, 21) that elastic supports add to the cells of their facets (n, 2), in the frame's units."""
+def edge_springs(supports: Sequence[Any], frame: Any) -> np.ndarray:
+    """Stiffness (n_facets, 2) against deflection and slope of the supports of facets, in the frame's units."""
+    pairs = [(kind.stiffness, kind.rotation) if isinstance(kind, Elastic) else (0.0, 0.0) for kind in supports]
+    return np.array(pairs) * [frame.length**3, frame.length] / frame.stiffness
+
+
+def plate_springs(space: Any, facets: np.ndarray, cells: np.ndarray, springs: np.ndarray) -> np.ndarray:
+    """Stiffness (n, 21, 21) that `edge_springs` (n, 2) add to the cells of their facets (n, 2)."""
     x, normal = along_facets(space, facets, cells)
     ds = np.linalg.norm(normal, axis=2)
     value, slope = space.functions(cells, x, (0, 1))
     across = np.einsum("nqi,niqk->nqk", normal / ds[..., None], slope)
-    push = np.array([spring.stiffness for spring in held]) * frame.length**3 / frame.stiffness
-    turn = np.array([spring.rotation for spring in held]) * frame.length / frame.stiffness
+    push, turn = springs.T
     pushed = (value * (push[:, None] * ds)[..., None]).transpose(0, 2, 1) @ value
     return pushed + (across * (turn[:, None] * ds)[..., None]).transpose(0, 2, 1) @ across
 

@@ -1,16 +1,14 @@
 """How singular a plate is at a corner, and triangles that shrink geometrically towards it."""
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from .curves import divided
 from .mesh import Mesh
+from .splitting import Rim, bisected, strip
 
 SHRINK = 0.5  # [-] of the distance to the corner from one ring of triangles to the next
 WIDE = 0.7  # [rad] triangles at a singular corner are bisected until they are narrower
-AT_VERTEX = 1e-6  # [-] in area coordinates: a point nearer to a corner or side of a triangle lies on it
 ROUNDS = 3  # [-] of such bisections
 CORNER_ERROR = 1e-7  # [-] share of the energy that the innermost ring may miss, about twice that in frequency
 SMALLEST = 1e-10  # [-] of the extent: rings stop here, before the rounding of coordinates shows
@@ -120,7 +118,7 @@ def towards(mesh: Mesh, wanted: dict[int, int]) -> Mesh:
     """The mesh with rings of triangles that shrink towards some of its vertices (vertex -> number of rings)."""
     if not wanted:
         return mesh
-    points, rim = list(mesh.points), _Rim(mesh)
+    points, rim = list(mesh.points), Rim(mesh)
     corner = mesh.points[mesh.cells]
     clockwise = np.linalg.det(corner[:, 1:] - corner[:, :1]) < 0.0
     anticlockwise = np.where(clockwise[:, None], mesh.cells[:, ::-1], mesh.cells).tolist()
@@ -141,40 +139,11 @@ def towards(mesh: Mesh, wanted: dict[int, int]) -> Mesh:
                         nearer[p] = len(points)
                         points.append(rim.split(vertex, p, len(points), points, SHRINK))
                 cells[c] = [vertex, nearer[a], nearer[b]]
-                cells += _strip(points, nearer[a], a, b, nearer[b])
+                cells += strip(points, nearer[a], a, b, nearer[b])
     return rim.finish(mesh, np.array(points), np.array(cells))
 
 
-def towards_points(mesh: Mesh, points: np.ndarray, n_rings: int) -> Mesh:
-    """The mesh with each point (n_points, 2) [m] as a vertex and rings of shrinking triangles towards it."""
-    wanted: dict[int, int] = {}
-    for point in points:
-        corners = mesh.points[mesh.cells]  # (n_cells, 3, 2)
-        sides = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
-        area = np.linalg.solve(sides, (point - corners[:, 0])[..., None])[..., 0]
-        area = np.column_stack([1.0 - area.sum(axis=1), area])
-        holds = np.flatnonzero(area.min(axis=1) > -AT_VERTEX)
-        if not holds.size:
-            raise ValueError(f"near must lie on the body and off its curved rim, got ({point[0]:g}, {point[1]:g}) m")
-        vertex = int(mesh.cells[holds[0], area[holds[0]].argmax()])
-        if area[holds[0]].max() < 1.0 - AT_VERTEX:
-            if len(holds) == 1 and area[holds[0]].min() < AT_VERTEX:
-                raise ValueError(
-                    f"near must lie inside the body or at a corner, got ({point[0]:g}, {point[1]:g}) m on an edge"
-                )
-            vertex, fresh = len(mesh.points), []
-            for c in holds:
-                cell = mesh.cells[c].tolist()
-                for k in range(3):
-                    if area[c, k] > AT_VERTEX:
-                        fresh.append([vertex if i == k else p for i, p in enumerate(cell)])
-            kept = np.delete(mesh.cells, holds, axis=0)
-            mesh = replace(mesh, points=np.vstack([mesh.points, point]), cells=np.vstack([kept, fresh]))
-        wanted[vertex] = n_rings
-    return towards(mesh, wanted)
-
-
-def _narrowed(points: list[np.ndarray], cells: list[list[int]], corners: set[int], rim: "_Rim") -> list[list[int]]:
+def _narrowed(points: list[np.ndarray], cells: list[list[int]], corners: set[int], rim: Rim) -> list[list[int]]:
     """Triangles with sides bisected until those at corners are narrow and no two corners share a triangle.
 
     The rings cannot mend a coarse division of the angle. What is done depends on the place of the triangles only, not
@@ -188,7 +157,7 @@ def _narrowed(points: list[np.ndarray], cells: list[list[int]], corners: set[int
         for a, b in marked:
             middle[a, b] = middle[b, a] = len(points)
             points.append(rim.split(a, b, len(points), points, 0.5))
-        cells = [piece for cell in cells for piece in _bisected(points, cell, middle)]
+        cells = [piece for cell in cells for piece in bisected(points, cell, middle)]
     return cells
 
 
@@ -204,76 +173,3 @@ def _wide_sides(points: list[np.ndarray], cell: list[int], corners: set[int]) ->
         if np.arccos(np.clip(u @ v / np.linalg.norm(u) / np.linalg.norm(v), -1.0, 1.0)) > WIDE:
             sides.append((min(a, b), max(a, b)))
     return sides
-
-
-def _bisected(points: list[np.ndarray], cell: list[int], middle: dict[tuple[int, int], int]) -> list[list[int]]:
-    """A triangle divided at the middles of some of its sides."""
-    a, b, c = cell
-    found = [middle.get((a, b), -1), middle.get((b, c), -1), middle.get((c, a), -1)]
-    count = sum(m >= 0 for m in found)
-    if count == 0:
-        return [cell]
-    while found[0] < 0 or (count == 2 and found[2] < 0):  # turn it until the divided sides come first and last
-        a, b, c, found = b, c, a, [*found[1:], found[0]]
-    ab, bc, ca = found
-    if count == 1:
-        return [[a, ab, c], [ab, b, c]]
-    if count == 3:
-        return [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-    return [[a, ab, ca], *_strip(points, ab, b, c, ca)]
-
-
-def _strip(points: list[np.ndarray], a: int, b: int, c: int, d: int) -> list[list[int]]:
-    """The quadrilateral a, b, c, d divided along its shorter diagonal; along a-c where they are alike."""
-    ac, bd = np.linalg.norm(points[a] - points[c]), np.linalg.norm(points[b] - points[d])
-    return [[a, b, d], [b, c, d]] if bd < ac * (1.0 - 1e-6) else [[a, b, c], [a, c, d]]
-
-
-class _Rim:
-    """The boundary facets while they are being split."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self.facets = mesh.facets.tolist()
-        self.number = {(a, b): i for i, (a, b) in enumerate(self.facets)}
-        self.middles, self.tangents, self.curvatures = list(mesh.middles), list(mesh.tangents), list(mesh.curvatures)
-        self.parent = list(range(len(self.facets)))
-
-    def split(self, vertex: int, far: int, new: int, points: list[np.ndarray], ratio: float) -> np.ndarray:
-        """The point that divides the side from a vertex to its neighbour; a boundary facet there becomes two."""
-        plain = points[vertex] + ratio * (points[far] - points[vertex])
-        forward = (vertex, far) in self.number
-        if not forward and (far, vertex) not in self.number:
-            return plain
-        pair = (vertex, far) if forward else (far, vertex)
-        facet = self.number.pop(pair)
-        ends = np.array([[points[pair[0]], points[pair[1]]]])
-        share = ratio if forward else 1.0 - ratio
-        middle, tangent, bend = (np.array([a[facet]]) for a in (self.middles, self.tangents, self.curvatures))
-        place, tangent, curvature, *halves = (a[0] for a in divided(ends, middle, tangent, bend, share))
-        first, last = self.tangents[facet], self.curvatures[facet]
-        self.facets[facet], self.number[pair[0], new] = [pair[0], new], facet
-        self.middles[facet] = halves[0]
-        self.tangents[facet], self.curvatures[facet] = np.array([first[0], tangent]), np.array([last[0], curvature])
-        self.number[new, pair[1]] = len(self.facets)
-        self.facets.append([new, pair[1]])
-        self.middles.append(halves[1])
-        self.tangents.append(np.array([tangent, first[1]]))
-        self.curvatures.append(np.array([curvature, last[1]]))
-        self.parent.append(self.parent[facet])
-        return place
-
-    def finish(self, mesh: Mesh, points: np.ndarray, cells: np.ndarray) -> Mesh:
-        parent = np.array(self.parent)
-        edges = {name: np.flatnonzero(np.isin(parent, numbers)) for name, numbers in mesh.edges.items()}
-        arrays = (np.array(a) for a in (self.middles, self.tangents, self.curvatures))
-        middles, tangents, curvatures = arrays
-        return replace(
-            mesh,
-            points=points,
-            cells=cells,
-            facets=np.array(self.facets),
-            edges=edges,
-            middles=middles,
-            tangents=tangents,
-            curvatures=curvatures,
-        )

@@ -1,10 +1,10 @@
-"""Finite elements whose shape functions stay accurate at any size, shape and place of a triangle or line element."""
+"""Finite elements whose shape functions stay accurate at any size, shape and place of a triangle."""
 
 from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
-from skfem import Dofs, ElementLineHermite, ElementTriArgyris, ElementTriMorley, MappingAffine, MeshLine, MeshTri
+from skfem import Dofs, ElementTriArgyris, ElementTriMorley, MappingAffine, MeshTri
 from skfem.element import DiscreteField
 from skfem.quadrature import get_quadrature
 
@@ -13,7 +13,7 @@ from .curves import Curves, powers
 EXPONENTS = np.array([(i, j) for i in range(6) for j in range(6 - i)])  # the 21 monomials of degree 5
 SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in scikit-fem's order
 ON_BODY = 1e-9  # [-] of a triangle: how far outside a point may lie by rounding
-NEAR_CURVE = 1e-5  # [-] of a triangle on a curved edge: it leaves the true curve by less
+NEAR_CURVE = 1e-5  # [-] of the largest triangle at a curved edge: the body leaves the true curve by less
 CANDIDATES = 8  # [-] nearest triangles looked at before all of them are
 REACH = 0.5  # [-] of a triangle: no curved edge bulges so far
 CURVE_STEPS = 12  # [-] fixed-point steps from a point to its place in a curved triangle
@@ -113,7 +113,10 @@ class Triangles:
         """The cell that holds each point (n, 2), or the nearest one, and whether the point lies in it."""
         near = self.tree.query(points, k=min(CANDIDATES, len(self.origin)))[1].reshape(len(points), -1)
         cell, depth = self._deepest(points, near)
-        margin = np.where(self.curved, -NEAR_CURVE, -ON_BODY)
+        margin = np.full(len(self.origin), -ON_BODY)
+        if self.curved.any():
+            size = np.sqrt(np.abs(np.linalg.det(self.jacobian)))
+            margin = np.minimum(margin, -NEAR_CURVE * size[self.curved].max() / size)
         lost = depth < margin[cell]
         if lost.any():
             every = np.broadcast_to(np.arange(len(self.origin)), (1, len(self.origin)))
@@ -319,64 +322,9 @@ def _quadratic(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
     return x[..., i] * y[..., j]
 
 
-class HermiteSpace:
-    """Cubic shape functions of every element on one line (unknowns: deflection and slope at both ends)."""
-
-    def __init__(self, mesh: MeshLine) -> None:
-        ends = mesh.p[0, mesh.t]  # (2, n_cells)
-        self.start, self.length = ends[0], ends[1] - ends[0]
-
-    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
-        """Derivatives (n, n_q, 4) of the shape functions of cells (n,) at points (n, n_q, 1), one array per order."""
-        h = self.length[cells][:, None]
-        s = (points[..., 0] - self.start[cells][:, None]) / h
-        cubic = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], float)
-        result = []
-        for order in orders:
-            basis = powers(s, 3, order) @ cubic.T
-            basis[..., 1::2] *= h[..., None]
-            result.append(basis / h[..., None] ** order)
-        return result
-
-    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The cell that holds each point (n, 1), or the nearest one, and whether the point lies in it."""
-        low = np.minimum(self.start, self.start + self.length)
-        order = np.argsort(low)
-        cell = order[np.clip(np.searchsorted(low[order], points[:, 0], side="right") - 1, 0, len(low) - 1)]
-        s = (points[:, 0] - self.start[cell]) / self.length[cell]
-        return cell, (s >= -ON_BODY) & (s <= 1.0 + ON_BODY)
-
-    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
-        """Unknowns (n_all, 2) of the deflections 1 and x: the rigid motions of a beam."""
-        result = np.zeros((n_all, 2))
-        for k in range(2):
-            result[element_dofs[2 * k], 0] = 1.0
-            result[element_dofs[2 * k], 1] = self.start + k * self.length
-            result[element_dofs[2 * k + 1], 1] = 1.0
-        return result
-
-
-class Hermite(ElementLineHermite):
-    """scikit-fem's Hermite element on the shape functions of `HermiteSpace`; make a new one for each mesh."""
-
-    def __init__(self, space: HermiteSpace) -> None:
-        self.space = space
-
-    def gbasis(self, mapping, X, i, tind=None):
-        cells = np.arange(len(self.space.start)) if tind is None else tind
-        points = mapping.F(X, tind=tind).transpose(1, 2, 0)
-        value, slope, bend = (f[..., i] for f in self.space.functions(cells, points, (0, 1, 2)))
-        return (DiscreteField(value=value, grad=slope[None], hess=bend[None, None]),)
-
-
 def triangles(points: np.ndarray, cells: np.ndarray) -> MeshTri:
     """scikit-fem's mesh of triangles."""
     return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
-
-
-def segments(points: np.ndarray, cells: np.ndarray) -> MeshLine:
-    """scikit-fem's mesh of line elements."""
-    return MeshLine(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
 
 
 def quadrature(mesh, element, order: int, mapping=None) -> tuple[np.ndarray, np.ndarray]:

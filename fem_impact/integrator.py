@@ -13,7 +13,7 @@ from . import _check, _kernels
 from ._check import SimulationError
 from .accuracy import left_out_error
 from .contact import Contact
-from .modal import Modes
+from .modal import Modes, left_out
 from .plans import asked_for
 from .response import Dip, Error, History, Response
 from .striker import Striker
@@ -51,6 +51,8 @@ SILENT = 1e-15  # [-] shape at the contact over the largest below which a mode r
 NOISE = 1e-16  # [-] approaches below this times duration and speed are rounding: contacts that merely touch
 STILL = 1e-12  # [-] rigid approaches slower than this times the speed are rounding, not a contact to come
 ROUNDING = 1e-13  # [-] below this two runs cannot be told apart
+NEGLIGIBLE = 1e-4  # [-] errors of the bodies below this share of the tolerance are not followed through the blow
+LARGEST_ERROR = 0.5  # [-] of a frequency that is
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,7 @@ class _Part:
     rows: np.ndarray  # (n_ends, n_modes) shapes at its contacts
     touched: tuple[tuple[int, float], ...]  # the contacts and its sign in each
     rest: np.ndarray  # (n_ends, n_ends) [m/N] compliance of what the modes leave out
+    doubt: np.ndarray  # (n_ends,) [m/N] error of its diagonal
     above: float  # [-] frequency of modes that stand for the rest over the last one kept
     q: np.ndarray
     p: np.ndarray
@@ -192,12 +195,13 @@ def strike(
     point = modes.point("at", at)
     options = _Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
     touch = Touch(contact, 0, 1, striker.at[None] if striker.modes.dimension else None, point)
-    whole = striker.compliance if residual and striker.modes.dimension else None
+    rest = striker.left_out if residual and striker.modes.dimension else None
     end = striker.at[None] if striker.modes.dimension else np.zeros((1, 0))
     motion = speed * striker.motion
-    arriving = _part(striker.modes, ((0, 1.0),), end, striker.shape[None], whole, forces[0], motion)
-    whole = modes.shapes.compliance(point) if residual and modes.dimension else None
-    struck = _part(modes, ((0, -1.0),), point, modes.shapes.at(point), whole, forces[1])
+    arriving = _part(striker.modes, ((0, 1.0),), end, striker.shape[None], rest, forces[0], motion)
+    rows = modes.shapes.at(point)
+    rest = left_out(modes, point, rows) if residual and modes.dimension else None
+    struck = _part(modes, ((0, -1.0),), point, rows, rest, forces[1])
     return _follow((striker.modes, modes), [touch], [arriving, struck], speed, options, striker, point[0])
 
 
@@ -259,7 +263,7 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> R
         system, options.scheme, options.dt, options.tolerance, options.quantities, pace, *last
     )
     truncation, resolvable = _truncation(parts, contacts, system, coarse, ran, size, differ, pace, *last)
-    mesh_error = _mesh_error(bodies, history)
+    mesh_error = _mesh_error(bodies, parts, contacts, system, coarse, ran, size, differ, options.tolerance, pace, last)
     error = Error(step_error, truncation, mesh_error, resolvable, sensitivity=_sensitivity(coarse, history))
     laws = tuple(touch.law for touch in contacts)
     dips = tuple(_dip(part, system) for part in parts)
@@ -306,8 +310,8 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Pa
     for body, modes in enumerate(bodies):
         points = np.vstack([point for _, _, point in ends[body]] or [np.zeros((0, modes.dimension))])
         rows = np.atleast_2d(modes.shapes.at(points)) if ends[body] else np.zeros((0, modes.n_modes))
-        whole = modes.shapes.compliance(points) if residual and modes.dimension and ends[body] else None
-        part = _part(modes, tuple((i, sign) for i, sign, _ in ends[body]), points, rows, whole, float(forces[body]))
+        rest = left_out(modes, points, rows) if residual and modes.dimension and ends[body] else None
+        part = _part(modes, tuple((i, sign) for i, sign, _ in ends[body]), points, rows, rest, float(forces[body]))
         if states is not None:
             q, p = (_check.array(f"states[{body}]", value, (modes.n_modes,)) for value in states[body])
             part = replace(part, q=q, p=p)
@@ -326,24 +330,25 @@ def _part(
     touched: tuple,
     points: np.ndarray,
     rows: np.ndarray,
-    whole: np.ndarray | None,
+    left_out: tuple[np.ndarray, np.ndarray] | None,
     force: float,
     motion: np.ndarray | None = None,
 ) -> _Part:
     """One undeformed body, at rest or with modal velocities: its shapes and the compliance left out at its contacts."""
-    rest = np.zeros((len(touched), len(touched)))
-    if whole is not None:
-        flexible = modes.omega > 0.0
-        scaled = rows[:, flexible] / modes.omega[flexible]
-        rest = 0.5 * (whole + whole.T) - scaled @ scaled.T
-        largest = rest[0, 0] if len(rest) == 1 else np.linalg.eigvalsh(rest)[-1]
-        if largest <= REST_FLOOR * np.trace(whole):
-            rest = np.zeros_like(rest)
+    n_ends = len(touched)
+    rest, doubt = (np.zeros((n_ends, n_ends)), np.zeros(n_ends)) if left_out is None else left_out
+    rest = 0.5 * (rest + rest.T)
+    carried = np.square(rows / np.where(modes.omega > 0.0, modes.omega, np.inf)).sum()
+    largest = rest[0, 0] if n_ends == 1 else np.linalg.eigvalsh(rest)[-1] if n_ends else 0.0
+    if largest <= REST_FLOOR * (np.trace(rest) + carried):
+        rest = np.zeros_like(rest)
     still = np.zeros(modes.n_modes)
     bias = force * rows[0] if force else still
     velocity = still if motion is None else motion
     above = REST_ABOVE[min(modes.dimension, 2)] if modes.dimension else 1.0
-    return _Part(modes.omega, modes.damping_ratio, rows, touched, rest, above, still, velocity, bias, force, points)
+    return _Part(
+        modes.omega, modes.damping_ratio, rows, touched, rest, doubt, above, still, velocity, bias, force, points
+    )
 
 
 def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
@@ -716,16 +721,20 @@ def _truncation(parts, contacts, system: _System, whole: History, scheme, size, 
     return max(differ(less, whole) / (least**2 - 1.0), AT_LEAST * float(expected)), resolvable
 
 
-def _mesh_error(bodies: tuple[Modes, ...], history: History) -> float:
-    """Estimated effect of the frequency errors the modes carry, each weighed by its share of the energy."""
-    total, start = 0.0, 0
-    if all(modes.frequency_error is None for modes in bodies):
-        return total
-    energy = 0.5 * (history.end_p**2 + (history.omega * history.end_q) ** 2)
-    whole = float(energy.sum())
-    for modes in bodies:
-        if modes.frequency_error is not None and whole > 0.0:
-            part = energy[start : start + modes.n_modes]
-            total += float(part @ modes.frequency_error) / whole
-        start += modes.n_modes
-    return total
+def _mesh_error(bodies, parts, contacts, system: _System, coarse: History, scheme, size, differ, tolerance, pace, last):
+    """Estimated effect [-] of what the modes' frequencies and static compliances err by.
+
+    The run is repeated with every frequency lower and every compliance larger by its error, so that the estimate grows
+    over several impacts as the error itself does.
+    """
+    softer, matters = [], False
+    mobility = np.maximum((system.shape**2) @ (system.omega <= np.pi / pace[0]), 1e-300)
+    for modes, part in zip(bodies, parts):
+        soft = [(np.pi / pace[0]) ** 2 / mobility[i] * doubt for (i, _), doubt in zip(part.touched, part.doubt)]
+        error = np.zeros(modes.n_modes) if modes.frequency_error is None else modes.frequency_error
+        matters |= max(error.max(), *soft, 0.0) > NEGLIGIBLE * tolerance
+        lower = part.omega * (1.0 - np.minimum(error, LARGEST_ERROR))
+        softer.append(replace(part, omega=lower, rest=part.rest + np.diag(part.doubt)))
+    if not matters:
+        return 0.0
+    return differ(_run(_joined(softer, contacts), scheme, size, pace, *last), coarse)

@@ -19,6 +19,8 @@ SMALLEST_HOLE = 1e-6  # [-] radius of a hole over the disk's: smaller ones are p
 OVERSHOOT = 1.45  # [-] triangles of a file are divided where that makes them no smaller than this times as asked for
 LONGEST = 1.5  # [-] longest side of a mesh over the size it was made for: 1.4 to 1.6 on rectangles, disks, a guitar
 DEFAULT_DIVISIONS = 8  # [-] elements across the shorter side where no size is stated; find_modes refines on its own
+BEAM_DIVISIONS = 4  # [-] likewise along a beam, whose elements are of high degree
+MOST_BEAM_CELLS = 5000  # [-] for the same reason
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +108,9 @@ def _element_size(size: float | None, default: float) -> tuple[float, bool]:
     return (default, False) if size is None else (_check.positive("size", size, "m"), True)
 
 
-def _check_affordable(cells: float, size: float) -> None:
-    if cells > MOST_CELLS:
-        raise ValueError(f"size must be larger: {size:g} m makes some {cells:.1g} elements, more than {MOST_CELLS}")
+def _check_affordable(cells: float, size: float, most: int = MOST_CELLS) -> None:
+    if cells > most:
+        raise ValueError(f"size must be larger: {size:g} m makes some {cells:.1g} elements, more than {most}")
 
 
 def rectangle(length: float, width: float, *, size: float | None = None) -> Mesh:
@@ -151,8 +153,8 @@ def rectangle(length: float, width: float, *, size: float | None = None) -> Mesh
 def line(length: float, *, size: float | None = None) -> Mesh:
     """Line [0, length] [m] for a beam; edges left (x = 0) and right (x = length)."""
     length = _check.positive("length", length, "m")
-    size, stated = _element_size(size, length / (4 * DEFAULT_DIVISIONS))
-    _check_affordable(length / size, size)
+    size, stated = _element_size(size, length / BEAM_DIVISIONS)
+    _check_affordable(length / size, size, MOST_BEAM_CELLS)
     n = max(1, round(length / size))
     cells = np.column_stack([np.arange(n), np.arange(1, n + 1)])
     edges = {"left": np.array([0]), "right": np.array([1]), "boundary": np.array([0, 1])}

@@ -13,7 +13,9 @@ from .eigen import Flexibility
 
 HIGHEST = 1e74  # [Hz] that a frequency may be scaled to, see `_check.REACH`
 SHOWN = 10  # [-] modes listed in a notebook
-REMEMBERED = 16  # [-] single points whose shapes are kept: a blow asks for them again and again
+REMEMBERED = 16  # [-] points whose shapes and static deflections are kept: a blow asks for them again and again
+ROUNDING = 1e-12  # [-] of a compliance in closed form, over itself and over that of the first mode
+SHAPE_ERROR = 10.0  # [-] relative error of what a mode adds to the compliance, over that of its frequency
 
 
 class Shapes(Protocol):
@@ -31,6 +33,12 @@ class Shapes(Protocol):
 
     def compliance(self, points: np.ndarray) -> np.ndarray:
         """Static compliance (n_points, n_points) [m/N] of the complete body; inertia relief if free."""
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        """Estimated relative error (n_points,) of its diagonal."""
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Static deflection (n_points, n_loads) [m/N] of the complete body under unit forces at ``loads``."""
 
     def take(self, n_modes: int) -> "Shapes":
         """The same body with only its first modes."""
@@ -60,6 +68,12 @@ class ScaledShapes:
     def compliance(self, points: np.ndarray) -> np.ndarray:
         return (self.amplitude / self.frequency) ** 2 * self.base.compliance(points)
 
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return self.base.compliance_error(points)
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return (self.amplitude / self.frequency) ** 2 * self.base.deflection(loads, points)
+
     def take(self, n_modes: int) -> "ScaledShapes":
         return replace(self, base=self.base.take(n_modes))
 
@@ -83,6 +97,12 @@ class RigidShapes:
 
     def compliance(self, points: np.ndarray) -> np.ndarray:
         return np.zeros((len(points), len(points)))
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros(len(points))
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return np.zeros((len(points), len(loads)))
 
     def take(self, n_modes: int) -> "RigidShapes":
         return replace(self, n_modes=n_modes)
@@ -119,8 +139,13 @@ class SampledShapes:
         return self._index(points)[1]
 
     def compliance(self, points: np.ndarray) -> np.ndarray:
-        index = self._index(points)[0]
-        return self.static[np.ix_(index, index)]
+        return self.deflection(points, points)
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros(len(points))
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return self.static[np.ix_(self._index(points)[0], self._index(loads)[0])]
 
     def take(self, n_modes: int) -> "SampledShapes":
         return replace(self, values=self.values[:, :n_modes].copy())
@@ -298,13 +323,23 @@ class Modes:
 
     def modal_compliance(self, points: Any) -> np.ndarray:
         """Static compliance carried by the kept modes between points, (n_points, n_points) [m/N]."""
-        flexible = self.omega > 0.0
-        scaled = self.shape_at(points)[:, flexible] / self.omega[flexible]
-        return scaled @ scaled.T
+        return self._carried(self.shape_at(points))
 
     def residual_compliance(self, points: Any) -> np.ndarray:
-        """Static compliance of everything the kept modes leave out, (n_points, n_points) [m/N]."""
-        return self.shapes.compliance(self.points("points", points)) - self.modal_compliance(points)
+        """Static compliance of everything the kept modes leave out, (n_points, n_points) [m/N].
+
+        Raises
+        ------
+        SimulationError
+            Where the kept modes are softer than the whole body by more than the errors of both allow.
+        """
+        place = self.points("points", points)
+        return left_out(self, place, self.shapes.at(place))[0]
+
+    def _carried(self, rows: np.ndarray, weight: Any = 1.0) -> np.ndarray:
+        flexible = self.omega > 0.0
+        scaled = rows[:, flexible] / self.omega[flexible]
+        return (weight * scaled) @ scaled.T
 
     def scaled(self, *, mass: float | None = None, first_frequency: float | None = None) -> "Modes":
         """The same form with another mass [kg] and lowest flexible frequency [Hz]; points stay where they are."""
@@ -347,6 +382,27 @@ class Modes:
         return replace(self, damping_ratio=damping_ratios(damping_ratio, self.omega))
 
 
+def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`Modes.residual_compliance` at points on the body, given their shapes (n_points, n_modes), and its error.
+
+    The error is that of its diagonal, (n_points,) [m/N].
+    """
+    whole = modes.shapes.compliance(place)
+    rest = whole - modes._carried(rows)
+    doubt = np.diag(whole) * (modes.shapes.compliance_error(place) + ROUNDING)
+    if modes.frequency_error is not None:
+        doubt = doubt + np.diag(modes._carried(rows, SHAPE_ERROR * modes.frequency_error[modes.omega > 0.0]))
+    if modes.omega[-1] > 0.0:  # where the body rests both are rounding
+        doubt = doubt + ROUNDING / (modes.mass * modes.omega[modes.omega > 0.0][0] ** 2)
+    for i in np.flatnonzero(np.diag(rest) < -doubt):
+        where = ", ".join(f"{x:g}" for x in place[i])
+        raise _check.SimulationError(
+            f"the modes are softer at ({where}) m than the whole body, {whole[i, i]:.4g} m/N, by "
+            f"{-rest[i, i]:.2g} m/N, more than their errors allow; find them on a finer mesh"
+        )
+    return rest, doubt
+
+
 def damping_ratios(damping_ratio: Any, omega: np.ndarray) -> np.ndarray:
     """Return the damping ratio of each mode, (n_modes,) [-]; rigid modes get zero.
 
@@ -385,7 +441,7 @@ class FieldShapes:
     system: System
     vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
     flexibility: Flexibility
-    _static: dict[bytes, np.ndarray] = field(default_factory=dict, repr=False)  # compliance by point, found once
+    _static: dict[bytes, pointload.Deflection] = field(default_factory=dict, repr=False)  # by loads, found once
     _single: dict[bytes, np.ndarray] = field(default_factory=dict, init=False, repr=False)  # shapes at the last points
 
     def __post_init__(self) -> None:
@@ -410,11 +466,22 @@ class FieldShapes:
     def contains(self, points: np.ndarray) -> np.ndarray:
         return self.system.contains(points)
 
-    def compliance(self, points: np.ndarray) -> np.ndarray:
-        key = points.tobytes()
+    def _under(self, loads: np.ndarray) -> pointload.Deflection:
+        key = loads.tobytes()
         if key not in self._static:
-            self._static[key] = pointload.static_compliance(self.system, self.flexibility, points)
+            if len(self._static) >= REMEMBERED:
+                self._static.clear()
+            self._static[key] = pointload.static_deflection(self.system, loads)
         return self._static[key]
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        return self._under(points).compliance
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return self._under(points).error
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return self._under(loads).at(points)
 
     def take(self, n_modes: int) -> "FieldShapes":
         return replace(self, vectors=self.vectors[:, :n_modes].copy())

@@ -3,32 +3,28 @@
 import hashlib
 import zipfile
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import brentq
 
-from . import _check
+from . import _check, residual
 from ._files import replacing
 from .assembly import System, assemble, reassemble
-from .eigen import RESIDUAL, SPARE, Flexibility, count_below, lowest
+from .eigen import FIRST_SLICE, RESIDUAL, SPARE, STRICT, Flexibility, by_slices, count_below, lowest
 from .mesh import Mesh
 from .section import Plate
 
-WAVE_PER_ELEMENT = {
-    "argyris": 1.8,
-    "hermite": 0.3,
-    "morley": 0.2,
-}  # [rad] error 1e-7 (kh)**8 and 7e-4 (kh)**4: about 1e-5 either way
-ERROR_OF_WAVE = {
-    "argyris": (1e-7, 8.0),
-    "hermite": (7e-4, 4.0),
-    "morley": (0.2, 2.0),
-}  # relative error of a frequency: factor and power of kh
-UNEVEN = (
-    50.0  # [-] times that: clamped corners on coarse meshes need half of it, smooth modes a fiftieth; test_modal.py
-)
-HELD = {"argyris": 2e-5, "hermite": 1e-12, "morley": 0.0}  # [-] what supports, curves and corners add at most
+WAVE_PER_ELEMENT = {"argyris": 1.8, "hermite": 30.0, "morley": 0.2}  # [rad] error 1e-5 and, on beams, 1e-12
+ERROR_OF_WAVE = (
+    8e-7,
+    3.3,
+)  # [-] error claimed of a smooth frequency at most, over (kh)**8, and the kh where it bends off
+EDGE_TERM = {"clamped": 1.76, "hinged": 1.0, "free": -1.71}  # [-] of Weyl's law for plates, times the edge's length
+MORLEY_ERROR = 0.2  # [-] likewise with Morley elements, over (kh)**2
+CLAIMED = 2.0  # [-] claims over estimates, which lie between 0.3 and 4 times the truth; test_residual.py
+ROUNDED = 3.0  # [-] claims over the rounding of K as a random walk
+LEAST = 1e-14  # [-] error of a frequency claimed at least: what the search for it leaves
 MORLEY = 0.2574578  # [-] error of the Morley interpolation, over h**2 (Carstensen and Gallistl 2014)
 MORLEY_UNKNOWNS = 20_000  # [-] spent on a second opinion
 ALGEBRA = 1e-9  # [-] margin for rounding and the eigensolver on either side of an enclosure
@@ -36,18 +32,16 @@ FINE_WAVE = 1.1  # [rad] likewise where the triangles stay fewer than the next n
 CHEAP_CELLS = 700  # [-]
 LAYERS = 10.0  # [-] elements under tension are no larger than this times sqrt(D / tension): error 1e-5 on a disk
 FINEST_LAYER = 40.0  # [-] nor are they made smaller than the extent over this
-MOST_ORDER = 4.0  # [-] order of convergence that an error estimate relies on at most
-LEAST_ORDER = 1.0  # [-] and at least
-ROUNDING = 3e-12  # [-] error of a frequency that no refinement removes
 MOST_UNKNOWNS = 150_000  # [-] where refinement gives up
-HOPELESS = 10.0  # [-] times as many unknowns, extrapolated, and refinement gives up at once
-FAR_APART = 3.6  # [-] times as many cells: two such meshes tell the error without a third
-TWO_LEVEL_ORDER = 3.0  # [-] order then relied on
-LEAST_STEP = 1.25  # [-] meshes closer in size than this say less about the error than their sizes suggest
-SAY = 1e-3  # [-] errors at singular corners beyond this are stated whether a tolerance was given or not
+AIM = 0.9  # [-] of a tolerance that the first mesh aims at
+MARGIN = 0.6  # [-] likewise the next ones
+ORDERS = 7.5, 5.0  # [-] powers of the element size by which the first two parts of an error fall
+LEAST_STEP = 1.05  # [-] between the element sizes of two meshes
+MOST_STEPS = 40.0  # [-] logarithm of the largest
+MOST_MESHES = 8  # [-] tried for a tolerance
+SAY = 1e-3  # [-] errors at singular corners beyond this are stated
 SEARCHES = 3  # [-] attempts to find every mode of a cluster
-STRICT = 1e-11  # [-] residual of the attempts after the first
-STEP = 2.0**0.5  # [-] from one mesh size to the next
+STEP = 2.0**0.5  # [-] a mesh finer than needed by this is replaced
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +52,12 @@ class Spectrum:
     flexibility: Flexibility
     omega: np.ndarray  # (n_modes,) [rad/s]
     vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
-    error: np.ndarray  # (n_modes,) [-] estimated relative error of omega
+    parts: np.ndarray  # (3, n_modes) [-] estimated relative error of omega: elements, curved edges, what no mesh mends
+
+    @property
+    def error(self) -> np.ndarray:
+        """Estimated relative error of omega, (n_modes,) [-]."""
+        return self.parts.sum(axis=0)
 
     @property
     def n_rigid(self) -> int:
@@ -75,8 +74,13 @@ def _wave(system: System, n_modes: int | None, max_frequency: float | None) -> f
     assert n_modes is not None
     if mesh.dimension == 1:
         return float(np.pi * (n_modes + 1) / np.ptp(mesh.points))
-    # Weyl's law: modes grow with the area, and fewer fit along the edge
-    return float(np.sqrt(4.0 * np.pi * n_modes / mesh.area) + 0.5 * mesh.perimeter / mesh.area)
+    # Weyl's law: modes grow with the area, and fewer fit along a held edge than along a free one
+    edge = mesh.perimeter * EDGE_TERM["hinged"]
+    if system.rim is not None:
+        ends = system.rim.points[system.rim.facets]
+        length = frame.length * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        edge = float(length @ [EDGE_TERM[kind] for kind in system.rim.kinds])
+    return float((edge + np.sqrt(edge**2 + 16.0 * np.pi * mesh.area * n_modes)) / (2.0 * mesh.area))
 
 
 def solve(system: System, n_modes: int | None, max_frequency: float | None) -> Spectrum:
@@ -92,18 +96,20 @@ def solve(system: System, n_modes: int | None, max_frequency: float | None) -> S
     if n_modes <= n_rigid:
         values, vectors = np.zeros(0), np.zeros((system.n_dofs, 0))
     else:
-        values, vectors = _counted(system, flexibility, n_modes - n_rigid, limit)
+        n = n_modes - n_rigid
+        many = system.element == "hermite" and n > FIRST_SLICE
+        values, vectors = by_slices(flexibility, n) if many else _counted(system, flexibility, n, limit)
         values, vectors = sharpened(system, values, vectors)
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
     vectors = np.column_stack([system.rigid, vectors])[:, :n_modes]
-    return Spectrum(system, flexibility, omega, vectors, _expected(system, omega))
+    return Spectrum(system, flexibility, omega, vectors, _claimed(system, omega, vectors))
 
 
 def kept(system: System, n_modes: int | None, max_frequency: float | None, path: Path) -> Spectrum:
     """What `solve` returns, kept in a file: a later call for the same modes of the same matrices reads it there."""
     asked = repr((n_modes, max_frequency)).encode()
     key = hashlib.sha256(b"".join([asked, system.K.data.tobytes(), system.M.data.tobytes()])).hexdigest()
-    names = ("omega", "vectors", "error")
+    names = ("omega", "vectors", "parts")
     try:
         with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
             if str(file["key"]) == key:
@@ -117,16 +123,21 @@ def kept(system: System, n_modes: int | None, max_frequency: float | None, path:
     return found
 
 
-def _expected(system: System, omega: np.ndarray) -> np.ndarray:
-    """Relative error (n_modes,) to expect of frequencies on a mesh of this size, where none was asked for."""
-    mesh, frame = system.mesh, system.frame
-    size = mesh.area / len(mesh.cells) if mesh.dimension == 1 else np.sqrt(2.0 * mesh.area / len(mesh.cells))
-    wave = (system.softness * frame.inertia / frame.stiffness * omega**2) ** 0.25
-    factor, power = ERROR_OF_WAVE[system.element]
-    error = UNEVEN * factor * (wave * size) ** power + HELD[system.element]
-    if system.unresolved > SAY:
-        error = np.maximum(error, system.unresolved)
-    return np.where(omega > 0.0, error, 0.0)
+def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Relative errors of frequencies (`Spectrum.parts`); the last are corners no mesh resolves, and rounding."""
+    parts, flexible = np.zeros((3, len(omega))), omega > 0.0
+    if not flexible.any():
+        return parts
+    values, vectors = (omega[flexible] / system.frame.rate) ** 2, vectors[:, flexible]
+    if system.element == "morley":
+        wave = (system.softness * values) ** 0.25 * np.sqrt(2.0 * system.mesh.area / len(system.mesh.cells))
+        parts[0, flexible] = CLAIMED * MORLEY_ERROR * (wave / system.frame.length) ** 2
+    else:
+        parts[:2, flexible] = CLAIMED * 0.5 * residual.energy_errors(system, vectors, vectors * values) / values
+    squares = system.K.multiply(system.K)
+    rounding = 0.5 * np.finfo(float).eps * np.sqrt(np.einsum("ij,ij->j", vectors**2, squares @ vectors**2)) / values
+    parts[2, flexible] = ROUNDED * rounding + LEAST + (system.unresolved if system.unresolved > SAY else 0.0)
+    return parts
 
 
 def _counted(system: System, flexibility: Flexibility, n: int, limit: float | None) -> tuple[np.ndarray, np.ndarray]:
@@ -188,9 +199,8 @@ def size_for(system: System, n_modes: int | None, max_frequency: float | None, t
     """Size [m] of elements that resolve the shortest wave asked for."""
     wave = _wave(system, n_modes, max_frequency)
     size = WAVE_PER_ELEMENT[system.element] / wave
-    if tolerance is not None:
-        factor, power = ERROR_OF_WAVE[system.element]
-        size = (tolerance / factor) ** (1.0 / power) / wave
+    if system.element == "argyris" and tolerance is not None:
+        size = _wave_per_element(AIM * tolerance) / wave
     elif system.element == "argyris":  # few modes are cheap enough to be had more exactly
         affordable = (2.3 * system.mesh.area / CHEAP_CELLS) ** 0.5
         size = min(size, max(affordable, FINE_WAVE / wave))
@@ -200,80 +210,72 @@ def size_for(system: System, n_modes: int | None, max_frequency: float | None, t
     return size
 
 
+def _wave_per_element(error: float) -> float:
+    """Wavenumber times element size [rad] at which the last frequency of a smooth plate errs by so much."""
+    factor, bend = ERROR_OF_WAVE
+
+    def excess(log: float) -> float:
+        return float(np.log(factor / error) + 8.0 * log - np.log1p((np.exp(log) / bend) ** 3))
+
+    return float(np.exp(brentq(excess, -10.0, 10.0)))
+
+
 def refine(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> Spectrum:
-    """Modes whose estimated relative error is below a tolerance, on meshes refined as often as that takes."""
+    """Modes whose estimated relative error is below a tolerance, on meshes refined as often as that takes.
+
+    The first mesh follows from the shortest wave; where edges or corners want more, what its modes err by tells the
+    size of the next.
+    """
     if system.mesh.recipe is None:
         raise ValueError(
             "tolerance needs a mesh that can be refined; make it with fi.mesh or load it with fi.mesh.load"
         )
-    start = _affordable(system, n_modes, max_frequency, tolerance)
-    if max_frequency is not None:  # from here on by number, so that all meshes give the same ones
-        n_modes = len(solve(start, None, max_frequency).omega)
-    history: list[Spectrum] = []
-    for candidate in (reassemble(system, start.mesh.refined(1.0 / STEP)), start):
-        if candidate is not start and (start.mesh.size_stated or _step(candidate.mesh, start.mesh) < LEAST_STEP):
-            continue  # the user's own mesh, or one that cannot be coarsened
-        if candidate.n_dofs > 2 * (n_modes or 0):
-            history.append(solve(candidate, n_modes, None))
-    while True:
-        mesh = history[-1].system.mesh if history else start.mesh
-        finer = mesh.refined(STEP)
-        if _step(mesh, finer) < LEAST_STEP:  # the size meant its longest side, the others are finer already
-            finer = mesh.refined(2.0)
-        history.append(solve(reassemble(system, finer), n_modes, None))
-        cells = [len(found.system.mesh.cells) for found in history[-2:]]
-        if len(history) < (2 if cells[-1] > FAR_APART * cells[0] else 3):
-            continue
-        error, order = _estimate(history[-3:])
-        if (error <= tolerance).all():
-            last = history[-1]
-            return Spectrum(last.system, last.flexibility, last.omega, last.vectors, error)
-        worst, n_dofs = int(error.argmax()), history[-1].system.n_dofs
-        needed = n_dofs * (error[worst] / tolerance) ** (mesh.dimension / order[worst])
-        if n_dofs * STEP**2 > MOST_UNKNOWNS or needed > HOPELESS * MOST_UNKNOWNS:
-            raise _check.SimulationError(
-                f"tolerance = {tolerance:g} is not met: mode {worst + 1} is uncertain by {error[worst]:.1e} with "
-                f"{n_dofs} unknowns; loosen the tolerance, or ask for fewer modes"
-            )
+    found, size = solve(_start(system, n_modes, max_frequency, tolerance), n_modes, max_frequency), np.inf
+    for _ in range(MOST_MESHES):
+        mesh = found.system.mesh
+        if float(found.error.max()) <= tolerance:
+            return found
+        step = _needed(found.parts, MARGIN * tolerance)
+        if not step < np.inf or found.system.n_dofs * step**mesh.dimension > MOST_UNKNOWNS or mesh.size >= size:
+            break
+        size = mesh.size
+        found = solve(reassemble(system, mesh.refined(step)), n_modes, max_frequency)
+    mode = int(found.error.argmax())
+    raise _check.SimulationError(
+        f"tolerance = {tolerance:g} is not met: mode {mode + 1} is uncertain by {found.error[mode]:.1e} with "
+        f"{found.system.n_dofs} unknowns; loosen the tolerance, or ask for fewer modes"
+    )
 
 
-def _affordable(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> System:
-    """The system on a mesh to begin with: as fine as the waves need, and no mesh of a file much finer than that."""
+def _needed(parts: np.ndarray, goal: float) -> float:
+    """How much smaller [-] elements have to be for errors (3, n_modes) to meet a goal; infinity where none would do."""
+    if float(parts[2].max()) >= goal:
+        return np.inf
+
+    def excess(log: float) -> float:
+        return float((np.exp(-log * np.array(ORDERS)) @ parts[:2] + parts[2]).max()) - goal
+
+    return max(LEAST_STEP, float(np.exp(brentq(excess, 0.0, MOST_STEPS)))) if excess(0.0) > 0.0 else LEAST_STEP
+
+
+def _start(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> System:
+    """The system on the mesh expected to meet a tolerance, if its edges and corners cost no more than its waves."""
     mesh, size = system.mesh, size_for(system, n_modes, max_frequency, tolerance)
-    if not mesh.size_stated and len(mesh.cells) > CHEAP_CELLS and size > STEP * mesh.size:
+    if mesh.size_stated:
+        return system
+    if size < mesh.size:
+        finer = mesh.refined(mesh.size / size)
+        return reassemble(system, finer) if len(finer.cells) > len(mesh.cells) else system
+    if size > STEP * mesh.size and len(mesh.cells) > CHEAP_CELLS:  # a file's mesh much finer than needed
         coarse = mesh.refined(mesh.size / size)
-        if _step(coarse, mesh) > LEAST_STEP:
+        if len(coarse.cells) < len(mesh.cells):
             return reassemble(system, coarse)
-    return fine_enough(system, n_modes, max_frequency, tolerance)
+    return system
 
 
 def _step(coarse: Mesh, fine: Mesh) -> float:
     """How much smaller [-] the elements of one mesh are than those of another."""
     return (len(fine.cells) / len(coarse.cells)) ** (1.0 / fine.dimension)
-
-
-def _estimate(history: list[Spectrum]) -> tuple[np.ndarray, np.ndarray]:
-    """Relative error (n_modes,) of the last spectrum from its difference to those before, and the order they show.
-
-    Of two spectra only, on meshes far apart, the order is taken as TWO_LEVEL_ORDER or that of the corners.
-    """
-    fine, medium = history[-1].omega, history[-2].omega
-    steps = [max(_step(a.system.mesh, b.system.mesh), LEAST_STEP) for a, b in pairwise(history)]
-    second, most = steps[-1], min(MOST_ORDER, history[-1].system.order)
-    flexible = fine > 0.0
-    scale = np.where(flexible, fine, 1.0)
-    newer = np.abs(medium - fine) / scale
-    order = np.full(len(fine), min(TWO_LEVEL_ORDER, most))
-    if len(history) > 2:
-        older = np.abs(history[0].omega - medium) / scale
-        with np.errstate(divide="ignore", invalid="ignore"):
-            shown = np.log(older / newer) / np.log(0.5 * (steps[0] + second))
-        order = np.clip(np.where(np.isfinite(shown), shown, most), min(LEAST_ORDER, most), most)
-    # a mode whose differences happen to be small borrows from its neighbours, which the same mesh resolves as well
-    error = newer / (second**order - 1.0)
-    near = np.array([np.median(error[max(0, i - 2) : i + 3]) for i in range(len(error))])
-    least = max(ROUNDING, history[-1].system.unresolved if history[-1].system.unresolved > SAY else 0.0)
-    return np.where(flexible, np.maximum(np.maximum(error, 0.1 * near), least), 0.0), order
 
 
 def enclosure(found: Spectrum) -> np.ndarray | None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from . import _check, mesh
 from .assembly import assemble
-from .modal import Modes, find_modes
+from .modal import Modes, find_modes, left_out
 from .section import Beam, Material
 
 SPHERES = 1e-9, 1e9  # [m] radii: from some atoms to a star
@@ -106,9 +106,9 @@ class Striker:
         return self.modes.rigid_motion(self._points if self.modes.dimension else None)
 
     @cached_property
-    def compliance(self) -> np.ndarray:
-        """Static compliance of the whole body at the contact point, (1, 1) [m/N]; inertia relief."""
-        return self.modes.shapes.compliance(self._points)
+    def left_out(self) -> tuple[np.ndarray, np.ndarray]:
+        """Residual compliance at the contact point, (1, 1) [m/N], and its estimated error, (1,)."""
+        return left_out(self.modes, self._points, self.shape[None])
 
     @property
     def felt_mass(self) -> float:

@@ -20,6 +20,7 @@ class Rim:
     curvatures: np.ndarray  # (n_facets, 2) at both ends, positive where convex
     points: np.ndarray  # (n_points, 2)
     kinds: list[str]  # (n_facets,) clamped, hinged or free
+    springs: np.ndarray  # (n_facets, 2) [-] stiffness of elastic supports against deflection and slope
 
     def is_special(self, at: list[tuple[int, int]]) -> bool:
         """Whether the curvature of the plate may jump at a vertex, given its facets and which of their ends it is."""

@@ -141,7 +141,7 @@ def test_a_disk_of_a_section_has_absolute_frequencies_and_compliance_at_every_si
     within = analytic.disk(radius, edge=edge, section=plate, max_frequency=1.0001 * exact)
     assert within.n_modes == (5 if edge == "free" else 1)  # three rigid motions and a pair
     assert_allclose(modes.mass, per_area * np.pi * radius**2, rtol=1e-14)
-    if edge != "free":  # Timoshenko and Woinowsky-Krieger, eq. (92) and its like for the hinged edge, load in the middle
+    if edge != "free":  # Timoshenko and Woinowsky-Krieger, Theory of plates and shells, eq. (89) and (92)
         centre = {"clamped": 1.0, "hinged": 3.3 / 1.3}[edge] * radius**2 / (16.0 * np.pi * rigidity)
         assert_allclose(modes.shapes.compliance(np.zeros((1, 2))), [[centre]], rtol=1e-12)
 

@@ -12,9 +12,11 @@ FLOORS = [
     {"_meshread"},
     {"outline", "curves", "boundary", "meshfile"},
     {"triangulation", "cad"},
-    {"mesh", "section", "contact", "elements", "supports", "eigen"},
-    {"corners", "attached"},
+    {"mesh", "section", "contact", "elements", "beam_elements", "supports", "eigen"},
+    {"splitting", "attached"},
+    {"corners"},
     {"assembly"},
+    {"residual"},
     {"pointload", "spectrum", "uff"},
     {"modal"},
     {"analytic"},
@@ -37,7 +39,7 @@ FLOORS = [
     {"__main__"},
 ]
 FLOOR = {name: level for level, names in enumerate(FLOORS) for name in names}
-OWNERS = {"numba": {"_kernels", "_batch"}, "skfem": {"elements"}, "matplotlib": {"figures", "charts"}}
+OWNERS = {"numba": {"_kernels", "_batch"}, "skfem": {"elements", "beam_elements"}, "matplotlib": {"figures", "charts"}}
 
 
 def imports(path):

@@ -240,11 +240,14 @@ def test_cells_on_finite_element_modes_are_single_strikes(body, exponent):
     for place in rng.integers((9, 13), size=(12, 2)):
         cell = table.isel(dict(zip(over, place)))
         striker, spring = fi.Striker.rigid(float(cell.mass)), fi.Contact.power(float(cell.stiffness), exponent)
-        if str(cell.failure.values):  # chatter whose digits are lost
-            with pytest.raises(fi.SimulationError, match="the step error stays"):
-                fi.strike(modes, striker, spring, at=at, speed=1.0, tolerance=tolerance)
+        try:
+            hit = fi.strike(modes, striker, spring, at=at, speed=1.0, tolerance=tolerance)
+        except fi.SimulationError as error:
+            assert "the step error stays" in str(error) and str(cell.failure.values)
             continue
-        hit = fi.strike(modes, striker, spring, at=at, speed=1.0, tolerance=tolerance)
+        if str(cell.failure.values):  # chatter whose digits are lost; the strike says so too
+            assert hit.error.total > 100.0 * tolerance
+            continue
         assert int(cell.n_impacts) == hit.n_impacts
         layers = ("contact_time", "peak_force", "impulse")
         relative = [float(cell[layer]) / getattr(hit, layer) - 1.0 for layer in layers]
