@@ -13,13 +13,14 @@ DONE, DOUBTFUL, AWKWARD, LONG = 0, 1, 2, 3  # how a blow ended: proved apart; wi
 SETTLED = 1e-12  # [-] of the approach: change at which the unknown of a step has converged
 SOLVES = 30  # [-] iterations of one step at most
 MOST_WAVES = 3e8  # [-] samples times frequencies of one centroid; the engine finds those of longer blows by a transform
-SAMPLES = 6.0  # [-] of the force per period of a spectrum's highest frequency: the rule errs by (2 pi / 6)**4 / 720
+SAMPLES = 12.0  # [-] of the force per period of a spectrum's highest frequency: the rule errs by (2 pi / 12)**4 / 720
 PARTS = 2.0  # [-] and per step, at least
 LOOKS = 8  # [-] parts of a look ahead judged apart where the whole leaves a doubt
 PIECES = 3  # [-] of the step in which a contact opens, integrated by themselves: order 4
 FEWEST = 1.0  # [-] steps of a contact at least; briefer ones are looked at closer
 LETTING_GO = 0.9  # [-] loss times rate of parting from which a blow is left to the modal engine: at 1 it stops pushing
 TINY = 1e-15  # [-] curvature of a straight line
+NEAR_PEAK = 0.5  # [-] of the largest force: steps that reach it are held to the law
 DIP = 0.2  # [-] of the lesser approach at a step's ends: one that dips lower in between is looked at closer
 
 
@@ -578,7 +579,8 @@ def run(
     shapes of all rigid motions; static (n_cells,) [m/N] static compliance of all flexible ones; slack (n_cells,): part
     of the deepest approach that a touch or a gap must exceed to be sure; band: of the centroid, 0 for none.
     out (9, n_cells): impacts, time in contact, impulse, peak force, centroid, how it ended, how far the peak was mended
-    (relative), steps needed, and the relative change of the time in contact per relative change of the approach.
+    or the forces near it miss the law (relative), steps needed,
+    and the relative change of the time in contact per relative change of the approach.
     """
     n_steps = target.shape[1]
     per_step = 1.0 / h
@@ -621,6 +623,7 @@ def run(
         jumps = bends = held = sloped = 0.0
         high = low = swing = 0.0  # farthest approaches of this contact and gap; sum of 1 / rate at their ends
         margin = needed = 0.0
+        largest = ripple = ripple_at = 0.0
         count = 0
         level = -1
         n_segments = 1
@@ -736,6 +739,16 @@ def run(
                 missed *= stiff if straight else 1.0 / (1.0 + f1 * (a / y * swift + loss * swift_rate))
             ends[n + 1] = y - missed * swift
             rates[n + 1] = rate1 - missed * swift_rate
+            if y > 0.0:  # what the force misses of the law near the peak: two runs may agree on a ripple they both miss
+                begin = spring(max(d, 0.0), k, a, c)[1] * max(0.0, 1.0 + loss * r)
+                middle, speed = cubic(d, r * h, ends[n + 1], rates[n + 1] * h, 0.5)
+                middle = spring(middle, k, a, c)[1] * max(0.0, 1.0 + loss * speed * per_step)
+                final = spring(ends[n + 1], k, a, c)[1] * max(0.0, 1.0 + loss * rates[n + 1])
+                top = max(begin, middle, final)
+                largest = max(largest, top)
+                miss = abs(f - (begin + 4.0 * middle + final) / 6.0)
+                if ripple_at < NEAR_PEAK * largest or (top >= NEAR_PEAK * largest and miss > ripple):
+                    ripple, ripple_at = (miss, top) if top >= NEAR_PEAK * largest else (0.0, largest)
             if ends[n + 1] > deepest:
                 deepest = ends[n + 1]
                 mended = a * abs(missed * swift) / deepest
@@ -778,7 +791,7 @@ def run(
         out[3, cell] = peak if loss > 0.0 else spring(deepest, k, a, c)[1]
         out[4, cell] = 0.0
         out[5, cell] = status
-        out[6, cell] = mended
+        out[6, cell] = max(mended, ripple / largest) if largest > 0.0 else mended
         out[7, cell] = n if status == LONG else needed
         out[8, cell] = deepest * swing / touched if touched > 0.0 else np.inf
         if band > 0.0 and status in (DONE, DOUBTFUL):

@@ -12,6 +12,7 @@ from .modal import Modes
 SMOOTH = 1.5, 3.0  # [-] power of omega_0 / omega_c in the error: this plus the contact's exponent, at most that
 FACTOR = 1.0, 2.0  # [-] and its factor, linear and from Hertz on: nine of ten random blows on plates stay below
 SERIES_SHARE = 0.1  # [-] residual compliance times contact stiffness above which the left-out modes shape the blow
+LOSSY = 5.0  # [-] times the error of a lossless contact: what is left out then acts as one mode, not as a spring
 BAND = 4.0  # [-] kept modes reach at least this multiple of the contact frequency, whatever the target weighs
 
 

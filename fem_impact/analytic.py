@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -307,9 +308,9 @@ class BeamShapes:
         return np.zeros(len(points))
 
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """|x - load|**3 / 12 plus the polynomial that meets the ends; inertia relief where the beam can move."""
-        rigid, x = _beam_rigid(self.ends), points[:, 0] / self.length
-        return np.column_stack([_beam_green(self.ends, rigid, load)(x) for load in loads[:, 0] / self.length])
+        """A cubic on either side of each load; inertia relief where the beam can move."""
+        x = points[:, 0] / self.length
+        return np.column_stack([_beam_green(self.ends, load)(x) for load in loads[:, 0] / self.length])
 
     def take(self, n_modes: int) -> "BeamShapes":
         return replace(self, k=self.k[:n_modes], weights=self.weights[:n_modes])
@@ -317,6 +318,9 @@ class BeamShapes:
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
         node = np.arange(129)
         return self.length * node[:, None] / 128.0, np.column_stack([node[:-1], node[1:]])
+
+
+VANISHING = {"clamped": (0, 1), "hinged": (0, 2), "free": (2, 3)}  # orders of the derivatives zero at an end
 
 
 def _beam_rigid(ends: tuple[str, str]) -> np.ndarray:
@@ -330,28 +334,33 @@ def _beam_rigid(ends: tuple[str, str]) -> np.ndarray:
     return np.zeros((0, 2))
 
 
-def _beam_green(ends: tuple[str, str], rigid: np.ndarray, load: float) -> Callable[[np.ndarray], np.ndarray]:
-    """Deflection of the unit beam under a unit force at ``load`` in 0 ... 1, without its rigid motion."""
+@lru_cache(maxsize=64)
+def _beam_green(ends: tuple[str, str], load: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Deflection of the unit beam under a unit force at ``load`` in 0 ... 1, without its rigid motion.
+
+    A polynomial whose coefficients meet the left end as they are, plus the cube of the way beyond the force. Beside a
+    clamped end only the cube of the distance is left, so the nearer end is the one on the left.
+    """
+    if load > 0.5:
+        mirrored = _beam_green(ends[::-1], 1.0 - load)
+        return lambda x: mirrored(1.0 - x)
+    rigid = _beam_rigid(ends)
     carried = -rigid.T @ (rigid @ [1.0, load])  # distributed inertia force c0 + c1 x that balances the unit force
     powers = np.array([0.0, 0.0, 0.0, 0.0, carried[0] / 24.0, carried[1] / 120.0])
-    poly = np.polynomial.Polynomial
-    orders = {"clamped": (0, 1), "hinged": (0, 2), "free": (2, 3)}
-    rows, right = [], []
-    for place, end in zip((0.0, 1.0), ends):
-        for order in orders[end]:
-            rows.append(
-                [poly(np.eye(4)[i]).deriv(order)(place) if order else poly(np.eye(4)[i])(place) for i in range(4)]
-            )
-            kink = poly([0, 0, 0, 1 / 12]).deriv(order)(abs(place - load)) if order else abs(place - load) ** 3 / 12
-            sign = np.sign(place - load) if order % 2 else 1.0
-            if order == 3 and place == load:
-                sign = 2.0 * place - 1.0  # the force stands just inside the end
-            smooth = poly(powers).deriv(order)(place) if order else poly(powers)(place)
-            right.append(-(sign * kink + smooth))
-    powers[:4] = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
+    beyond = np.polynomial.Polynomial([-load, 1.0]) ** 3 / 6.0
+
+    def slopes(coefficients: np.ndarray) -> np.ndarray:
+        """Derivatives at the right end that vanish there, of the polynomial."""
+        whole = np.polynomial.Polynomial(coefficients)
+        return np.array([whole.deriv(k)(1.0) if k else whole(1.0) for k in VANISHING[ends[1]]])
+
+    free = np.setdiff1d(np.arange(4), VANISHING[ends[0]])
+    matrix = np.column_stack([slopes(np.eye(4)[k]) for k in free])
+    powers[free] = np.linalg.lstsq(matrix, -slopes(powers) - slopes(beyond.coef), rcond=None)[0]
+    poly = np.polynomial.Polynomial(powers)
 
     def bare(x):
-        return poly(powers)(x) + np.abs(x - load) ** 3 / 12.0
+        return poly(x) + (x - load).clip(0.0) ** 3 / 6.0
 
     node, weight = np.polynomial.legendre.leggauss(6)  # exact to degree 11 on either side of the force
     x = np.concatenate([0.5 * load * (node + 1.0), load + 0.5 * (1.0 - load) * (node + 1.0)])

@@ -33,7 +33,6 @@ KINDS = ("clamped", "hinged", "free")
 MORLEY_ORDER = 4  # [-] likewise for products of quadratics
 MASS_ORDER = 10  # [-] of the quadrature: exact for products of quintics
 UNEVEN = 20.0  # [-] largest over smallest triangle from which eigenvalues are taken from the strain energy
-SAME_NODE = 1e-9  # [-] of a beam: nodes nearer to each other than this are one
 TINY = 4e-3  # [-] of the extent: likewise for the root of the area of the smallest triangle
 CHUNK = 256  # [-] triangles whose strain is computed together
 RIGID = 1e-9  # [-] share of a rigid motion that supports may suppress by rounding alone
@@ -388,35 +387,34 @@ def _centred(mesh: Mesh) -> tuple[np.ndarray, float, np.ndarray]:
 
 
 def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, marked: np.ndarray) -> _Raw:
-    """``marked`` are places (n,) [m] that become nodes, as the shear force jumps there."""
+    """``marked`` are places (n,) [m] where the shear force jumps."""
     centre, length, points = _centred(mesh)
 
     def fields(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         place = (centre + length * x[:, None]).clip(mesh.points.min(), mesh.points.max())
         return section.stiffness(place), section.inertia(place)
 
-    nodes = np.sort(points[:, 0])
-    marked = (marked - centre[0]) / length
-    nodes = np.sort(np.append(nodes, marked[np.abs(marked[:, None] - nodes).min(axis=1, initial=np.inf) > SAME_NODE]))
-    nodes = nodes[np.append(True, np.diff(nodes) > SAME_NODE)]
+    kinds = support_of_facets(mesh, supports)
+    held = [kind in ("clamped", "hinged") for kind in kinds]
+    ends = points[mesh.facets[:, 0], 0]
+    nodes = beam_elements.nodes(points[:, 0], (marked - centre[0]) / length, ends[held])
     line = beam_elements.segments(beam_elements.divisions(fields, nodes))
     space = HermiteSpace(line)
     K, M, stiffness, inertia, dx = beam_elements.integrals(space, fields)
     frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
     dofs, n_all = beam_elements.numbering(line, space)
     fixed: list[int] = []
-    ends: list[tuple[int, int]] = []
-    held: list[Elastic] = []
-    for vertex, kind in zip(mesh.facets[:, 0], support_of_facets(mesh, supports)):
+    sprung: list[tuple[tuple[int, int], Elastic]] = []
+    for vertex, kind in zip(mesh.facets[:, 0], kinds):
         left = points[vertex, 0] <= points[:, 0].min()
         deflection, slope = (dofs[:2, 0] if left else dofs[2:4, -1]).tolist()
         if isinstance(kind, Elastic):
-            ends, held = [*ends, (deflection, slope)], [*held, kind]
+            sprung.append(((deflection, slope), kind))
         else:
             fixed += {"clamped": [deflection, slope], "hinged": [deflection], "free": []}[kind]
     free = np.setdiff1d(np.arange(n_all), fixed)
     expand = csr_matrix((np.ones(len(free)), (free, np.arange(len(free)))), shape=(n_all, len(free)))
-    springs = beam_springs(ends, held, frame, n_all)
+    springs = beam_springs([at for at, _ in sprung], [kind for _, kind in sprung], frame, n_all)
     matrices = _scatter(K / frame.stiffness, dofs, n_all), _scatter(M / frame.inertia, dofs, n_all), springs.tocsc()
     softness = float((inertia / stiffness).max()) * frame.stiffness / frame.inertia
     return _Raw(

@@ -17,6 +17,9 @@ from .curves import powers
 DEGREE = 32  # [-] of the deflection within an element
 QUADRATURE = 48  # [-] Gauss points of an element: exact for products of the shapes and sections of degree 31
 ON_BODY = 1e-9  # [-] of an element: how far outside a point may lie by rounding
+APART = 0.01  # [-] of the beam: nodes nearer to each other than this spoil 1e-9 of the stiffness
+SAME_NODE = 1e-9  # [-] likewise of a held end, where deflections are so small that nothing is spoilt
+ROUNDED = 1e-15  # [-] of the stiffness of an element as long as the beam, to be divided by its length cubed
 SMOOTH = 12  # [-] degree of the polynomial that must follow the section within an element
 RESOLVED = 1e-9  # [-] to this accuracy, relative to its largest value there
 NARROW = 1e-9  # [-] of the beam: a step or a kink is located to this
@@ -119,6 +122,29 @@ def segments(nodes: np.ndarray) -> MeshLine:
     return MeshLine(nodes[None], np.stack([np.arange(len(nodes) - 1), np.arange(1, len(nodes))]))
 
 
+def nodes(points: np.ndarray, marked: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """Ascending nodes of a beam: its ends, the places ``marked`` where the shear force jumps, and points of the mesh.
+
+    The stiffness of a short element drowns that of the others in rounding. So points of the mesh give way to the marked
+    places, and a marked place close to a node that must stay gets none: the jump matters little to such a short piece,
+    unless the end beside it is held.
+    """
+    points = np.sort(points)
+    kept = [points[0], points[-1]]
+    apart = min(APART * (points[-1] - points[0]), 0.5 * np.diff(points).min())
+    for place in marked:
+        off = np.abs(place - np.array(kept))
+        if off.min() > (SAME_NODE if kept[off.argmin()] in held else apart):
+            kept.append(place)
+    between = points[np.abs(points[:, None] - kept).min(axis=1) > apart]
+    return np.unique(np.append(kept, between))
+
+
+def rounding(space: Any) -> float:
+    """Relative error of static deflections by rounding in the stiffness of the shortest element."""
+    return float(ROUNDED / max(np.abs(space.length).min(), APART) ** 3)
+
+
 def integrals(space: HermiteSpace, fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> Any:
     """Stiffness and mass (n_cells, n_local, n_local) of all elements, and the two fields (n_cells, n_q) with weights.
 
@@ -195,7 +221,7 @@ def _misfit(fields: Callable, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def energy_errors(
-    space: HermiteSpace, stiffness: np.ndarray, curvature: np.ndarray, load: np.ndarray, forces: np.ndarray
+    space: HermiteSpace, stiffness: np.ndarray, curvature: np.ndarray, load: np.ndarray, moments: np.ndarray
 ) -> np.ndarray:
     """Error (n,) of the squared energy norm of solutions, from the moments that are in equilibrium with their loads.
 
@@ -208,16 +234,16 @@ def energy_errors(
     stiffness : ndarray, shape (n_cells, n_q), at the points of `quadrature`
     curvature : ndarray, shape (n_cells, n_q, n) of n solutions
     load : ndarray, shape (n_cells, n_q, n), per length
-    forces : ndarray, shape (n_cells, n), at the first node of each element
+    moments : ndarray, shape (n_cells, n_q, n), of forces at points, each times the way beyond its point
     """
     x, dx = quadrature(space)
     half, upto = 0.5 * space.length[:, None, None], _running_integral()
-    each = np.einsum("eq,eqk->ek", dx, load) + forces
+    each = np.einsum("eq,eqk->ek", dx, load)
     before = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)[:-1]])
-    shear = (before + forces)[:, None] + half * (upto @ load)
+    shear = before[:, None] + half * (upto @ load)
     each = np.einsum("eq,eqk->ek", dx, shear)
     before = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)[:-1]])
-    missed = stiffness[..., None] * curvature - before[:, None] - half * (upto @ shear)
+    missed = stiffness[..., None] * curvature - before[:, None] - half * (upto @ shear) - moments
     weight = (dx / stiffness).ravel()
     flat = missed.reshape(weight.size, -1)
     free = np.sqrt(weight)[:, None] * np.column_stack([np.ones(weight.size), x.ravel()])

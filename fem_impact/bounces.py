@@ -11,7 +11,7 @@ import numpy as np
 from scipy import special
 
 from . import _batch, _kernels
-from .integrator import RESOLVED, REST_ABOVE
+from .integrator import RESOLVED, rest_mode
 from .modal import Modes
 from .striker import Striker
 
@@ -20,6 +20,7 @@ STEP_ORDER = 3.5  # [-] of the error in the step: 3 linear, 4 Hertz
 REFINEMENTS = 6  # [-] how often the step is cut before a blow goes to the modal engine
 ORDER = 2.0  # [-] assumed of the difference between two runs in the step; 3 and more was measured
 ALLOWED = 0.5  # [-] of the tolerance: error estimated so
+PER_PERIOD = 2.0  # [-] steps per period of the highest frequency of the centroid
 MILD = 8.0  # [-] times that, of an error for which 1/sqrt(2) of the step will do instead of 1/2
 MENDED = 3.0  # [-] error of the peak over how far it was mended: up to that was measured
 HEARD = (
@@ -54,8 +55,8 @@ class Family:
             omega, zeta = np.array(body.omega), np.array(body.damping_ratio)
             squared = body.shape_at(place)[0] ** 2 * body.mass
             if lossy and rest > 0.0:
-                above = REST_ABOVE[min(body.dimension, 2)] * omega[-1]
-                omega, zeta = np.append(omega, above), np.append(zeta, zeta[-1])
+                above, damping = rest_mode(body.dimension, omega[-1], zeta[-1], lossy)
+                omega, zeta = np.append(omega, above), np.append(zeta, damping)
                 squared, rest = np.append(squared, rest * above**2), 0.0
             parts.append((omega, zeta, squared, rest))
         return cls(*zip(*parts))
@@ -307,7 +308,7 @@ class _Engine:
         duration = 2.0 * np.sqrt(np.pi) * special.gamma(1.0 + q) / special.gamma(0.5 + q) * deepest
         duration *= np.where(exponent == 1.0, np.sqrt(1.0 + stiffness * rest), 1.0)
         count = STEPS * (1e-3 / tolerance) ** (1.0 / STEP_ORDER)
-        step = np.ceil(2.0 * np.log2(count / duration)).astype(int)
+        step = np.ceil(2.0 * np.log2(np.maximum(count / duration, PER_PERIOD * self.band))).astype(int)
         for body in (0, 1):
             edge, yields = self.of_family(Family.edge, body), self.of_family(Family.top, body)
             angle = edge * 2.0 ** (-0.5 * step)

@@ -568,7 +568,10 @@ def _completion(parser: argparse.ArgumentParser) -> str:
 def _wrapped(text: str) -> str:
     """Text broken to the width of the terminal, continued lines indented."""
     width = max(20, min(WIDEST, shutil.get_terminal_size().columns))
-    lines = (textwrap.wrap(line, width, subsequent_indent="    ") or [""] for line in text.splitlines())
+    filled = textwrap.TextWrapper(
+        width, subsequent_indent="    ", break_on_hyphens=False
+    )  # paths are there to be copied
+    lines = (filled.wrap(line) or [""] for line in text.splitlines())
     return "\n".join(line for wrapped in lines for line in wrapped)
 
 

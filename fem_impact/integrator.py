@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.special import gamma
 
-from . import _check, _kernels
+from . import _check, _kernels, accuracy
 from ._check import SimulationError
-from .accuracy import left_out_error
 from .contact import Contact
 from .modal import Modes, left_out
 from .plans import asked_for
@@ -33,20 +32,27 @@ FEW = 20  # [-] impacts up to which that is asked: of chatter there is always a 
 DOUBLINGS = 7  # [-] how often the step is halved before the run gives up
 # [-] Difference of two runs over the error of the finer one: for speeds and impulse, and for what hangs on one instant,
 # contact time and peak force, where modes faster than the step keep scheme A4 from its order.
-RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 2.0), "collocation": (1.0, 1.0), "secular": (1.0, 1.0)}
-LOSSY = 0.5  # [-] the second of them where a contact loses energy: its peak hangs on the rates of fast modes
+RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 4.0), "collocation": (1.0, 1.0), "secular": (1.0, 1.0)}
+MISFIT = 1.5, 12.0  # [-] error of the peak force over what steps near the peak miss of the law, without and with loss
+NEAR_PEAK = 0.8, 0.35  # [-] forces over the peak in those steps
+RINGING = 0.5  # [-] damping ratio from which a mode does not
 RESOLVED = 2.0  # [rad] of those modes' motion in the longer of two steps
 COLLOCATION_BELOW = 1e-7  # [-] tolerance from which collocation needs less work than A4
 BAND_POINTS = 257  # [-] frequencies at which two spectra are compared
 NODES = 5  # [-] of collocation; more gain nothing where onset and release limit the smoothness
 RESOLVABLE = 0.3  # [-] contact stiffness times residual compliance up to which the estimate of its error holds
 AT_LEAST = 0.3  # [-] share of the error to expect below which a difference is taken for luck; the median of blows
-THINNED = 1.4  # [-] highest frequency kept over that of the run that tells what the modes left out do
+THINNED = 1.4, 2.0  # [-] highest frequency kept over those of the two runs that tell what the modes left out do
+FALLING = 2.0  # [-] least power of the highest frequency kept with which the error of the others falls
 REST_FLOOR = 1e-12  # [-] residual compliance below this share of the whole is rounding
-REST_ABOVE = {
-    1: 1.53,
-    2: 1.73,
-}  # [-] by dimension: sqrt of sum u2/w2 over sum u2/w4 beyond the last mode, over omega**2
+# [-] by dimension: sqrt of sum u2/w2 over sum u2/w4 beyond the last mode, over omega**2
+REST_ABOVE = {1: 1.53, 2: 1.73}
+LOSSY_ABOVE, LOSSY_DAMPING = (
+    30.0,
+    1.0,
+)  # [-] what stands for the rest under a lossy force: over the last mode, of critical
+LOSSY_STRIKER = 30.0  # [-] likewise of a striker, whose few modes are far apart
+STRIKER_SHARE = 0.05  # [-] of the tolerance for the striker's modes left out: few modes, cheaply kept
 SILENT = 1e-15  # [-] shape at the contact over the largest below which a mode rests there
 NOISE = 1e-16  # [-] approaches below this times duration and speed are rounding: contacts that merely touch
 STILL = 1e-12  # [-] rigid approaches slower than this times the speed are rounding, not a contact to come
@@ -122,7 +128,6 @@ class _Part:
     touched: tuple[tuple[int, float], ...]  # the contacts and its sign in each
     rest: np.ndarray  # (n_ends, n_ends) [m/N] compliance of what the modes leave out
     doubt: np.ndarray  # (n_ends,) [m/N] error of its diagonal
-    above: float  # [-] frequency of modes that stand for the rest over the last one kept
     q: np.ndarray
     p: np.ndarray
     bias: np.ndarray
@@ -194,15 +199,23 @@ def strike(
     ]
     point = modes.point("at", at)
     options = _Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
-    touch = Touch(contact, 0, 1, striker.at[None] if striker.modes.dimension else None, point)
-    rest = striker.left_out if residual and striker.modes.dimension else None
-    end = striker.at[None] if striker.modes.dimension else np.zeros((1, 0))
-    motion = speed * striker.motion
-    arriving = _part(striker.modes, ((0, 1.0),), end, striker.shape[None], rest, forces[0], motion)
     rows = modes.shapes.at(point)
     rest = left_out(modes, point, rows) if residual and modes.dimension else None
     struck = _part(modes, ((0, -1.0),), point, rows, rest, forces[1])
-    return _follow((striker.modes, modes), [touch], [arriving, struck], speed, options, striker, point[0])
+
+    def blow(striker: Striker) -> Response:
+        touch = Touch(contact, 0, 1, striker.at[None] if striker.modes.dimension else None, point)
+        rest = striker.left_out if residual and striker.modes.dimension else None
+        end = striker.at[None] if striker.modes.dimension else np.zeros((1, 0))
+        motion = speed * striker.motion
+        arriving = _part(striker.modes, ((0, 1.0),), end, striker.shape[None], rest, forces[0], motion)
+        return _follow((striker.modes, modes), [touch], [arriving, struck], speed, options, striker, point[0])
+
+    if striker.fixed or not residual or speed == 0.0:
+        return blow(striker)
+    needed = striker_modes(striker, contact=contact, speed=speed, tolerance=options.tolerance)[0]
+    hit = blow(shortened(striker, needed))
+    return hit if hit.error.truncation <= 0.5 * options.tolerance else blow(striker)
 
 
 @_check.typed
@@ -345,10 +358,7 @@ def _part(
     still = np.zeros(modes.n_modes)
     bias = force * rows[0] if force else still
     velocity = still if motion is None else motion
-    above = REST_ABOVE[min(modes.dimension, 2)] if modes.dimension else 1.0
-    return _Part(
-        modes.omega, modes.damping_ratio, rows, touched, rest, doubt, above, still, velocity, bias, force, points
-    )
+    return _Part(modes.omega, modes.damping_ratio, rows, touched, rest, doubt, still, velocity, bias, force, points)
 
 
 def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
@@ -374,14 +384,14 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
             law[first, 3] += part.rest[0, 0]
             offset[first] += sign * part.rest[0, 0] * part.force
             continue
-        above = part.above * part.omega[-1]
+        above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], bool((law[:, 2] > 0.0).any()))
         size, vectors = np.linalg.eigh(part.rest)
         for value, vector in zip(size, vectors.T):
             if value > REST_FLOOR * size[-1]:
                 column = np.zeros(len(law))
                 for (i, sign), share in zip(part.touched, vector):
                     column[i] += sign * share * np.sqrt(value) * above
-                extra.append((above, float(part.zeta[-1]), column))
+                extra.append((above, damping, column))
     lists: list[list] = [
         [part.omega for part in parts],
         [part.zeta for part in parts],
@@ -397,12 +407,23 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
     return _System(omega, zeta, shape, offset, bias, law, q, p)
 
 
-def _thinned(part: _Part) -> tuple[_Part, float]:
+def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[float, float]:
+    """Frequency [rad/s] and damping ratio [-] of the mode that stands for those beyond the last one kept.
+
+    A lossy force hangs on the rate of approach, in which an undamped mode just beyond the last would ring on; one far
+    above, critically damped, yields with the rate of a spring in series and takes next to no energy.
+    """
+    if lossy:
+        return LOSSY_ABOVE * omega, LOSSY_DAMPING
+    return REST_ABOVE[min(dimension, 2)] * omega, float(zeta)
+
+
+def _thinned(part: _Part, wanted: float) -> tuple[_Part, float]:
     """The body without its upper modes, their compliance in their place, and the ratio of the highest frequencies."""
     flexible = part.omega[part.omega > 0.0]
     if not part.rest.any() or len(flexible) < 2:
         return part, np.inf
-    limit = max(flexible[-1] / THINNED, flexible[0])
+    limit = max(flexible[-1] / wanted, flexible[0])
     n = int(np.searchsorted(part.omega, limit, side="right"))
     gone = part.rows[:, n:] / part.omega[n:]
     thin = replace(
@@ -478,6 +499,39 @@ def steps_for(
     return scheme, dt or duration / (2.0 if scheme == "collocation" else 1.0)
 
 
+def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance: float) -> tuple[int, float]:
+    """How many modes of a striker a blow needs, and the error [-] to expect of leaving out the others.
+
+    They take a small share of the tolerance, as they cost little.
+    """
+    modes = striker.modes
+    law: dict[str, Any] = {"contact": contact, "mass": striker.felt_mass, "speed": speed}
+    allowed = STRIKER_SHARE * tolerance / (LOSSY_STRIKER if contact.loss else 1.0)
+    omega_0 = np.pi / accuracy.contact_duration(**law)
+    whole = modes.truncated(n_modes=modes.n_rigid).residual_compliance(striker.at[None])[0, 0]
+    if striker.felt_mass * omega_0**2 * whole <= allowed:
+        return modes.n_rigid, allowed
+    limit = accuracy.cutoff_frequency(modes, striker.at, tolerance=allowed, **law)
+    kept = min(modes.n_modes, max(modes.n_rigid + 2, int(np.searchsorted(modes.frequencies, limit, side="right"))))
+    return kept, striker_error(striker, kept, contact=contact, speed=speed)
+
+
+def striker_error(striker: Striker, n_modes: int, *, contact: Contact, speed: float) -> float:
+    """Error [-] to expect of keeping so many modes of a striker."""
+    highest = float(striker.modes.frequencies[max(n_modes - 1, 1)])
+    law: dict[str, Any] = {"contact": contact, "mass": striker.felt_mass, "speed": speed}
+    return accuracy.truncation_error(striker.modes, striker.at, highest, **law) * (
+        LOSSY_STRIKER if contact.loss else 1.0
+    )
+
+
+def shortened(striker: Striker, n_modes: int) -> Striker:
+    """The striker with its first modes only; the rest yields as a spring."""
+    if n_modes >= striker.modes.n_modes:
+        return striker
+    return Striker.flexible(striker.modes.truncated(n_modes=n_modes), at=striker.at)
+
+
 def _controlled(
     system, scheme, dt, tolerance, quantities, pace, horizon, n_max
 ) -> tuple[History, float, str, History, float]:
@@ -486,13 +540,14 @@ def _controlled(
     Returns the history, its estimated error, the scheme, and the coarser history with its size.
     """
     differ = partial(_difference, quantities)
+    missed = _force_missed if "force" in quantities else lambda _: 0.0
     free = scheme is None and dt is None
     scheme = scheme or _scheme_for(tolerance, float(system.law[:, 1].min()))
     if scheme == "collocation" and (system.law[:, 1] < 1.0).any():
         raise ValueError(f"scheme collocation needs exponents of at least 1, got {system.law[:, 1].min():g}; take A4")
     over = RICHARDSON[scheme]
-    if (system.law[:, 2] > 0.0).any():
-        over = over[0], min(over[1], LOSSY)
+    if scheme != "collocation":  # a strong loss feels the rates of modes faster than the step
+        over = over[0], over[1] / (1.0 + 2.0 * pace[1] * system.law[:, 2].max())
     shortest = min(pace[0], horizon)  # or two runs of one step each, cut to the same length, would agree on anything
     if scheme == "secular":
         _check_secular(system)
@@ -502,7 +557,7 @@ def _controlled(
         dt = min(dt, 0.5 * horizon)
         fine = _run(system, scheme, dt, pace, horizon, n_max)
         coarse = _run(system, scheme, 2.0 * dt, pace, horizon, n_max)
-        return fine, differ(coarse, fine, over), scheme, coarse, 2.0 * dt
+        return fine, max(differ(coarse, fine, over), missed(fine)), scheme, coarse, 2.0 * dt
     if scheme == "collocation":
         sizes = [max(1e-15, tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)]
     else:
@@ -514,7 +569,7 @@ def _controlled(
     best, met, grazes = np.inf, None, 0 if quantities.keys() & {"n_impacts", "contact_time"} else GRAZES
     for before, size in pairwise(sizes):
         fine = _run(system, scheme, size, pace, horizon, n_max)
-        estimate = differ(coarse, fine, over)
+        estimate = max(differ(coarse, fine, over), missed(fine))
         if estimate <= tolerance:
             met = fine, estimate, scheme, coarse, before
             if grazes == GRAZES or not _grazes(fine, GRAZE * tolerance * (size / sizes[1]) ** 3):
@@ -549,7 +604,8 @@ def _longest_lossy(system: _System, pace: tuple[float, float], tolerance: float)
     """
     longest = np.inf
     slow = system.omega <= np.pi / pace[0]
-    order = np.argsort(-system.omega, kind="stable")[: np.count_nonzero(system.omega)]  # fastest first
+    fastest = np.argsort(-system.omega, kind="stable")[: np.count_nonzero(system.omega)]
+    order = fastest[system.zeta[fastest] < RINGING]
     omega = system.omega[order]
     for shape, loss in zip(system.shape, system.law[:, 2]):
         number = loss * pace[1]
@@ -673,6 +729,24 @@ def _size(vector: np.ndarray) -> float:
     return float(vector @ vector) ** 0.5
 
 
+def _force_missed(history: History) -> float:
+    """Error [-] of the peak force where steps are too long for its ripples, on which two runs may agree by chance.
+
+    The mean force of each step is compared with Simpson's rule on the law along the cubic through both ends.
+    """
+    if history.n_coefficients > 2 or not len(history.contacts):
+        return 0.0
+    worst, peak, part = 0.0, history.contacts[:, 2].max(), np.array([0.0, 0.5, 1.0])
+    mean = history.impulses / np.maximum(history.steps[:, 1:2], np.finfo(float).tiny)
+    for i, loss in enumerate(history.law[:, 2]):
+        closed = np.flatnonzero(history.pressed[:, i])
+        force = history.force(closed, i, part)  # (n_closed, 3)
+        near = force.max(axis=1, initial=0.0) > NEAR_PEAK[bool(loss)] * peak
+        missed = np.abs(mean[closed, i] - force @ [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0])[near]
+        worst = max(worst, MISFIT[bool(loss)] * missed.max(initial=0.0) / peak)
+    return float(worst)
+
+
 def _totals(history: History) -> tuple[float, float, float]:
     """Impulse [N s], time in contact [s] and peak force [N] of a run that has impacts."""
     rows = history.contacts.tolist()
@@ -697,9 +771,9 @@ def _sensitivity(coarse: History, fine: History) -> float:
 def _truncation(parts, contacts, system: _System, whole: History, scheme, size, differ, pace, horizon, n_max):
     """Estimated error [-] of leaving out modes, and whether the estimate can be trusted.
 
-    The run is repeated with the upper modes left out as well, their compliance in their place; as the error falls
-    with the square of the highest frequency or faster, the change bounds what the modes left out already do. Where the
-    change happens to be small, a share of the error to expect stands in for it.
+    The run is repeated with the upper modes of one body left out as well, their compliance in their place; as the error
+    falls with the power FALLING of the highest frequency or faster, the change bounds what the modes left out do. Two
+    such runs, and a share of the error to expect, guard against a change that is small by chance.
     """
     if not any(part.rest.any() for part in parts):
         return 0.0, True
@@ -711,14 +785,19 @@ def _truncation(parts, contacts, system: _System, whole: History, scheme, size, 
         for (i, _), rest in zip(part.touched, np.diag(part.rest)):
             soft = omega_0**2 / mobility[i] * rest
             softness[i] += soft
-            expected += left_out_error(soft, ratio, contacts[i].law.exponent, part.points.shape[1])
+            expected += accuracy.left_out_error(soft, ratio, contacts[i].law.exponent, part.points.shape[1])
     resolvable = bool((softness <= RESOLVABLE).all())
-    thin = [_thinned(part) for part in parts]
-    least = min(ratio for _, ratio in thin)  # of the body that loses least
-    if not 1.0 < least < np.inf:
-        return float(expected), resolvable
-    less = _run(_joined([part for part, _ in thin], contacts), scheme, size, pace, horizon, n_max)
-    return max(differ(less, whole) / (least**2 - 1.0), AT_LEAST * float(expected)), resolvable
+    found = 0.0
+    for i, part in enumerate(parts):
+        guesses = [0.0]
+        for wanted in THINNED:
+            thin, ratio = _thinned(part, wanted)
+            if 1.0 < ratio < np.inf:
+                less = [*parts[:i], thin, *parts[i + 1 :]]
+                change = differ(_run(_joined(less, contacts), scheme, size, pace, horizon, n_max), whole)
+                guesses.append(change / (ratio**FALLING - 1.0))
+        found += max(guesses)
+    return max(found, AT_LEAST * float(expected)), resolvable
 
 
 def _mesh_error(bodies, parts, contacts, system: _System, coarse: History, scheme, size, differ, tolerance, pace, last):

@@ -392,9 +392,10 @@ def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.nd
     doubt = np.diag(whole) * (modes.shapes.compliance_error(place) + ROUNDING)
     if modes.frequency_error is not None:
         doubt = doubt + np.diag(modes._carried(rows, SHAPE_ERROR * modes.frequency_error[modes.omega > 0.0]))
+    allowed = doubt.copy()
     if modes.omega[-1] > 0.0:  # where the body rests both are rounding
-        doubt = doubt + ROUNDING / (modes.mass * modes.omega[modes.omega > 0.0][0] ** 2)
-    for i in np.flatnonzero(np.diag(rest) < -doubt):
+        allowed += ROUNDING / (modes.mass * modes.omega[modes.omega > 0.0][0] ** 2)
+    for i in np.flatnonzero(np.diag(rest) < -allowed):
         where = ", ".join(f"{x:g}" for x in place[i])
         raise _check.SimulationError(
             f"the modes are softer at ({where}) m than the whole body, {whole[i, i]:.4g} m/N, by "

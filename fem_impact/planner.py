@@ -23,11 +23,9 @@ MARGINS = (1.0, 4.0, 16.0)  # [-] stricter choices of modes, taken one after ano
 NOTCH = 8.0  # [-] by which a verifying run is stricter
 FINEST = 1e-10  # [-] but never stricter than this
 CAUTION = 2.0  # [-] by which modes are chosen more strictly than expected: a quarter more, and seldom a second time
-LOSSY = 5.0  # [-] times the error of a lossless contact: what is left out then acts as one mode, not as a spring
-STRIKER_SHARE = 0.05  # [-] of the tolerance for the striker's modes left out: few modes, cheaply kept
 FIRST_LOOK = 20  # [-] modes found first: enough to set the scale and to tell how densely the others follow
 MOST_MODES = {"fe": 2000, "analytic": 50_000}  # [-] about 2 GB, and minutes
-SHORT_WAVES = 1e-5  # [-] error of the frequencies that `find_modes` sets the size of its elements for
+SHORT_WAVES = {"argyris": 1e-5, "hermite": 1e-9}  # [-] error of the frequencies that `find_modes` sets the mesh for
 LOOK = 20.0  # [-] closed-form modes that judge whether a body yields reach this multiple of the contact frequency
 MOST_LOOKED_AT = 5000  # [-] of them at most
 PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}  # that one may set
@@ -114,7 +112,7 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     for margin in MARGINS:
         if margin > 1.0:
             plan = _modal(scene, plan.changes, blow, stages, plan.first, margin)
-        modes, striker = target(plan, stages, keep), _shortened(blow.striker, plan.n_striker_modes)
+        modes, striker = target(plan, stages, keep), integrator.shortened(blow.striker, plan.n_striker_modes)
         if plan.target == "modal":
             with scene.blame("observe"):
                 for point in scene.points:
@@ -287,7 +285,7 @@ def _modal(
     modes = first.scaled(**scale)
     with scene.blame("strike"):
         modes.point("at", blow.values["at"])
-    allowed = SHARE * blow.tolerance / (CAUTION * margin) / (LOSSY if blow.contact.loss else 1.0)
+    allowed = SHARE * blow.tolerance / (CAUTION * margin) / (accuracy.LOSSY if blow.contact.loss else 1.0)
     law = {"contact": blow.contact, "speed": blow.values["speed"]}
     needed = accuracy.cutoff_frequency(modes, blow.values["at"], mass=blow.striker.felt_mass, tolerance=allowed, **law)
     band = max((band for band in blow.quantities.values() if band), default=0.0)
@@ -312,7 +310,7 @@ def _modal(
         kept += f" ({band:g} Hz asked for, {needed:.4g} Hz needed for the blow)"
     plan = _plan(
         scene, changes, blow, target="modal", errors={"target modes left out": left}, reasons=(why, kept),
-        mass=modes.mass, n_modes=number, max_frequency=limit, first=first, element="closed form",
+        mass=modes.mass, n_modes=number, max_frequency=limit, first=first, element="closed form", margin=margin,
     )  # fmt: skip
     if isinstance(first.shapes, FieldShapes):
         plan = _with_mesh(plan, first, first.shapes.system, limit * first.frequencies[-1] / modes.frequencies[-1])
@@ -326,7 +324,7 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
     stated = plan.scene.size_stated or "size" in plan.changes or spectrum.resolves(system, limit)
     size = mesh.size if stated else min(mesh.size, spectrum.size_for(system, None, limit, None))
     n_dofs = round(DOFS_PER_AREA[system.element] * mesh.area / size**mesh.dimension)
-    error = max(float(first.frequency_error.max()), SHORT_WAVES)
+    error = max(float(first.frequency_error.max()), SHORT_WAVES[system.element])
     reason = f"{system.element} elements of {size:.3g} m, about {n_dofs} unknowns, resolve the shortest wave"
     seconds = plan.seconds + RATES["dofs"] * n_dofs + RATES["pairs"] * n_dofs * plan.n_modes
     memory = plan.memory + BYTES["dofs"] * n_dofs + BYTES["pairs"] * n_dofs * plan.n_modes
@@ -336,9 +334,11 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
     )  # fmt: skip
 
 
-def _plan(scene: Any, changes: Mapping[str, Any], blow: _Blow, *, errors, reasons, n_modes=0, **chosen: Any) -> Plan:
+def _plan(
+    scene: Any, changes: Mapping[str, Any], blow: _Blow, *, errors, reasons, n_modes=0, margin=1.0, **chosen: Any
+) -> Plan:
     """A plan with what every target has in common: the striker, the steps, and their share of errors and cost."""
-    kept, left = _striker_modes(blow)
+    kept, left = _striker_modes(blow, margin)
     modes = blow.striker.modes
     if modes.dimension:
         errors = {**errors, "striker modes left out": left}
@@ -370,30 +370,16 @@ def _plan(scene: Any, changes: Mapping[str, Any], blow: _Blow, *, errors, reason
     )
 
 
-def _striker_modes(blow: _Blow) -> tuple[int, float]:
+def _striker_modes(blow: _Blow, margin: float) -> tuple[int, float]:
     """How many modes of the striker are kept, and the error of leaving out the others."""
-    modes = blow.striker.modes
+    modes, kept = blow.striker.modes, blow.pieces.get("n_striker_modes")
     if not modes.dimension:
         return modes.n_modes, 0.0
-    law = {"contact": blow.contact, "speed": blow.values["speed"], "mass": blow.striker.felt_mass}
-    kept, allowed = blow.pieces.get("n_striker_modes"), STRIKER_SHARE * blow.tolerance
-    if kept is None:
-        kept = modes.n_modes
-        if blow.values.get("residual", True):
-            whole = modes.truncated(n_modes=modes.n_rigid).residual_compliance(blow.striker.at[None])[0, 0]
-            if blow.striker.felt_mass * (np.pi / blow.duration) ** 2 * whole <= allowed:
-                return modes.n_rigid, allowed
-            limit = accuracy.cutoff_frequency(modes, blow.striker.at, tolerance=allowed, **law)
-            kept = max(modes.n_rigid + 2, int(np.searchsorted(modes.frequencies, limit, side="right")))
-    kept = max(modes.n_rigid, min(kept, modes.n_modes))
-    return kept, accuracy.truncation_error(modes, blow.striker.at, float(modes.frequencies[max(kept - 1, 1)]), **law)
-
-
-def _shortened(striker: Striker, n_modes: int) -> Striker:
-    """The striker with its first modes only; the rest yields as a spring."""
-    if n_modes >= striker.modes.n_modes:
-        return striker
-    return Striker.flexible(striker.modes.truncated(n_modes=n_modes), at=striker.at)
+    law = {"contact": blow.contact, "speed": blow.values["speed"]}
+    if kept is None and blow.values.get("residual", True):
+        return integrator.striker_modes(blow.striker, tolerance=blow.tolerance / margin, **law)
+    kept = max(modes.n_rigid, min(kept or modes.n_modes, modes.n_modes))
+    return kept, integrator.striker_error(blow.striker, kept, **law)
 
 
 def target(plan: Plan, stages: Stages, keep: Any = None) -> Modes:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _check, residual
+from . import _check, beam_elements, residual
 from .assembly import System, assemble
 from .eigen import Flexibility
 from .mesh import Mesh
@@ -13,8 +13,8 @@ from .mesh import Mesh
 CELLS = 600  # [-] triangles of the mesh to begin with, about
 GOAL = 1e-5  # [-] relative error of the compliance that ends the refinement
 ROUNDS = 3  # [-] meshes tried for it, each with elements half as large
-ROUNDING = 1e-7  # [-] of the compliance, left by the smallest triangles
-RESTS = 1e-20  # [-] compliance in the frame below which a point rests on a support
+ROUNDING = 1e-7  # [-] of a plate's compliance, left by the smallest triangles; of a beam's, see `beam_elements`
+RESTS = 1e-15  # [-] compliance in the frame below which a point rests on a support
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,8 @@ def _solved(system: System, mesh: Mesh, loads: np.ndarray) -> Deflection:
     diagonal = compliance.diagonal()
     inertia = -fine.rigid @ (fine.rigid.T @ forces)
     error = residual.energy_errors(fine, vectors, inertia, loads).sum(axis=0)
+    rounding = ROUNDING if mesh.dimension == 2 else beam_elements.rounding(fine.space)
     moves = diagonal > RESTS
-    relative = np.where(moves, error / np.where(moves, diagonal, 1.0), 0.0) + ROUNDING
+    relative = np.where(moves, error / np.where(moves, diagonal, 1.0), 0.0) + rounding
     unit = fine.frame.mass * fine.frame.rate**2
     return Deflection(fine, loads.copy(), vectors, 0.5 * (compliance + compliance.T) / unit, relative)

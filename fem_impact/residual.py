@@ -210,22 +210,15 @@ def energy_errors(
     stiffness = system.section.stiffness(place).reshape(x.shape) / frame.stiffness
     inertia = system.section.inertia(place).reshape(x.shape) / frame.inertia
     value, bend = space.functions(np.arange(len(x)), x[..., None], (0, 2))
-    forces = np.zeros((len(x), vectors.shape[1]))
+    moments = np.zeros((*x.shape, vectors.shape[1]))
     for point, mass in system.point_masses:
-        _add_force(system, forces, point, mass / frame.mass * (system.interpolate(point[None]) @ loads)[0])
-    for i, point in enumerate(forced if forced is not None else ()):
-        _add_force(system, forces[:, i], point, 1.0)
+        beyond = (x - frame.local(point[None])[0, 0]).clip(0.0)
+        moments += mass / frame.mass * beyond[..., None] * (system.interpolate(point[None]) @ loads)
+    if forced is not None:
+        moments += (x[..., None] - frame.local(forced)[:, 0]).clip(0.0)
     load = inertia[..., None] * (value @ _of_cells(system, loads))
-    errors = beam_elements.energy_errors(space, stiffness, bend @ _of_cells(system, vectors), load, forces)
+    errors = beam_elements.energy_errors(space, stiffness, bend @ _of_cells(system, vectors), load, moments)
     return np.stack([errors, np.zeros_like(errors)])
-
-
-def _add_force(system: System, forces: np.ndarray, point: np.ndarray, force: Any) -> None:
-    """Add a force at a node to those at the first nodes of the elements; one at the beam's end bends nothing."""
-    space: Any = system.space
-    off = np.abs(space.start - system.frame.local(point[None])[0, 0])
-    if off.min() < beam_elements.ON_BODY:
-        forces[int(off.argmin())] += force
 
 
 def _squares(values: np.ndarray) -> np.ndarray:

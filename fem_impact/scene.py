@@ -14,7 +14,7 @@ from . import _check, analytic, assembly, modal, planner, spectrum, svg
 from .contact import Contact
 from .mesh import Mesh
 from .modal import Modes
-from .planner import SHORT_WAVES, Run, Stages, Watch
+from .planner import Run, Stages, Watch
 from .plans import Plan
 from .response import Response
 from .section import Beam, Material, Plate
@@ -177,10 +177,13 @@ class Scene:
                 names.append(source.name)
         return tables, names
 
-    @property
+    @cached_property
     def source(self) -> str:
-        """Where the target's modes come from, "fe" or "analytic"."""
-        return self._target["source"]
+        """Where the target's modes come from, "fe" or "analytic": closed formulas where there are any, unless told."""
+        told = self._target["source"]
+        if told != "auto":
+            return told
+        return "fe" if self.size_stated or self.closed_form() is None else "analytic"
 
     @property
     def scale(self) -> Mapping[str, float]:
@@ -199,7 +202,9 @@ class Scene:
 
     def finder(self, stages: Stages, tolerance: float, size: float | None = None) -> Finder:
         """What finds the target's modes, before mass, first frequency and damping are set (see `Finder`)."""
-        return self._analytic() if self.source == "analytic" else self._finite_elements(stages, tolerance, size)
+        if self.source == "analytic" and (size is None or self._target["source"] == "analytic"):
+            return self._analytic()
+        return self._finite_elements(stages, tolerance, size)
 
     def closed_form(self) -> Finder | None:
         """The same by closed formulas, whatever the source; None where there are none."""
@@ -239,10 +244,7 @@ class Scene:
                 enough = insisted or (max_frequency is not None and spectrum.resolves(system, max_frequency))
                 system = replace(system, mesh=replace(system.mesh, size_stated=enough))
                 reach = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}
-                modes = modal.find_modes(system, **reach, keep=keep)
-                error = np.full(modes.n_modes, max(first.frequency_error.max(), SHORT_WAVES))
-                error[: first.n_modes] = first.frequency_error[: modes.n_modes]
-                return replace(modes, frequency_error=error)
+                return modal.find_modes(system, **reach, keep=keep)
 
         return find
 

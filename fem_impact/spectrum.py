@@ -231,12 +231,17 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
             "tolerance needs a mesh that can be refined; make it with fi.mesh or load it with fi.mesh.load"
         )
     found, size = solve(_start(system, n_modes, max_frequency, tolerance), n_modes, max_frequency), np.inf
-    for _ in range(MOST_MESHES):
-        mesh = found.system.mesh
+    for left in reversed(range(MOST_MESHES + 1)):
         if float(found.error.max()) <= tolerance:
             return found
+        mesh = found.system.mesh
         step = _needed(found.parts, MARGIN * tolerance)
-        if not step < np.inf or found.system.n_dofs * step**mesh.dimension > MOST_UNKNOWNS or mesh.size >= size:
+        if (
+            not left
+            or not step < np.inf
+            or found.system.n_dofs * step**mesh.dimension > MOST_UNKNOWNS
+            or mesh.size >= size
+        ):
             break
         size = mesh.size
         found = solve(reassemble(system, mesh.refined(step)), n_modes, max_frequency)

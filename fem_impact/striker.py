@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from . import _check, mesh
-from .assembly import assemble
-from .modal import Modes, find_modes, left_out
-from .section import Beam, Material
+from . import _check
+from .analytic import beam
+from .modal import Modes, left_out
+from .section import Material
 
 SPHERES = 1e-9, 1e9  # [m] radii: from some atoms to a star
+STICK_MODES = 96  # [-] bending modes of a stick from which a blow takes what it needs
 MOST_MODES = 1000  # [-] of a stick: where they are as short as it is thick it is no slender beam any more
 
 
@@ -27,6 +28,7 @@ class Striker:
     at: np.ndarray  # (dimension,) [m] the contact point
     material: Material | None = None  # of a sphere, for `Contact.between`
     radius: float | None = None  # [m] of a sphere
+    fixed: bool = True  # whether all modes are kept; otherwise a blow keeps those that its tolerance needs
 
     def __post_init__(self) -> None:
         _check.instance("modes", self.modes, Modes)
@@ -59,7 +61,7 @@ class Striker:
         return cls(Modes.rigid(4.0 / 3.0 * np.pi * radius**3 * material.rho), np.zeros(0), material, radius)
 
     @classmethod
-    def stick(cls, mass: float, first_frequency: float, *, n_modes: int = 8) -> "Striker":
+    def stick(cls, mass: float, first_frequency: float, *, n_modes: int | None = None) -> "Striker":
         """A uniform stick hinged at its far end that strikes with its free end, as a drumstick.
 
         Parameters
@@ -68,18 +70,13 @@ class Striker:
             While the stick is rigid, its tip feels as a third of this.
         first_frequency : float [Hz]
             Of its first bending mode.
-        n_modes : int
-            Bending modes kept, one turning mode besides; the rest act by their residual compliance.
+        n_modes : int, optional
+            Bending modes kept, one turning mode besides; the rest act by their residual compliance. Where left out,
+            each blow keeps what its tolerance needs.
         """
-        mass = _check.positive("mass", mass, "kg")
-        first_frequency = _check.positive("first_frequency", first_frequency, "Hz")
-        beam = Beam.rectangular(Material(E=1.0, nu=0.0, rho=1.0), width=1.0, height=1.0)
-        line = mesh.line(
-            1.0, size=0.2 / (1 + _check.count("n_modes", n_modes, high=MOST_MODES))
-        )  # five elements per half wave
-        system = assemble(line, beam, supports={"left": "hinged"})
-        modes = find_modes(system, n_modes=1 + n_modes)
-        return cls(modes.scaled(mass=mass, first_frequency=first_frequency), np.ones(1))
+        kept = STICK_MODES if n_modes is None else _check.count("n_modes", n_modes, high=MOST_MODES)
+        modes = beam(1.0, ends=("hinged", "free"), mass=mass, first_frequency=first_frequency, n_modes=1 + kept)
+        return cls(modes, np.ones(1), fixed=n_modes is not None)
 
     @classmethod
     def flexible(cls, modes: Modes, *, at: Any) -> "Striker":

@@ -40,7 +40,7 @@ def _sphere(*, radius: float, E: float, nu: float, rho: float) -> Striker:
     return Striker.sphere(Material(E=E, nu=nu, rho=rho), radius)
 
 
-def target_values(*, mass=None, first_frequency=None, nu=0.3, damping_ratio=0.0, source="fe") -> dict[str, Any]:
+def target_values(*, mass=None, first_frequency=None, nu=0.3, damping_ratio=0.0, source="auto") -> dict[str, Any]:
     """The table [target], checked: what to scale to, nu where there is no material, damping and source."""
     _check.between("nu", nu, -1.0, 0.5)
     _check.non_negative("damping_ratio", damping_ratio)
@@ -87,7 +87,7 @@ def _along(name: str, values: Any) -> np.ndarray:
 
 
 MOST_VALUES = 10**6  # [-] along one axis of a map
-SOURCES = ("fe", "analytic")
+SOURCES = ("auto", "fe", "analytic")
 # What makes each part of a scene: the keys of its table are the arguments of these functions, no list is kept twice.
 # A table whose first entry is not empty names its maker by that key.
 MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {

@@ -30,7 +30,7 @@ import numpy as np
 import fem_impact as fi
 
 TOLERANCE = 1e-3
-N_MODES, N_REFERENCE = 60, 1500
+N_MODES, N_REFERENCE = 100, 1500
 AT = (0.465, 0.3)
 BALANCE = 1e-9  # [-] of energy and momentum, where nothing else judges
 MOST_IMPACTS = 3  # [-] beyond, digits are not promised: the trajectory may be chaotic, and its count is compared

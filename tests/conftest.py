@@ -4,7 +4,10 @@ import shutil
 import time
 
 import pytest
+from hypothesis import settings
 
+settings.register_profile("same", derandomize=True)  # the same cases in every run
+settings.load_profile("same")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 FLAGS = (
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
@@ -50,6 +53,18 @@ class Page:
                 break
             stops.append(stop)
         return stops
+
+
+def pytest_configure(config):
+    """Compile the inner loops once, before workers start, so that no test waits for the compiler."""
+    if not hasattr(config, "workerinput"):
+        import fem_impact as fi
+
+        plate = fi.analytic.rectangle(1.0, 0.7, mass=1.0, first_frequency=100.0, n_modes=20)
+        blow = {"at": (0.3, 0.3), "speed": 1.0}
+        for scheme in ("A4", "collocation"):
+            fi.strike(plate, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), scheme=scheme, **blow)
+        fi.sweep(plate, fi.Striker.rigid(0.02), fi.Contact.linear(1e5), over={"mass": [0.02, 0.03]}, **blow)
 
 
 @pytest.fixture(scope="session")

@@ -217,7 +217,7 @@ def test_interrupted_run_leaves_nothing(scene, tmp_path, capsys, monkeypatch):
 def test_modes_are_listed_and_written(scene, tmp_path, capsys):
     assert cli.main(["modes", str(scene), "--count", "5", "--vtk", str(tmp_path / "m.pvd")]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "A small test" and len(lines) == 2 + 5 + 1
+    assert lines[0] == "A small test" and sum("Hz" in line for line in lines) == 5
     assert lines[2].split() == ["1", "100", "Hz", "0.01"]
     assert len(list((tmp_path / "m").glob("*.vtu"))) == 5
 

@@ -16,8 +16,6 @@ from test_studies import study
 
 from fem_impact import cli
 
-FOLLOWS = 0.1  # [s] within which the page follows
-
 
 def served(scene, *options):
     """A server of its own, and the address it printed."""
@@ -117,16 +115,12 @@ def test_nothing_fails_and_nothing_is_asked_for_elsewhere(opened, address):
     assert shown.tab.title() == "<b>small</b>" and shown.tab.locator("h1").inner_text() == "<b>small</b>"
 
 
-def test_sliders_change_the_pictures_in_time(opened):
+def test_sliders_change_the_pictures(opened):
     shown, turn = opened(), study("explore_speed").TURN
     shown.tab.wait_for_timeout(1000)  # until the map is there
     for name in ("mass", "stiffness", "exponent", "speed", "bending", "x", "y"):
         before = {plot: shown.tab.locator(f"figure >> nth={i}").screenshot() for plot, i in (("map", 1), ("force", 2))}
-        times = [shown.tab.evaluate(turn, name)]
-        while min(times) > 1e3 * FOLLOWS and len(times) < 20:  # the least: other programs run here too
-            shown.tab.wait_for_timeout(1000)  # until the map, drawn when the hand rests, is done too
-            times.append(shown.tab.evaluate(turn, name))
-        assert min(times) < 1e3 * FOLLOWS, (name, times)
+        shown.tab.evaluate(turn, name)  # how fast: studies/explore_speed.py
         shown.tab.wait_for_timeout(100)
         assert shown.tab.locator("figure >> nth=2").screenshot() != before["force"]
         if name in ("mass", "stiffness"):

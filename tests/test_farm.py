@@ -186,6 +186,11 @@ def test_killed_workers_and_killed_runs_lose_nothing(tmp_path, cluster, monkeypa
     assert json.loads(table.attrs["scene"])["target"]["mass"] == 0.2
 
 
+def _times(store):
+    """When each block of numbers was written."""
+    return {path: path.stat().st_mtime_ns for path in (store / "numbers").rglob("*") if path.is_file()}
+
+
 def _wait_for_blocks(store, count, patience=60.0):
     end = time.monotonic() + patience
     while time.monotonic() < end:
@@ -238,8 +243,10 @@ def test_a_map_at_the_prompt_survives_its_own_end(tmp_path, cluster):
     _wait_for_blocks(tmp_path / "kept", 12)
     os.kill(run.pid, signal.SIGKILL)
     run.wait()
-    time.sleep(1.0)  # the other worker finishes what it has begun
-    kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "kept" / "numbers").rglob("*") if path.is_file()}
+    kept: dict[Path, int] = {}
+    while not kept or kept != _times(tmp_path / "kept"):  # the other worker finishes what it has begun
+        kept = _times(tmp_path / "kept")
+        time.sleep(3.0)
     assert 12 <= farm.Store(tmp_path / "kept").group["done"][:].sum() < 48
     again = subprocess.run([*command, "--cluster", address], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert again.returncode == 0, again.stderr

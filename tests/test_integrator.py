@@ -49,7 +49,7 @@ def test_two_masses_share_speed_as_in_newtons_cradle(law, ratio):
 
 def test_stick_on_half_a_million_kilograms_rings_like_a_third_of_its_mass():
     plate = fi.analytic.rectangle(1.55, 1.0, mass=5e5, first_frequency=100.0, n_modes=60)
-    stick = fi.Striker.stick(0.1, 10e3)
+    stick = fi.Striker.stick(0.1, 10e3, n_modes=8)
     hit = fi.strike(plate, stick, fi.Contact.linear(88.6e3), at=(0.465, 0.3), speed=1.0)
     half_period = np.pi * np.sqrt(0.1 / 3.0 / 88.6e3)
     # the stick's own bending at 10 kHz lengthens a contact of 260 Hz by some (260/10000)**2
@@ -81,7 +81,7 @@ def test_sixty_modes_meet_the_eigen_solution():
 
 def test_response_agrees_with_itself():
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=60)
-    hit = fi.strike(plate, fi.Striker.stick(0.1, 10e3), fi.Contact.linear(1e6), at=(0.465, 0.3), speed=1.0)
+    hit = fi.strike(plate, fi.Striker.stick(0.1, 10e3, n_modes=8), fi.Contact.linear(1e6), at=(0.465, 0.3), speed=1.0)
     assert hit.n_impacts == 3
     assert_allclose(sum(hit.energies.values()), 0.5 * 0.1 / 3.0, rtol=1e-12)  # rounding of some hundred steps
     assert_allclose(np.trapezoid(hit.force, hit.time), hit.impulse, rtol=1e-4)  # the tolerance asked for
@@ -272,7 +272,7 @@ def test_onset_at_any_phase_of_the_step(exponent):
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10])
 def test_promise_is_kept_and_the_estimate_is_fair(law, tolerance):
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=80)
-    stick = fi.Striker.stick(0.1, 10e3)
+    stick = fi.Striker.stick(0.1, 10e3, n_modes=8)
     blow = {"at": (0.465, 0.3), "speed": 1.0, "residual": False}
     truth = fi.strike(plate, stick, law, tolerance=1e-12, scheme="collocation", **blow)
     hit = fi.strike(plate, stick, law, tolerance=tolerance, **blow)
@@ -290,10 +290,16 @@ def test_promise_is_kept_and_the_estimate_is_fair(law, tolerance):
 
 def test_secular_and_collocation_and_a4_agree():
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=80)
+    stick = fi.Striker.stick(0.1, 10e3, n_modes=8)
     blow = {"at": (0.465, 0.3), "speed": 1.0}
     hits = [
         fi.strike(
-            plate, fi.Striker.stick(0.1, 10e3), fi.Contact.linear(1e6), scheme=scheme, tolerance=tolerance, **blow
+            plate,
+            stick,
+            fi.Contact.linear(1e6),
+            scheme=scheme,
+            tolerance=tolerance,
+            **blow,
         )
         for scheme, tolerance in (("secular", 1e-4), ("collocation", 1e-12), ("A4", 1e-8))
     ]
@@ -366,9 +372,8 @@ def test_residual_compliance_stands_for_the_modes_left_out():
             assert bare.error.truncation == 0.0
         assert with_rest[-1] < 1e-5  # what is asked of 2000 modes holds with 1000 here
         assert with_rest[0] < 0.2 * without[0]
-        assert (
-            np.log(with_rest[0] / with_rest[-1]) / np.log(10.0) > 2.5
-        )  # omega_c**-2.9 and steeper was measured; n ~ omega_c
+        # n is proportional to omega_c; 2.9 and steeper was measured, and 1.95 with loss, which feels velocities
+        assert np.log(with_rest[0] / with_rest[-1]) / np.log(10.0) > (1.8 if law.loss else 2.5)
         assert 0.8 < np.log(without[0] / without[-1]) / np.log(10.0) < 1.1  # as 1 / omega_c
 
 
@@ -451,7 +456,7 @@ def test_restituting_contact_gives_the_restitution_asked_for(restitution):
 
 def test_duration_and_max_impacts_stop_the_run():
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=60)
-    stick, law = fi.Striker.stick(0.1, 10e3), fi.Contact.linear(1e6)
+    stick, law = fi.Striker.stick(0.1, 10e3, n_modes=8), fi.Contact.linear(1e6)
     cut = fi.strike(plate, stick, law, at=(0.465, 0.3), speed=1.0, duration=2e-3)
     assert_allclose(cut.time[-1], 2e-3, rtol=1e-12)
     assert cut.n_impacts == 2

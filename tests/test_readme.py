@@ -40,7 +40,7 @@ def test_first_two_commands_are_single_lines_that_install_then_run_and_test():
     run, test = (block.strip() for block in blocks("sh")[:2])
     assert "\n" not in run and "\n" not in test
     assert run.split(" && ")[2].startswith(".venv/bin/fem-impact strike studies/scenes/drumstick.toml")
-    assert test.endswith(".venv/bin/python -m pytest") and ".[test]" in test
+    assert test.endswith(".venv/bin/python -m pytest -n auto") and ".[test]" in test
 
 
 def test_commands_shown_name_scenes_that_exist_and_load():

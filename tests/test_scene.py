@@ -190,7 +190,7 @@ BAD = [
     ("mass = 0.2", "mass = inf", r"\[target\] mass must be finite, got inf"),
     ("mass = 0.2", "", r"\[target\] needs mass and first_frequency where there is no \[material\]"),
     ("damping_ratio = 0.005", "damping_ratio = -1", r"\[target\] damping_ratio must not be negative"),
-    ('"analytic"', '"formula"', r"\[target\] source must be one of fe, analytic"),
+    ('"analytic"', '"formula"', r"\[target\] source must be one of auto, fe, analytic"),
     ("stiffness = 695e3", "stiffness = 0", r"\[contact\] stiffness must be positive"),
     ("stiffness = 695e3", "stifness = 1.0", r"\[contact\] stifness is not a key .*did you mean 'stiffness'"),
     (
