@@ -1,4 +1,4 @@
-"""The same verbs at the prompt: parses, calls, prints; no physics."""
+"""The command line: parses the arguments, calls the library and prints the results; contains no physics."""
 
 import argparse
 import atexit
@@ -34,10 +34,10 @@ from rich.progress import (
 
 import fem_impact as fi
 
-from ._files import undo_all, undoable
+from ._base.files import undo_all, undoable
 
 BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses
-WIDEST = 88  # [-] columns of text at most; a narrow terminal has fewer
+WIDEST = 88  # [-] columns: printed text is never wider, and narrower on a narrow terminal
 MOTION_TIMES = 100  # [-] instants in motion.pvd
 SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` writes any number
 
@@ -46,7 +46,9 @@ def main(arguments: list[str] | None = None) -> int:
     """Run one command; the exit status is 0, 2 for bad input, 1 for a run that failed, 130 after Ctrl-C."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # a title may hold what this terminal cannot show
+            stream.reconfigure(
+                errors="backslashreplace"
+            )  # a title may contain characters that this terminal cannot show
     options = _parser().parse_args(arguments)
     plain = _prepare(os.environ, once=options.run in (_strike, _modes, _report))
     try:
@@ -66,7 +68,7 @@ def main(arguments: list[str] | None = None) -> int:
     except RuntimeError as error:
         if not isinstance(error, fi.SimulationError):
             raise
-        if plain:  # too much for plain Python, perhaps: once more, compiled
+        if plain:  # perhaps only plain Python failed: run again with compiled kernels
             again = [sys.executable, "-m", "fem_impact", *(sys.argv[1:] if arguments is None else arguments)]
             os.execve(sys.executable, again, {**os.environ, "NUMBA_DISABLE_JIT": "0"})
         return _complain(error, FAILED)
@@ -77,7 +79,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 @contextmanager
 def _interruptible(options: argparse.Namespace) -> Iterator[None]:
-    """End the process on Ctrl-C or SIGTERM, with what is unfinished taken back."""
+    """On Ctrl-C or SIGTERM, remove unfinished output and end the process."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -86,7 +88,7 @@ def _interruptible(options: argparse.Namespace) -> Iterator[None]:
         for each in before:
             signal.signal(each, signal.SIG_IGN)
         if options.run is _explore and number == signal.SIGINT:
-            os._exit(0)  # that is how one ends it
+            os._exit(0)  # Ctrl-C is the normal way to stop the server
         if undo_all():
             word = "interrupted" if number == signal.SIGINT else "terminated"
             with suppress(OSError):
@@ -102,59 +104,60 @@ def _interruptible(options: argparse.Namespace) -> Iterator[None]:
 
 
 def _kept(options: argparse.Namespace) -> str:
-    """What is left of an interrupted command."""
+    """Say what an interrupted command left on disk."""
     if options.run is not _map:
         return "nothing was written"
     if options.store is None:
         return "nothing was written; --store DIR keeps finished cells"
-    return f"finished cells are in {options.store}, the same command goes on from there"
+    return f"finished cells are in {options.store}; run the same command again to continue"
 
 
 def _forget_output() -> None:
-    """Throw away what could not be printed; Python would try again at its exit, and complain again."""
+    """Discard pending output: Python would otherwise write it again at exit and report the same error twice."""
     if sys.stdout is not None:
         with suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _place(text: str) -> Path:
-    """A path given at the prompt."""
-    from . import _check  # with numpy, which help and version do without
+    """A path given on the command line."""
+    from ._base import check  # imports numpy, which --help and --version do not need
 
     try:
-        return _check.path("it", text)
+        return check.path("it", text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _prepare(environment: MutableMapping[str, str], once: bool) -> bool:
-    """Set what numpy and numba read when they are loaded; whatever the user has set stays.
+    """Set the environment variables that numpy and numba read on import, unless the user has set them.
 
-    A command that strikes once runs in plain Python until the kernels are compiled; returns whether this one will.
+    Until the kernels are compiled, a command that strikes once runs in plain Python; returns whether this one does.
     """
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        # The dense algebra is small: on two busy cores two threads took 18 s where one took 4 s.
+        # The dense matrices are small: on two busy cores, two threads took 18 s and one thread 4 s.
         environment.setdefault(name, "1")
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # a font or cache folder it does without is no news here
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # users need not read about fonts or cache folders
     package = Path(str(fi.__file__)).parent
     if "numba" not in sys.modules:
         _find_cache(environment, package)
     if not once or "numba" in sys.modules or "NUMBA_DISABLE_JIT" in environment:
         return False
-    source = (package / "_kernels.py").stat().st_mtime
-    compiled = (package / "__pycache__").glob("_kernels.run_energy-*.nbi")
-    if any(file.stat().st_mtime >= source for file in compiled):
+    compiled = package / "impact" / "compiled"
+    source = max(file.stat().st_mtime for file in compiled.glob("*.py"))
+    kept = (compiled / "__pycache__").glob("energy.run_energy-*.nbi")
+    if any(file.stat().st_mtime >= source for file in kept):
         return False
-    # A single strike takes some 0.3 to 1 s in plain Python, compiling it 15 to 30 s: `doctor` does that once.
+    # A single strike takes 0.3 to 1 s in plain Python; compiling takes 15 to 30 s, and `doctor` does it once.
     environment["NUMBA_DISABLE_JIT"] = "1"
     return True
 
 
 def _find_cache(environment: MutableMapping[str, str], package: Path) -> None:
-    """Give numba a folder of this run alone where it may write in none of its own: it refuses to work without one."""
+    """Give numba a temporary cache folder if it can write to none of its own: it refuses to work without one."""
     given = environment.get("NUMBA_CACHE_DIR")
     home = environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    for place in [given] if given else [str(package / "__pycache__"), home]:
+    for place in [given] if given else [str(package / "impact" / "compiled" / "__pycache__"), home]:
         with suppress(OSError):
             os.makedirs(place, exist_ok=True)
             tempfile.TemporaryFile(dir=place).close()
@@ -164,18 +167,18 @@ def _find_cache(environment: MutableMapping[str, str], package: Path) -> None:
 
 
 def _complain(error: object, status: int) -> int:
-    with suppress(OSError):  # where nobody listens, the status has to do
+    with suppress(OSError):  # if stderr is closed, the exit status must suffice
         print(f"fem-impact: {_printable(str(error))}", file=sys.stderr, flush=True)
     return status
 
 
 def _printable(text: str) -> str:
-    """One line, without what would act on a terminal."""
+    """The text on one line, with control characters escaped."""
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says in one line what is wrong with a command, and the nearest word that would be right."""
+    """Reports a bad command in one line and suggests the nearest valid word."""
 
     given: Sequence[str] = ()
 
@@ -189,7 +192,7 @@ class _Parser(argparse.ArgumentParser):
         parsers = [self, *(verb for choices in verbs for verb in choices.values())]
         known = [word for each in parsers for action in each._actions for word in action.option_strings]
         known += [word for action in self._actions for word in action.choices or ()]
-        if "required" in message:  # because its name has a slip, perhaps
+        if "required" in message:  # perhaps the option was given but misspelled
             words = [word.partition("=")[0] for word in self.given if word.startswith("--")]
             found = [word for word in words if word not in known]
         close = difflib.get_close_matches(found[0], known, n=1) if found else []
@@ -209,20 +212,24 @@ def _parser() -> argparse.ArgumentParser:
     strike.add_argument(
         "scene", metavar="SCENE", type=_place, help="a TOML file, such as studies/scenes/drumstick.toml"
     )
-    strike.add_argument("--out", metavar="DIR", type=_place, help="where the files go (default: out/NAME-OF-SCENE)")
+    strike.add_argument("--out", metavar="DIR", type=_place, help="output folder (default: out/NAME-OF-SCENE)")
     _add_choices(strike)
-    strike.add_argument("--verify", action="store_true", help="strike again, finer, and print the true differences")
     strike.add_argument(
-        "--pictures", action="store_true", help="write mode shapes and the wave in space, as PNG and GIF"
+        "--verify", action="store_true", help="strike again with a finer model and print the differences"
     )
-    strike.add_argument("--vtk", action="store_true", help="write the motion for ParaView and pyvista, motion.pvd")
+    strike.add_argument(
+        "--pictures", action="store_true", help="write 3-D pictures of the mode shapes and the wave, as PNG and GIF"
+    )
+    strike.add_argument("--vtk", action="store_true", help="write motion.pvd, the motion for ParaView and pyvista")
     strike.add_argument(
         "--listener", metavar=("X", "Y", "Z"), nargs=3, type=float,
-        help="write the sound the plate radiates to there [m], Z off its plane: radiated.wav",
+        help="write radiated.wav, the sound the plate radiates to this point [m]; Z is the height above the plate",
     )  # fmt: skip
-    strike.add_argument("--json", action="store_true", help="print what response.json holds instead of the summary")
+    strike.add_argument(
+        "--json", action="store_true", help="print the contents of response.json instead of the summary"
+    )
 
-    plan = verbs.add_parser("plan", help="say what would be modelled, why, how well and at which cost; strike nothing")
+    plan = verbs.add_parser("plan", help="show the model, its reasons, expected errors and cost, without striking")
     plan.set_defaults(run=_plan)
     plan.add_argument("scene", metavar="SCENE", type=_place, help="a TOML file")
     _add_choices(plan)
@@ -235,58 +242,63 @@ def _parser() -> argparse.ArgumentParser:
     modes.add_argument("--vtk", metavar="FILE", type=_place, help="write the shapes to a .pvd or .vtu file")
     modes.add_argument("--json", action="store_true", help="print the numbers as JSON")
 
-    chart = verbs.add_parser("map", help="strike a scene over the axes of its table [map]; write numbers and pictures")
+    chart = verbs.add_parser("map", help="strike a scene on the grid of its table [map]; write numbers and pictures")
     chart.set_defaults(run=_map)
     chart.add_argument(
         "scene", metavar="SCENE", type=_place, help="a TOML file, such as studies/scenes/drumstick_map.toml"
     )
     chart.add_argument(
         "--out", metavar="DIR", type=_place,
-        help="where map.nc, map.csv and, of two axes, a PNG of each layer go (default: out/NAME-OF-SCENE)",
+        help="folder for map.nc, map.csv and, for two axes, a PNG of each layer (default: out/NAME-OF-SCENE)",
     )  # fmt: skip
-    chart.add_argument("--tolerance", metavar="T", type=float, help="largest error accepted, instead of the scene's")
+    chart.add_argument("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
     chart.add_argument(
-        "--format", choices=("nc", "zarr"), default="nc", help="of the numbers: map.nc, or map.zarr (default: nc)"
+        "--format", choices=("nc", "zarr"), default="nc", help="format of the numbers: map.nc or map.zarr (default: nc)"
     )
-    chart.add_argument("--workers", metavar="N", type=int, help="threads (default: one for each core)")
-    chart.add_argument("--cluster", metavar="ADDRESS", help="strike on the Dask cluster whose scheduler is there")
+    chart.add_argument("--workers", metavar="N", type=int, help="number of threads (default: one per core)")
+    chart.add_argument("--cluster", metavar="ADDRESS", help="run on the Dask cluster whose scheduler has this address")
     chart.add_argument(
-        "--store", metavar="DIR", type=_place, help="keep finished cells there; a killed run goes on from it"
+        "--store",
+        metavar="DIR",
+        type=_place,
+        help="keep finished cells in this folder; an interrupted run continues from it",
     )
-    chart.add_argument("--max-cells", metavar="N", type=float, default=1e8, help="refuse larger maps (default: 1e8)")
+    chart.add_argument(
+        "--max-cells", metavar="N", type=float, default=1e8, help="refuse maps with more cells (default: 1e8)"
+    )
 
-    hammer = verbs.add_parser("hammer", help="choose a hammer: bandwidth without a double hit")
+    hammer = verbs.add_parser("hammer", help="find the hammers that reach a bandwidth without a double hit")
     hammer.set_defaults(run=_hammer)
     hammer.add_argument("scene", metavar="SCENE", type=_place, help="a TOML file; its body and strike point are used")
-    hammer.add_argument("--bandwidth", metavar="F", type=float, required=True, help="to be reached [Hz]")
+    hammer.add_argument("--bandwidth", metavar="F", type=float, required=True, help="bandwidth to reach [Hz]")
     hammer.add_argument(
         "--drop",
         metavar="D",
         type=float,
         default=10.0,
-        help="how far the spectrum may fall till there, dB (default: 10)",
+        help="how far the spectrum may fall within the bandwidth [dB] (default: 10)",
     )
-    hammer.add_argument("--masses", metavar="KG", type=float, nargs="+", help="of the hammers (default: 1 g to 1 kg)")
-    hammer.add_argument("--out", metavar="FILE", type=_place, help="write a picture there: .png, .pdf or .svg")
+    hammer.add_argument(
+        "--masses", metavar="KG", type=float, nargs="+", help="masses of the hammers [kg] (default: 1 g to 1 kg)"
+    )
+    hammer.add_argument("--out", metavar="FILE", type=_place, help="write a picture to this file: .png, .pdf or .svg")
     hammer.add_argument("--json", action="store_true", help="print the numbers as JSON")
 
-    report = verbs.add_parser("report", help="strike a scene; write one page that holds everything about the blow")
+    report = verbs.add_parser("report", help="strike a scene; write one HTML page with everything about the blow")
     report.set_defaults(run=_report)
     report.add_argument(
-        "scene", metavar="SCENE|RESULT", type=_place, help="a TOML file, or the folder that `strike` wrote"
+        "scene", metavar="SCENE|RESULT", type=_place, help="a TOML file, or a folder written by `strike`"
     )
-    report.add_argument(
-        "--out", metavar="FILE", type=_place, help="where the page goes (default: out/NAME/report.html)"
-    )
-    report.add_argument("--tolerance", metavar="T", type=float, help="largest error accepted, instead of the scene's")
+    report.add_argument("--out", metavar="FILE", type=_place, help="the page to write (default: out/NAME/report.html)")
+    report.add_argument("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
 
-    explore = verbs.add_parser("explore", help="serve a page on this machine: turn the hammer, click the strike point")
+    explore = verbs.add_parser("explore", help="serve a page on this machine where sliders and clicks change the blow")
     explore.set_defaults(run=_explore)
     explore.add_argument("scene", metavar="SCENE", type=_place, help="a TOML file")
-    explore.add_argument("--port", metavar="N", type=int, default=0, help="of 127.0.0.1 (default: any that is free)")
+    explore.add_argument("--port", metavar="N", type=int, default=0, help="port on 127.0.0.1 (default: any free port)")
     explore.add_argument("--no-open", action="store_true", help="print the address, but do not open it in a browser")
 
-    doctor = verbs.add_parser("doctor", help="check this installation; say what to do about what fails")
+    doctor = verbs.add_parser("doctor", help="check this installation and suggest a remedy for each failure")
     doctor.set_defaults(run=_doctor)
 
     completion = verbs.add_parser("completion", help="print a completion script for bash: eval it in ~/.bashrc")
@@ -295,17 +307,19 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_choices(verb: argparse.ArgumentParser) -> None:
-    """The options that decide what is modelled."""
-    verb.add_argument("--tolerance", metavar="T", type=float, help="largest error accepted, instead of the scene's")
+    """Add the options that choose the model."""
+    verb.add_argument("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
     verb.add_argument(
         "--quantity", metavar="Q", action="append",
-        help="what the tolerance is for, once or more: restitution, contact_time, force ..., spectrum=5000 (to 5 kHz)",
+        help="what the tolerance is for; repeatable: restitution, contact_time, force ..., spectrum=5000 (up to 5 kHz)",
     )  # fmt: skip
     verb.add_argument(
-        "--target", metavar="KIND", help="hold the struck body for rigid, infinite or modal, come what may"
+        "--target",
+        metavar="KIND",
+        help="treat the struck body as rigid, infinite or modal, whatever the plan would choose",
     )
-    verb.add_argument("--n-modes", metavar="N", type=int, help="keep so many modes of the struck body")
-    verb.add_argument("--size", metavar="H", type=float, help="size of the elements [m]")
+    verb.add_argument("--n-modes", metavar="N", type=int, help="number of modes to keep for the struck body")
+    verb.add_argument("--size", metavar="H", type=float, help="element size [m]")
 
 
 def _choices(options: argparse.Namespace) -> dict[str, Any]:
@@ -326,8 +340,10 @@ def _strike(options: argparse.Namespace) -> None:
         scene = scene.heard_from(options.listener)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:
-        needs = {"target": "modal"} if options.pictures or options.vtk else {}  # motion is that of modes
-        keep = folder.with_name(f"{folder.name}.modes.npz")  # beside the folder: a broken-off run leaves that as it was
+        needs = {"target": "modal"} if options.pictures or options.vtk else {}  # only a modal body shows motion
+        keep = folder.with_name(
+            f"{folder.name}.modes.npz"
+        )  # beside the folder, which an interrupted run leaves unchanged
         choices = {**needs, **_choices(options)}
         run = scene.run(_progress, before=_warn, verify=options.verify, keep=keep, **choices)
         start = time.perf_counter()
@@ -344,31 +360,37 @@ def _strike(options: argparse.Namespace) -> None:
     print(_wrapped(run.response.summary()))
     if run.plan.target != "modal":
         print(
-            _wrapped(f"Model: {run.plan.reasons[0]}; no modes and no sound (--target modal, or --quantity sound=5000)")
+            _wrapped(
+                f"Model: {run.plan.reasons[0]}; no modes and no sound (use --target modal or --quantity sound=5000)"
+            )
         )
     if run.verified is not None:
         tested = (
-            "" if run.finer.target == "modal" else f" (with the body {run.finer.target} too: it has too many modes)"
+            ""
+            if run.finer.target == "modal"
+            else f" (which also treats the body as {run.finer.target}: it has too many modes)"
         )
         differences = ", ".join(f"{name} {value:.1e}" for name, value in run.verified.items())
         print(_wrapped(f"Verified by a finer run{tested}: {differences}"))
     if "radiated" in data:
         heard = data["radiated"]
-        text = f"Heard: peak {heard['level']:.1f} dB re 20 µPa; 1.0 in radiated.wav is {heard['full_scale']:g} Pa"
+        text = f"Listener: peak {heard['level']:.1f} dB re 20 µPa; 1.0 in radiated.wav is {heard['full_scale']:g} Pa"
         print(_wrapped(text))
     print(_wrapped("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())))
     print(_wrapped(f"Files in {folder}{os.sep}: {', '.join(data['files'])}"))
 
 
 def _warn(plan: Any) -> None:
-    """Say beforehand what would surprise."""
+    """Warn of a long run before it starts."""
     if plan.costly:
-        text = f"{plan.cost}; Ctrl-C stops it, and the same command goes on from the modes it had found"
-        print(_wrapped(f"fem-impact: {text} (`fem-impact plan` says why)"), file=sys.stderr)
+        text = f"{plan.cost}; Ctrl-C stops it, and the same command later reuses the modes already found"
+        print(_wrapped(f"fem-impact: {text} (`fem-impact plan` explains why)"), file=sys.stderr)
 
 
 def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> dict[str, Any]:
-    """Write every file of a strike; return what response.json holds."""
+    """Write every file of a strike; return the contents of response.json."""
+    from .show import sampling  # imported only when needed
+
     response, files = run.response, ["response.json", "force.csv", "force.png"]
     extra: dict[str, Any] = {}
     fi.export.write_force(folder / "force.csv", response)
@@ -377,7 +399,7 @@ def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> d
         fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=SHAPES_WRITTEN))
         files += ["modes.pvd", *_write_sounds(folder, scene, response, extra)]
         if options.vtk:
-            end = fi.drawing.end_of(response)
+            end = sampling.end_of(response)
             times = [end * i / (MOTION_TIMES - 1) for i in range(MOTION_TIMES)]
             fi.export.write_vtk(folder / "motion.pvd", response.target, response, times)
             files.append("motion.pvd")
@@ -386,7 +408,7 @@ def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> d
             fi.pictures.wave(folder / "wave.png", response)
             missing = fi.pictures.mode_shapes(folder / "modes.png", response.target)
             if missing:
-                print(_wrapped(f"fem-impact: pictures are drawn in the plane; {missing}"), file=sys.stderr)
+                print(_wrapped(f"fem-impact: pictures are drawn in two dimensions; {missing}"), file=sys.stderr)
             files += ["modes.png", "wave.png", "wave.gif"]
     if run.verified is not None:
         extra["verified"] = run.verified
@@ -410,7 +432,7 @@ def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> d
 
 
 def _write_sounds(folder: Path, scene: Any, response: Any, extra: dict[str, Any]) -> list[str]:
-    """Write the motion of a point as sound, and what a listener hears; note places and levels."""
+    """Write the motion of a point and the pressure at the listener as sound; record places and levels."""
     heard = {"sound": ("strike.wav", {"at": scene.points[0]})}
     if scene.listener is not None:
         heard["radiated"] = ("radiated.wav", {"listener": scene.listener})
@@ -432,18 +454,20 @@ def _plan(options: argparse.Namespace) -> None:
 
 
 def _map(options: argparse.Namespace) -> None:
+    from .scenes import maps  # imported only when needed
+
     began = time.perf_counter()
-    fi.atlas.can_write(options.format, options.out)
+    maps.can_write(options.format, options.out)
     scene = fi.load_scene(options.scene)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:
         with _counted("cells") as watch:
-            table = fi.atlas.map_scene(
+            table = maps.map_scene(
                 scene, tolerance=options.tolerance, workers=options.workers, client=options.cluster,
                 store=options.store, watch=watch, max_cells=options.max_cells, tell=_tell,
             )  # fmt: skip
         with _progress("files"):
-            names = fi.atlas.write(staging, table, options.format)
+            names = maps.write(staging, table, options.format)
     print(_wrapped(scene.title or str(scene.path)))
     axes = ", ".join(f"{name} ({size})" for name, size in table.sizes.items())
     single, failed = int((table.n_impacts == 1).sum()), int((table.n_impacts < 0).sum())
@@ -453,23 +477,28 @@ def _map(options: argparse.Namespace) -> None:
 
 
 def _tell(text: str) -> None:
-    """One sentence beside what the command prints."""
+    """Print one sentence to stderr."""
     print(_wrapped(f"fem-impact: {text}"), file=sys.stderr, flush=True)
 
 
 def _hammer(options: argparse.Namespace) -> None:
+    from .scenes import maps  # imported only when needed
+    from .show import plots  # imported only when needed
+
     scene = fi.load_scene(options.scene)
     masses = options.masses or [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]
     with _progress("hammers"):
-        hammers = fi.atlas.hammers_for(scene, options.bandwidth, masses, drop=options.drop)
+        hammers = maps.hammers_for(scene, options.bandwidth, masses, drop=options.drop)
         if options.out is not None:
-            fi.figures.save(options.out, fi.hammers.draw(hammers, options.bandwidth, options.drop))
+            fi.figures.save(options.out, plots.hammers(hammers, options.bandwidth, options.drop))
     if options.json:
         data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [vars(hammer) for hammer in hammers]}
         print(json.dumps(fi.export.plain({**data, "versions": fi.export.versions()}), indent=2, allow_nan=False))
         return
     print(_wrapped(scene.title or str(scene.path)))
-    print(_wrapped(f"Tips that reach {options.bandwidth:g} Hz (spectrum {options.drop:g} dB down) and hit once:"))
+    print(
+        _wrapped(f"Tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:")
+    )
     print(f"{'mass':>9} {'softest tip':>14} {'hardest tip':>14} {'its reach':>11}")
     for hammer in hammers:
         soft = f"{hammer.softest:10.3g} N/m" if hammer.softest else "none"
@@ -478,7 +507,7 @@ def _hammer(options: argparse.Namespace) -> None:
         print(f"{1e3 * hammer.mass:7.4g} g {soft:>14} {hard:>14} {reach:>11}")
     idle = ", ".join(f"{1e3 * hammer.mass:.4g} g" for hammer in hammers if not hammer.works)
     if idle:
-        print(_wrapped(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; lighter hammers may"))
+        print(_wrapped(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; try lighter hammers"))
     if options.out is not None:
         print(_wrapped(f"Files: {options.out}"))
 
@@ -500,7 +529,7 @@ def _explore(options: argparse.Namespace) -> None:
     scene = fi.load_scene(options.scene)
 
     def ready(address: str) -> None:
-        print(f"{address}   (Ctrl-C ends it)", flush=True)
+        print(f"{address}   (Ctrl-C stops it)", flush=True)
         if not options.no_open:
             webbrowser.open(address)
 
@@ -514,7 +543,7 @@ def _modes(options: argparse.Namespace) -> None:
             modes = scene.modes(options.count)
     else:
         fi.export.vtk_ending(options.vtk)
-        with fi.export.staged(options.vtk.parent) as staging:  # found wanting before the work, not after it
+        with fi.export.staged(options.vtk.parent) as staging:  # a bad folder fails before the work, not after it
             with _progress("modes"):
                 modes = scene.modes(options.count)
             fi.export.write_vtk(staging / options.vtk.name, modes)
@@ -531,10 +560,12 @@ def _modes(options: argparse.Namespace) -> None:
 
 
 def _doctor(options: argparse.Namespace) -> None:
+    from . import doctor  # imported only when needed
+
     for name, version in fi.export.versions().items():
         print(f"{name:<22} {version}")
-    with _progress("examining, and compiling if it was not done before"):
-        findings = fi.doctor.examine()
+    with _progress("checking, and compiling if not yet done"):
+        findings = doctor.examine()
     for finding in findings:
         state = "works" if finding.works else "fails" if finding.vital else "missing"
         print(_wrapped(f"{finding.name:<22} {state:<8} {finding.seconds:5.2f} s  {finding.remedy}".rstrip()))
@@ -544,7 +575,7 @@ def _doctor(options: argparse.Namespace) -> None:
 
 
 def _completion(parser: argparse.ArgumentParser) -> str:
-    """A bash script that completes verbs, then the options of the verb and file names."""
+    """A bash script that completes the command, then its options and file names."""
     (verbs,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
     cases = [
         f"        {name}) words='{' '.join(word for action in verb._actions for word in action.option_strings)}' ;;"
@@ -566,23 +597,23 @@ def _completion(parser: argparse.ArgumentParser) -> str:
 
 
 def _wrapped(text: str) -> str:
-    """Text broken to the width of the terminal, continued lines indented."""
+    """Wrap text to the width of the terminal and indent continued lines."""
     width = max(20, min(WIDEST, shutil.get_terminal_size().columns))
     filled = textwrap.TextWrapper(
         width, subsequent_indent="    ", break_on_hyphens=False
-    )  # paths are there to be copied
+    )  # so that paths can be copied
     lines = (filled.wrap(line) or [""] for line in text.splitlines())
     return "\n".join(line for wrapped in lines for line in wrapped)
 
 
 def _show_cursor() -> None:
-    """Undo what a running display does to the terminal."""
+    """Clear the progress line and show the cursor again."""
     os.write(2, b"\r\x1b[2K\x1b[?25h")
 
 
 @contextmanager
 def _progress(stage: str) -> Iterator[None]:
-    """Show on a terminal that a stage is at work, and for how long."""
+    """On a terminal, show which stage is running and for how long."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield
@@ -595,7 +626,7 @@ def _progress(stage: str) -> Iterator[None]:
 
 @contextmanager
 def _counted(what: str) -> Iterator[Any]:
-    """Show on a terminal how many of many things are done, how many a second, and the time left."""
+    """On a terminal, show the number done, the rate and the time left."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield None

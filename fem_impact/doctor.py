@@ -1,4 +1,4 @@
-"""Is this installation sound? Small checks with a known answer, and a sentence of help for each that fails."""
+"""Checks the installation with small problems of known answer; each failed check comes with a remedy."""
 
 import importlib.util
 import time
@@ -7,18 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import export, figures, mesh, pictures
-from ._files import scratch
-from .assembly import assemble
-from .contact import Contact
-from .integrator import strike
-from .modal import Modes, find_modes
-from .section import Material, Plate
-from .striker import Striker
+from . import mesh
+from ._base.files import scratch
+from .fe.assembly import assemble
+from .fe.section import Material, Plate
+from .impact.collision import strike
+from .impact.contact import Contact
+from .impact.striker import Striker
+from .modes.modal import Modes, find_modes
+from .show import export, figures, pictures
 
 SQUARE = 2.0 * np.pi**2  # [-] omega of a hinged unit square of unit stiffness and mass
 
-EXTRAS = {  # what each is for, and the modules it needs
+EXTRAS = {  # extra: its purpose and the modules it needs
     "cad": ("drawings", "svgelements", "ezdxf"),
     "film": ("films as MP4 files", "imageio_ffmpeg"),
     "uff": ("universal files", "pyuff"),
@@ -30,22 +31,22 @@ EXTRAS = {  # what each is for, and the modules it needs
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was tried."""
+    """The result of one check."""
 
     name: str
     works: bool
     seconds: float  # [s]
-    remedy: str  # empty where it works
+    remedy: str  # empty if it works
     vital: bool = True  # whether the command line needs it
 
 
 def examine() -> list[Finding]:
-    """Try everything a strike needs, and 3-D rendering, which it does not need; takes some seconds."""
+    """Check everything a strike needs, and the optional 3-D rendering and extras; takes a few seconds."""
     return [
-        _tried("finite elements", _finite_elements, "install scikit-fem again: its numbers are wrong or it fails"),
-        _tried("compiled kernels", _kernels, "install numba again; NUMBA_DISABLE_JIT=1 runs without, slowly"),
-        _tried("pictures", _picture, "install matplotlib again"),
-        _tried("mode shapes as files", _vtk, "check that the folder for temporary files can be written to"),
+        _tried("finite elements", _finite_elements, "reinstall scikit-fem: it fails or gives wrong numbers"),
+        _tried("compiled kernels", _kernels, "reinstall numba; NUMBA_DISABLE_JIT=1 runs without it, slowly"),
+        _tried("pictures", _picture, "reinstall matplotlib"),
+        _tried("mode shapes as files", _vtk, "make the folder for temporary files writable"),
         _tried("3-D rendering", pictures.can_render, pictures.REMEDY, vital=False),
         *(_extra(name, purpose, modules) for name, (purpose, *modules) in EXTRAS.items()),
     ]
@@ -62,7 +63,7 @@ def _tried(name: str, check: Callable[[], bool], remedy: str, vital: bool = True
 
 
 def _extra(name: str, purpose: str, modules: list[str]) -> Finding:
-    """Whether an optional extra is installed; nothing is loaded."""
+    """Check whether an optional extra is installed, without importing it."""
     missing = [module for module in modules if importlib.util.find_spec(module) is None]
     remedy = f"pip install 'fem-impact[{name}]' ({', '.join(missing)})" if missing else ""
     return Finding(purpose, not missing, 0.0, remedy, vital=False)

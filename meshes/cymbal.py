@@ -1,4 +1,4 @@
-"""A flat cymbal of 16 inches: a free annulus with a hole of 12 mm, edges outer and inner."""
+"""A flat cymbal of 16 inches: a free annulus with a hole of 12 mm; edges outer and inner."""
 
 from pathlib import Path
 

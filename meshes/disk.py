@@ -1,4 +1,4 @@
-"""A disk of radius 0.15 m, edge outer."""
+"""A disk of radius 0.15 m; its edge is outer."""
 
 from pathlib import Path
 

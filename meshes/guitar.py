@@ -1,6 +1,6 @@
 """A guitar-like top plate, 0.49 m long, with a round sound hole; edges body and hole0.
 
-The curve is the author's own: half of it is drawn by the control points below, the other half mirrors it.
+The curve is an original design: the control points below define one half, and the other half mirrors it.
 """
 
 from pathlib import Path
@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 import fem_impact as fi
-from fem_impact.outline import Bezier, Outline, circle
+from fem_impact.mesh.loops import Bezier, Outline, circle
 
-HALF = [  # [m] cubic pieces from the tail to the neck, y > 0; neighbours share tangents
+HALF = [  # [m] cubic pieces from tail to neck, y > 0, with continuous tangents
     [(0.0, 0.0), (0.0, 0.11), (0.045, 0.185), (0.13, 0.185)],
     [(0.13, 0.185), (0.21, 0.185), (0.235, 0.118), (0.29, 0.118)],
     [(0.29, 0.118), (0.335, 0.118), (0.345, 0.14), (0.39, 0.14)],

@@ -1,4 +1,4 @@
-"""An L of three squares with sides of 0.2 m, edges edge0 (bottom) to edge5 (left), anticlockwise."""
+"""An L of three squares with sides of 0.2 m; edges edge0 (bottom) to edge5 (left), anticlockwise."""
 
 from pathlib import Path
 

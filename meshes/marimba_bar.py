@@ -1,6 +1,6 @@
 """An undercut marimba bar: a free beam whose height follows marimba_bar.csv, thin in the middle.
 
-The undercut is a parabola between two pads; it draws the second mode up to about four times the first, two octaves.
+The undercut is a parabola between two uncut ends; it tunes the second mode to about four times the first, two octaves.
 """
 
 from pathlib import Path
@@ -11,7 +11,7 @@ import fem_impact as fi
 
 PROFILE = Path(__file__).with_suffix(".csv")
 LENGTH, WIDTH, HEIGHT = 0.35, 0.055, 0.022  # [m]
-THINNEST, PAD = 0.0092, 0.075  # [m] in the middle; length of each uncut end
+THINNEST, PAD = 0.0092, 0.075  # [m] height in the middle; length of each uncut end
 ROSEWOOD = {"E": 16e9, "nu": 0.35, "rho": 900.0}
 
 

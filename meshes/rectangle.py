@@ -1,4 +1,4 @@
-"""The plate of Euphonics 12.1: a rectangle of 1.55 : 1, edges left, right, bottom and top."""
+"""The plate of Euphonics 12.1: a rectangle of 1.55 : 1; edges left, right, bottom and top."""
 
 from pathlib import Path
 

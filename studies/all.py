@@ -1,4 +1,4 @@
-"""Run every figure study; write the small pictures that README.md shows to studies/pictures.
+"""Runs every figure study and writes the small pictures for README.md to studies/pictures.
 
 python studies/all.py [FOLDER for full pictures and data, studies/out by default]
 """
@@ -10,11 +10,11 @@ from pathlib import Path
 from PIL import Image
 
 STUDIES = Path(__file__).parent
-WIDTH, COLOURS = 640, 256  # [-] pixels and colours of a small picture: some 30 kB
+WIDTH, COLOURS = 640, 256  # [-] pixels and colours of a small picture: about 30 kB
 
 
 def main() -> None:
-    """Run the scripts one after another, then shrink what they drew."""
+    """Run the scripts one after another, then shrink their pictures."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else STUDIES / "out"
     for script in sorted(path for name in ("fig", "beyond_", "tutorial_") for path in STUDIES.glob(f"{name}*.py")):
         subprocess.run([sys.executable, str(script), str(folder)], check=True)

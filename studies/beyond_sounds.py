@@ -1,4 +1,4 @@
-"""Beyond the source: hard heads, light sticks and second hits sound brighter, heavy sticks louder."""
+"""Beyond the source: hard heads, light sticks and double hits sound brighter; heavy sticks sound louder."""
 
 import sys
 from pathlib import Path
@@ -8,11 +8,11 @@ import source_scenes as source
 from scipy.io import wavfile
 
 import fem_impact as fi
-from fem_impact import charts
+from fem_impact.show import plots
 
 DAMPING = 0.005  # [-] a wooden plate
 SPEED = 2.0  # [m/s] of the tip
-LISTEN = (1.085, 0.7)  # [m] where the motion is heard: 0.7 of both sides
+LISTEN = (1.085, 0.7)  # [m] observation point: 0.7 of both sides
 BLOWS = {  # name: mass of the stick [kg], stiffness of the Hertz contact [N/m^1.5]
     "soft": (0.1, 2e5),
     "hard": (0.1, 5e6),
@@ -22,13 +22,13 @@ BLOWS = {  # name: mass of the stick [kg], stiffness of the Hertz contact [N/m^1
     "double": (0.1, 2e7),
 }
 PANELS = {"head": ("soft", "hard"), "stick": ("light", "heavy"), "impact": ("single", "double")}
-THIRD = 2.0 ** (1.0 / 6.0)  # [-] half a third of an octave: from the middle of a band to its edge
-BANDS = 50.0 * 2.0 ** (np.arange(25) / 3.0)  # [Hz] middles
-RING = 0.05  # [s] after which no blow touches any more, and the decay is measured
+THIRD = 2.0 ** (1.0 / 6.0)  # [-] half a third-octave: from the centre of a band to its edge
+BANDS = 50.0 * 2.0 ** (np.arange(25) / 3.0)  # [Hz] band centres
+RING = 0.05  # [s] after this all contacts are over and the decay is measured
 
 
 def compute(duration=1.5, n_modes=150):
-    """Samples [m/s] of each blow's sound, and how often it struck."""
+    """For each blow: the number of impacts and the samples [m/s] of its sound."""
     modes = source.plate(0.2, damping_ratio=DAMPING).truncated(n_modes=n_modes)
     heard = {}
     for name, (mass, stiffness) in BLOWS.items():
@@ -40,18 +40,18 @@ def compute(duration=1.5, n_modes=150):
 
 
 def level(samples, full_scale=1.0):
-    """Root of the mean square in dB."""
+    """RMS level in dB."""
     return 20.0 * np.log10(np.sqrt(np.mean(samples**2)) / full_scale)
 
 
 def centroid(samples, rate):
-    """Mean frequency [Hz] of the sound's energy."""
+    """Spectral centroid [Hz]: mean frequency, weighted by energy."""
     power = np.abs(np.fft.rfft(samples)) ** 2
     return float(np.fft.rfftfreq(len(samples), 1.0 / rate) @ power / power.sum())
 
 
 def bands(samples, rate):
-    """Level [dB] in thirds of an octave."""
+    """Levels [dB] in third-octave bands."""
     power = np.abs(np.fft.rfft(samples) / len(samples)) ** 2
     frequencies = np.fft.rfftfreq(len(samples), 1.0 / rate)
     inside = (frequencies > BANDS[:, None] / THIRD) & (frequencies <= BANDS[:, None] * THIRD)
@@ -59,7 +59,7 @@ def bands(samples, rate):
 
 
 def decay_time(samples, rate, frequency):
-    """Time [s] in which a mode loses 60 dB, from the size of its line in two windows of a recording."""
+    """Time [s] in which a mode decays by 60 dB, from its amplitude in an early and a late window."""
     n = round(10 * rate / frequency)
     starts = round(RING * rate), len(samples) - n
     turns = np.exp(-2j * np.pi * frequency * np.arange(n) / rate) * np.hanning(n)
@@ -68,26 +68,26 @@ def decay_time(samples, rate, frequency):
 
 
 def draw(heard):
-    """Levels of all blows in thirds of an octave, on one scale."""
+    """Draw the third-octave levels of all blows on one scale."""
     columns = {"frequency_Hz": BANDS}
     for name, (_, sound) in heard.items():
         columns[f"{name}_dB"] = bands(sound.samples, sound.rate)
     curves = [
-        charts.Curve(BANDS, columns[f"{name}_dB"], name, paint, panel=panel)
+        plots.Curve(BANDS, columns[f"{name}_dB"], name, paint, panel=panel)
         for panel, names in PANELS.items()
-        for name, paint in zip(names, (charts.BLUE, charts.VERMILION))
+        for name, paint in zip(names, (plots.BLUE, plots.VERMILION))
     ]
-    figure = charts.curves(
+    figure = plots.curves(
         curves,
-        x=charts.Axis("frequency", "Hz", log=True),
-        y=charts.Axis("level re 10 m/s", "dB", limits=(-120.0, -25.0)),
+        x=plots.Axis("frequency", "Hz", log=True),
+        y=plots.Axis("level re 10 m/s", "dB", limits=(-120.0, -25.0)),
         title="Sounds of one plate, in thirds of an octave",
     )
     return figure, columns
 
 
 def main():
-    """Write a WAV for each blow and print what is measured in the files."""
+    """Write a WAV file for each blow and print the values measured in it."""
     heard = compute()
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "out"
     source.publish("beyond_sounds", *draw(heard))

@@ -1,4 +1,4 @@
-"""How long a user waits: cold wall time of the main job and of `--help`, each in a new process."""
+"""Measures how long a user waits: wall time of a strike and of `--help`, each in a new process."""
 
 import argparse
 import os

@@ -1,9 +1,9 @@
-"""What compilation costs: the first blow of a fresh install, and of every process after it.
+"""Measures what compilation costs: the first blow of a fresh install, and of every later process.
 
     python studies/compile_time.py
 
-Times the first `fi.strike` of new processes, with an empty kernel cache and with a filled one, import of the compiler
-apart, and the blow once everything is loaded.
+Times the first `fi.strike` of a new process with an empty and with a filled kernel cache, not counting the imports,
+and then a blow with everything loaded.
 """
 
 import json

@@ -1,14 +1,14 @@
-"""Does the promise hold, is the estimate honest, and is the choice cheap? Random scenes against far finer references.
+"""Checks tolerance, error estimate and cost of random scenes against much finer references.
 
     python studies/effectivity.py [--scenes 500] [--seed 1] [--out studies/out]
 
-prints the share of scenes whose true error is below the tolerance, how the estimated error compares with the true one,
-every miss by name, and what the chosen model costs over the cheapest setting that is as exact; writes effectivity.csv
-and effectivity.png. The scenes are read from TOML as a user would write them: hinged rectangles, disks of every edge,
-beams of all ends and, by finite elements, a guitar top and a rectangle; struck by a rigid mass through a linear or a
-Hertz spring, from soft to hard, to tolerances from 1e-2 to 1e-5 (finite elements: to 1e-3). The reference takes a
-tenth of the tolerance, and modes and elements to match. The cheapest setting is sought, for every tenth scene with
-closed forms, among all combinations of ten numbers of modes and seven steps.
+Prints the share of scenes whose true error is below the tolerance, the ratio of estimated to true error, every miss by
+name, and the cost of the chosen model over that of the cheapest equally accurate setting; writes effectivity.csv and
+effectivity.png. The scenes are TOML texts as a user would write them: hinged rectangles, disks with every edge support,
+beams with all end supports and, by finite elements, a guitar top and a rectangle. A rigid mass strikes them through a
+linear or a Hertz spring, soft to hard, at tolerances from 1e-2 to 1e-5 (finite elements: to 1e-3). The reference uses a
+tenth of the tolerance with the modes and elements that this needs. For every tenth scene with closed forms, the study
+searches the cheapest setting among all combinations of ten numbers of modes and seven steps.
 """
 
 import argparse
@@ -38,7 +38,7 @@ TARGETS = {
     "elements": ('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', 'boundary = "hinged"'),
     "guitar": (f'shape = "file"\npath = "{GUITAR}"', 'body = "clamped"\nhole0 = "free"'),
 }
-FINITE = {"elements": 0.02, "guitar": 0.02}  # [-] share of the scenes with finite elements
+FINITE = {"elements": 0.02, "guitar": 0.02}  # [-] share of each finite-element scene
 SCENE = """
 [mesh]
 {mesh}
@@ -59,17 +59,17 @@ at = {at}
 speed = {speed!r}
 tolerance = {tolerance!r}
 """
-BEYOND = 0.1  # [-] tolerance of the reference over that of the scene
-WITHIN = (0.5, 20.0)  # [-] estimate over truth that counts as honest
-CHAOTIC = 3  # [-] impacts after which digits are not promised; such scenes are counted apart
-SEARCHED = 10  # [-] every so many scenes the cheapest setting is sought
+BEYOND = 0.1  # [-] reference tolerance over scene tolerance
+WITHIN = (0.5, 20.0)  # [-] estimated over true error that counts as honest
+CHAOTIC = 3  # [-] scenes with more impacts are chaotic and counted separately
+SEARCHED = 10  # [-] one scene in so many gets a search for the cheapest setting
 NUMBERS = (5, 10, 20, 40, 80, 160, 320, 640, 1280, 2560)  # [-] modes tried
-STEPS = [0.5**n for n in range(1, 8)]  # [-] steps tried, over the contact time
+STEPS = [0.5**n for n in range(1, 8)]  # [-] steps tried, as shares of the contact time
 
 
 @dataclass(frozen=True)
 class Case:
-    """One scene, what it promised and what came out."""
+    """One scene with its tolerance, errors and cost."""
 
     name: str
     tolerance: float
@@ -77,7 +77,7 @@ class Case:
     true: float
     estimated: float
     remark: str = ""
-    over: float = np.nan  # [-] seconds over those of the cheapest setting as exact
+    over: float = np.nan  # [-] seconds over those of the cheapest equally accurate setting
 
 
 def random_scene(rng: np.random.Generator) -> tuple[str, str, float]:
@@ -118,19 +118,19 @@ def random_scene(rng: np.random.Generator) -> tuple[str, str, float]:
 
 
 def difference(hit: fi.Response, other: fi.Response) -> float:
-    """What the tolerance speaks of: absolute in the restitution, relative in impulse, contact time and peak force."""
+    """Error as the tolerance counts it: absolute in restitution, relative in impulse, contact time and peak force."""
     relative = (abs(getattr(hit, x) / getattr(other, x) - 1.0) for x in ("impulse", "contact_time", "peak_force"))
     return max(abs(hit.restitution - other.restitution), *relative)
 
 
 def examine(name: str, text: str, tolerance: float, search: bool) -> Case:
-    """Strike one scene and its reference; if told to, seek the cheapest setting as exact."""
+    """Strike one scene and its reference; with ``search``, also find the cheapest equally accurate setting."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.toml"
         path.write_text(text)
         scene = fi.load_scene(path)
     try:
-        scene.strike()  # whatever is loaded or compiled at first use
+        scene.strike()  # so that imports and compilation are not timed
         start = time.perf_counter()
         hit = scene.strike()
         seconds = time.perf_counter() - start
@@ -138,13 +138,13 @@ def examine(name: str, text: str, tolerance: float, search: bool) -> Case:
         reference = scene.strike(**finer)
     except (ValueError, fi.SimulationError) as error:
         return Case(name, tolerance, 0, np.nan, np.nan, str(error))
-    remark = "" if hit.n_impacts == reference.n_impacts else f"{hit.n_impacts} impacts, truly {reference.n_impacts}"
+    remark = "" if hit.n_impacts == reference.n_impacts else f"{hit.n_impacts} impacts, reference {reference.n_impacts}"
     over = seconds / cheapest(scene, reference, tolerance) if search and 'source = "analytic"' in text else np.nan
     return Case(name, tolerance, hit.n_impacts, difference(hit, reference), float(hit.error), remark, over)
 
 
 def cheapest(scene: fi.Scene, reference: fi.Response, tolerance: float) -> float:
-    """Fewest seconds in which any number of modes and any step meet the tolerance; inf where none does."""
+    """Fewest seconds in which any number of modes and any step meet the tolerance; inf if none does."""
     best = np.inf
     for n_modes in NUMBERS:
         for step in STEPS:
@@ -160,7 +160,7 @@ def cheapest(scene: fi.Scene, reference: fi.Response, tolerance: float) -> float
 
 
 def study(n_scenes: int, seed: int, workers: int | None = None) -> list[Case]:
-    """Examine so many random scenes."""
+    """Examine ``n_scenes`` random scenes."""
     rng = np.random.default_rng(seed)
     scenes = [(*random_scene(rng), i % SEARCHED == 0) for i in range(n_scenes)]
     with ProcessPoolExecutor(workers) as pool:
@@ -168,7 +168,7 @@ def study(n_scenes: int, seed: int, workers: int | None = None) -> list[Case]:
 
 
 def report(cases: list[Case]) -> str:
-    """What the cases say, misses by name."""
+    """Summarise the cases and name every miss."""
     judged = [case for case in cases if np.isfinite(case.true) and case.n_impacts <= CHAOTIC]
     true, tolerance = np.array([c.true for c in judged]), np.array([c.tolerance for c in judged])
     ratio = np.array([c.estimated for c in judged]) / np.maximum(true, 1e-300)
@@ -178,12 +178,12 @@ def report(cases: list[Case]) -> str:
         f"{len(cases)} scenes: {len(judged)} judged, {len(refused)} refused, "
         f"{len(cases) - len(judged) - len(refused)} with more than {CHAOTIC} impacts",
         f"true error within the tolerance: {np.mean(true <= tolerance):.1%}",
-        f"estimate over truth within {WITHIN}: {honest.mean():.1%}, median {np.median(ratio):.2g}",
-        f"estimate below half the truth: {np.mean(ratio < WITHIN[0]):.1%}",
+        f"estimated over true error within {WITHIN}: {honest.mean():.1%}, median {np.median(ratio):.2g}",
+        f"estimate below half the true error: {np.mean(ratio < WITHIN[0]):.1%}",
     ]
     over = np.array([case.over for case in cases if np.isfinite(case.over) and case.over > 0.0])
     if over.size:
-        lines.append(f"seconds over the cheapest setting as exact: median {np.median(over):.2g} in {over.size} scenes")
+        lines.append(f"seconds over the cheapest equally accurate: median {np.median(over):.2g} in {over.size} scenes")
     lines += [
         f"  miss: {case.name}: true {case.true:.1e}, estimated {case.estimated:.1e} {case.remark}"
         for case in judged
@@ -193,7 +193,7 @@ def report(cases: list[Case]) -> str:
 
 
 def draw(cases: list[Case], path: Path) -> None:
-    """Estimated over true error, each case where its tolerance puts it."""
+    """Draw estimated over true error and true error over tolerance."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.5), layout="constrained")
     judged = [case for case in cases if np.isfinite(case.true)]
     for label, chosen in (("up to three impacts", True), ("more impacts", False)):
@@ -214,11 +214,11 @@ def draw(cases: list[Case], path: Path) -> None:
 
 
 def main() -> None:
-    """Run the study at the prompt."""
+    """Run the study from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", type=int, default=500)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--workers", type=int, help="processes (default: one for each core)")
+    parser.add_argument("--workers", type=int, help="number of processes (default: one per core)")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "out")
     options = parser.parse_args()
     cases = study(options.scenes, options.seed, options.workers)

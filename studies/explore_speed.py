@@ -1,4 +1,4 @@
-"""How soon `fem-impact explore` follows a hand: from turning a slider in a browser to the new spectrum being there.
+"""Measures how quickly `fem-impact explore` answers: from a slider move in a browser to the new spectrum.
 
 python studies/explore_speed.py [SCENE]; needs chromium, and playwright (pip install -e '.[test]')
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from playwright.sync_api import sync_playwright
 
-TURNS = 30  # of each slider
+TURNS = 30  # moves of each slider
 FLAGS = ("--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking", "--disable-sync")
 TURN = """name => new Promise(done => {
     const page = Bokeh.documents[0], slider = page.get_model_by_name(name);
@@ -20,7 +20,7 @@ TURN = """name => new Promise(done => {
     const signal = page.get_model_by_name('spectrum-data').properties.data.change;
     const said = page.get_model_by_name('said');
     const began = performance.now(), before = JSON.stringify(said.data.text);
-    const then = () => {  // an answer to an earlier turn may still be on its way
+    const then = () => {  // ignore the late answer to an earlier move
         if (JSON.stringify(said.data.text) === before) return;
         signal.disconnect(then);
         done(performance.now() - began);
@@ -31,7 +31,7 @@ TURN = """name => new Promise(done => {
 
 
 def main(scene: str) -> None:
-    """Serve the scene, turn every slider, print the round trips."""
+    """Serve the scene, move every slider and print the response times."""
     command = [sys.executable, "-m", "fem_impact", "explore", scene, "--no-open"]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
@@ -42,8 +42,8 @@ def main(scene: str) -> None:
             page = browser.new_page()
             page.goto(address)
             page.wait_for_selector("html[data-ready]")
-            page.wait_for_timeout(2000)  # until the map is drawn
-            print(f"{'slider':<12}{'least':>8}{'median':>8}{'most':>8}   [ms] of {TURNS} turns, {Path(scene).stem}")
+            page.wait_for_timeout(2000)  # wait for the map
+            print(f"{'slider':<12}{'least':>8}{'median':>8}{'most':>8}   [ms] of {TURNS} moves, {Path(scene).stem}")
             for name in ("mass", "stiffness", "exponent", "speed", "bending", "x", "y"):
                 times = [page.evaluate(TURN, name) for _ in range(TURNS)]
                 if times[0] is not None:

@@ -1,19 +1,19 @@
-"""Stability at the extremes: where is the answer right, flagged, or refused? Silently wrong must not occur.
+"""Checks that results at extreme parameters are right, flagged or refused, and never silently wrong.
 
     python studies/extremes.py [--corners 150] [--seed 1] [--out studies/out]
 
 A hinged plate of 200 g with its first mode at 100 Hz is struck at 1 m/s by a rigid mass of 33 g through a spring of
-contact frequency 300 Hz, tolerance 1e-3, sixty modes and the residual compliance of the rest. Each axis is then walked
-alone from absurdly small to absurdly large: stiffness, mass, speed, damping, thickness (which moves mass and
-frequencies), number of modes, step, exponent and loss of the contact; then all of them at once in random corners.
+contact frequency 300 Hz, tolerance 1e-3, sixty modes and the residual compliance of the rest. The study varies
+each parameter alone from absurdly small to absurdly large: stiffness, mass, speed, damping, thickness (which changes
+mass and frequencies), number of modes, step, exponent and loss of the contact. Then it varies all of them at random.
 
-right    the true error, against 1 500 modes and a hundredth of the tolerance, is within the tolerance
-flagged  it need not be: the estimated error is above the tolerance, or "not resolvable"
+right    the true error is within the tolerance; the reference has 1 500 modes and a hundredth of the tolerance
+flagged  the estimated error is above the tolerance or "not resolvable"
 refused  ValueError or SimulationError
-wrong    none of these: what there must not be
+wrong    none of these; must not occur
 
-Where even the reference is refused a blow is judged by the balance of energy and momentum, 1e-9. Prints the table,
-writes extremes.csv and extremes.png.
+If the reference is refused too, energy and momentum must balance to 1e-9. Prints a table and writes extremes.csv and
+extremes.png.
 """
 
 import argparse
@@ -32,9 +32,9 @@ import fem_impact as fi
 TOLERANCE = 1e-3
 N_MODES, N_REFERENCE = 100, 1500
 AT = (0.465, 0.3)
-BALANCE = 1e-9  # [-] of energy and momentum, where nothing else judges
-MOST_IMPACTS = 3  # [-] beyond, digits are not promised: the trajectory may be chaotic, and its count is compared
-AXES = {  # each a factor on the basic scene, but for the number of modes, exponent, loss and step
+BALANCE = 1e-9  # [-] limit for energy and momentum if there is no reference
+MOST_IMPACTS = 3  # [-] with more impacts the trajectory may be chaotic
+AXES = {  # factors on the basic scene, except modes, exponent, loss and step
     "stiffness": np.logspace(-12, 12, 25),
     "mass": np.logspace(-9, 9, 19),
     "speed": np.logspace(-12, 6, 19),
@@ -53,7 +53,7 @@ COLOURS = {"right": "#0072b2", "flagged": "#e69f00", "refused": "#999999", "wron
 
 @dataclass(frozen=True)
 class Outcome:
-    """One blow: where it lies, what became of it, and how far off it was."""
+    """One blow: its parameter, verdict, errors and time."""
 
     axis: str
     value: float
@@ -65,7 +65,7 @@ class Outcome:
 
 
 def struck(choice: dict[str, float], modes: fi.Modes, tolerance: float, **how: object) -> fi.Response:
-    """The blow a choice describes, on given modes."""
+    """Strike the given modes with the parameters of a choice."""
     mass = 0.1 / 3.0 * choice["mass"]
     stiffness = mass * (2.0 * np.pi * 300.0) ** 2 * choice["stiffness"]
     law = fi.Contact.power(stiffness, choice["exponent"], loss=choice["loss"])
@@ -73,14 +73,14 @@ def struck(choice: dict[str, float], modes: fi.Modes, tolerance: float, **how: o
 
 
 def plate(choice: dict[str, float], n_modes: int) -> fi.Modes:
-    """The plate of a choice: mass goes with the thickness, and so do the frequencies."""
+    """The plate of a choice: mass and frequencies are proportional to the thickness."""
     scale = choice["thickness"]
     modes = fi.analytic.rectangle(1.55, 1.0, mass=0.2 * scale, first_frequency=100.0 * scale, n_modes=n_modes)
     return modes.damped(choice["damping"])
 
 
 def difference(hit: fi.Response, other: fi.Response) -> float:
-    """What the tolerance speaks of; 1 where impacts are counted differently."""
+    """Error as the tolerance counts it; 1 if the numbers of impacts differ."""
     if hit.n_impacts != other.n_impacts:
         return 1.0
     names = ("impulse", "contact_time", "peak_force")
@@ -89,7 +89,7 @@ def difference(hit: fi.Response, other: fi.Response) -> float:
 
 
 def judge(axis: str, value: float, choice: dict[str, float]) -> Outcome:
-    """Strike, and strike again far more exactly."""
+    """Strike, strike again with the reference, and judge the result."""
     start = time.perf_counter()
     modes, step = int(choice["modes"]), choice["step"]
     how = {} if step is None else {"dt": step * 0.5 / 300.0, "max_impacts": 1}
@@ -106,18 +106,18 @@ def judge(axis: str, value: float, choice: dict[str, float]) -> Outcome:
         true = difference(hit, reference)
         text = f"{hit.n_impacts} impacts, reference {reference.n_impacts}"
     except (ValueError, fi.SimulationError):
-        true, text = max(hit.energy_error, hit.momentum_error), "by the balance of energy and momentum"
+        true, text = max(hit.energy_error, hit.momentum_error), "judged by the balance of energy and momentum"
         true *= TOLERANCE / BALANCE
     return Outcome(axis, value, "right" if true <= TOLERANCE else "wrong", true, estimated, seconds, text)
 
 
 def walks() -> list[Outcome]:
-    """Every axis alone."""
+    """Vary each parameter alone."""
     return [judge(axis, float(x), BASIS | {axis: x}) for axis, values in AXES.items() for x in values]
 
 
 def corners(count: int, seed: int) -> list[Outcome]:
-    """All axes at once, each somewhere between its middle and an end."""
+    """Vary all parameters at once, each chosen at random from its values."""
     rng = np.random.default_rng(seed)
     found = []
     for number in range(count):
@@ -128,7 +128,7 @@ def corners(count: int, seed: int) -> list[Outcome]:
 
 
 def report(found: list[Outcome]) -> str:
-    """How many of each kind, and every wrong one by name."""
+    """Count the verdicts of each axis and name every wrong result."""
     lines = []
     for axis in dict.fromkeys(outcome.axis for outcome in found):
         mine = [outcome for outcome in found if outcome.axis == axis]
@@ -144,7 +144,7 @@ def report(found: list[Outcome]) -> str:
 
 
 def draw(found: list[Outcome], path: Path) -> None:
-    """One row of dots for each axis."""
+    """Draw one row of dots per axis."""
     figure, axis = plt.subplots(figsize=(10, 5), layout="constrained")
     rows = list(dict.fromkeys(outcome.axis for outcome in found))
     for kind, colour in COLOURS.items():
@@ -163,7 +163,7 @@ def draw(found: list[Outcome], path: Path) -> None:
 
 
 def main() -> None:
-    """Run the study at the prompt."""
+    """Run the study from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--corners", type=int, default=150)
     parser.add_argument("--seed", type=int, default=1)

@@ -1,4 +1,4 @@
-"""Figure 1: of two equal steel balls the arriving one stops dead, the other flies off, comes back, and it repeats."""
+"""Figure 1: one of two equal steel balls hits the other and stops; the other swings out and back, and this repeats."""
 
 import fig02
 import source_scenes as source

@@ -1,4 +1,4 @@
-"""Figure 2: in a row of five equal steel balls only the last flies off; the others hardly move."""
+"""Figure 2: in a row of five equal steel balls, only the last one flies off; the others hardly move."""
 
 from dataclasses import dataclass
 
@@ -6,27 +6,27 @@ import numpy as np
 import source_scenes as source
 
 import fem_impact as fi
-from fem_impact import charts
-from fem_impact.integrator import Touch
+from fem_impact.impact.collision import Touch
+from fem_impact.show import plots
 
-RADIUS, SWING, SPEED = 0.01, 1.0, 0.5  # [m], [s] of a whole swing, [m/s] of the ball let go
+RADIUS, SWING, SPEED = 0.01, 1.0, 0.5  # [m], [s] period, [m/s] of the first ball on arrival
 GAP = 20e-6  # [m] between neighbours, the source's "very small space"
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
-PAINTS = (charts.BLUE, charts.VERMILION, charts.GREEN, charts.ORANGE, charts.PURPLE)
+PAINTS = (plots.BLUE, plots.VERMILION, plots.GREEN, plots.ORANGE, plots.PURPLE)
 
 
 @dataclass(frozen=True)
 class Cradle:
-    """What the balls did; the first arrives at time zero."""
+    """Motion of the balls; the first one arrives at time zero."""
 
     time: np.ndarray  # (n_times,) [s]
-    position: np.ndarray  # (n_times, n_balls) [m] from where each hangs at rest
+    position: np.ndarray  # (n_times, n_balls) [m] from each ball's rest position
     velocity: np.ndarray  # (n_times, n_balls) [m/s]
     impacts: tuple
 
 
 def cradle(n_balls: int, duration: float = 1.3 * SWING) -> Cradle:
-    """Equal balls on pendulums in a row; the first comes down and meets the others at rest."""
+    """Equal balls on pendulums in a row; the first one swings down onto the others, which are at rest."""
     ball = fi.Striker.sphere(fi.Material(**STEEL), RADIUS)
     pendulum = fi.Modes.from_arrays([1.0 / SWING], [[ball.mass**-0.5]], points=[[0.0]], mass=ball.mass)
     stiffness = 4.0 / 3.0 * np.sqrt(0.5 * RADIUS) * STEEL["E"] / (2.0 * (1.0 - STEEL["nu"] ** 2))
@@ -47,14 +47,14 @@ def compute():
 
 
 def draw(result: Cradle):
-    """Where each ball is over time, the first at zero when it hangs at rest and each next one a diameter on."""
+    """Draw the position of each ball over time; the rest positions are one diameter apart."""
     curves = [
-        charts.Curve(result.time, result.position[:, i] + 2.0 * RADIUS * i, f"ball {i + 1}", PAINTS[i])
+        plots.Curve(result.time, result.position[:, i] + 2.0 * RADIUS * i, f"ball {i + 1}", PAINTS[i])
         for i in range(result.position.shape[1])
     ]
-    axis = charts.Axis("time", "s", limits=(None, 1.65 * SWING))  # room for the legend
+    axis = plots.Axis("time", "s", limits=(None, 1.65 * SWING))  # room for the legend
     title = f"Newton's cradle, {len(curves)} balls: the first arrives at time zero"
-    figure = charts.curves(curves, x=axis, y=charts.Axis("position", "m"), title=title)
+    figure = plots.curves(curves, x=axis, y=plots.Axis("position", "m"), title=title)
     columns = {"time [s]": result.time}
     columns |= {f"ball {i + 1} [m]": result.position[:, i] for i in range(result.position.shape[1])}
     return figure, columns

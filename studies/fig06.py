@@ -4,16 +4,16 @@ import numpy as np
 import source_scenes as source
 
 import fem_impact as fi
-from fem_impact import charts
-from fem_impact.integrator import Touch
+from fem_impact.impact.collision import Touch
+from fem_impact.show import plots
 
-RESONANCES = {300.0: charts.VERMILION, 1500.0: charts.BLACK}  # [Hz]
+RESONANCES = {300.0: plots.VERMILION, 1500.0: plots.BLACK}  # [Hz]
 MASS, SPEED = 0.05, 1.0  # [kg], [m/s] chosen
 FREQUENCIES = np.linspace(0.0, 8e3, 1601)  # [Hz]
 
 
 def compute(mass=MASS, speed=SPEED):
-    """Level [dB] of the computed pulse's spectrum for each contact resonance, and that of the formula."""
+    """Spectrum level [dB] of the computed pulse and of the formula, for each contact resonance."""
     result = {}
     for resonance in RESONANCES:
         law = fi.Contact.linear(mass * (2.0 * np.pi * resonance) ** 2)
@@ -25,18 +25,18 @@ def compute(mass=MASS, speed=SPEED):
 
 
 def reach(level, drop):
-    """Frequency [Hz] at which a level first falls ``drop`` [dB]."""
+    """Frequency [Hz] at which a level has first fallen by ``drop`` [dB]."""
     return FREQUENCIES[np.argmax(level < -drop)]
 
 
 def draw(result):
-    """Both levels over frequency."""
+    """Draw both levels over frequency."""
     drawn = [
-        charts.Curve(FREQUENCIES, level, f"contact resonance {resonance:g} Hz", RESONANCES[resonance])
+        plots.Curve(FREQUENCIES, level, f"contact resonance {resonance:g} Hz", RESONANCES[resonance])
         for resonance, (level, _) in result.items()
     ]
-    axis = charts.Axis("frequency", "Hz", limits=(0.0, FREQUENCIES[-1]))
-    figure = charts.curves(drawn, x=axis, y=source.LEVEL, title="A stiffer or lighter hammer reaches higher")
+    axis = plots.Axis("frequency", "Hz", limits=(0.0, FREQUENCIES[-1]))
+    figure = plots.curves(drawn, x=axis, y=source.LEVEL, title="A stiffer or lighter hammer reaches higher")
     columns = {"frequency [Hz]": FREQUENCIES}
     return figure, columns | {f"level at {resonance:g} Hz [dB]": level for resonance, (level, _) in result.items()}
 

@@ -3,7 +3,7 @@
 import numpy as np
 import source_scenes as source
 
-from fem_impact import charts
+from fem_impact.show import plots
 
 
 def compute():
@@ -12,8 +12,8 @@ def compute():
 
 
 def draw(corners):
-    """The scene in oblique view."""
-    figure = charts.blow(corners, source.AT, title="A stick strikes a plate")
+    """Draw the scene in oblique view."""
+    figure = plots.blow(corners, source.AT, title="A stick strikes a plate")
     return figure, {"x [m]": [*corners[:, 0], source.AT[0]], "y [m]": [*corners[:, 1], source.AT[1]]}
 
 

@@ -1,8 +1,8 @@
-"""Figure 8: on a plate of 500 t the linear spring gives a half sine, the Hertz spring a pulse that begins softly."""
+"""Figure 8: on a plate of 500 t, the linear spring gives a half sine; the Hertz pulse starts more gently."""
 
 import source_scenes as source
 
-from fem_impact import charts
+from fem_impact.show import plots
 
 
 def compute():
@@ -11,14 +11,14 @@ def compute():
 
 
 def draw(hits):
-    """Forces over their peaks, because the two have different speeds."""
+    """Draw each force over its peak, because the speeds differ."""
     names = "linear, 88.6 kN/m", "Hertz, 695 kN/m$^{1.5}$"
     drawn = [
-        charts.Curve(hit.time, hit.force / hit.peak_force, name, color)
-        for hit, name, color in zip(hits, names, (charts.VERMILION, charts.BLUE))
+        plots.Curve(hit.time, hit.force / hit.peak_force, name, color)
+        for hit, name, color in zip(hits, names, (plots.VERMILION, plots.BLUE))
     ]
-    axis = charts.Axis("force over its peak", "", limits=(0.0, 1.05))
-    figure = charts.curves(drawn, x=source.TIME, y=axis, title="Stick of 100 g on an unyielding plate")
+    axis = plots.Axis("force over its peak", "", limits=(0.0, 1.05))
+    figure = plots.curves(drawn, x=source.TIME, y=axis, title="Stick of 100 g on an unyielding plate")
     columns = {}
     for hit, name in zip(hits, ("linear", "hertz")):
         columns |= {f"time, {name} [s]": hit.time, f"force, {name} [N]": hit.force}

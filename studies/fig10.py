@@ -1,15 +1,15 @@
-"""Figure 10: contact time on a plate of 500 t follows the contours of the contact resonance, linear spring."""
+"""Figure 10: plate of 500 t, linear spring: contact time follows the contours of the contact resonance."""
 
 import source_scenes as source
 
 
 def compute(**wanted):
-    """Stick masses and linear springs on the plate of 500 t."""
+    """Map of stick masses and linear springs on the plate of 500 t."""
     return source.linear_map(5e5, **wanted)
 
 
 def draw(table):
-    """The map with contours of the contact resonance."""
+    """Draw the map with contours of the contact resonance."""
     return source.draw_map(table, "contact_time", "Contact time, plate of 500 t, linear spring", source.FIGURES_8_9)
 
 

@@ -7,7 +7,7 @@ compute = fig10.compute
 
 
 def draw(table):
-    """The map with contours of the contact resonance."""
+    """Draw the map with contours of the contact resonance."""
     return source.draw_map(table, "centroid", "Spectral centroid, plate of 500 t, linear spring", source.FIGURES_8_9)
 
 

@@ -1,15 +1,15 @@
-"""Figure 12: contact time on a plate of 500 t with Hertz springs: the same trends."""
+"""Figure 12: with Hertz springs on a plate of 500 t, contact time shows the same trends."""
 
 import source_scenes as source
 
 
 def compute(**wanted):
-    """Stick masses and Hertz springs on the plate of 500 t."""
+    """Map of stick masses and Hertz springs on the plate of 500 t."""
     return source.hertz_map(5e5, **wanted)
 
 
 def draw(table):
-    """The map with contours of the contact resonance."""
+    """Draw the map with contours of the contact resonance."""
     return source.draw_map(
         table, "contact_time", "Contact time, plate of 500 t, Hertz spring", source.FIGURES_8_9_HERTZ
     )

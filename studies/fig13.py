@@ -1,4 +1,4 @@
-"""Figure 13: the spectral centroid with Hertz springs: the same trends."""
+"""Figure 13: with Hertz springs, the spectral centroid shows the same trends."""
 
 import fig12
 import source_scenes as source
@@ -7,7 +7,7 @@ compute = fig12.compute
 
 
 def draw(table):
-    """The map with contours of the contact resonance."""
+    """Draw the map with contours of the contact resonance."""
     return source.draw_map(
         table, "centroid", "Spectral centroid, plate of 500 t, Hertz spring", source.FIGURES_8_9_HERTZ
     )

@@ -3,9 +3,9 @@
 import fig07
 import source_scenes as source
 
-from fem_impact import charts
+from fem_impact.show import plots
 
-PLACES = {0.05: charts.VERMILION, 0.2: charts.BLUE, 0.3: charts.GREEN, 0.5: charts.BLACK}  # [-] of the length
+PLACES = {0.05: plots.VERMILION, 0.2: plots.BLUE, 0.3: plots.GREEN, 0.5: plots.BLACK}  # [-] of the length
 
 
 def compute():
@@ -14,10 +14,10 @@ def compute():
 
 
 def draw(points):
-    """The plate from above."""
+    """Draw the plate from above."""
     labels = [f"{place:g}" for place in PLACES]
     title = "Where the plate is struck, as a share of its length"
-    figure = charts.plan(fig07.compute(), points, labels, title=title, colors=list(PLACES.values()))
+    figure = plots.plan(fig07.compute(), points, labels, title=title, colors=list(PLACES.values()))
     return figure, {"x [m]": [x for x, _ in points], "y [m]": [y for _, y in points]}
 
 

@@ -1,17 +1,17 @@
-"""Figure 15: above which contact resonance the plate of 200 g stops a hammer dead, over the hammer's mass."""
+"""Figure 15: the contact resonance above which the plate of 200 g stops a hammer, over the hammer's mass."""
 
 import fig14
 import numpy as np
 import source_scenes as source
 
 import fem_impact as fi
-from fem_impact import charts
+from fem_impact.show import plots
 
 HAMMERS = np.geomspace(1e-3, 0.2, 60)  # [kg]
 
 
 def thresholds(modes, places, hammers=HAMMERS):
-    """Threshold [Hz] of each hammer at each place; not a number where nothing rebounds."""
+    """Threshold [Hz] of each hammer at each place; NaN if it never rebounds."""
     return {
         place: np.array([fi.threshold_frequency(modes, point, mass) or np.nan for mass in hammers])
         for place, point in places.items()
@@ -24,15 +24,15 @@ def compute(hammers=HAMMERS):
 
 
 def draw(result, places=fig14.PLACES, title="Threshold of a clean rebound, plate of 200 g"):
-    """The four curves on logarithmic axes."""
+    """Draw the four curves on logarithmic axes."""
     drawn = [
-        charts.Curve(1e3 * HAMMERS, values, f"at {place:g} of the length", places[place])
+        plots.Curve(1e3 * HAMMERS, values, f"at {place:g} of the length", places[place])
         for place, values in result.items()
     ]
-    figure = charts.curves(
+    figure = plots.curves(
         drawn,
-        x=charts.Axis("mass of the hammer", "g", log=True),
-        y=charts.Axis("threshold of contact resonance", "Hz", log=True),
+        x=plots.Axis("mass of the hammer", "g", log=True),
+        y=plots.Axis("threshold of contact resonance", "Hz", log=True),
         title=title,
     )
     return figure, {"mass [kg]": HAMMERS} | {f"at {place:g} [Hz]": values for place, values in result.items()}

@@ -2,9 +2,9 @@
 
 import source_scenes as source
 
-from fem_impact import charts
+from fem_impact.show import plots
 
-PLACES = {0.0: charts.VERMILION, 0.03: charts.BLUE, 0.1: charts.GREEN, 0.4: charts.BLACK}  # [-] of the length
+PLACES = {0.0: plots.VERMILION, 0.03: plots.BLUE, 0.1: plots.GREEN, 0.4: plots.BLACK}  # [-] of the length
 
 
 def compute():
@@ -13,10 +13,10 @@ def compute():
 
 
 def draw(points):
-    """The beam from the side."""
+    """Draw the beam from the side."""
     labels = [f"{place:g}" for place in PLACES]
     title = "Where the free beam is struck, as a share of its length"
-    figure = charts.plan([[0.0], [1.0]], points, labels, title=title, colors=list(PLACES.values()))
+    figure = plots.plan([[0.0], [1.0]], points, labels, title=title, colors=list(PLACES.values()))
     return figure, {"x [m]": [x for (x,) in points]}
 
 

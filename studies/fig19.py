@@ -1,15 +1,15 @@
-"""Figure 19: on a plate of 200 g contact times differ at the upper right, where the stick strikes more than once."""
+"""Figure 19: on a plate of 200 g, contact times differ at the upper right, where the stick hits more than once."""
 
 import source_scenes as source
 
 
 def compute(**wanted):
-    """Stick masses and linear springs on the plate of 200 g."""
+    """Map of stick masses and linear springs on the plate of 200 g."""
     return source.linear_map(0.2, **wanted)
 
 
 def draw(table):
-    """The map with contours of the contact resonance."""
+    """Draw the map with contours of the contact resonance."""
     return source.draw_map(table, "contact_time", "Contact time, plate of 200 g, linear spring", source.FIGURES_21_22)
 
 

@@ -1,16 +1,16 @@
-"""Figure 22: a stiff spring on the same plates; on the lightest three impacts, with a long wait before the third."""
+"""Figure 22: a stiff spring on the same plates; the lightest gives three impacts, the third after a long gap."""
 
 import fig21
 import source_scenes as source
 
 
 def compute(stiffness=source.STIFF[1]):
-    """One blow for each plate, by the plate's name."""
+    """One blow per plate, by name of the plate."""
     return fig21.compute(stiffness)
 
 
 def draw(hits):
-    """Forces over time."""
+    """Draw the forces over time."""
     return fig21.draw(hits, "Stick of 100 g, spring of 1 MN/m")
 
 

@@ -1,4 +1,4 @@
-"""Figure 24: spectra of figure 22; several impacts make the spectrum ragged, with shallower dips on lighter plates."""
+"""Figure 24: spectra of figure 22; several impacts make the spectrum ragged, and lighter plates have shallower dips."""
 
 import fig22
 import fig23
@@ -14,7 +14,7 @@ def compute():
 
 
 def draw(result):
-    """Levels over frequency."""
+    """Draw the levels over frequency."""
     return fig23.draw(result, FREQUENCIES, "Spectra of the pulses of figure 22")
 
 

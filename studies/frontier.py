@@ -1,14 +1,14 @@
-"""What accuracy costs: error against time for every choice there is, and where the tolerance puts a scene among them.
+"""Measures what accuracy costs: error against time for every choice, compared with the choices of the tolerance.
 
     python studies/frontier.py [--out studies/out]
 
-The scene is the source's hinged plate of 200 g struck by a rigid hammer of 33 g through a Hertz spring. Four pictures:
+A rigid hammer of 33 g strikes the hinged plate of 200 g of *Euphonics* 12.1 through a Hertz spring. Draws four plots:
 mesh size and element (largest error of the first sixty frequencies), number of modes with and without the residual
-compliance, step and scheme, and the whole chain from mesh to response, where every combination of mesh, modes and steps
-is one dot and the tolerance, 1e-1 to 1e-8, stands beside them. Prints the README's table, the ratio of the
-tolerance's cost to the cheapest combination found, and the constants by which a plan predicts seconds and memory.
-Errors are the largest of restitution (absolute), impulse, contact time and peak force (relative), against closed-form
-modes: 20 000 of them where modes are counted, as many as 1e-9 takes for the chain.
+compliance, step and scheme, and the whole chain from mesh to response. There, every combination of mesh, modes and
+steps is one dot, and a line shows the choices for tolerances from 1e-1 to 1e-8. Prints the README's table, the cost of
+a tolerance over that of the cheapest combination, and the seconds and memory predicted by the plan and measured. The
+error is the largest of those in restitution (absolute), impulse, contact time and peak force (relative). The reference
+uses 20 000 closed-form modes, or as many as a tolerance of 1e-9 needs for the chain.
 """
 
 import argparse
@@ -51,14 +51,14 @@ speed = 1.0
 """
 TOLERANCES = [10.0**-n for n in range(1, 9)]
 SIZES = (0.5, 0.35, 0.25, 0.18, 0.125, 0.09, 0.06)  # [m] of elements
-NUMBERS = (10, 20, 40, 80, 160, 320, 640, 1280)  # [-] modes
-STEPS = [2.0**-n for n in range(1, 11)]  # [-] of the contact time
-REPEATS = 3  # [-] runs of each setting; the fastest counts
+NUMBERS = (10, 20, 40, 80, 160, 320, 640, 1280)  # [-] numbers of modes
+STEPS = [2.0**-n for n in range(1, 11)]  # [-] steps as shares of the contact time
+REPEATS = 3  # [-] runs per setting; the fastest one counts
 
 
 @dataclass(frozen=True)
 class Point:
-    """One setting: what it costs and how far it errs."""
+    """The cost and error of one setting."""
 
     name: str
     seconds: float
@@ -67,7 +67,7 @@ class Point:
 
 
 def difference(hit: fi.Response, other: fi.Response) -> float:
-    """What the tolerance speaks of; 1 where the impacts are counted differently."""
+    """Error as the tolerance counts it; 1 if the numbers of impacts differ."""
     if hit.n_impacts != other.n_impacts:
         return 1.0
     relative = (abs(getattr(hit, x) / getattr(other, x) - 1.0) for x in ("impulse", "contact_time", "peak_force"))
@@ -75,7 +75,7 @@ def difference(hit: fi.Response, other: fi.Response) -> float:
 
 
 def timed(make: Callable[[], object], repeats: int = REPEATS) -> tuple[float, object]:
-    """Fewest seconds of some calls, and what the last returned."""
+    """Shortest time [s] of several calls, and the result of the last one."""
     best = np.inf
     for _ in range(repeats):
         start = time.perf_counter()
@@ -92,7 +92,7 @@ def scene(source: str, folder: Path) -> fi.Scene:
 
 
 def meshes() -> list[Point]:
-    """Error of the first sixty frequencies over element size, two elements."""
+    """Error of the first sixty frequencies over element size, for two elements."""
     plate = fi.Plate(fi.Material(E=70e9, nu=0.3, rho=2700.0), 2e-3)
     exact = fi.analytic.rectangle(1.55, 1.0, section=plate, n_modes=60).frequencies
     points = []
@@ -113,7 +113,7 @@ def meshes() -> list[Point]:
 
 
 def blow(whole: fi.Scene) -> dict[str, object]:
-    """Arguments of `fi.strike` of the scene."""
+    """The arguments of `fi.strike` for the scene."""
     return {"striker": whole.make_striker(), "contact": whole.make_contact(), "at": (0.465, 0.3), "speed": 1.0}
 
 
@@ -130,7 +130,7 @@ def truncations(whole: fi.Scene, reference: fi.Response) -> list[Point]:
 
 
 def steps(whole: fi.Scene, reference: fi.Response) -> list[Point]:
-    """Error over the step of each scheme, and over collocation's tolerance; the bare set, so that only steps err."""
+    """Error over the step of each scheme and the tolerance of collocation, on the same 80 modes as the reference."""
     modes, length = reference.target.truncated(n_modes=80), reference.contact_time
     exact = fi.strike(modes, **blow(whole), tolerance=1e-12, scheme="collocation")
     points = []
@@ -146,7 +146,7 @@ def steps(whole: fi.Scene, reference: fi.Response) -> list[Point]:
 
 
 def combinations(whole: fi.Scene, reference: fi.Response) -> list[Point]:
-    """The whole chain with every combination of mesh, modes and steps."""
+    """Run the whole chain with every combination of mesh, modes and steps."""
     points = []
     for size, number in product(SIZES, NUMBERS[:-1]):
         start = time.perf_counter()
@@ -169,7 +169,7 @@ def combinations(whole: fi.Scene, reference: fi.Response) -> list[Point]:
 
 @dataclass(frozen=True)
 class Dial:
-    """What a tolerance chose and what that cost."""
+    """The choices of one tolerance and their cost."""
 
     tolerance: float
     seconds: float
@@ -179,7 +179,7 @@ class Dial:
 
 
 def dials(whole: fi.Scene) -> list[Dial]:
-    """The chain as the tolerance chooses it, from the loosest on, so that the peak of memory is that of each."""
+    """Run the chain for each tolerance, loosest first, because peak memory only grows within a process."""
     found = []
     for tolerance in TOLERANCES:
         repeats = REPEATS if tolerance > 1e-6 else 1
@@ -190,7 +190,7 @@ def dials(whole: fi.Scene) -> list[Dial]:
 
 
 def table(found: list[Dial]) -> str:
-    """The README's table."""
+    """The table of the README."""
     lines = ["| tolerance | seconds | unknowns | modes | steps | MB | true error |", "|---|---|---|---|---|---|---|"]
     for d in found:
         hit = d.run.response
@@ -201,7 +201,7 @@ def table(found: list[Dial]) -> str:
 
 
 def cheapest(points: list[Point], found: list[Dial]) -> list[str]:
-    """Cost of the dial's choice over that of the cheapest combination as exact as asked."""
+    """Cost of each tolerance over that of the cheapest combination that meets it."""
     lines, ratios = [], []
     for dial in found:
         good = [point for point in points if point.error <= dial.tolerance]
@@ -212,11 +212,11 @@ def cheapest(points: list[Point], found: list[Dial]) -> list[str]:
                 f"  {dial.tolerance:.0e}: {dial.seconds:.3f} s, cheapest of {len(points)} combinations "
                 f"{best.seconds:.3f} s ({best.detail}), ratio {ratios[-1]:.2f}"
             )
-    return [f"cost over the cheapest combination's: median {np.median(ratios):.2f}", *lines]
+    return [f"cost over that of the cheapest combination: median {np.median(ratios):.2f}", *lines]
 
 
 def predictions(found: list[Dial]) -> list[str]:
-    """Seconds and megabytes predicted over measured."""
+    """Seconds and megabytes, predicted and measured."""
     return [
         f"  {d.tolerance:.0e}: predicted {d.run.plan.seconds:.2f} s and {d.run.plan.memory / 1e6:.0f} MB, "
         f"took {d.seconds:.2f} s and {d.megabytes:.0f} MB"
@@ -225,7 +225,7 @@ def predictions(found: list[Dial]) -> list[str]:
 
 
 def draw(panels: dict[str, list[Point]], found: list[Dial], path: Path) -> None:
-    """Error over seconds, one picture for each choice and one for the whole."""
+    """Draw error over seconds, one plot for each choice and one for the whole chain."""
     figure, axes = plt.subplots(2, 2, figsize=(11, 8), layout="constrained")
     for axis, (title, points) in zip(axes.flat, panels.items()):
         for name, marker in zip(dict.fromkeys(point.name for point in points), "osd^"):
@@ -246,7 +246,7 @@ def draw(panels: dict[str, list[Point]], found: list[Dial], path: Path) -> None:
 
 
 def main() -> None:
-    """Run the study at the prompt."""
+    """Run the study from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "out")
     options = parser.parse_args()

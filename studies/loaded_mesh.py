@@ -1,9 +1,10 @@
-"""What it takes to find the modes of a mesh from a file: new triangles within its rim where that pays, or divided ones.
+"""Measures the cost of modes on a mesh from a file, with new triangles within its rim or with divided triangles.
 
     python studies/loaded_mesh.py
 
-The guitar top of `meshes/` as it is there and meshed more finely, clamped at the body, 52 modes to a tolerance of 1e-2
-and then with elements for the highest of them, as a strike of `scenes/guitar_top.toml` asks; each row is one run.
+Takes the guitar top of `meshes/` as it is and meshed more finely, clamped at the body. As in a strike of
+`scenes/guitar_top.toml`, the study finds 52 modes to a tolerance of 1e-2 and then with elements for the highest of
+them. Each row is one run.
 """
 
 import sys
@@ -15,13 +16,13 @@ from pathlib import Path
 import fem_impact as fi
 
 HERE = Path(__file__).parent
-SIZES = (0.04, 0.02, 0.01)  # [m] that of the file in `meshes`, and finer
+SIZES = (0.04, 0.02, 0.01)  # [m] element size of the file in `meshes`, and finer
 SUPPORTS = {"body": "clamped", "hole0": "free"}
 FREQUENCY = 1943.5  # [Hz] of mode 52
 
 
 def row(shape, plate):
-    """Seconds, unknowns and the 20th frequency [Hz] of the modes on a loaded mesh."""
+    """Seconds, number of unknowns and 20th frequency [Hz] on a loaded mesh."""
     start = time.perf_counter()
     first = fi.find_modes(fi.assemble(shape, plate, SUPPORTS), n_modes=20, tolerance=1e-2)
     system = first.shapes.system
@@ -32,7 +33,7 @@ def row(shape, plate):
 
 
 def main():
-    """Print one row for each mesh and way."""
+    """Print one row per mesh and method."""
     sys.path.insert(0, str(HERE.parent / "meshes"))
     from guitar import outline
 

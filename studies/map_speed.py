@@ -1,9 +1,10 @@
-"""How fast maps are: the source's grids and a million bounces, beside a plain loop over `strike` and over solve_ivp.
+"""Measures the speed of maps against plain loops over `strike` and over solve_ivp.
 
     python studies/map_speed.py [--bounces 1000000]
-    python studies/map_speed.py --cluster 10000000      threads beside Dask with two workers of one thread
+    python studies/map_speed.py --cluster 10000000      threads against Dask with two workers of one thread
 
-Stick and hinged plate of the source with 300 modes, tolerance 1e-3; the times are after compilation, best of some runs.
+Stick and hinged plate of *Euphonics* 12.1, 300 modes, tolerance 1e-3. Times are the best of several runs and do not
+include compilation.
 """
 
 import argparse
@@ -22,7 +23,7 @@ STICK = source.stick()
 
 
 def best(repeats, work, *arguments):
-    """Shortest wall time [s] of some runs."""
+    """Shortest wall time [s] of several runs."""
     times = []
     for _ in range(repeats):
         start = time.perf_counter()
@@ -32,13 +33,13 @@ def best(repeats, work, *arguments):
 
 
 def grid(modes, side, **wanted):
-    """One map of sticks and linear springs, side times side."""
+    """One map of sticks and linear springs with ``side`` x ``side`` cells."""
     over = {"mass": np.linspace(10e-3, 200e-3, side), "stiffness": np.geomspace(1e4, 1e6, side)}
     return fi.sweep(modes, STICK, fi.Contact.linear(1e5), at=source.AT, speed=1.0, over=over, tolerance=1e-3, **wanted)
 
 
 def beyond(modes, frequency, side=100):
-    """How many cells of a map at 1e-3 are off by more, against one at 1e-5."""
+    """Say how many cells of a map at 1e-3 miss the tolerance, judged by a map at 1e-5."""
     over = {"mass": np.linspace(11e-3, 197e-3, side), "stiffness": np.geomspace(1.1e4, 0.93e6, side)}
     stick, shared = source.stick(first_frequency=frequency), {"at": source.AT, "speed": 1.0, "over": over}
     rough, fine = (fi.sweep(modes, stick, fi.Contact.linear(1e5), tolerance=t, **shared) for t in (1e-3, 1e-5))
@@ -48,7 +49,7 @@ def beyond(modes, frequency, side=100):
         off = np.maximum(off, np.abs(rough[name] / fine[name] - 1.0).values)
     return (
         f"of {side**2} cells {(off[same] > 1e-3).sum()} off by more than 1e-3, at most {off[same].max():.1e}, median "
-        + (f"{np.median(off):.1e}; {(~same).sum()} with another number of impacts")
+        + (f"{np.median(off):.1e}; {(~same).sum()} with a different number of impacts")
     )
 
 
@@ -73,7 +74,7 @@ def by_solve_ivp(plate_mass, mass, stiffness, n_modes=300):
 
 
 def by_cluster(bounces):
-    """The same map off the 2 kg plate by threads and by a cluster on this machine, in turns."""
+    """Compute the same map of the 2 kg plate alternately by threads and by a local cluster."""
     from distributed import Client, LocalCluster
 
     modes, side = source.plate(2.0), round(bounces**0.5)
@@ -86,7 +87,7 @@ def by_cluster(bounces):
 
 
 def main():
-    """Measure and print."""
+    """Measure and print the times."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--bounces", type=int, default=1_000_000)
     parser.add_argument("--cluster", type=int, default=0, metavar="BOUNCES")

@@ -1,11 +1,11 @@
-"""How fast modes are: 200 of the hinged 1.55 : 1 plate, error against seconds, beside scikit-fem's Morley and NGSolve.
+"""Compares error and time of 200 modes of the hinged 1.55 : 1 plate with scikit-fem's Morley plate and NGSolve.
 
     python studies/modes_speed.py [--out out/] [--large]
 
-Each row is one run from mesh to modes, assembly included, on one core; the error is the largest of the 200 relative
-errors against the closed form. scikit-fem is used as in its example 2 (Morley plate, `eigsh` about zero); NGSolve, if
-it is installed, with its Hellan-Herrmann-Johnson elements, its own sparse inverse and the same `eigsh`. ``--large``
-measures instead how time and memory grow up to 100 000 unknowns.
+Each row is one run from mesh to modes, including assembly, on one core; the error is the largest of the 200 relative
+errors against the closed form. scikit-fem runs as in its example 2 (Morley plate, `eigsh` about zero). NGSolve, if
+installed, uses Hellan-Herrmann-Johnson elements, its own sparse inverse and the same `eigsh`. With ``--large`` the
+study measures instead how time and memory grow up to 100 000 unknowns.
 """
 
 import argparse
@@ -32,7 +32,7 @@ PLATE = fi.Plate(fi.Material(E=12.0 * (1.0 - NU**2), nu=NU, rho=1.0), thickness=
 OURS = (8, 11, 14, 17, 20, 22, 25, 30)  # [-] elements across the plate
 MORLEY = (16, 32, 64, 96, 128, 160)
 HHJ = ((0.2, 2), (0.12, 2), (0.12, 3), (0.09, 3), (0.075, 3), (0.1, 4))  # element size and order
-BUDGET = 45.0  # [s] no method gets more for one run
+BUDGET = 45.0  # [s] limit for one run of a method
 
 
 def exact():
@@ -42,7 +42,7 @@ def exact():
 
 
 def ours(divisions):
-    """fem_impact with a stated element size; unknowns and angular frequencies."""
+    """fem_impact with a given element size: number of unknowns and angular frequencies."""
     system = fi.assemble(fi.mesh.rectangle(LENGTH, WIDTH, size=WIDTH / divisions), PLATE, {"boundary": "hinged"})
     return system.n_dofs, fi.find_modes(system, n_modes=N_MODES).omega
 
@@ -114,14 +114,14 @@ def hhj(size, order):
 
 
 def measure(work, *arguments):
-    """Seconds of processor time, unknowns and largest relative error of one run."""
+    """Processor time [s], number of unknowns and largest relative error of one run."""
     start = time.process_time()
     n_dofs, omega = work(*arguments)
     return time.process_time() - start, n_dofs, float(np.abs(omega / exact() - 1.0).max())
 
 
 def compare():
-    """Rows (method, setting, seconds, unknowns, error); each method stops at the budget."""
+    """Rows (method, setting, seconds, unknowns, error); a method stops when it comes near the budget."""
     rows = []
     methods = [("fem_impact", ours, [(n,) for n in OURS]), ("scikit-fem, Morley", morley, [(n,) for n in MORLEY])]
     try:
@@ -141,7 +141,7 @@ def compare():
 
 
 def growth():
-    """Print time and memory for 20 modes up to 100 000 unknowns, and the power of the unknowns they grow by."""
+    """Print time and memory for 20 modes up to 100 000 unknowns, and their exponents of growth."""
     sizes, times, memory = [], [], []
     start_memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     for divisions in (15, 21, 30, 42, 60, 84):
@@ -155,11 +155,11 @@ def growth():
     power = np.polyfit(np.log(sizes[1:]), np.log(times[1:]), 1)[0]
     used = np.array(memory) - start_memory
     space = np.polyfit(np.log(sizes[2:]), np.log(used[2:]), 1)[0]
-    print(f"time grows as unknowns**{power:.2f}, memory beyond the start as unknowns**{space:.2f}")
+    print(f"time grows as unknowns**{power:.2f}, additional memory as unknowns**{space:.2f}")
 
 
 def draw(rows, path):
-    """Error against seconds, one line per method."""
+    """Draw error against seconds, one line per method."""
     figure, axes = plt.subplots(figsize=(6.0, 4.0))
     for name, marker in zip(dict.fromkeys(row[0] for row in rows), "os^"):
         mine = np.array([(row[2], row[4]) for row in rows if row[0] == name])
@@ -172,12 +172,12 @@ def draw(rows, path):
 
 
 def main():
-    """Measure, print and draw."""
+    """Measure, print and draw the comparison."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("out"))
     parser.add_argument("--large", action="store_true")
     arguments = parser.parse_args()
-    ours(6)  # imports and first calls are not what is compared
+    ours(6)  # so that imports and first calls are not timed
     if arguments.large:
         print("| unknowns | seconds | MB |\n| --- | --- | --- |")
         growth()

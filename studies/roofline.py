@@ -1,12 +1,11 @@
-"""How close the contact loop comes to what the machine can do, and how its cost grows with modes.
+"""Measures how close the contact loop comes to the limit of the machine, and how its cost grows with modes.
 
     python studies/roofline.py [--out DIR]
 
-Measures one core's multiply-add peak and its read bandwidth at several array sizes with small compiled loops, then the
-time of one step of scheme A4 from 10 to 10 000 modes. A mode-step of one contact takes about 36 floating-point
-operations and 15 reads and writes of 8 bytes; the bound is the slower of the two. Draws time per step and the share
-of the bound reached. Then the time of blows of a batch, from 100 to 10 000 of them: both costs as powers of their
-number, 1 where they are linear.
+Small compiled loops measure the multiply-add peak of one core and its read bandwidth at several array sizes. Then the
+study times one step of scheme A4 for 10 to 10 000 modes. One step of one mode with one contact takes about 36
+floating-point operations and 15 reads and writes of 8 bytes; the slower of the two is the bound. Draws the time per
+step and the bound. Also times batches of 100 to 10 000 blows, and fits a power law to both costs; exponent 1 is linear.
 """
 
 import argparse
@@ -22,17 +21,18 @@ import numba
 import numpy as np
 
 import fem_impact as fi
-from fem_impact import _kernels, bounces
+from fem_impact.impact.compiled import energy
+from fem_impact.sweeps import batches
 
 COUNTS = [10, 30, 100, 300, 1000, 3000, 10000]
 BLOWS = [100, 300, 1000, 3000, 10000]
-OPERATIONS = 36.0  # [-] per mode-step: response 11, free motion and bias 12, three sums 13
-BYTES = 8.0 * 15.0  # [-] per mode-step: state, shape, bias, damping and six coefficients read, four values written
+OPERATIONS = 36.0  # [-] per mode and step: response 11, free motion and bias 12, three sums 13
+BYTES = 8.0 * 15.0  # [-] per mode and step: state, shape, bias, damping and six coefficients read, four values written
 
 
 @numba.njit(fastmath=True)
 def multiply_adds(x: np.ndarray, out: np.ndarray, turns: int) -> None:
-    """Two polynomials at every x: 16 multiply-adds per value, in two independent chains."""
+    """Evaluate two polynomials at every x: 16 multiply-adds per value in two independent chains."""
     for _ in range(turns):
         for n in range(x.size):
             v = x[n]
@@ -59,7 +59,7 @@ def multiply_adds(x: np.ndarray, out: np.ndarray, turns: int) -> None:
 
 @numba.njit(fastmath=True)
 def read(one: np.ndarray, other: np.ndarray, turns: int) -> float:
-    """Inner product of two arrays, several times."""
+    """Compute the inner product of two arrays several times."""
     total = 0.0
     for turn in range(turns):
         part = 0.0
@@ -70,7 +70,7 @@ def read(one: np.ndarray, other: np.ndarray, turns: int) -> float:
 
 
 def best(run, repeats: int = 15) -> float:
-    """Best time [s] of some runs, the first not counted."""
+    """Best time [s] of several runs, not counting the first."""
     run()
     times = []
     for _ in range(repeats):
@@ -87,14 +87,14 @@ def peak() -> float:
 
 
 def bandwidth(n_bytes: int) -> float:
-    """Bytes per second one core reads from two arrays of together a size."""
+    """Bytes per second that one core reads from two arrays of ``n_bytes`` in total."""
     one, other = np.ones((2, max(64, n_bytes // 16)))
     turns = max(1, int(2e7 / one.size))
     return 16.0 * one.size * turns / best(lambda: read(one, other, turns), 5)
 
 
 def step_time(n_modes: int, compliance: float = 0.0) -> float:
-    """Seconds per step of A4: the slope between a long and a short run in sustained contact, set-up taken out."""
+    """Seconds per step of A4, without set-up: the slope between a long and a short run in sustained contact."""
     rng = np.random.default_rng(0)
     omega = np.append(0.0, np.sort(rng.uniform(1e2, 1e5, n_modes - 1)))
     shape = np.append(1.0, -rng.normal(0.0, 1.0, n_modes - 1) * n_modes**-0.5)[None]
@@ -104,7 +104,7 @@ def step_time(n_modes: int, compliance: float = 0.0) -> float:
 
     def run(n_steps: int) -> float:
         return best(
-            lambda: _kernels.run_energy(
+            lambda: energy.run_energy(
                 omega, zeros, shape, np.zeros(1), zeros, law, zeros, p, 1, 1e-7, 0.0, 0.0, np.inf, 0, n_steps
             )
         )
@@ -115,23 +115,23 @@ def step_time(n_modes: int, compliance: float = 0.0) -> float:
 def batch_time(n_blows: int) -> float:
     """Seconds for a batch of blows of a rigid mass on a plate, on one core."""
     plate = fi.analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=100.0, n_modes=100)
-    family = bounces.Family.of(plate, np.array([0.465, 0.3]), fi.Striker.rigid(0.02), True)
+    family = batches.Family.of(plate, np.array([0.465, 0.3]), fi.Striker.rigid(0.02), True)
     spread = 10.0 ** np.random.default_rng(3).uniform(-0.5, 0.5, (3, n_blows))
     one = np.ones(n_blows)
-    blows = bounces.Blows(
+    blows = batches.Blows(
         {0: family}, np.zeros(n_blows, int), 2.0 * spread[0], 0.02 * spread[1], 1e5 * spread[2], one, one, 0.0 * one
     )
-    return best(lambda: bounces.bounce(blows, tolerance=1e-3, workers=1), 5)
+    return best(lambda: batches.bounce(blows, tolerance=1e-3, workers=1), 5)
 
 
 def power(counts: np.ndarray, seconds: np.ndarray) -> float:
-    """Exponent of the power law through the upper half of the counts, in the mean."""
+    """Exponent of a power law fitted to the upper half of the counts."""
     half = len(counts) // 2
     return float(np.polyfit(np.log(counts[half:]), np.log(seconds[half:]), 1)[0])
 
 
 def main() -> None:
-    """Measure, print, draw."""
+    """Measure, print and draw the results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "out")
     out = parser.parse_args().out
@@ -149,12 +149,12 @@ def main() -> None:
             f"  {bound / taken:10.0%}"
         )
     counts, taken, bound = np.array(rows).T
-    print(f"cost of a step grows with modes to the power {power(counts, taken):.2f}")
+    print(f"the cost of a step grows with the number of modes to the power {power(counts, taken):.2f}")
     print("blows   batch (ms)   each (us)")
     batches = np.array([batch_time(n) for n in BLOWS])
     for n, seconds in zip(BLOWS, batches):
         print(f"{n:5d}  {seconds * 1e3:11.2f}  {seconds / n * 1e6:10.2f}")
-    print(f"cost of a batch grows with its blows to the power {power(np.array(BLOWS), batches):.2f}")
+    print(f"the cost of a batch grows with the number of blows to the power {power(np.array(BLOWS), batches):.2f}")
     figure, axes = plt.subplots(figsize=(6, 4.5))
     axes.loglog(counts, taken * 1e6, "o-", label="A4, one contact")
     axes.loglog(counts, bound * 1e6, "k--", label="bound of the machine")

@@ -1,4 +1,4 @@
-"""Tutorial: is my hammer test going to double-hit? A plate, a hammer with three tips, and the bandwidth wanted.
+"""Tutorial: will my hammer test double-hit? Tries a hammer with three tips on a plate, for a given bandwidth.
 
 python studies/tutorial_hammer_test.py [FOLDER]
 """
@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 
 import fem_impact as fi
-from fem_impact import accuracy, charts, hammers
+from fem_impact.impact import accuracy
+from fem_impact.show import plots
+from fem_impact.sweeps import hammers
 
-BANDWIDTH, DROP = 800.0, 10.0  # [Hz] in which the force may fall by so many [dB]
+BANDWIDTH, DROP = 800.0, 10.0  # [Hz], and [dB] by which the force may fall within it
 HAMMER = 0.1  # [kg]
 TIPS = {"rubber": 3e5, "nylon": 3e6, "steel": 3e7}  # [N/m] linear, as data sheets state them
 PLACES = {"middle": (0.3, 0.2), "corner": (0.02, 0.02)}  # [m]
@@ -21,7 +23,7 @@ SPEED = 0.5  # [m/s]
 
 @dataclass(frozen=True)
 class Verdict:
-    """What one tip does at one place."""
+    """The result of one tip at one place."""
 
     place: str
     tip: str
@@ -31,12 +33,12 @@ class Verdict:
 
     @property
     def good(self) -> bool:
-        """Whether it hits once and reaches the bandwidth."""
+        """Whether the tip hits once and reaches the bandwidth."""
         return self.n_impacts == 1 and self.reach >= BANDWIDTH
 
 
 def structure(max_frequency: float = 8e3) -> fi.Modes:
-    """An aluminium plate, free all round, as it hangs on soft cords."""
+    """An aluminium plate with free edges, as if hung on soft cords."""
     mesh = fi.mesh.rectangle(0.6, 0.4)
     plate = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), thickness=4e-3)
     return fi.find_modes(fi.assemble(mesh, plate), max_frequency=max_frequency, damping_ratio=0.002)
@@ -57,26 +59,26 @@ def judge(modes: fi.Modes) -> list[Verdict]:
 
 
 def draw(modes: fi.Modes) -> object:
-    """Force spectra of the three tips at the middle, over their value at zero frequency."""
+    """Draw the force spectra of the three tips at the middle, relative to zero frequency."""
     frequencies = np.linspace(1.0, 4.0 * BANDWIDTH, 400)
     curves = []
-    for (tip, stiffness), paint in zip(TIPS.items(), (charts.BLUE, charts.GREEN, charts.VERMILION)):
+    for (tip, stiffness), paint in zip(TIPS.items(), (plots.BLUE, plots.GREEN, plots.VERMILION)):
         law = fi.Contact.linear(stiffness)
         hit = fi.strike(modes, fi.Striker.rigid(HAMMER), law, at=PLACES["middle"], speed=SPEED, tolerance=1e-3)
         size = np.abs(hit.spectrum(frequencies))
         count = "one impact" if hit.n_impacts == 1 else f"{hit.n_impacts} impacts"
-        curves.append(charts.Curve(frequencies, 20.0 * np.log10(size / size[0]), f"{tip}, {count}", paint))
-    curves.append(charts.Curve(np.array([0.0, BANDWIDTH]), np.full(2, -DROP), "wanted", charts.GREY, "--"))
-    frequency, level = charts.Axis("frequency", "Hz"), charts.Axis("force spectrum", "dB", limits=(-40.0, 6.0))
-    return charts.curves(curves, x=frequency, y=level, title="Three tips on one hammer, struck at the middle")
+        curves.append(plots.Curve(frequencies, 20.0 * np.log10(size / size[0]), f"{tip}, {count}", paint))
+    curves.append(plots.Curve(np.array([0.0, BANDWIDTH]), np.full(2, -DROP), "wanted", plots.GREY, "--"))
+    frequency, level = plots.Axis("frequency", "Hz"), plots.Axis("force spectrum", "dB", limits=(-40.0, 6.0))
+    return plots.curves(curves, x=frequency, y=level, title="Three tips on one hammer, struck at the middle")
 
 
 def main(folder: Path, max_frequency: float = 8e3) -> list[Verdict]:
-    """Say which tip to screw on, and where to strike."""
+    """Say which tip to use and where to strike."""
     folder.mkdir(parents=True, exist_ok=True)
     modes = structure(max_frequency)
     print(f"A free plate of {modes.mass:.2f} kg, {modes.n_modes} modes up to {modes.frequencies[-1]:.0f} Hz; "
-          f"a hammer of {1e3 * HAMMER:g} g; {BANDWIDTH:g} Hz wanted, {DROP:g} dB down at most.")  # fmt: skip
+          f"a hammer of {1e3 * HAMMER:g} g; {BANDWIDTH:g} Hz required, {DROP:g} dB down at most.")  # fmt: skip
     verdicts = judge(modes)
     print(f"{'place':<8}{'tip':<8}{'impacts':>8}{'reaches':>10}{'of threshold':>14}   verdict")
     for one in verdicts:
@@ -84,8 +86,8 @@ def main(folder: Path, max_frequency: float = 8e3) -> list[Verdict]:
         print(f"{one.place:<8}{one.tip:<8}{one.n_impacts:8d}{one.reach:7.0f} Hz{one.ratio:14.2f}   {why}")
     chosen = hammers.choose(modes, PLACES["middle"], BANDWIDTH, [0.01, HAMMER], drop=DROP)
     for hammer in chosen:
-        advice = "no tip does it" if not hammer.works else (
-            f"tips from {hammer.softest:.2g} to {hammer.hardest:.2g} N/m do it"
+        advice = "no tip works" if not hammer.works else (
+            f"tips from {hammer.softest:.2g} to {hammer.hardest:.2g} N/m work"
         )  # fmt: skip
         print(f"In the middle, with a hammer of {1e3 * hammer.mass:g} g: {advice}.")
     fi.figures.save(folder / "hammer_test.png", draw(modes))

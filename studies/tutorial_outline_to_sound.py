@@ -1,4 +1,4 @@
-"""Tutorial: from an SVG outline to its sound. A ukulele's top is drawn, meshed, tapped and heard.
+"""Tutorial: from an SVG outline to its sound. Meshes the top of a ukulele, taps it and writes the sound.
 
 python studies/tutorial_outline_to_sound.py [FOLDER]
 """
@@ -11,7 +11,7 @@ import numpy as np
 import fem_impact as fi
 
 DRAWING = Path(__file__).parents[1] / "meshes" / "ukulele.svg"
-TAP = (0.09, -0.195)  # [m] where the bridge sits; the origin is the upper left corner of the drawing, y upward
+TAP = (0.09, -0.195)  # [m] at the bridge; the origin is the upper left corner of the drawing, y points up
 LISTEN = (0.09, -0.17, 0.5)  # [m] half a metre in front of the top
 
 
@@ -19,23 +19,23 @@ def main(folder: Path, tolerance: float = 1e-3) -> dict[str, fi.Response]:
     """Go from the drawing to the sound; return the blows."""
     folder.mkdir(parents=True, exist_ok=True)
 
-    print("1. The drawing. Its shapes have ids, `rim` and `hole`; they become the names of the edges.")
+    print("1. The drawing. The ids of its shapes, `rim` and `hole`, become the names of the edges.")
     mesh = fi.mesh.outline(DRAWING)
     print(f"   {1e4 * mesh.area:.0f} cm2, edges {', '.join(mesh.edges)}")
 
-    print("2. The wood: spruce, 1.8 mm, its grain along the strings; glued to the sides, free around the hole.")
+    print("2. The wood: spruce, 1.8 mm, with the grain along the strings; clamped at the sides, free around the hole.")
     spruce = fi.Material.orthotropic(E_along=11e9, E_across=0.7e9, G=0.7e9, nu=0.37, rho=420.0, angle=np.pi / 2)
     plate = fi.Plate(spruce, thickness=1.8e-3)
     system = fi.assemble(mesh, plate, supports={"rim": "clamped", "hole": "free"})
     print(f"   {1e3 * system.mass:.1f} g")
 
-    print("3. Its modes, all up to 8 kHz, none missed.")
+    print("3. All modes up to 8 kHz.")
     modes = fi.find_modes(system, max_frequency=8e3, damping_ratio=0.01)
     print(f"   {modes.n_modes}, the lowest at {', '.join(f'{f:.0f}' for f in modes.frequencies[:5])} Hz")
     missing = fi.pictures.mode_shapes(folder / "ukulele_modes.png", modes)
-    print(f"   ukulele_modes.png{f' (in the plane; {missing})' if missing else ''}")
+    print(f"   ukulele_modes.png{f' (in two dimensions; {missing})' if missing else ''}")
 
-    print("4. Two taps at the same point and speed: a fingertip, soft and lossy, and a fingernail.")
+    print("4. Two taps at the same point and speed: with a soft, lossy fingertip and with a fingernail.")
     finger = fi.Striker.rigid(0.005)
     laws = {"fingertip": fi.Contact.power(1e7, 2.0, loss=0.2), "fingernail": fi.Contact.hertz(2e6)}
     hits = {}
@@ -49,7 +49,7 @@ def main(folder: Path, tolerance: float = 1e-3) -> dict[str, fi.Response]:
         hits[name] = hit
     fi.pictures.wave(folder / "ukulele_wave.png", hits["fingernail"])
 
-    print("5. The sound half a metre in front of it. 1.0 in the files stands for 200 Pa, whoever taps: they compare.")
+    print("5. The sound half a metre in front of the top. In both files 1.0 means 200 Pa, so you can compare them.")
     for name, hit in hits.items():
         sound = fi.export.write_wav(folder / f"ukulele_{name}.wav", hit, listener=LISTEN, duration=1.0)
         pressure = sound.full_scale * np.abs(sound.samples).max()

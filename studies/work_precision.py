@@ -1,20 +1,20 @@
-"""Error against time: the project's schemes beside general solvers, same blow, same machine, same run.
+"""Compares error and time of the project's schemes with general solvers: same blow, same machine, same run.
 
     python studies/work_precision.py [--out DIR] [--modes 40 300 1000]
 
-A rigid hammer of 5 g strikes a hinged plate of 200 g (bare set of modes, 300 of them up to 18.7 kHz) through a linear
-spring of 0.3 MN/m: a contact of 0.45 ms. Every solver does the same work: from the first touch until no further contact
-is possible, which the rigid and the flexible motion prove some 2 ms after the separation. The compiled loops find that
-proof themselves; the others are told when it holds and integrate up to there, watching for contacts by their events,
-or taking the spring's force as it comes where they have none.
+A rigid hammer of 5 g strikes a hinged plate of 200 g (300 modes up to 18.7 kHz, no residual compliance) through a
+linear spring of 0.3 MN/m; the contact lasts 0.45 ms. Every solver integrates from the first touch until no further
+contact is possible. The rigid and the flexible motion prove this about 2 ms after the separation. The compiled loops
+find the proof themselves; the other solvers get the time at which it holds and integrate up to there. They detect
+contacts by their events, or, if they have none, simply evaluate the spring force.
 
-Error is the larger of the rebound speed's (over the arrival's) and the impulse's (relative), against collocation at
-1e-12, and the worst of four blows (strike points and stiffnesses beside each other): a solver's error changes its sign
-as its setting or the blow does, and one blow alone credits that to the setting where it passes through zero. Time is
-the mean over the four of the best of several runs, of one where a run takes long. Prints one row per setting and draws
-error over time. Then the whole call a user makes of a stick on the complete plate at a tolerance of 1e-6, the upper
-modes' compliance and its error estimated, beside the time its compiled loops take. scikit-sundae and Exudyn take part
-where they are installed (``pip install fem-impact[peers]``).
+The error is the larger of those in rebound speed (over arrival speed) and impulse (relative), against collocation at
+1e-12. The worst of four blows with similar strike points and stiffnesses counts: the error of a solver changes sign
+with its setting and with the blow, so with one blow a setting could look accurate by chance. The time is the mean over
+the four blows of the best of several runs, or of a single run if it is long. Prints one row per setting and draws error
+over time. Then times the whole `fi.strike` call for a stick on the complete plate at a tolerance of 1e-6, including
+residual compliance and error estimate, and the compiled loops within it. scikit-sundae and Exudyn take part if they are
+installed (``pip install fem-impact[peers]``).
 """
 
 import argparse
@@ -34,21 +34,22 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import fem_impact as fi
-from fem_impact import _kernels, integrator
+from fem_impact.impact import collision
+from fem_impact.impact.compiled import collocation, energy
 
 MASS, SPEED = 0.005, 1.0  # [kg], [m/s]
 BLOWS = [((0.465, 0.31), 3.0e5), ((0.465, 0.33), 2.8e5), ((0.60, 0.40), 3.1e5), ((0.50, 0.37), 3.3e5)]  # [m], [N/m]
-PATIENCE = 20.0  # [s] a solver whose four blows took longer gets no finer tolerance
-LONG = 0.2  # [s] runs longer than this are timed once
-STICKS = [(0.02, 1.0e5), (0.1, 1.0e5), (0.1, 3.0e5)]  # [kg], [N/m] of the whole call
-CALLS = 400  # [-] of which the best counts
+PATIENCE = 20.0  # [s] a solver that takes longer for the four blows gets no finer tolerance
+LONG = 0.2  # [s] longer runs are timed only once
+STICKS = [(0.02, 1.0e5), (0.1, 1.0e5), (0.1, 3.0e5)]  # [kg], [N/m] for the timing of the whole call
+CALLS = 400  # [-] repeated calls; the fastest counts
 TOLERANCES = 10.0 ** -np.arange(2.0, 12.0)
 
 Answer = tuple[float, float]  # rebound speed [m/s] (negative), impulse [N s]
 
 
 class Blow:
-    """One blow as plain arrays, for solvers that know nothing of modes, and its true end."""
+    """One blow as plain arrays, for solvers that do not know modes, and its reference result."""
 
     def __init__(self, plate: fi.Modes, at: tuple[float, float], stiffness: float) -> None:
         self.plate, self.at, self.stiffness = plate, at, stiffness
@@ -64,10 +65,10 @@ class Blow:
         h, flexible = truth.history, self.omega > 0.0
         rigid, rate = h.shape[0, ~flexible] @ h.end_q[~flexible], h.shape[0, ~flexible] @ h.end_p[~flexible]
         swing = np.abs(h.shape[0, flexible]) @ np.hypot(h.end_q[flexible], h.end_p[flexible] / self.omega[flexible])
-        self.horizon = float(truth.impacts[0].end + (swing + rigid) / -rate)  # [s] from where no contact can come
+        self.horizon = float(truth.impacts[0].end + (swing + rigid) / -rate)  # [s] after this no contact is possible
 
     def strike(self, scheme: str, tolerance: float) -> fi.Response:
-        """The whole call, plan, error estimate and audit included."""
+        """The whole call, including plan, error estimate and audit."""
         return fi.strike(
             self.plate, self.striker, self.law, at=self.at, speed=SPEED, residual=False, scheme=scheme,
             tolerance=tolerance,
@@ -84,7 +85,7 @@ class Blow:
         return np.concatenate([z[n:], -(self.omega**2) * z[:n] - force * self.shape])
 
     def jacobian(self, t: float, z: np.ndarray) -> np.ndarray:
-        """Derivative of `rate` by the state."""
+        """Derivative of `rate` with respect to the state."""
         n = len(self.omega)
         result = np.zeros((2 * n, 2 * n))
         result[:n, n:] = np.eye(n)
@@ -100,39 +101,34 @@ class Blow:
 
 
 def call(blow: Blow, scheme: str, tolerance: float) -> Answer:
-    """What a user calls."""
+    """The call that a user makes."""
     hit = blow.strike(scheme, tolerance)
     return hit.speeds[0], hit.impulse
 
 
 def kernel(blow: Blow, scheme: str, size: float) -> Callable[[], Answer]:
-    """One run of the compiled loop at one step (A, A4), misfit (collocation) or at all (secular)."""
+    """A run of the compiled loop with a given step (A, A4) or misfit (collocation)."""
     n = len(blow.omega)
     state = (
         blow.omega, np.zeros(n), blow.shape[None], np.zeros(1), np.zeros(n),
         np.array([[blow.stiffness, 1.0, 0.0, 0.0]]),
         np.zeros(n), blow.start[n:].copy(),
     )  # fmt: skip
-    nodes, contact = integrator._gauss(integrator.NODES), np.pi * np.sqrt(MASS / blow.stiffness)
+    nodes, contact = collision._gauss(collision.NODES), np.pi * np.sqrt(MASS / blow.stiffness)
     noise = (1e-19, 1e-12)
 
     def run() -> Answer:
         if scheme == "collocation":
-            out = _kernels.run_collocation(*state, *nodes, contact / 2.0, SPEED, size, *noise, np.inf, 0, 10**6)
-        elif scheme == "secular":
-            group, amplitude = np.arange(n), np.abs(blow.shape)
-            out = _kernels.run_secular(
-                blow.omega, group, amplitude, *state[2:], *nodes, contact, *noise, np.inf, 0, 10**6
-            )
+            out = collocation.run_collocation(*state, *nodes, contact / 2.0, SPEED, size, *noise, np.inf, 0, 10**6)
         else:
-            out = _kernels.run_energy(*state, int(scheme == "A4"), contact / size, *noise, np.inf, 0, 10**6)
+            out = energy.run_energy(*state, int(scheme == "A4"), contact / size, *noise, np.inf, 0, 10**6)
         return blow.answer(np.concatenate([out[1], out[2]]))
 
     return run
 
 
 def scipy_solver(blow: Blow, method: str, tolerance: float) -> Answer:
-    """SciPy's solve_ivp with every onset and separation as its events."""
+    """SciPy's solve_ivp with onsets and separations as events."""
 
     def apart(t: float, z: np.ndarray) -> float:
         return blow.shape @ z[: len(blow.omega)]
@@ -146,7 +142,7 @@ def scipy_solver(blow: Blow, method: str, tolerance: float) -> Answer:
 
 
 def sundials(blow: Blow, tolerance: float) -> Answer:
-    """CVODE (Adams, dense Newton) by scikit-sundae, with every onset and separation as its events."""
+    """CVODE (Adams, dense Newton) from scikit-sundae, with onsets and separations as events."""
     from sksundae.cvode import CVODE
 
     def rate(t, z, out):
@@ -169,7 +165,7 @@ def sundials(blow: Blow, tolerance: float) -> Answer:
 
 
 def exudyn_solver(blow: Blow, n_steps: int) -> Answer:
-    """Exudyn's explicit RK44 at fixed steps, forces by a user function."""
+    """Exudyn's explicit RK44 with fixed steps and a user function for the force."""
     import exudyn
     from exudyn.itemInterface import NodeGenericODE2, ObjectGenericODE2
 
@@ -201,7 +197,7 @@ def exudyn_solver(blow: Blow, n_steps: int) -> Answer:
 
 
 def best_time(run: Callable[[], Answer]) -> tuple[float, Answer]:
-    """Best wall time [s] of some runs, or of the first if it is long, and the answer."""
+    """Best wall time [s] of several runs, or that of the first if it is long, and the answer."""
     run_once = time.perf_counter()
     answer = run()
     first = time.perf_counter() - run_once
@@ -216,7 +212,7 @@ def best_time(run: Callable[[], Answer]) -> tuple[float, Answer]:
 
 
 def solvers(n_modes: int, cycles: float) -> Iterator[tuple[str, list[tuple[str, Callable]]]]:
-    """Name of each solver and its settings, coarse to fine, each with what prepares its run of a blow.
+    """Name of each solver and its settings, coarse to fine, each with a function that prepares a run.
 
     ``cycles`` is the highest frequency times the time to integrate [rad].
     """
@@ -227,13 +223,11 @@ def solvers(n_modes: int, cycles: float) -> Iterator[tuple[str, list[tuple[str, 
         yield f"{scheme} (kernel)", [(f"{n} steps", partial(kernel, scheme=scheme, size=n)) for n in counts]
     misfits = 10.0 ** -np.arange(1.0, 12.0, 2)
     yield "collocation (kernel)", [(f"{x:.0e}", partial(kernel, scheme="collocation", size=x)) for x in misfits]
-    if n_modes <= 300:
-        yield "secular (kernel)", [("exact", partial(kernel, scheme="secular", size=1.0))]
     for scheme in ("A4", "collocation"):
         yield f"fi.strike, {scheme}", [(f"{x:.0e}", prepared(call, scheme, float(x))) for x in TOLERANCES[:9:2]]
     for method in ("DOP853", "RK45", "LSODA", "Radau"):
         if method in ("LSODA", "Radau") and n_modes > 300:
-            continue  # dense 2000 x 2000 Jacobians: minutes a run
+            continue  # dense 2000 x 2000 Jacobians take minutes per run
         yield method, [(f"{x:.0e}", prepared(scipy_solver, method, x)) for x in TOLERANCES]
     if find_spec("sksundae") and n_modes <= 300:
         yield "CVODE", [(f"{x:.0e}", prepared(sundials, x)) for x in TOLERANCES]
@@ -243,12 +237,12 @@ def solvers(n_modes: int, cycles: float) -> Iterator[tuple[str, list[tuple[str, 
 
 
 def prepared(solver: Callable, *arguments: object) -> Callable[[Blow], Callable[[], Answer]]:
-    """A solver as something that makes a run of a blow."""
+    """Wrap a solver into a function that prepares its run of a blow."""
     return lambda blow: lambda: solver(blow, *arguments)
 
 
 def measure(n_modes: int) -> list[dict]:
-    """One row per solver and setting."""
+    """Measure one row per solver and setting."""
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=n_modes)
     blows = [Blow(plate, *blow) for blow in BLOWS]
     rows = []
@@ -265,15 +259,15 @@ def measure(n_modes: int) -> list[dict]:
 
 
 def time_at(rows: list[dict], solver: str, error: float) -> float:
-    """Least time [s] of a solver's runs with at most an error; infinity if none."""
+    """Least time [s] among a solver's runs that are within an error; infinity if none is."""
     return min((r["seconds"] for r in rows if r["solver"] == solver and r["error"] <= error), default=np.inf)
 
 
 def whole_call(n_modes: int, mass: float, stiffness: float) -> tuple[fi.Response, float, float, int]:
-    """A stick on the complete plate at 1e-6: the response, best seconds of the call and of its loops, their number."""
+    """A stick on the complete plate at 1e-6: response, best time of the call, that of its loops, number of loops."""
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=n_modes)
     stick, law = fi.Striker.stick(mass, 10e3), fi.Contact.linear(stiffness)
-    loop, taken = _kernels.run_energy, []
+    loop, taken = energy.run_energy, []
 
     def timed(*state: object) -> tuple:
         begin = time.perf_counter()
@@ -286,7 +280,7 @@ def whole_call(n_modes: int, mass: float, stiffness: float) -> tuple[fi.Response
 
     hit = once()
     best, loops = np.inf, np.inf
-    _kernels.run_energy = timed
+    energy.run_energy = timed
     try:
         for _ in range(CALLS):
             taken.clear()
@@ -294,12 +288,12 @@ def whole_call(n_modes: int, mass: float, stiffness: float) -> tuple[fi.Response
             once()
             best, loops = min(best, time.perf_counter() - begin), min(loops, sum(taken))
     finally:
-        _kernels.run_energy = loop
+        energy.run_energy = loop
     return hit, best, loops, len(taken)
 
 
 def draw(rows: list[dict], path: Path) -> None:
-    """Error over time, one panel per number of modes."""
+    """Draw error over time, one panel per number of modes."""
     counts = sorted({r["modes"] for r in rows})
     figure, panels = plt.subplots(1, len(counts), figsize=(5 * len(counts), 4.5), sharey=True, squeeze=False)
     for axes, count in zip(panels[0], counts):
@@ -318,7 +312,7 @@ def draw(rows: list[dict], path: Path) -> None:
 
 
 def main() -> None:
-    """Measure, print, write."""
+    """Measure, print and write the results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "out")
     parser.add_argument("--modes", type=int, nargs="+", default=[40, 300, 1000])
@@ -332,14 +326,14 @@ def main() -> None:
         writer.writeheader()
         writer.writerows(rows)
     draw(rows, options.out / "work_precision.png")
-    print("\nleast time at an error of 1e-6, and its ratio to A4's kernel and to the whole call of fi.strike:")
+    print("\nleast time at an error of 1e-6, and its ratio to A4's kernel and to the whole fi.strike call:")
     for n_modes in options.modes:
         some = [row for row in rows if row["modes"] == n_modes]
         ours, whole = time_at(some, "A4 (kernel)", 1e-6), time_at(some, "fi.strike, A4", 1e-6)
         for name in dict.fromkeys(row["solver"] for row in some):
             taken = time_at(some, name, 1e-6)
             print(f"{n_modes:5d}  {name:22s} {taken * 1e6:12.1f} us  x {taken / ours:9.1f}  x {taken / whole:9.1f}")
-    print("\nwhole call of fi.strike, a stick on the complete plate at a tolerance of 1e-6:")
+    print("\nwhole fi.strike call, a stick on the complete plate at a tolerance of 1e-6:")
     print("modes  stick (kg)  spring (N/m)  impacts  call (us)  its loops (us)  runs")
     for n_modes in options.modes:
         for mass, stiffness in STICKS:

@@ -38,8 +38,12 @@ import numpy as np
 from scenes import QUICK as SCENE
 
 import fem_impact as fi
-from fem_impact import _apart, cli, farm, maps
-from fem_impact.scene import Scene
+from fem_impact import cli
+from fem_impact._base import isolated
+from fem_impact.scenes import maps
+from fem_impact.scenes.scene import Scene
+from fem_impact.sweeps import grid
+from fem_impact.sweeps.store import Texts, by_store
 
 PATIENCE = 10.0  # [s] per input
 MEMORY = 2 << 30  # [byte] more than the process has when it begins
@@ -205,7 +209,7 @@ def read_mesh(path: Path) -> object:
 
 
 def quick(path: Path, reader: str, arguments: tuple[str, ...], patience: float) -> tuple[int, bytes, bytes]:
-    """What `_apart.run` gives, from this process: one that starts afresh would take 0.2 s an input.
+    """What `isolated.run` gives, from this process: one that starts afresh would take 0.2 s an input.
 
     An input that ends this process is judged again by the real one, see `fuzz`.
     """
@@ -213,7 +217,7 @@ def quick(path: Path, reader: str, arguments: tuple[str, ...], patience: float) 
     known = getattr(h5py, "File", None)
     try:
         with limited(SHORT_PATIENCE):
-            status, answer = _apart.main(path, reader, list(arguments))
+            status, answer = isolated.main(path, reader, list(arguments))
     except Hang:
         raise subprocess.TimeoutExpired("a reader", patience) from None
     finally:
@@ -327,7 +331,7 @@ def store_samples() -> list[tuple[str, bytes]]:
     made = {}
     with tempfile.TemporaryDirectory() as name:
         store = Path(name) / "store"
-        farm.by_store(small_grid(), store, solved, None)
+        by_store(small_grid(), store, solved, None)
         made = {str(path.relative_to(store)): path.read_bytes() for path in store.rglob("*") if path.is_file()}
     PRISTINE.update(made)
     return [(name.replace("/", "%"), raw) for name, raw in sorted(made.items())]
@@ -343,20 +347,20 @@ def read_store(path: Path) -> object:
     for name, content in {**PRISTINE, place: raw}.items():
         (path / name).parent.mkdir(parents=True, exist_ok=True)
         (path / name).write_bytes(content)
-    numbers, texts = farm.by_store(small_grid(), path, solved, None)
+    numbers, texts = by_store(small_grid(), path, solved, None)
     assert numbers.shape == (6, 2) and numbers.dtype == float and set(texts) <= {0, 1}
     assert all(isinstance(text, str) for text in texts.values())
     return numbers
 
 
 @cache
-def small_grid() -> maps.Grid:
+def small_grid() -> grid.Grid:
     """Two blows on a rigid body."""
-    base = maps.Case(fi.Modes.rigid(1.0), fi.Striker.rigid(1.0), fi.Contact.linear(1e5), np.zeros(0), 1.0)
-    return maps.Grid(base, {"mass": np.array([0.1, 0.2])}, 1e-3, True, None, {})
+    base = grid.Case(fi.Modes.rigid(1.0), fi.Striker.rigid(1.0), fi.Contact.linear(1e5), np.zeros(0), 1.0)
+    return grid.Grid(base, {"mass": np.array([0.1, 0.2])}, 1e-3, True, None, {})
 
 
-def solved(grid: maps.Grid, start: int, stop: int) -> tuple[np.ndarray, farm.Texts]:
+def solved(grid: grid.Grid, start: int, stop: int) -> tuple[np.ndarray, Texts]:
     """Stands for the blows themselves, which are of no interest here."""
     texts = {i: "the motion may be chaotic: é" for i in range(start, stop) if i % 2 == 0}
     return np.ones((len(grid.layers), stop - start)), texts
@@ -380,8 +384,8 @@ def command_samples() -> list[tuple[str, bytes]]:
     path.write_text(QUICK)
     scene = fi.load_scene(path)
     run, modes = scene.run(), scene.modes(5)
-    fi.atlas.hammers_for(scene, 800.0, [0.1])  # compiles, which may take half a minute
-    fi.atlas.map_scene(scene)
+    maps.hammers_for(scene, 800.0, [0.1])  # compiles, which may take half a minute
+    maps.map_scene(scene)
     fi.figures.save = lambda path, figure: Path(path).write_bytes(b"")
     fi.report.write = lambda path, scene, run: Path(path).write_bytes(b"")
     Scene.run = lambda self, watch=None, **changes: run
@@ -492,7 +496,7 @@ def work(category: str, numbers: range, pipe: int, keep: Path | None, again: boo
     resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY, resource.RLIM_INFINITY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     if not again:
-        _apart.run, _apart.confine = quick, lambda path: None  # which would bind this process for good
+        isolated.run, isolated.confine = quick, lambda path: None  # which would bind this process for good
     with tempfile.TemporaryDirectory() as name, open(os.devnull, "w") as null, os.fdopen(pipe, "w") as out:
         os.dup2(null.fileno(), 1)
         os.dup2(null.fileno(), 2)

@@ -185,7 +185,7 @@ def test_scene_may_not_be_a_pipe_that_never_ends(tmp_path, capsys):
 
 def test_a_billion_modes_are_refused(scene, capsys):
     assert cli.main(["modes", str(scene), "--count", "1000000000"]) == 2
-    assert "count must be at most 50000 modes of this scene, got 1000000000" in capsys.readouterr().err
+    assert "count must be at most 50000 modes for this scene, got 1000000000" in capsys.readouterr().err
 
 
 def test_place_that_cannot_be_written_to_is_a_sentence(scene, tmp_path, capsys):
@@ -320,7 +320,9 @@ def test_any_arguments_end_in_a_status_and_a_message(tmp_path, monkeypatch, caps
 
 
 def test_uncompiled_kernels_run_as_plain_python(monkeypatch, tmp_path):
-    (tmp_path / "_kernels.py").write_text("")
+    home = tmp_path / "impact" / "compiled"
+    (home / "__pycache__").mkdir(parents=True)
+    (home / "energy.py").write_text("")
     monkeypatch.setattr(fi, "__file__", str(tmp_path / "__init__.py"))
     monkeypatch.delitem(sys.modules, "numba", raising=False)
     fresh: dict[str, str] = {}
@@ -332,8 +334,7 @@ def test_uncompiled_kernels_run_as_plain_python(monkeypatch, tmp_path):
     many: dict[str, str] = {}
     cli._prepare(many, once=False)
     assert "NUMBA_DISABLE_JIT" not in many
-    (tmp_path / "__pycache__").mkdir(exist_ok=True)
-    (tmp_path / "__pycache__" / "_kernels.run_energy-1.py311.nbi").write_text("")
+    (home / "__pycache__" / "energy.run_energy-1.py311.nbi").write_text("")
     compiled: dict[str, str] = {}
     assert not cli._prepare(compiled, once=True)
     assert "NUMBA_DISABLE_JIT" not in compiled

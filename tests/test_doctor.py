@@ -1,6 +1,7 @@
 """The examination finds this very installation sound, and says so when it is not."""
 
-from fem_impact import cli, doctor, pictures
+from fem_impact import cli, doctor
+from fem_impact.show import pictures
 
 
 def test_this_installation_is_sound(monkeypatch):
@@ -18,7 +19,7 @@ def test_what_fails_comes_with_its_remedy_and_reason(monkeypatch, capsys):
     monkeypatch.setattr(pictures, "can_render", lambda: False)
     assert cli.main(["doctor"]) == 1
     captured = capsys.readouterr()
-    assert "install matplotlib again (OSError: no font)" in " ".join(captured.out.split())
+    assert "reinstall matplotlib (OSError: no font)" in " ".join(captured.out.split())
     assert captured.err == "fem-impact: pictures: not working; see above\n"
 
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact import analytic
+from fem_impact.modes import analytic
 
 AT = (0.3 * 1.55, 0.3)
 SOFT = fi.Contact.hertz(695e3)  # N/m**1.5, the source's marked case

@@ -36,7 +36,7 @@ def samples(category):
 def test_samples_are_read_before_they_are_mutated(category, tmp_path):
     for name, raw in samples(category):
         (tmp_path / name).write_bytes(raw)
-        if category != "mesh" or name in ("binary41.msh", "plate.vtu"):  # the others in test_meshfile
+        if category != "mesh" or name in ("binary41.msh", "plate.vtu"):  # the others in test_mesh_files
             assert fuzz.judged(fuzz.CATEGORIES[category].read, tmp_path / name) == ""
 
 

@@ -12,7 +12,7 @@ import pytest
 from scenes import QUICK
 
 import fem_impact
-from fem_impact import _files
+from fem_impact._base import files
 
 ENDS = {signal.SIGINT: (130, -2), signal.SIGTERM: (143, -15)}  # ours, and Python's own before and after our part
 OVER = 'over = { "striker.mass" = { from = 0.01, to = 0.1, count = 8 }, "contact.exponent" = [0.9, 1.0] }'
@@ -57,14 +57,14 @@ def test_every_command_at_any_moment(tmp_path, name):
 
 def check(folder, name, number, delay):
     (folder / "scene.toml").write_text(SCENE)
-    words, files = COMMANDS[name]
+    words, expected = COMMANDS[name]
     status, said = interrupted(folder, words, number, delay)
     out = folder / "out"
     there = sorted(path.name for path in out.iterdir()) if out.exists() else []
     assert status in (0, *ENDS[number]), (delay, said)
-    assert not list(folder.rglob(f"{_files.PARTIAL}*")), delay
+    assert not list(folder.rglob(f"{files.PARTIAL}*")), delay
     if status == 0 or there:  # it was done before the signal came
-        assert set(files) <= set(there), (delay, there)
+        assert set(expected) <= set(there), (delay, there)
         return
     assert "fem_impact" not in said, (delay, said)  # no trace of ours; Python's own start may leave one of its own
     if status == ENDS[number][0] and said:
@@ -80,7 +80,9 @@ def test_stored_cells_are_kept_and_used(tmp_path):
     for delay in (1.5, 3.0):
         status, said = interrupted(tmp_path, words, signal.SIGINT, delay)
         if status == 130 and said:
-            assert said == "fem-impact: interrupted; finished cells are in store, the same command goes on from there\n"
+            assert (
+                said == "fem-impact: interrupted; finished cells are in store; run the same command again to continue\n"
+            )
     environment = {**os.environ, "PYTHONPATH": str(Path(fem_impact.__file__).parents[1])}
     run = subprocess.run([sys.executable, "-m", "fem_impact", *words.split()], cwd=tmp_path, env=environment)
     assert run.returncode == 0 and (tmp_path / "out" / "map.nc").is_file()
@@ -88,13 +90,13 @@ def test_stored_cells_are_kept_and_used(tmp_path):
 
 def test_undoing_takes_back_the_newest_first_and_nothing_that_is_appearing(tmp_path, monkeypatch):
     seen = []
-    with _files.undoable(lambda: seen.append("first")), _files.undoable(lambda: seen.append("second")):
-        assert _files.undo_all() and seen == ["second", "first"]
-        monkeypatch.setattr(_files, "FINISHING", [tmp_path])
-        assert not _files.undo_all() and len(seen) == 2
-    assert not _files.UNDONE
-    with _files.staged(tmp_path / "new" / "deep") as staging:
+    with files.undoable(lambda: seen.append("first")), files.undoable(lambda: seen.append("second")):
+        assert files.undo_all() and seen == ["second", "first"]
+        monkeypatch.setattr(files, "FINISHING", [tmp_path])
+        assert not files.undo_all() and len(seen) == 2
+    assert not files.UNDONE
+    with files.staged(tmp_path / "new" / "deep") as staging:
         (staging / "half.txt").write_text("half")
-        monkeypatch.setattr(_files, "FINISHING", [])
-        assert _files.undo_all() and not (tmp_path / "new").exists()
+        monkeypatch.setattr(files, "FINISHING", [])
+        assert files.undo_all() and not (tmp_path / "new").exists()
         staging.mkdir(parents=True)  # so that the block may end as if nothing had been

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import fem_impact as fi
-from fem_impact import _check
+from fem_impact._base import check
 
 for extra in ("pyuff", "jinja2", "plotly"):  # the table writes a universal file and a report
     pytest.importorskip(extra)
@@ -73,4 +73,4 @@ def test_the_judge_tells_bare_and_unclear_errors_murmurs_and_broken_numbers_apar
     assert verdict(lambda speed: float("x")).startswith("bare ValueError")
     assert verdict(murmur).startswith("UserWarning")
     assert verdict(lambda speed: fi.mesh.line(-1.0)).startswith("does not name speed")
-    assert verdict(lambda speed: _check.positive("speed", -speed)) == ""
+    assert verdict(lambda speed: check.positive("speed", -speed)) == ""

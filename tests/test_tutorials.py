@@ -16,7 +16,7 @@ def studies_path(monkeypatch):
 
 @pytest.mark.slow
 def test_from_the_outline_to_the_sound(tmp_path, capsys, monkeypatch):
-    from fem_impact import pictures
+    from fem_impact.show import pictures
 
     monkeypatch.setattr(pictures, "can_render", lambda: False)  # the plane is quicker; the picture has its own test
     hits = import_module("tutorial_outline_to_sound").main(tmp_path, tolerance=1e-2)

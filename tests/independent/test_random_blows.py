@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 
 import fem_impact as fi
 
+pytestmark = pytest.mark.xdist_group("blows")  # the same blows serve several tests
 SEED = 20_240
 SURE = 0.1  # [-] of the tolerance that the reference may err by; a case where it may err by more is not judged
 FAIR = 0.5, 20.0  # [-] claim over truth that counts as fair

@@ -1,0 +1,296 @@
+"""Input checks: decide what a valid number is and word every input error the same way."""
+
+import difflib
+import functools
+import importlib
+import inspect
+import math
+import os
+from collections.abc import Callable, Iterable
+from itertools import chain
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, TypeVar, get_args, get_origin
+
+import numpy as np
+
+LONGEST = 500  # [-] characters quoted from a file or another library; longer text is cut
+SHOWN = 80  # [-] characters quoted from a value the user passed; longer text is cut
+REACH = 1e75  # [-] largest number accepted; 1 / REACH is the smallest: the fourth power of both still fits a float
+MOST = 10**9  # [-] largest count accepted: more items would not fit into memory
+LONGEST_NAME = 255  # [byte] longest name of a file or folder on common file systems
+LONGEST_PATH = 4000  # [byte] longest path: Linux allows 4096
+SOURCES = {  # type -> how a user makes one, for error messages
+    "Contact": "fi.Contact.hertz, linear or power",
+    "Figure": "fi.figures",
+    "Material": "fi.Material",
+    "Mesh": "fi.mesh",
+    "Modes": "fi.find_modes, fi.analytic or fi.Modes",
+    "Plan": "fi.plan",
+    "Response": "fi.strike or fi.collide",
+    "Run": "Scene.run",
+    "Scene": "fi.load_scene",
+    "Striker": "fi.Striker.rigid, sphere, stick or flexible",
+    "System": "fi.assemble",
+    "Touch": "fi.Touch",
+}
+
+Function = TypeVar("Function", bound=Callable)
+
+
+class SimulationError(RuntimeError):
+    """A run missed its accuracy or failed; the text says what went wrong and what to change."""
+
+
+def _suffix(unit: str) -> str:
+    return f" {unit}" if unit else ""
+
+
+def shown(value: Any) -> str:
+    """Any value as one short line of text for a message."""
+    try:
+        text = repr(value)
+    except ValueError:  # Python refuses to print an integer with thousands of digits
+        text = f"a {type(value).__name__} too long to print"
+    return line(text)[:SHOWN]
+
+
+def number(name: str, value: Any, unit: str = "", *, reach: float = REACH) -> float:
+    """Return ``value`` as a float no larger than ``reach``, or raise ValueError."""
+    scalar = isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "iuf"
+    if isinstance(value, bool) or not (scalar or isinstance(value, (int, float, np.integer, np.floating))):
+        raise ValueError(f"{name} must be a number{f' in {unit}' if unit else ''}, got {shown(value)}")
+    try:
+        result = float(value)
+    except OverflowError:
+        raise ValueError(f"{name} must be finite, got an integer beyond the range of a float") from None
+    if not math.isfinite(result):
+        raise ValueError(f"{name} must be finite, got {result}{_suffix(unit)}")
+    if abs(result) > reach:
+        raise ValueError(f"{name} must not exceed {reach:g}{_suffix(unit)} in magnitude, got {result:g}{_suffix(unit)}")
+    return result
+
+
+def positive(name: str, value: Any, unit: str = "", *, reach: float = REACH) -> float:
+    """Return ``value`` as a float between 1 / ``reach`` and ``reach``."""
+    result = number(name, value, unit, reach=reach)
+    if result <= 0.0:
+        raise ValueError(f"{name} must be positive, got {result:g}{_suffix(unit)}")
+    if result * reach < 0.999:  # not 1.0: at the limit itself the product may round to just below 1
+        raise ValueError(f"{name} must be at least {1.0 / reach:g}{_suffix(unit)}, got {result:g}{_suffix(unit)}")
+    return result
+
+
+def non_negative(name: str, value: Any, unit: str = "") -> float:
+    """Return ``value`` as a float that is zero or passes `positive`."""
+    result = number(name, value, unit)
+    if result < 0.0:
+        raise ValueError(f"{name} must not be negative, got {result:g}{_suffix(unit)}")
+    return positive(name, result, unit) if result else result
+
+
+def between(name: str, value: Any, low: float, high: float, unit: str = "") -> float:
+    """Return ``value`` as a float with ``low <= value <= high``."""
+    result = number(name, value, unit, reach=math.inf)
+    if not low <= result <= high:
+        raise ValueError(f"{name} must lie between {low:g} and {high:g}{_suffix(unit)}, got {result:g}{_suffix(unit)}")
+    return result
+
+
+def count(name: str, value: Any, low: int = 1, high: int = MOST) -> int:
+    """Return ``value`` as an int from ``low`` to ``high``."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise ValueError(f"{name} must be a whole number, got {shown(value)}")
+    if value < low:
+        raise ValueError(f"{name} must be at least {low}, got {shown(value)}")
+    if value > high:
+        raise ValueError(f"{name} must be at most {high}, got {shown(value)}")
+    return int(value)
+
+
+def flag(name: str, value: Any) -> bool:
+    """Return ``value`` if it is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{name} must be True or False, got {shown(value)}")
+    return bool(value)
+
+
+def instance(name: str, value: Any, *kinds: type) -> None:
+    """Raise ValueError unless ``value`` has one of these types; the message says how to make one."""
+    if not isinstance(value, kinds):
+        wanted = " or ".join(f"a {kind.__name__} of {SOURCES.get(kind.__name__, 'fem_impact')}" for kind in kinds)
+        raise ValueError(f"{name} must be {wanted}, got {shown(value)}")
+
+
+def several(name: str, value: Any, kind: type) -> tuple:
+    """Return ``value`` as a tuple, or raise ValueError unless it is a non-empty list or tuple of ``kind``."""
+    if not isinstance(value, (list, tuple)) or not value:
+        raise ValueError(f"{name} must be a list of {kind.__name__}, got {shown(value)}")
+    for i, item in enumerate(value):
+        instance(f"{name}[{i}]", item, kind)
+    return tuple(value)
+
+
+def path(name: str, value: Any) -> Path:
+    """Return ``value`` as a path, or raise ValueError if it cannot be a file name."""
+    text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
+    try:
+        if isinstance(text, str) and "\0" not in text and 0 < len(os.fsencode(text)) <= LONGEST_PATH:
+            path = Path(text)
+            if all(len(os.fsencode(part)) <= LONGEST_NAME for part in path.parts):
+                return path
+    except UnicodeEncodeError:
+        pass
+    raise ValueError(f"{name} must be the path of a file, got {shown(value)}")
+
+
+def typed(function: Function) -> Function:
+    """Decorator: check arguments against the annotations of the signature.
+
+    It checks the classes in `SOURCES`, paths, callables and bools; `Any` and numbers are left to the function.
+    """
+    tests: dict[str, Callable[[Any], Any]] = {}
+    parameters = inspect.signature(function).parameters
+    for name, parameter in parameters.items():
+        stated = parameter.annotation
+        kinds = get_args(stated) if isinstance(stated, UnionType) else (stated,)
+        ours = tuple(kind for kind in kinds if isinstance(kind, type) and kind.__name__ in SOURCES)
+        if Path in kinds:
+            test: Callable[..., Any] = functools.partial(_path_or, name, ours)
+        elif all(get_origin(kind) is Callable or kind is NoneType for kind in kinds):
+            test = functools.partial(_function, name)
+        elif ours:
+            test = functools.partial(_instance, name, ours)
+        elif stated is bool:
+            test = functools.partial(flag, name)
+        else:
+            continue
+        tests[name] = functools.partial(_unless_none, test) if NoneType in kinds else test
+
+    @functools.wraps(function)
+    def tested(*given: Any, **named: Any) -> Any:
+        for name, value in chain(zip(parameters, given), named.items()):
+            if name in tests:
+                tests[name](value)
+        return function(*given, **named)
+
+    return tested  # type: ignore[return-value]
+
+
+def _unless_none(test: Callable[..., Any], value: Any) -> None:
+    if value is not None:
+        test(value)
+
+
+def _function(name: str, value: Any) -> None:
+    if not callable(value):
+        raise ValueError(f"{name} must be a function, got {shown(value)}")
+
+
+def _path_or(name: str, kinds: tuple[type, ...], value: Any) -> None:
+    if not isinstance(value, kinds):
+        path(name, value)
+
+
+def _instance(name: str, kinds: tuple[type, ...], value: Any) -> None:
+    instance(name, value, *kinds)
+
+
+def array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "", *, lift: bool = False) -> np.ndarray:
+    """Return a new float array of the given shape (None: any length), or raise ValueError; all entries are finite.
+
+    ``lift`` adds missing dimensions in front: a single point (2,) becomes (1, 2).
+    """
+    result = numbers(name, value, unit)
+    if lift and result.ndim < len(shape):
+        result = result.reshape((1,) * (len(shape) - result.ndim) + result.shape)
+    if result.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, result.shape)):
+        wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+        raise ValueError(f"{name} must have shape {wanted}, got {result.shape}")
+    return finite(name, result, unit)
+
+
+def band(name: str, value: Any, unit: str) -> tuple[float, float]:
+    """Return ``value`` as two positive floats in ascending order."""
+    low, high = (positive(name, end, unit) for end in array(name, value, (2,), unit))
+    if low >= high:
+        raise ValueError(f"{name} must be ascending, got {low:g} before {high:g} {unit}")
+    return low, high
+
+
+def finite(name: str, result: np.ndarray, unit: str = "") -> np.ndarray:
+    """Return the array, or raise ValueError if an entry is not finite or exceeds `REACH` in magnitude."""
+    good = np.abs(result) <= REACH
+    if not good.all():
+        where = np.argwhere(~good)[0]
+        index, entry = ", ".join(str(i) for i in where), result[tuple(where)]
+        rule = f"not exceed {REACH:g}{_suffix(unit)} in magnitude" if math.isfinite(entry) else "be finite"
+        raise ValueError(f"{name} must {rule}, got {entry} at index {index}")
+    return result
+
+
+def numbers(name: str, value: Any, unit: str = "") -> np.ndarray:
+    """Return a new float array of any shape, or raise ValueError."""
+    try:
+        raw = np.asarray(value)
+        if raw.dtype.kind in "iufO":
+            return np.array(raw, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ValueError(f"{name} must be numbers{f' in {unit}' if unit else ''}, got {shown(value)}")
+
+
+def field(name: str, function: Any, points: np.ndarray, unit: str = "") -> np.ndarray:
+    """Values (n_points,) of a user's function at points (n_points, ...), or ValueError if it returns anything else."""
+    try:
+        values = np.broadcast_to(numbers(name, function(points), unit), (len(points),))
+    except (TypeError, ValueError, IndexError) as error:
+        raise ValueError(f"{name} must be a function that returns numbers of shape ({len(points)},): {error}") from None
+    return array(name, values, (None,), unit)
+
+
+def ascending(name: str, value: Any, unit: str = "") -> np.ndarray:
+    """Return a new one-dimensional float array, non-negative and in ascending order (equal neighbours allowed)."""
+    result = array(name, value, (None,), unit)
+    if result.size and result[0] < 0.0:
+        raise ValueError(f"{name} must not be negative, got {result[0]:g}{_suffix(unit)}")
+    if (np.diff(result) < 0.0).any():
+        i = int(np.argmax(np.diff(result) < 0.0))
+        raise ValueError(f"{name} must be ascending, got {result[i]:g} before {result[i + 1]:g}{_suffix(unit)}")
+    return result
+
+
+def line(text: str) -> str:
+    """Text from a file or another library, reduced to one printable line of limited length."""
+    safe = "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
+    return safe if len(safe) <= LONGEST else safe[:LONGEST] + " ..."
+
+
+def one_of(name: str, value: Any, allowed: Iterable[str]) -> str:
+    """Return ``value`` if it is one of the allowed words; the error suggests the closest one."""
+    words = list(allowed)
+    if isinstance(value, str) and value in words:
+        return value
+    raise ValueError(f"{name} must be one of {', '.join(words)}, got {shown(value)}{nearest(value, words)}")
+
+
+def nearest(word: Any, known: Iterable[str]) -> str:
+    """Return '; did you mean ...?' for a near miss, else an empty string."""
+    close = difflib.get_close_matches(str(word), list(known), n=1, cutoff=0.6)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def lock_arrays(instance: Any) -> None:
+    """Make every array field of a frozen dataclass read-only; ``frozen=True`` alone does not protect the contents."""
+    for value in vars(instance).values():
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
+
+
+def extra(module: str, name: str, purpose: str) -> Any:
+    """Import a module of an optional extra; ValueError says how to install it."""
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        package = module.partition(".")[0]
+        raise ValueError(f"{purpose} needs {package}: pip install 'fem-impact[{name}]'") from None

@@ -1,0 +1,109 @@
+"""Write a file completely or not at all: write it under a temporary name, then rename it."""
+
+import os
+import secrets
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+PARTIAL = ".partial-"  # prefix of every temporary name: marks what a killed run left behind
+
+UNDONE: list[Callable[[], object]] = []  # functions that remove unfinished work, called newest first
+FINISHING: list[Path] = []  # folders that are receiving their finished files: too late to undo
+
+
+@contextmanager
+def undoable(undo: Callable[[], object]) -> Iterator[None]:
+    """Register ``undo`` while the block runs; `undo_all` calls it if the process has to stop at once."""
+    UNDONE.append(undo)
+    try:
+        yield
+    finally:
+        UNDONE.remove(undo)
+
+
+def undo_all() -> bool:
+    """Remove all unfinished work; return False, and remove nothing, while finished files are being moved into place.
+
+    Made for signal handlers. An exception would not do there: Python swallows one raised inside a finaliser or a
+    library callback.
+    """
+    if FINISHING:
+        return False
+    for undo in reversed(UNDONE):
+        undo()
+    return True
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path beside ``path`` (same suffix); rename it if the block succeeds, otherwise delete it."""
+    path = Path(path)
+    _placed(path)
+    temporary = path.with_name(f"{PARTIAL}{secrets.token_hex(4)}-{path.name}")
+    with undoable(lambda: temporary.unlink(missing_ok=True)):
+        try:
+            yield temporary
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def staged(folder: str | Path) -> Iterator[Path]:
+    """Yield an empty folder; move its files into ``folder`` if the block succeeds.
+
+    ``folder`` and its parents are created first, so a location without write access fails before the work starts. If
+    the block fails, the folders created here are deleted again. Other files in ``folder`` are left alone.
+    """
+    folder = Path(folder)
+    new = [path for path in (folder, *folder.parents) if not path.exists()]
+    staging = folder / f"{PARTIAL}{secrets.token_hex(4)}"
+
+    def undo() -> None:
+        shutil.rmtree(staging, ignore_errors=True)
+        for path in new:
+            if path.is_dir() and not any(path.iterdir()):
+                path.rmdir()
+
+    with undoable(undo):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            staging.mkdir()
+            yield staging
+            FINISHING.append(folder)
+            try:
+                _move(staging, folder)
+            finally:
+                FINISHING.remove(folder)
+            shutil.rmtree(staging, ignore_errors=True)
+        except BaseException:  # includes Ctrl-C, which must leave nothing behind either
+            undo()
+            raise
+
+
+@contextmanager
+def scratch() -> Iterator[Path]:
+    """Yield a temporary folder and delete it when the block ends."""
+    with tempfile.TemporaryDirectory() as name, undoable(lambda: shutil.rmtree(name, ignore_errors=True)):
+        yield Path(name)
+
+
+def _placed(path: Path) -> None:
+    """Refuse to overwrite anything that is not a regular file: the rename would replace a device or a pipe."""
+    if path.is_dir():
+        raise IsADirectoryError(21, "Is a directory", str(path))
+    if path.exists() and not path.is_file():
+        raise FileExistsError(17, "Not a regular file", str(path))
+
+
+def _move(staging: Path, folder: Path) -> None:
+    """Move every file below ``staging`` to the same relative path below ``folder``."""
+    files = sorted(path.relative_to(staging) for path in staging.rglob("*") if path.is_file())
+    for name in files:
+        _placed(folder / name)
+    for name in files:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        os.replace(staging / name, folder / name)

@@ -1,0 +1,134 @@
+"""Read a file with another library in a separate process.
+
+Some parsers hang, fill the memory, crash or open other files. The separate process has limits on time, memory and file
+access, and any failure becomes a one-line error message.
+"""
+
+import importlib
+import io
+import logging
+import os
+import subprocess
+import sys
+from contextlib import redirect_stderr, redirect_stdout, suppress
+from pathlib import Path
+
+import numpy as np
+
+from . import check
+
+PATIENCE = 8.0  # [s] time limit for a small file: a valid file of 1 MB takes less than a tenth of this
+RATE = 2e5  # [byte/s] adds file size / RATE to the time limit: a third of the slowest reader's speed
+HEAD = 4096  # [byte] files whose first HEAD bytes are all zero are refused: parsing 1 GB of zeros takes minutes
+MEMORY = 2 << 30  # [byte] limit on the reader's address space; Python and numpy alone use 0.2 GB
+EXTRAS = {"svgelements": "cad", "ezdxf": "cad", "pyuff": "uff", "h5py": "hdf5"}  # library -> extra
+ACTS = ("socket.", "subprocess.", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.fork", "shutil.", "ftplib.")
+DONE, REFUSED, TOLD = 0, 1, 3  # [-] exit statuses; any other means the reader crashed
+
+
+def read(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.ndarray]:
+    """Call a reader function of this package on a file, in a separate process.
+
+    Parameters
+    ----------
+    path : Path
+    kind : str, what the file should contain, for the message: "a mesh"
+    reader : str, "module:function" of this package; called as function(path, *arguments)
+
+    Returns
+    -------
+    dict
+        Name -> ndarray, as the reader returned them.
+
+    Raises
+    ------
+    ValueError
+        If the reader raises, takes too long or needs too much memory; one line that names the file.
+    """
+    if not path.is_file():
+        raise ValueError(f"path must name {kind}, got {str(path)!r}; there is no such file")
+    with path.open("rb") as file:
+        if not file.read(HEAD).strip(b"\0"):
+            raise ValueError(f"{path.name} cannot be read as {kind} (it is empty or begins with zeros only)")
+    patience = PATIENCE + path.stat().st_size / RATE
+    try:
+        status, out, said = run(path, reader, arguments, patience)
+    except subprocess.TimeoutExpired:
+        status, out = REFUSED, b""
+        said = f"reading took longer than {patience:.0f} s; export it again or in another format".encode()
+    if status != DONE:
+        reason = check.line(said.decode("utf-8", "replace"))
+        if status == TOLD:
+            raise ValueError(reason)
+        reason = reason if status == REFUSED else f"its reader crashed or exceeded {MEMORY >> 30} GB"
+        raise ValueError(f"{path.name} cannot be read as {kind} ({reason})")
+    with np.load(io.BytesIO(out), allow_pickle=False) as arrays:
+        return dict(arrays)
+
+
+def run(path: Path, reader: str, arguments: tuple[str, ...], patience: float) -> tuple[int, bytes, bytes]:
+    """Run the reader process: its exit status, the arrays as npz bytes, and the error text if it failed."""
+    command = [sys.executable, "-m", __name__, str(path), reader, *arguments]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, capture_output=True, timeout=patience, env=environment, check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+def main(path: Path, reader: str, arguments: list[str]) -> tuple[int, bytes]:
+    """The reader process itself: exit status, and the arrays as npz bytes or the error text."""
+    said = io.StringIO()
+    logging.disable()
+    try:
+        with redirect_stdout(said), redirect_stderr(said), np.errstate(all="ignore"):
+            module, function = reader.split(":")
+            arrays = getattr(importlib.import_module(f"fem_impact.{module}"), function)(path, *arguments)
+            if any(array.dtype.hasobject for array in arrays.values()):
+                raise TypeError("it contains objects where numbers should be")
+            out = io.BytesIO()
+            np.savez(out, **arrays)
+            return DONE, out.getvalue()
+    except ImportError as error:
+        extra = f"'fem-impact[{EXTRAS[error.name]}]'" if error.name in EXTRAS else error.name
+        return REFUSED, f"this needs {error.name}: pip install {extra}".encode()
+    except MemoryError:
+        return 2, b""
+    except (Exception, SystemExit) as error:  # parsers raise anything, even SystemExit
+        text = str(error)
+        if isinstance(error, ValueError) and text.startswith(path.name):  # our own message, already complete
+            return TOLD, text.encode("utf-8", "replace")
+        return REFUSED, (said.getvalue().strip() or text or type(error).__name__).encode("utf-8", "replace")
+
+
+def confine(path: Path) -> None:
+    """Restrict this process for good: it may open only files in the folder of ``path`` and Python's own.
+
+    Sockets and child processes are refused too.
+    """
+    homes = [os.path.realpath(place) for place in (str(path.parent), sys.prefix, sys.base_prefix, *sys.path) if place]
+    own = os.path.realpath(path)
+
+    def watch(event: str, arguments: tuple) -> None:
+        if event.startswith(ACTS):
+            raise PermissionError(f"reading it would call {event}")
+        if event == "open" and isinstance(arguments[0], (str, bytes)):
+            place = os.path.realpath(os.fsdecode(arguments[0]))
+            if place != own and not any(place.startswith(home + os.sep) for home in homes):
+                raise PermissionError("it refers to a file outside its folder")
+
+    sys.addaudithook(watch)
+
+
+def limit_memory() -> None:
+    """Limit the address space of this process to `MEMORY` and disable core files."""
+    with suppress(ImportError):  # Windows has no such limit; only the time limit remains there
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+if __name__ == "__main__":
+    limit_memory()
+    status, answer = main(Path(sys.argv[1]), sys.argv[2], sys.argv[3:])
+    (sys.stderr if status else sys.stdout).buffer.write(answer)
+    sys.exit(status)

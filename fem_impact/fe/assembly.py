@@ -1,0 +1,531 @@
+"""Assemble the stiffness and mass matrices of a body from its mesh, section and supports."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import qr
+from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags
+
+from .._base import check
+from ..mesh.facets import Curves
+from ..mesh.meshes import Mesh, aligned
+from . import beam_elements
+from .beam_elements import HermiteSpace
+from .corners import around_corners
+from .elements import Argyris, ArgyrisSpace, Bent, BentMapping, Morley, MorleySpace, numbering, quadrature, triangles
+from .section import Beam, Elastic, Plate
+from .splitting import towards_points
+from .springs import beam_springs, check_masses, edge_springs, plate_springs
+from .supports import Rim, cells_of_facets, constrain
+
+KINDS = ("clamped", "hinged", "free")
+MORLEY_ORDER = 4  # [-] order of the quadrature on Morley elements; exact for products of quadratics
+MASS_ORDER = 10  # [-] order of the quadrature on Argyris elements; exact for products of quintics
+UNEVEN = 20.0  # [-] above this ratio of triangle sizes, eigenvalues are computed from the strain energy
+TINY = 4e-3  # [-] the same if the smallest triangle is below this fraction of the extent
+CHUNK = 256  # [-] triangles whose strain is computed together, to limit memory
+RIGID = 1e-9  # [-] a rigid motion is free if supports suppress less than this share of it, which is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The units used for one body, so that its size, position and stiffness do not affect the accuracy."""
+
+    centre: np.ndarray  # (dimension,) [m]
+    length: float  # [m]
+    stiffness: float  # [N m] on a plate, [N m^2] on a beam
+    inertia: float  # [kg/m^2] on a plate, [kg/m] on a beam
+
+    @property
+    def rate(self) -> float:
+        """Angular frequency [rad/s] of an eigenvalue 1 in the frame."""
+        return float(np.sqrt(self.stiffness / self.inertia) / self.length**2)
+
+    @property
+    def mass(self) -> float:
+        """Mass [kg] of a mass 1 in the frame."""
+        return float(self.inertia * self.length ** len(self.centre))
+
+    def local(self, points: np.ndarray) -> np.ndarray:
+        """Coordinates [-] in the frame of points [m]."""
+        return (points - self.centre) / self.length
+
+
+@dataclass(frozen=True, eq=False)
+class Strain:
+    """Data to compute the strain energy of a plate from curvatures, for meshes so uneven that K loses digits.
+
+    The stiffness of a triangle grows with its size to the power -2, so the rounding of K in the smallest triangles
+    affects the total energy. Curvature squared times area is equally accurate in all triangles.
+    """
+
+    x: np.ndarray  # (n_cells, n_q, 2) quadrature points
+    stiffness: np.ndarray  # (n_cells, n_q, 3, 3) times the quadrature weights
+    springs: csc_matrix  # (n_all, n_all) stiffness of elastic supports and tension
+
+    def energy(self, system: "System", vectors: np.ndarray) -> np.ndarray:
+        """Twice the strain energy (n_modes,) of vectors (n_dofs, n_modes)."""
+        return self._sum(system, vectors, "nqik,nqik->k")
+
+    def products(self, system: "System", vectors: np.ndarray) -> np.ndarray:
+        """Twice the mutual strain energy (n, n) of all pairs of vectors (n_dofs, n)."""
+        return self._sum(system, vectors, "nqik,nqil->kl")
+
+    def _sum(self, system: "System", vectors: np.ndarray, pairs: str) -> np.ndarray:
+        moved = system.expand @ vectors
+        total = np.einsum(pairs.replace("nqi", "n"), moved, self.springs @ moved)
+        for start in range(0, len(self.x), CHUNK):
+            cells = np.arange(start, min(start + CHUNK, len(self.x)))
+            hessian = system.space.functions(cells, self.x[cells], (2,))[0][:, [0, 2, 1]]
+            bend = hessian.transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]  # (n, n_q, 3, n_local)
+            curved = bend @ moved[system.element_dofs[:, cells].T][:, None]  # (n, n_q, 3, n_modes)
+            total += np.einsum(pairs, self.stiffness[cells] @ curved, curved)
+        return total
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Stiffness and mass of a supported body in the units of its frame, and the shape functions."""
+
+    mesh: Mesh
+    section: Plate | Beam
+    supports: dict[str, Any]
+    element: str
+    mass: float  # [kg] of the whole body
+    frame: Frame
+    K: csc_matrix = field(repr=False)  # (n_dofs, n_dofs) [-] for the unknowns not fixed by supports
+    M: csc_matrix = field(repr=False)  # (n_dofs, n_dofs) [-]
+    expand: csr_matrix = field(repr=False)  # (n_all, n_dofs) from these unknowns to all unknowns of the elements
+    element_dofs: np.ndarray = field(repr=False)  # (n_local, n_cells) unknowns of each cell, among all
+    space: ArgyrisSpace | HermiteSpace | MorleySpace = field(repr=False)  # shape functions
+    rigid: np.ndarray = field(repr=False)  # (n_dofs, n_rigid) [-] mass-normalised rigid motions
+    held: np.ndarray = field(repr=False)  # (n_rigid,) unknowns that, when fixed, just prevent rigid motion
+    graded: bool = True  # whether rings of shrinking triangles surround singular corners
+    rim: Rim | None = field(default=None, repr=False)  # boundary of the triangles used, in the frame; None on a beam
+    order: float = np.inf  # [-] power of the element size with which corners let the frequency error fall
+    softness: float = 1.0  # [-] largest inertia over stiffness on the body, in the frame; sets the shortest waves
+    point_masses: tuple = ()  # pairs of point [m] and mass [kg]
+    strain: Strain | None = field(default=None, repr=False)
+    near: np.ndarray | None = None  # (n_points, 2) [m] points towards which the triangles shrink
+    unresolved: float = 0.0  # [-] approximate relative error that singular corners leave on any mesh
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of unknowns not fixed by supports."""
+        return self.K.shape[0]
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        """Whether each point (n_points, dimension) [m] lies on the body, (n_points,) bool."""
+        return self.space.locate(self.frame.local(points))[1]
+
+    def interpolate(self, points: np.ndarray) -> csr_matrix:
+        """Matrix (n_points, n_dofs) [-] from the unknowns to the deflection at points (n_points, dimension) [m]."""
+        full = _interpolation(self.space, self.element_dofs, self.expand.shape[0], self.frame.local(points))
+        return full @ self.expand
+
+
+@check.typed
+def assemble(
+    mesh: Mesh,
+    section: Plate | Beam,
+    supports: dict | None = None,
+    element: str | None = None,
+    *,
+    point_masses: Sequence = (),
+    near: Any = None,
+    graded: bool = True,
+) -> System:
+    """Assemble stiffness and mass of a body supported at its named edges.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    section : Plate on a plane mesh, Beam on a line
+    supports : dict, name of an edge -> "clamped", "hinged", "free" or an Elastic
+        Edges not named are free. "boundary" means all edges; a support of a part overrides that of the whole.
+    element : str, optional
+        For a plate "argyris" (the default; frequencies from above) or "morley" (from below, straight edges only, as
+        a check); for a beam "hermite".
+    point_masses : sequence of (point [m], mass [kg])
+        Masses without extent that move with the plate or beam.
+    near : array_like, shape (n_points, dimension) [m], optional
+        Points where forces act, such as the strike point; triangles shrink towards them, and a beam gets a node there.
+    graded : bool
+        Whether to put rings of shrinking triangles at corners where the supports make the solution singular.
+
+    Returns
+    -------
+    System
+
+    Raises
+    ------
+    ValueError
+        If section and mesh do not match, an edge does not exist or a support is unknown.
+    """
+    kinds = ("argyris", "morley") if mesh.dimension == 2 else ("hermite",)
+    element = kinds[0] if element is None else check.one_of("element", element, kinds)
+    supports = {} if supports is None else supports
+    if callable(getattr(section, "thickness", None)):
+        mesh = aligned(mesh)
+    masses = check_masses(point_masses, mesh.dimension)
+    near = None if near is None else check.array("near", near, (None, mesh.dimension), "m", lift=True)
+    near = None if near is None or not len(near) else near
+    none = np.zeros((0, mesh.dimension))
+    marked = np.vstack([none if near is None else near, none, *(point for point, _ in masses)])  # forces act here
+    if mesh.dimension == 1 and isinstance(section, Beam):
+        made = replace(_assemble_beam(mesh, section, supports, marked[:, 0]), near=near)
+    elif isinstance(section, Plate) and element == "morley":
+        made = _assemble_morley(mesh, section, supports)
+    elif mesh.dimension == 2 and isinstance(section, Plate):
+        order, unresolved, fine = around_corners(mesh, _kinds(support_of_facets(mesh, supports)), section.material.nu)
+        fine = fine if graded else mesh
+        if len(marked):
+            held = np.array([kind != "free" for kind in support_of_facets(fine, supports)])
+            fine = towards_points(fine, marked, held)
+        made = _assemble_plate(fine, section, supports)
+        made = replace(made, mesh=mesh, graded=graded, order=order, near=near, unresolved=unresolved)
+    else:
+        wanted = "Plate" if mesh.dimension == 2 else "Beam"
+        raise ValueError(
+            f"section must be a {wanted} on a mesh of dimension {mesh.dimension}, got {check.shown(section)}"
+        )
+    if near is not None:
+        _check_on(made, "near", near)
+    return _reduced(made if not masses else _loaded(made, masses))
+
+
+def reassemble(system: System, mesh: Mesh) -> System:
+    """Assemble the same body on another mesh."""
+    section, supports, masses = system.section, system.supports, system.point_masses
+    return assemble(
+        mesh, section, supports, system.element, point_masses=masses, near=system.near, graded=system.graded
+    )
+
+
+def support_of_facets(mesh: Mesh, supports: dict) -> list[str | Elastic]:
+    """The support of each facet."""
+    if not isinstance(supports, dict):
+        raise ValueError(f"supports must be a dict of edge name -> support, got {check.shown(supports)}")
+    for name, kind in supports.items():
+        if name not in mesh.edges:
+            raise ValueError(
+                f"supports names edge {name!r}, but the mesh has the edges {', '.join(sorted(mesh.edges)):.300}"
+                + check.nearest(name, mesh.edges)
+            )
+        if not isinstance(kind, Elastic):
+            check.one_of(f"supports[{name!r}]", kind, KINDS)
+    kinds: list[str | Elastic] = ["free"] * len(mesh.facets)
+    stated: dict[int, str] = {}
+    for name in sorted(supports, key=lambda name: -len(mesh.edges[name])):
+        mine = mesh.edges[name].tolist()
+        for facet in mine:
+            before = stated.get(facet)
+            nested = before is not None and set(mine) < set(mesh.edges[before].tolist())
+            if before is not None and not nested and kinds[facet] != supports[name]:
+                raise ValueError(
+                    f"supports must agree where edges overlap; edge {before!r} and edge {name!r} overlap but differ"
+                )
+            kinds[facet], stated[facet] = supports[name], name
+    return kinds
+
+
+def _kinds(supports: list[str | Elastic]) -> list[str]:
+    """The kind of support of each facet; an elastic support counts as free because it only adds stiffness."""
+    return ["free" if isinstance(kind, Elastic) else kind for kind in supports]
+
+
+def _scatter(local: np.ndarray, element_dofs: np.ndarray, n_all: int) -> csc_matrix:
+    """Add element matrices (n_cells, n_local, n_local) into a sparse one (n_all, n_all)."""
+    rows = np.broadcast_to(element_dofs.T[:, :, None], local.shape)
+    columns = np.broadcast_to(element_dofs.T[:, None, :], local.shape)
+    held = local != 0.0  # drop the zeros between bubbles of a beam
+    return coo_matrix((local[held], (rows[held], columns[held])), shape=(n_all, n_all)).tocsc()
+
+
+@dataclass(frozen=True, eq=False)
+class _Raw:
+    """The fields of a System for all unknowns, before supports are applied to the matrices."""
+
+    mesh: Mesh
+    section: Plate | Beam
+    supports: dict[str, Any]
+    mass: float
+    frame: Frame
+    K: csc_matrix
+    M: csc_matrix
+    springs: csc_matrix  # (n_all, n_all) stiffness of elastic supports and tension
+    expand: csr_matrix
+    project: csr_matrix
+    element_dofs: np.ndarray
+    space: Any
+    softness: float
+    rim: Rim | None = None
+    graded: bool = True
+    order: float = np.inf
+    point_masses: tuple = ()
+    element: str = "argyris"
+    strain: Strain | None = None
+    near: np.ndarray | None = None
+    unresolved: float = 0.0
+
+    def interpolate(self, points: np.ndarray) -> csr_matrix:
+        """Matrix (n_points, n_all) [-] from all unknowns to the deflection at points (n_points, dimension) [m]."""
+        return _interpolation(self.space, self.element_dofs, self.expand.shape[0], self.frame.local(points))
+
+
+def _interpolation(space: Any, element_dofs: np.ndarray, n_all: int, local: np.ndarray) -> csr_matrix:
+    cells = space.locate(local)[0]
+    values = space.functions(cells, local[:, None, :], (0,))[0][:, 0]  # (n_points, n_local)
+    dofs = element_dofs[:, cells].T
+    rows = np.repeat(np.arange(len(local)), dofs.shape[1])
+    return csr_matrix((values.ravel(), (rows, dofs.ravel())), shape=(len(local), n_all))
+
+
+def _check_on(raw: _Raw, name: str, points: np.ndarray) -> None:
+    """Raise ValueError unless every point lies on the body."""
+    inside = raw.space.locate(raw.frame.local(points))[1]
+    if not inside.all():
+        where = ", ".join(f"{x:g}" for x in points[int(np.argmin(inside))])
+        raise ValueError(f"{name} must lie on the body, got ({where}) m")
+
+
+def _loaded(raw: _Raw, masses: list[tuple[np.ndarray, float]]) -> _Raw:
+    """The same body with point masses added."""
+    points, weights = np.array([point for point, _ in masses]), np.array([mass for _, mass in masses])
+    for i, point in enumerate(points):
+        _check_on(raw, f"point of point_masses[{i}]", point[None])
+    rows = raw.interpolate(points)
+    M = (raw.M + rows.T @ diags(weights / raw.frame.mass) @ rows).tocsc()
+    return replace(raw, M=M, mass=raw.mass + float(weights.sum()), point_masses=tuple(masses))
+
+
+def _rigid(raw: _Raw) -> np.ndarray:
+    """Rigid motions (n_dofs, n_rigid) that the supports allow without any strain energy."""
+    every = raw.space.linear(raw.element_dofs, raw.expand.shape[0])
+    left = raw.project @ every
+    lost = every - raw.expand @ left
+    scale = np.abs(every).max()
+    _, lengths, turn = np.linalg.svd(lost.T @ lost / scale**2)
+    kept = turn[np.sqrt(lengths) < RIGID * np.sqrt(len(every))].T  # (n_motions, n_rigid)
+    if raw.springs.nnz and kept.shape[1]:
+        moving = every @ kept
+        energy, turn = np.linalg.eigh(moving.T @ (raw.springs @ moving))
+        kept = kept @ turn[:, energy <= RIGID * energy[-1]]
+    return left @ kept
+
+
+def _reduced(raw: _Raw) -> System:
+    """Apply the supports to the matrices and find the rigid motions they allow."""
+    across = _across(raw)
+    expand, rigid = raw.expand[:, across].tocsr(), _rigid(raw)[across]
+    K, M = (expand.T @ (raw.K + raw.springs) @ expand).tocsc(), (expand.T @ raw.M @ expand).tocsc()
+    size = 1.0 / np.sqrt(K.diagonal())
+    even = diags(size)
+    K, M, expand = (even @ K @ even).tocsc(), (even @ M @ even).tocsc(), (expand @ even).tocsr()
+    held = qr(rigid.T, pivoting=True, mode="economic")[2][: rigid.shape[1]]
+    rigid = rigid / size[:, None]
+    if rigid.shape[1]:
+        factor = np.linalg.cholesky(rigid.T @ (M @ rigid))
+        rigid = np.linalg.solve(factor, rigid.T).T
+    return System(
+        raw.mesh,
+        raw.section,
+        raw.supports,
+        raw.element,
+        raw.mass,
+        raw.frame,
+        0.5 * (K + K.T).tocsc(),
+        0.5 * (M + M.T).tocsc(),
+        expand,
+        raw.element_dofs,
+        raw.space,
+        rigid,
+        held,
+        raw.graded,
+        raw.rim,
+        raw.order,
+        raw.softness,
+        raw.point_masses,
+        raw.strain,
+        raw.near,
+        raw.unresolved,
+    )
+
+
+def _across(raw: _Raw) -> np.ndarray:
+    """Order of the unknowns (n_dofs,) along the x axis, for a fast factorisation.
+
+    In the order left by dividing triangles into four, the minimum degree ordering takes five times as long.
+    """
+    n_all = raw.expand.shape[0]
+    origin = raw.space.origin if raw.mesh.dimension == 2 else raw.space.start[:, None]
+    place, weight = np.zeros(n_all), np.zeros(n_all)
+    for row in raw.element_dofs:
+        np.add.at(place, row, origin[:, 0])
+        np.add.at(weight, row, 1.0)
+    used = abs(raw.expand).sign()
+    shares = np.asarray(used.sum(axis=0)).ravel()
+    return np.argsort((used.T @ (place / np.maximum(weight, 1.0))) / shares, kind="stable")
+
+
+def _centred(mesh: Mesh) -> tuple[np.ndarray, float, np.ndarray]:
+    """Centre (dimension,) and largest side [m] of the bounding box of a mesh, and its points in the frame."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    centre, length = 0.5 * (low + high), float((high - low).max())
+    return centre, length, (mesh.points - centre) / length
+
+
+def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, marked: np.ndarray) -> _Raw:
+    """Assemble a beam; ``marked`` are places (n,) [m] where the shear force jumps."""
+    centre, length, points = _centred(mesh)
+
+    def fields(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        place = (centre + length * x[:, None]).clip(mesh.points.min(), mesh.points.max())
+        return section.stiffness(place), section.inertia(place)
+
+    kinds = support_of_facets(mesh, supports)
+    held = [kind in ("clamped", "hinged") for kind in kinds]
+    ends = points[mesh.facets[:, 0], 0]
+    nodes = beam_elements.nodes(points[:, 0], (marked - centre[0]) / length, ends[held])
+    line = beam_elements.segments(beam_elements.divisions(fields, nodes))
+    space = HermiteSpace(line)
+    K, M, stiffness, inertia, dx = beam_elements.integrals(space, fields)
+    frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
+    dofs, n_all = beam_elements.numbering(line, space)
+    fixed: list[int] = []
+    sprung: list[tuple[tuple[int, int], Elastic]] = []
+    for vertex, kind in zip(mesh.facets[:, 0], kinds):
+        left = points[vertex, 0] <= points[:, 0].min()
+        deflection, slope = (dofs[:2, 0] if left else dofs[2:4, -1]).tolist()
+        if isinstance(kind, Elastic):
+            sprung.append(((deflection, slope), kind))
+        else:
+            fixed += {"clamped": [deflection, slope], "hinged": [deflection], "free": []}[kind]
+    free = np.setdiff1d(np.arange(n_all), fixed)
+    expand = csr_matrix((np.ones(len(free)), (free, np.arange(len(free)))), shape=(n_all, len(free)))
+    springs = beam_springs([at for at, _ in sprung], [kind for _, kind in sprung], frame, n_all)
+    matrices = _scatter(K / frame.stiffness, dofs, n_all), _scatter(M / frame.inertia, dofs, n_all), springs.tocsc()
+    softness = float((inertia / stiffness).max()) * frame.stiffness / frame.inertia
+    return _Raw(
+        mesh,
+        section,
+        supports,
+        float((inertia * dx).sum()) * length,
+        frame,
+        *matrices,
+        expand,
+        expand.T.tocsr(),
+        dofs,
+        space,
+        softness,
+        element="hermite",
+    )
+
+
+def _fields(section, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness (n_cells, n_q, ...) and inertia (n_cells, n_q) at points (n_cells, n_q, dimension)."""
+    flat = points.reshape(-1, points.shape[-1])
+    stiffness, inertia = section.stiffness(flat), section.inertia(flat)
+    return stiffness.reshape(*points.shape[:2], *stiffness.shape[1:]), inertia.reshape(points.shape[:2])
+
+
+def _bent(mesh: Mesh, centre: np.ndarray, length: float, points: np.ndarray, plane: Any) -> Bent | None:
+    """Bending of the triangles at curved facets onto the true edge; None if every edge is straight."""
+    curved = mesh.curved
+    if not curved.any():
+        return None
+    facets = mesh.facets[curved]
+    middles = (mesh.middles[curved] - centre) / length
+    curves = Curves(points[facets], middles, mesh.tangents[curved], mesh.curvatures[curved] * length)
+    return Bent(curves, facets, *cells_of_facets(facets, plane.t.T), plane.t.T)
+
+
+def _assemble_plate(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
+    centre, length, points = _centred(mesh)
+    plane = triangles(points, mesh.cells)
+    bent = _bent(mesh, centre, length, points, plane)
+    mapping = None if bent is None else BentMapping(plane, bent)
+    space = ArgyrisSpace(plane, bent)
+    element = Argyris(space)
+    x, dx = quadrature(plane, element, MASS_ORDER, mapping)
+    stiffness, inertia = _fields(section, centre + length * x)
+    frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
+    stiffness, inertia = stiffness / frame.stiffness, inertia / frame.inertia
+    softness = float((inertia / np.minimum(stiffness[..., 0, 0], stiffness[..., 1, 1])).max())
+    K, M = np.empty((len(x), 21, 21)), np.empty((len(x), 21, 21))
+    plain = ~space.curved & (not callable(section.thickness))
+    if plain.any():
+        cells = np.flatnonzero(plain)
+        K[cells], M[cells] = space.uniform(cells, stiffness[0, 0], MASS_ORDER)
+    if not plain.all():
+        cells = np.flatnonzero(~plain)
+        value, hessian = space.functions(cells, x[cells], (0, 2))
+        bend = hessian[:, [0, 2, 1]].transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]  # (n, n_q, 3, 21)
+        moment = (stiffness[cells] * dx[cells, :, None, None]) @ bend
+        shape = (len(cells), 3 * x.shape[1], 21)
+        K[cells] = bend.reshape(shape).transpose(0, 2, 1) @ moment.reshape(shape)
+        M[cells] = (value * (inertia * dx)[cells, :, None]).transpose(0, 2, 1) @ value
+    held = support_of_facets(mesh, supports)
+    elastic = edge_springs(held, frame)
+    rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, _kinds(held), elastic)
+    expand, project, dofs = constrain(rim, space.vertices, *numbering(plane, element))
+    n_all = expand.shape[0]
+    springs = csc_matrix((n_all, n_all))
+    on = np.flatnonzero(elastic.any(axis=1))
+    if on.size:
+        cells = cells_of_facets(mesh.facets[on], space.vertices)[0]
+        springs = _scatter(plate_springs(space, mesh.facets[on], cells, elastic[on]), dofs[:, cells], n_all)
+    if section.tension:
+        if "free" in held:
+            raise ValueError("tension needs every edge supported, because a free edge cannot be pulled; add supports")
+        slope = space.functions(np.arange(len(x)), x, (1,))[0].transpose(0, 2, 1, 3)  # (n_cells, n_q, 2, 21)
+        pulled = section.tension * length**2 / frame.stiffness * dx[..., None, None] * slope
+        shape = (len(x), 2 * x.shape[1], 21)
+        springs = springs + _scatter(slope.reshape(shape).transpose(0, 2, 1) @ pulled.reshape(shape), dofs, n_all)
+    matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), springs
+    mass = float((inertia * dx).sum()) * frame.mass
+    made = _Raw(mesh, section, supports, mass, frame, *matrices, expand, project, dofs, space, softness, rim)
+    area = np.abs(np.linalg.det(space.jacobian))
+    uneven = area.min() < max(area.max() / UNEVEN**2, TINY**2)
+    return replace(made, strain=Strain(x, stiffness * dx[..., None, None], springs.tocsc())) if uneven else made
+
+
+def _assemble_morley(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
+    if mesh.curved.any():
+        raise ValueError("element 'morley' needs straight edges; use 'argyris', or a polygon")
+    held = support_of_facets(mesh, supports)
+    if section.tension or not all(isinstance(kind, str) for kind in held):
+        raise ValueError("element 'morley' does not allow tension or elastic supports; use 'argyris'")
+    centre, length, points = _centred(mesh)
+    plane = triangles(points, mesh.cells)
+    space = MorleySpace(plane)
+    x, dx = quadrature(plane, Morley(), MORLEY_ORDER)
+    stiffness, inertia = _fields(section, centre + length * x)
+    frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
+    stiffness, inertia = stiffness / frame.stiffness, inertia / frame.inertia
+    value, hessian = space.functions(np.arange(len(x)), x, (0, 2))
+    bend = hessian[:, [0, 2, 1]].transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]  # (n, n_q, 3, 6)
+    moment = (stiffness * dx[..., None, None]) @ bend
+    shape = (len(x), 3 * x.shape[1], 6)
+    K = bend.reshape(shape).transpose(0, 2, 1) @ moment.reshape(shape)
+    M = (value * (inertia * dx)[..., None]).transpose(0, 2, 1) @ value
+    dofs, n_all = numbering(plane, Morley())
+    cells, sides = cells_of_facets(mesh.facets, space.vertices)
+    fixed = np.zeros(n_all, bool)
+    for facet, kind in enumerate(held):
+        if kind != "free":
+            corner = np.isin(space.vertices[cells[facet]], mesh.facets[facet])
+            fixed[dofs[:3, cells[facet]][corner]] = True
+        if kind == "clamped":
+            fixed[dofs[3 + sides[facet], cells[facet]]] = True
+    free = np.flatnonzero(~fixed)
+    if not free.size:
+        raise ValueError("supports fix every unknown of this mesh; refine it")
+    expand = csr_matrix((np.ones(len(free)), (free, np.arange(len(free)))), shape=(n_all, len(free)))
+    matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), csc_matrix((n_all, n_all))
+    mass = float((inertia * dx).sum()) * frame.mass
+    softness = float((inertia / np.minimum(stiffness[..., 0, 0], stiffness[..., 1, 1])).max())
+    made = _Raw(mesh, section, supports, mass, frame, *matrices, expand, expand.T.tocsr(), dofs, space, softness)
+    return replace(made, order=2.0, element="morley")

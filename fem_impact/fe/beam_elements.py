@@ -1,0 +1,261 @@
+"""Beam elements of high degree, placed so that the section is smooth within each of them.
+
+A thousand modes would take thousands of cubic elements, and the rounding error of their stiffness, which grows with
+the fourth power of their number, would spoil the lowest modes. One element of degree 32 resolves ten half waves to
+rounding.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from skfem import Dofs, ElementLineHermite, MeshLine
+from skfem.element import DiscreteField
+
+from ..mesh.facets import powers
+
+DEGREE = 32  # [-] polynomial degree of the deflection within an element
+QUADRATURE = 48  # [-] Gauss points of an element; exact for products of two shapes and a section of degree 31
+ON_BODY = 1e-9  # [-] distance in the frame by which rounding may put a point outside its element
+APART = 0.01  # [-] nodes closer than this fraction of the beam cause a rounding error of 1e-9 in the stiffness
+SAME_NODE = 1e-9  # [-] the same at a held end, where deflections are so small that rounding does no harm
+ROUNDED = 1e-15  # [-] rounding error of an element as long as the beam; grows as 1 / length**3 for shorter ones
+SMOOTH = 12  # [-] degree of the polynomial that must fit the section within an element
+RESOLVED = 1e-9  # [-] largest error of this fit, relative to the largest value in the element
+NARROW = 1e-9  # [-] accuracy with which a step or kink is located, as a fraction of the beam
+NARROWEST = 1e-6  # [-] smallest element made to fit the section, as a fraction of the beam
+ROUNDING = 1e-14  # [-] a smaller misfit is just rounding
+MOST_BREAKS = 2000  # [-] most places where the section may jump or kink
+
+
+class HermiteSpace:
+    """Shape functions of the elements of one line: deflection and slope at both ends, and bubbles in between.
+
+    The bubbles are the modes of the element clamped at both ends, so they do not couple to each other.
+    """
+
+    def __init__(self, mesh: MeshLine) -> None:
+        ends = mesh.p[0, mesh.t]  # (2, n_cells)
+        self.start, self.length = ends[0], ends[1] - ends[0]
+        self.bubbles = np.broadcast_to(np.eye(DEGREE - 3), (len(self.start), DEGREE - 3, DEGREE - 3))  # Legendre
+
+    def decouple(self, K: np.ndarray, M: np.ndarray) -> None:
+        """Turn the bubbles into modes of the clamped elements and update K and M (n_cells, n_local, n_local)."""
+        # scaled to unit stiffness, because the low modes, which matter, then keep more digits than with unit mass
+        back = np.linalg.inv(np.linalg.cholesky(K[:, 4:, 4:])).transpose(0, 2, 1)
+        values, turn = np.linalg.eigh(back.transpose(0, 2, 1) @ M[:, 4:, 4:] @ back)
+        self.bubbles = turn = back @ turn
+        for matrix, diagonal in ((K, np.ones_like(values)), (M, values)):
+            matrix[:, :4, 4:] = matrix[:, :4, 4:] @ turn
+            matrix[:, 4:, :4] = matrix[:, :4, 4:].transpose(0, 2, 1)
+            matrix[:, 4:, 4:] = diagonal[..., None] * np.eye(DEGREE - 3)
+
+    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+        """Derivatives (n, n_q, DEGREE + 1) of order 0 to 2 of the shapes of cells (n,) at points (n, n_q, 1)."""
+        h = self.length[cells][:, None]
+        s = (points[..., 0] - self.start[cells][:, None]) / h
+        cubic = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], float)
+        legendre = _legendre(2.0 * s - 1.0)
+        j = np.arange(2, DEGREE - 1)
+        norm = np.sqrt(j + 0.5)
+        result = []
+        for order in orders:
+            ends = powers(s, 3, order) @ cubic.T
+            ends[..., 1::2] *= h[..., None]
+            bubbles = legendre[..., j]
+            if order < 2:
+                bubbles = (legendre[..., j + 1] - legendre[..., j - 1]) / (2 * j + 1)
+            if order == 0:
+                above = (legendre[..., j + 2] - legendre[..., j]) / (2 * j + 3)
+                below = (legendre[..., j] - legendre[..., j - 2]) / (2 * j - 1)
+                bubbles = (above - below) / (2 * j + 1)
+            bubbles = (norm * bubbles * 2.0**order) @ self.bubbles[cells]
+            whole = np.concatenate([ends, bubbles], axis=-1)
+            result.append(whole / h[..., None] ** order)
+        return result
+
+    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cell that holds each point (n, 1), or else the nearest one, and whether the point lies in it."""
+        low = np.minimum(self.start, self.start + self.length)
+        order = np.argsort(low)
+        cell = order[np.clip(np.searchsorted(low[order], points[:, 0], side="right") - 1, 0, len(low) - 1)]
+        s = (points[:, 0] - self.start[cell]) / self.length[cell]
+        slack = ON_BODY / np.abs(self.length[cell])
+        return cell, (s >= -slack) & (s <= 1.0 + slack)
+
+    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+        """Unknowns (n_all, 2) of the deflections 1 and x, the rigid motions of a beam."""
+        result = np.zeros((n_all, 2))
+        for k in range(2):
+            result[element_dofs[2 * k], 0] = 1.0
+            result[element_dofs[2 * k], 1] = self.start + k * self.length
+            result[element_dofs[2 * k + 1], 1] = 1.0
+        return result
+
+
+def _legendre(x: np.ndarray) -> np.ndarray:
+    """Legendre polynomials of degree 0 to DEGREE + 1 at points (...), shape (..., DEGREE + 2)."""
+    result = np.empty((*x.shape, DEGREE + 2))
+    result[..., 0], result[..., 1] = 1.0, x
+    for n in range(1, DEGREE + 1):
+        result[..., n + 1] = ((2 * n + 1) * x * result[..., n] - n * result[..., n - 1]) / (n + 1)
+    return result
+
+
+class Hermite(ElementLineHermite):
+    """scikit-fem's Hermite element with the shape functions of `HermiteSpace`; make a new one for each mesh."""
+
+    interior_dofs = DEGREE - 3
+
+    def __init__(self, space: HermiteSpace) -> None:
+        self.space = space
+
+    def gbasis(self, mapping, X, i, tind=None):
+        cells = np.arange(len(self.space.start)) if tind is None else tind
+        points = mapping.F(X, tind=tind).transpose(1, 2, 0)
+        value, slope, bend = (f[..., i] for f in self.space.functions(cells, points, (0, 1, 2)))
+        return (DiscreteField(value=value, grad=slope[None], hess=bend[None, None]),)
+
+
+def segments(nodes: np.ndarray) -> MeshLine:
+    """Make scikit-fem's mesh of line elements between ascending nodes (n,)."""
+    return MeshLine(nodes[None], np.stack([np.arange(len(nodes) - 1), np.arange(1, len(nodes))]))
+
+
+def nodes(points: np.ndarray, marked: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """Ascending nodes of a beam: its ends, the places ``marked`` where the shear force jumps, and points of the mesh.
+
+    Rounding in the stiffness of a short element spoils that of the others. So a mesh point close to a marked place is
+    left out, and a marked place close to an end or to another marked place gets no node: over such a short distance
+    the jump matters little. Only near a held end are nodes allowed much closer.
+    """
+    points = np.sort(points)
+    kept = [points[0], points[-1]]
+    apart = min(APART * (points[-1] - points[0]), 0.5 * np.diff(points).min())
+    for place in marked:
+        off = np.abs(place - np.array(kept))
+        if off.min() > (SAME_NODE if kept[off.argmin()] in held else apart):
+            kept.append(place)
+    between = points[np.abs(points[:, None] - kept).min(axis=1) > apart]
+    return np.unique(np.append(kept, between))
+
+
+def rounding(space: Any) -> float:
+    """Relative error of static deflections caused by rounding in the stiffness of the shortest element."""
+    return float(ROUNDED / max(np.abs(space.length).min(), APART) ** 3)
+
+
+def integrals(space: HermiteSpace, fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> Any:
+    """Element stiffness and mass (n_cells, n_local, n_local), and the two fields and Gauss weights (n_cells, n_q).
+
+    ``fields`` returns bending stiffness and mass per length at places (n,).
+    """
+    x, dx = quadrature(space)
+    stiffness, inertia = (field.reshape(x.shape) for field in fields(x.ravel()))
+    value, bend = space.functions(np.arange(len(x)), x[..., None], (0, 2))
+    K = bend.transpose(0, 2, 1) @ (bend * (stiffness * dx)[..., None])
+    M = value.transpose(0, 2, 1) @ (value * (inertia * dx)[..., None])
+    space.decouple(K, M)
+    return K, M, stiffness, inertia, dx
+
+
+def quadrature(space: HermiteSpace) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points of every element and their weights, both (n_cells, n_q)."""
+    node, weight = np.polynomial.legendre.leggauss(QUADRATURE)
+    return space.start[:, None] + 0.5 * (node + 1.0) * space.length[:, None], 0.5 * weight * space.length[:, None]
+
+
+def numbering(line: MeshLine, space: HermiteSpace) -> tuple[np.ndarray, int]:
+    """Numbers of the unknowns of each element, (n_local, n_cells), and how many unknowns there are."""
+    dofs = Dofs(line, Hermite(space))
+    return dofs.element_dofs, dofs.N
+
+
+def divisions(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes: np.ndarray) -> np.ndarray:
+    """Add nodes until a polynomial fits the section between any two neighbours; return them ascending.
+
+    Steps and kinks of stiffness and inertia are found by halving every interval that no polynomial fits. An interval
+    that still has a bad fit when it is as narrow as NARROW contains a step or kink and gets a node.
+    """
+    span = nodes[-1] - nodes[0]
+    breaks = _breaks(fields, nodes)
+    breaks = breaks[np.abs(breaks[:, None] - nodes).min(axis=1, initial=np.inf) > 4.0 * NARROW * span]
+    every = np.sort(np.append(nodes, breaks))
+    low, high, margin = every[:-1], every[1:], NARROW * span  # skip the inexactly located kink at a node
+    while low.size:
+        rough = (_misfit(fields, low + margin, high - margin) > RESOLVED) & (high - low > NARROWEST * span)
+        middle = 0.5 * (low + high)[rough]
+        every = np.append(every, middle)
+        low, high = np.append(low[rough], middle), np.append(middle, high[rough])
+    return np.sort(every)
+
+
+def _breaks(fields: Callable, nodes: np.ndarray) -> np.ndarray:
+    """Places (n,) where the section jumps or kinks, each to within NARROW times the length of the beam."""
+    span, low, high = nodes[-1] - nodes[0], nodes[:-1], nodes[1:]
+    found: list[float] = []
+    while low.size:
+        # at a kink the misfit falls only in proportion to the interval; for a smooth section it falls much faster
+        rough = _misfit(fields, low, high) > np.maximum(RESOLVED * (high - low) / span, ROUNDING)
+        low, high = low[rough], high[rough]
+        found += (0.5 * (low + high)[high - low < NARROW * span]).tolist()
+        low, high = low[high - low >= NARROW * span], high[high - low >= NARROW * span]
+        if len(low) + len(found) > MOST_BREAKS:
+            raise ValueError(f"section must have at most {MOST_BREAKS} steps and kinks, got more; make it smoother")
+        middle = 0.5 * (low + high)
+        low, high = np.append(low, middle), np.append(middle, high)
+    places = np.array(sorted(found))
+    return places[np.append(True, np.diff(places) > 4.0 * NARROW * span)[: len(places)]]  # drop doubles
+
+
+def _misfit(fields: Callable, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Relative misfit (n,) of stiffness, its inverse and inertia to polynomials of degree SMOOTH on intervals."""
+    count = 2 * SMOOTH + 1
+    node = np.cos(np.pi * (np.arange(count) + 0.5) / count)  # Chebyshev
+    x = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * node
+    stiffness, inertia = (field.reshape(x.shape) for field in fields(x.ravel()))
+    vander = np.polynomial.chebyshev.chebvander(node, SMOOTH)
+    missed = np.eye(count) - vander @ np.linalg.pinv(vander)
+    every = np.stack([stiffness, 1.0 / stiffness, inertia])
+    return (np.abs(every @ missed.T).max(axis=2) / np.abs(every).max(axis=2)).max(axis=0)
+
+
+def energy_errors(
+    space: HermiteSpace, stiffness: np.ndarray, curvature: np.ndarray, load: np.ndarray, moments: np.ndarray
+) -> np.ndarray:
+    """Error (n,) of the squared energy norm of solutions, from moments in equilibrium with the loads.
+
+    The bending moment that balances a load is its double integral plus a linear function. The least difference
+    between the moment of the solution and any such moment bounds the error (Prager and Synge).
+
+    Parameters
+    ----------
+    space : HermiteSpace
+    stiffness : ndarray, shape (n_cells, n_q), at the points of `quadrature`
+    curvature : ndarray, shape (n_cells, n_q, n), of n solutions
+    load : ndarray, shape (n_cells, n_q, n), force per length
+    moments : ndarray, shape (n_cells, n_q, n), of point forces: each force times the distance beyond its point
+    """
+    x, dx = quadrature(space)
+    half, upto = 0.5 * space.length[:, None, None], _running_integral()
+    each = np.einsum("eq,eqk->ek", dx, load)
+    before = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)[:-1]])
+    shear = before[:, None] + half * (upto @ load)
+    each = np.einsum("eq,eqk->ek", dx, shear)
+    before = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)[:-1]])
+    missed = stiffness[..., None] * curvature - before[:, None] - half * (upto @ shear) - moments
+    weight = (dx / stiffness).ravel()
+    flat = missed.reshape(weight.size, -1)
+    free = np.sqrt(weight)[:, None] * np.column_stack([np.ones(weight.size), x.ravel()])
+    rest = np.sqrt(weight)[:, None] * flat
+    rest -= free @ np.linalg.lstsq(free, rest, rcond=None)[0]
+    return (rest**2).sum(axis=0)
+
+
+def _running_integral() -> np.ndarray:
+    """Matrix (n_q, n_q) from values at the Gauss points to the integral of their polynomial from -1 to each point."""
+    node, weight = np.polynomial.legendre.leggauss(QUADRATURE)
+    values = np.polynomial.legendre.legvander(node, QUADRATURE)
+    k = np.arange(1, QUADRATURE)
+    integrals = np.column_stack([node + 1.0, (values[:, 2:] - values[:, :-2]) / (2 * k + 1)])
+    return integrals @ ((np.arange(QUADRATURE)[:, None] + 0.5) * values[:, :-1].T * weight)

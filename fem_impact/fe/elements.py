@@ -1,0 +1,341 @@
+"""Triangular elements whose shape functions stay accurate for any size, shape and position of the triangle."""
+
+from itertools import product
+
+import numpy as np
+from scipy.spatial import cKDTree
+from skfem import Dofs, ElementTriArgyris, ElementTriMorley, MappingAffine, MeshTri
+from skfem.element import DiscreteField
+from skfem.quadrature import get_quadrature
+
+from ..mesh.facets import Curves, powers
+
+EXPONENTS = np.array([(i, j) for i in range(6) for j in range(6 - i)])  # the 21 monomials of degree 5
+SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in scikit-fem's order
+ON_BODY = 1e-9  # [-] share of a triangle's size by which rounding may put a point outside it
+NEAR_CURVE = 1e-5  # [-] the same at curved edges: the mesh is closer to the curve than this share of a triangle
+CANDIDATES = 8  # [-] nearest triangles searched first; if none holds the point, all are searched
+REACH = 0.5  # [-] share of a triangle's size; no curved edge bulges this far
+CURVE_STEPS = 12  # [-] fixed-point steps to find the coordinates of a point in a curved triangle
+REFERENCE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) - 1.0 / 3.0  # corners in local coordinates
+DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+
+
+def monomials(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
+    """Derivative of the 21 monomials at local coordinates (..., 2), shape (..., 21)."""
+    x, y = powers(local[..., 0], 5, dx), powers(local[..., 1], 5, dy)
+    return x[..., EXPONENTS[:, 0]] * y[..., EXPONENTS[:, 1]]
+
+
+class Bent:
+    """Map that bends the triangles at curved facets onto the true curve and leaves the others straight."""
+
+    def __init__(self, curves: Curves, facets: np.ndarray, cells: np.ndarray, sides: np.ndarray, vertices) -> None:
+        self.curves, self.cells, self.sides = curves, cells, sides
+        corner = vertices[cells]  # (n, 3)
+        self.start = (corner == facets[:, :1]).argmax(axis=1)
+        self.stop = (corner == facets[:, 1:]).argmax(axis=1)
+        self.of_side = np.full(vertices.shape, -1)
+        self.of_side[cells, sides] = np.arange(len(cells))
+
+    def shift(self, cells: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement (n, n_q, 2) of cells (n,) at area coordinates (n, n_q, 3), and its gradient (n, n_q, 2, 3)."""
+        moved, gradient = np.zeros((*area.shape[:2], 2)), np.zeros((*area.shape[:2], 2, 3))
+        for side in range(3):
+            here = np.flatnonzero(self.of_side[cells, side] >= 0)
+            rows = self.of_side[cells[here], side]
+            first, last, out = self.start[rows], self.stop[rows], self.curves.out[rows]
+            a, b = area[here, :, first], area[here, :, last]
+            p, dp = self.curves.graph(rows, 0.5 * (1.0 + b - a))
+            moved[here] += (a * b * p)[..., None] * out[:, None]
+            gradient[here, :, :, first] += (b * (p - 0.5 * a * dp))[..., None] * out[:, None]
+            gradient[here, :, :, last] += (a * (p + 0.5 * b * dp))[..., None] * out[:, None]
+        return moved, gradient
+
+
+class BentMapping(MappingAffine):
+    """scikit-fem's mapping from the reference triangle, extended to bent triangles."""
+
+    def __init__(self, mesh: MeshTri, bent: Bent) -> None:
+        super().__init__(mesh)
+        self.bent = bent
+
+    def _shift(self, X, tind):
+        cells = np.arange(self.mesh.t.shape[1]) if tind is None else tind
+        X = np.broadcast_to(X, (2, X.shape[-1]))
+        area = np.broadcast_to(np.stack([1.0 - X[0] - X[1], X[0], X[1]], axis=1), (len(cells), X.shape[1], 3))
+        return cells, *self.bent.shift(cells, area)
+
+    def F(self, X, tind=None):
+        return super().F(X, tind) + self._shift(X, tind)[1].transpose(2, 0, 1)
+
+    def detDF(self, X, tind=None):
+        cells, _, gradient = self._shift(X, tind)
+        J = self.A[:, :, cells].transpose(2, 0, 1)[:, None] + gradient[..., 1:] - gradient[..., :1]
+        return J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
+
+
+class Triangles:
+    """The triangles of one mesh: local coordinates, normals of sides, and a search for the triangle of a point."""
+
+    def __init__(self, mesh: MeshTri, bent: Bent | None = None) -> None:
+        corners = mesh.p[:, mesh.t].transpose(2, 1, 0)  # (n_cells, 3, 2)
+        self.corners, self.vertices, self.bent = corners, mesh.t.T, bent
+        self.origin = corners.mean(axis=1)
+        self.jacobian = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+        self.inverse = np.linalg.inv(self.jacobian)
+        along = np.stack([corners[:, q] - corners[:, p] for p, q in SIDES], axis=1)
+        up = np.stack([self.vertices[:, p] < self.vertices[:, q] for p, q in SIDES], axis=1)
+        along = along * np.where(up, 1.0, -1.0)[..., None]  # the two triangles of a side must agree
+        self.normals = np.stack([along[..., 1], -along[..., 0]], axis=-1) / np.linalg.norm(along, axis=2)[..., None]
+        self.curved = np.zeros(len(corners), bool)
+        if bent is not None:
+            self.curved[bent.cells] = True
+        self.tree = cKDTree(self.origin)
+
+    def local(self, cells: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Local coordinates (n, ..., 2) of points (n, ..., 2); they are zero at the centre of the triangle."""
+        shape = (len(cells),) + (1,) * (points.ndim - 2)
+        offset = points - self.origin[cells].reshape(*shape, 2)
+        return np.einsum("eij,e...j->e...i", self.inverse[cells], offset)
+
+    def chain(self, cells: np.ndarray, order: int) -> np.ndarray:
+        """Matrices (n, order + 1, order + 1) that turn derivatives in local coordinates of cells (n,) into x and y."""
+        inverse = self.inverse[cells]
+        a, b, c, d = (inverse[:, i, j] for i, j in product(range(2), repeat=2))
+        if order == 1:
+            rows = [[a, c], [b, d]]
+        else:
+            rows = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
+        return np.stack([np.stack(row, axis=-1) for row in rows], axis=1)
+
+    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cell that holds each point (n, 2), or else the nearest one, and whether the point lies in it."""
+        near = self.tree.query(points, k=min(CANDIDATES, len(self.origin)))[1].reshape(len(points), -1)
+        cell, depth = self._deepest(points, near)
+        margin = np.full(len(self.origin), -ON_BODY)
+        if self.curved.any():
+            size = np.sqrt(np.abs(np.linalg.det(self.jacobian)))
+            margin = np.minimum(margin, -NEAR_CURVE * size[self.curved].max() / size)
+        lost = depth < margin[cell]
+        if lost.any():
+            every = np.broadcast_to(np.arange(len(self.origin)), (1, len(self.origin)))
+            for i in np.flatnonzero(lost):
+                cell[i], depth[i] = (a[0] for a in self._deepest(points[i : i + 1], every))
+        return cell, depth >= margin[cell]
+
+    def _deepest(self, points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The candidate cell (n, k) in which each point lies deepest, and how deep (smallest area coordinate)."""
+        cells = np.broadcast_to(cells, (len(points), cells.shape[1]))
+        offset = points[:, None] - self.origin[cells]
+        local = np.einsum("nkij,nkj->nki", self.inverse[cells], offset) + 1.0 / 3.0
+        straight = np.minimum(local.min(axis=2), 1.0 - local.sum(axis=2))
+        bent = self.curved[cells] & (straight > -REACH)
+        if self.bent is not None and bent.any():
+            which, away = cells[bent], offset[bent]
+            place = local[bent]
+            for _ in range(CURVE_STEPS):
+                area = np.column_stack([1.0 - place.sum(axis=1), place])
+                moved = self.bent.shift(which, area[:, None])[0][:, 0]
+                place = np.einsum("nij,nj->ni", self.inverse[which], away - moved) + 1.0 / 3.0
+                place = np.clip(place, -1.0, 2.0)  # points far away are outside anyway
+            local[bent] = place
+        depth = np.minimum(local.min(axis=2), 1.0 - local.sum(axis=2))
+        best = depth.argmax(axis=1)
+        row = np.arange(len(points))
+        return cells[row, best], depth[row, best]
+
+
+class ArgyrisSpace:
+    """Quintic shape functions of all triangles of one mesh, in the local coordinates of each.
+
+    scikit-fem inverts a Vandermonde matrix of monomials in physical coordinates, which becomes singular when elements
+    are a thousand times smaller than the coordinates. This class first maps each triangle to the reference triangle
+    and its unknowns to the reference directions.
+    """
+
+    def __init__(self, mesh: MeshTri, bent: Bent | None = None) -> None:
+        self.inner = Triangles(mesh, bent)
+        self.origin, self.inverse, self.jacobian = self.inner.origin, self.inner.inverse, self.inner.jacobian
+        self.vertices, self.curved, self.bent = self.inner.vertices, self.inner.curved, bent
+        corners, self.normals = self.inner.corners, self.inner.normals.copy()
+        self.middles = np.stack([0.5 * (corners[:, p] + corners[:, q]) for p, q in SIDES], axis=1)
+        if bent is not None:
+            at = bent.cells, bent.sides
+            self.middles[at], self.normals[at] = bent.curves.middle()
+        self.coefficients = self._invert(corners, self.middles)
+
+    def _invert(self, corners: np.ndarray, middles: np.ndarray) -> np.ndarray:
+        n = len(corners)
+        functionals = np.zeros((n, 21, 21))
+        turn = np.zeros((n, 21, 21))  # physical unknowns -> unknowns along the reference directions
+        J = self.jacobian
+        for k in range(3):
+            at = self.inner.local(np.arange(n), corners[:, k])
+            for row, (dx, dy) in enumerate(DERIVATIVES):
+                functionals[:, 6 * k + row] = monomials(at, dx, dy)
+            a, b, c, d = J[:, 0, 0], J[:, 0, 1], J[:, 1, 0], J[:, 1, 1]
+            block = turn[:, 6 * k : 6 * k + 6, 6 * k : 6 * k + 6]
+            block[:, 0, 0] = 1.0
+            block[:, 1:3, 1:3] = np.stack([np.stack([a, c], -1), np.stack([b, d], -1)], axis=1)
+            hessian = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
+            block[:, 3:, 3:] = np.stack([np.stack(row, axis=-1) for row in hessian], axis=1)
+        for side in range(3):
+            weight = np.einsum("eij,ej->ei", self.inverse, self.normals[:, side])  # in local coordinates
+            size = np.linalg.norm(weight, axis=1)
+            at = self.inner.local(np.arange(n), middles[:, side])
+            row = weight[:, :1] * monomials(at, 1, 0) + weight[:, 1:] * monomials(at, 0, 1)
+            functionals[:, 18 + side] = row / size[:, None]
+            turn[:, 18 + side, 18 + side] = 1.0 / size
+        return np.linalg.solve(functionals, turn)
+
+    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+        """Derivatives of the shape functions of cells (n,) at points (n, n_q, 2), one array for each order.
+
+        The arrays are (n, n_q, 21) for order 0, (n, 2, n_q, 21) for order 1, (n, 3, n_q, 21) for order 2 (xx, xy, yy).
+        """
+        local = self.inner.local(cells, points)
+        result = []
+        for order in orders:
+            raw = [monomials(local, order - k, k) @ self.coefficients[cells] for k in range(order + 1)]
+            if order == 0:
+                result.append(raw[0])
+                continue
+            stacked = np.stack(raw, axis=1)  # (n, order + 1, n_q, 21)
+            shape = stacked.shape
+            turned = self.inner.chain(cells, order) @ stacked.reshape(*shape[:2], -1)
+            result.append(turned.reshape(shape))
+        return result
+
+    def uniform(self, cells: np.ndarray, stiffness: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
+        """Bending and mass matrices (n, 21, 21) of straight cells (n,) with uniform stiffness (3, 3) and unit inertia.
+
+        The integrals of products of monomials are the same for all triangles, so they are computed once.
+        """
+        X, weight = get_quadrature(Argyris.refdom, order)
+        local = X.T - 1.0 / 3.0
+        values = monomials(local, 0, 0)
+        bends = np.stack([monomials(local, 2 - k, k) for k in range(3)])  # (3, n_q, 21)
+        products = np.einsum("iqa,q,jqb->ijab", bends, weight, bends).reshape(9, 441)
+        determinant = np.abs(np.linalg.det(self.jacobian[cells]))
+        engineering = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, 2.0, 0]])  # (xx, xy, yy) -> (xx, yy, 2 xy)
+        turn = engineering @ self.inner.chain(cells, 2)
+        metric = turn.transpose(0, 2, 1) @ stiffness @ turn * determinant[:, None, None]
+        C = self.coefficients[cells]
+        bending = C.transpose(0, 2, 1) @ (metric.reshape(-1, 9) @ products).reshape(-1, 21, 21) @ C
+        mass = C.transpose(0, 2, 1) @ (values.T * weight @ values) @ C
+        return bending, mass * determinant[:, None, None]
+
+    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cell that holds each point (n, 2), or else the nearest one, and whether the point lies in it."""
+        return self.inner.locate(points)
+
+    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+        """Unknowns (n_all, 3) of the deflections 1, x and y, the rigid motions of a plate."""
+        result = np.zeros((n_all, 3))
+        corner = self.inner.corners
+        for k in range(3):
+            result[element_dofs[6 * k], 0] = 1.0
+            result[element_dofs[6 * k], 1:] = corner[:, k]
+            result[element_dofs[6 * k + 1], 1] = 1.0
+            result[element_dofs[6 * k + 2], 2] = 1.0
+            result[element_dofs[18 + k], 1:] = self.normals[:, k]
+        return result
+
+
+class Argyris(ElementTriArgyris):
+    """scikit-fem's Argyris element with the shape functions of `ArgyrisSpace`; make a new one for each mesh."""
+
+    def __init__(self, space: ArgyrisSpace) -> None:
+        self.space = space
+        self.fields: list[np.ndarray] = []
+        self.asked: object = None
+
+    def gbasis(self, mapping, X, i, tind=None):
+        cells = np.arange(len(self.space.origin)) if tind is None else tind
+        if X is not self.asked:
+            points = mapping.F(X, tind=tind).transpose(1, 2, 0)  # (n_cells, n_q, 2)
+            self.fields, self.asked = self.space.functions(cells, points, (0, 1, 2)), X
+        value, gradient, hessian = self.fields
+        xx, xy, yy = hessian[:, 0, :, i], hessian[:, 1, :, i], hessian[:, 2, :, i]
+        grad = gradient[..., i].transpose(1, 0, 2)
+        return (DiscreteField(value=value[..., i], grad=grad, hess=np.array([[xx, xy], [xy, yy]])),)
+
+
+class MorleySpace:
+    """Quadratic Morley shape functions of straight triangles: deflection at corners, slope at mid-sides.
+
+    They are continuous only at those points and approach the frequencies from below, while Argyris elements approach
+    them from above.
+    """
+
+    def __init__(self, mesh: MeshTri) -> None:
+        self.inner = Triangles(mesh)
+        self.origin, self.inverse, self.jacobian = self.inner.origin, self.inner.inverse, self.inner.jacobian
+        self.vertices, self.normals, self.bent = self.inner.vertices, self.inner.normals, None
+        n = len(self.origin)
+        functionals = np.zeros((n, 6, 6))
+        for k, corner in enumerate(REFERENCE):
+            functionals[:, k] = _quadratic(corner[None], 0, 0)
+        for side, (p, q) in enumerate(SIDES):
+            weight = np.einsum("eij,ej->ei", self.inverse, self.normals[:, side])
+            at = 0.5 * (REFERENCE[p] + REFERENCE[q])[None]
+            functionals[:, 3 + side] = weight[:, :1] * _quadratic(at, 1, 0) + weight[:, 1:] * _quadratic(at, 0, 1)
+        self.coefficients = np.linalg.inv(functionals)
+
+    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+        """The same as `ArgyrisSpace.functions`, with six shape functions per cell."""
+        offset = points - self.origin[cells][:, None]
+        local = np.einsum("eij,eqj->eqi", self.inverse[cells], offset)
+        result = []
+        for order in orders:
+            raw = [_quadratic(local, order - k, k) @ self.coefficients[cells] for k in range(order + 1)]
+            if order == 0:
+                result.append(raw[0])
+                continue
+            stacked = np.stack(raw, axis=1)
+            shape = stacked.shape
+            result.append((self.inner.chain(cells, order) @ stacked.reshape(*shape[:2], -1)).reshape(shape))
+        return result
+
+    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cell that holds each point (n, 2), or the nearest one, and whether the point lies in it."""
+        return self.inner.locate(points)
+
+    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+        """Unknowns (n_all, 3) of the deflections 1, x and y."""
+        result = np.zeros((n_all, 3))
+        for k in range(3):
+            result[element_dofs[k], 0] = 1.0
+            result[element_dofs[k], 1:] = self.origin + self.jacobian @ REFERENCE[k]
+            result[element_dofs[3 + k], 1:] = self.normals[:, k]
+        return result
+
+
+class Morley(ElementTriMorley):
+    """scikit-fem's Morley element, used only to number the unknowns; make a new one for each mesh."""
+
+
+def _quadratic(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
+    """Derivative of the six monomials of degree 2 at local coordinates (..., 2), shape (..., 6)."""
+    x, y = powers(local[..., 0], 2, dx), powers(local[..., 1], 2, dy)
+    i, j = np.array([(i, j) for i in range(3) for j in range(3 - i)]).T
+    return x[..., i] * y[..., j]
+
+
+def triangles(points: np.ndarray, cells: np.ndarray) -> MeshTri:
+    """Make scikit-fem's mesh of triangles."""
+    return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
+
+
+def quadrature(mesh, element, order: int, mapping=None) -> tuple[np.ndarray, np.ndarray]:
+    """Quadrature on every cell: points (n_cells, n_q, dimension) and weights (n_cells, n_q)."""
+    X, weight = get_quadrature(element.refdom, order)
+    mapping = mesh._mapping() if mapping is None else mapping
+    return mapping.F(X).transpose(1, 2, 0), np.abs(mapping.detDF(X)) * weight
+
+
+def numbering(mesh, element) -> tuple[np.ndarray, int]:
+    """Numbers of the unknowns of each cell, (n_local, n_cells), and how many unknowns there are."""
+    dofs = Dofs(mesh, element)
+    return dofs.element_dofs, dofs.N

@@ -1,0 +1,87 @@
+"""Static deflection of a body under point forces, on elements that shrink towards the forces."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from ..mesh.meshes import Mesh
+from . import beam_elements, residual
+from .assembly import System, assemble
+from .eigenvalues import Flexibility
+
+CELLS = 600  # [-] approximate number of triangles in the first mesh
+GOAL = 1e-5  # [-] refinement stops at this relative error of the compliance
+ROUNDS = 3  # [-] most meshes tried; each halves the element size
+ROUNDING = 1e-7  # [-] relative rounding error of a plate's compliance, caused by the smallest triangles
+RESTS = 1e-15  # [-] a point whose compliance in the frame is below this lies on a support
+
+
+@dataclass(frozen=True, eq=False)
+class Deflection:
+    """Static deflections of a body under unit forces at points, one at a time.
+
+    If the body can move rigidly, inertia balances the load and the deflection contains no rigid motion.
+    """
+
+    system: System  # with elements that shrink towards the points
+    loads: np.ndarray  # (n_loads, dimension) [m] where the forces act
+    vectors: np.ndarray  # (n_dofs, n_loads) [-] in the frame of the system
+    compliance: np.ndarray  # (n_loads, n_loads) [m/N] deflection at one load under another
+    error: np.ndarray  # (n_loads,) [-] estimated relative error of the compliance's diagonal
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Deflection [m/N] at points (n_points, dimension) [m] under each load, (n_points, n_loads)."""
+        unit = self.system.frame.mass * self.system.frame.rate**2
+        return np.asarray(self.system.interpolate(points) @ self.vectors) / unit
+
+
+def static_deflection(system: System, loads: np.ndarray) -> Deflection:
+    """Find the deflections of a body under unit forces at points (n_loads, dimension) [m], edges and corners included.
+
+    A coarse mesh is enough, because the deflection is smooth except for the dip under the force, and there the
+    elements shrink. If the estimated error is still too large, finer meshes follow.
+    """
+    mesh = _coarse(system.mesh)
+    best: Any = None
+    for _ in range(ROUNDS):
+        found = _solved(system, mesh, loads)
+        if best is None or found.error.max() < best.error.max():
+            best = found
+        if best.error.max() <= GOAL or mesh.recipe is None:
+            break
+        mesh = mesh.refined(2.0)
+    return best
+
+
+def _coarse(mesh: Mesh) -> Mesh:
+    """The same body with fewer triangles, or unchanged if it cannot be meshed again."""
+    if mesh.recipe is None or mesh.dimension == 1 or len(mesh.cells) <= 2 * CELLS:
+        return mesh
+    coarse = mesh.refined((CELLS / len(mesh.cells)) ** 0.5)
+    return coarse if len(coarse.cells) < len(mesh.cells) else mesh
+
+
+def _solved(system: System, mesh: Mesh, loads: np.ndarray) -> Deflection:
+    fine = assemble(
+        mesh, system.section, system.supports, point_masses=system.point_masses, near=loads, graded=system.graded
+    )
+    rows = fine.interpolate(loads)
+    flexibility = Flexibility(fine.K, fine.M, fine.rigid, fine.held)
+    forces = rows.toarray().T
+    vectors = flexibility.solve(forces)
+    compliance = np.asarray(rows @ vectors)
+    if fine.strain is not None:  # this form is stationary, so the rounding error of K enters squared
+        compliance = compliance + compliance.T - fine.strain.products(fine, vectors)
+    diagonal = compliance.diagonal()
+    inertia = -fine.rigid @ (fine.rigid.T @ forces)
+    error = residual.energy_errors(fine, vectors, inertia, loads).sum(axis=0)
+    rounding = ROUNDING if mesh.dimension == 2 else beam_elements.rounding(fine.space)
+    moves = diagonal > RESTS
+    relative = np.where(moves, error / np.where(moves, diagonal, 1.0), 0.0) + rounding
+    unit = fine.frame.mass * fine.frame.rate**2
+    return Deflection(fine, loads.copy(), vectors, 0.5 * (compliance + compliance.T) / unit, relative)

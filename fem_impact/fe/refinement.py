@@ -1,0 +1,332 @@
+"""Find the lowest modes of a system without missing any, and refine the mesh until their estimated error is small."""
+
+import hashlib
+import zipfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import brentq
+
+from .._base import check
+from .._base.files import replacing
+from ..mesh.meshes import Mesh
+from . import residual
+from .assembly import System, assemble, reassemble
+from .eigenvalues import FIRST_SLICE, RESIDUAL, SPARE, STRICT, Flexibility, by_slices, count_below, lowest
+from .section import Plate
+
+WAVE_PER_ELEMENT = {"argyris": 1.8, "hermite": 30.0, "morley": 0.2}  # [rad] largest k h: error 1e-5, 1e-12 on beams
+ERROR_OF_WAVE = (8e-7, 3.3)  # [-] a smooth frequency's error is at most 8e-7 (kh)**8, growing slower above kh = 3.3
+EDGE_TERM = {"clamped": 1.76, "hinged": 1.0, "free": -1.71}  # [-] factor of the edge length in Weyl's law for plates
+MORLEY_ERROR = 0.2  # [-] relative frequency error of Morley elements, divided by (kh)**2
+CLAIMED = 2.0  # [-] factor on error estimates, which are 0.3 to 4 times the true error; test_residual.py
+ROUNDED = 3.0  # [-] factor on the rounding error of K, estimated as a random walk
+LEAST = 1e-14  # [-] smallest relative error stated for a frequency; the eigensolver leaves about this much
+MORLEY = 0.2574578  # [-] error constant of Morley interpolation, over h**2 (Carstensen and Gallistl 2014)
+MORLEY_UNKNOWNS = 20_000  # [-] unknowns of the Morley solution for the lower bounds; cheap beside the modes themselves
+ALGEBRA = 1e-9  # [-] margin added to guaranteed bounds on both sides for rounding and the eigensolver
+FINE_WAVE = 1.1  # [rad] as WAVE_PER_ELEMENT, if CHEAP_CELLS triangles suffice: error 2e-7, clamped 1e-5
+CHEAP_CELLS = 700  # [-] triangles that take little time to solve, so that fewer are not worthwhile
+LAYERS = 10.0  # [-] largest element under tension, in edge layers sqrt(D / tension): error 1e-5 on a disk
+FINEST_LAYER = 40.0  # [-] but elements are not made smaller than the body's extent divided by this
+MOST_UNKNOWNS = 150_000  # [-] refinement gives up beyond this size
+AIM = 0.9  # [-] fraction of the tolerance that the first mesh aims at
+MARGIN = 0.6  # [-] fraction of the tolerance that later meshes aim at
+ORDERS = 7.5, 5.0  # [-] powers of the element size with which the first two parts of the error fall
+LEAST_STEP = 1.05  # [-] smallest ratio of element sizes between two meshes
+MOST_STEPS = 40.0  # [-] logarithm of the largest ratio
+MOST_MESHES = 8  # [-] meshes tried to meet a tolerance
+SAY = 1e-3  # [-] errors at singular corners are added to the estimate above this value
+SEARCHES = 3  # [-] attempts to find every mode of a cluster
+STEP = 2.0**0.5  # [-] a mesh file's elements are replaced by larger ones if they can grow by this factor
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Eigenpairs of a system, rigid motions first."""
+
+    system: System
+    flexibility: Flexibility
+    omega: np.ndarray  # (n_modes,) [rad/s]
+    vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
+    parts: np.ndarray  # (3, n_modes) [-] relative error of omega from elements, curved edges, causes no mesh cures
+
+    @property
+    def error(self) -> np.ndarray:
+        """Estimated relative error of omega, (n_modes,) [-]."""
+        return self.parts.sum(axis=0)
+
+    @property
+    def n_rigid(self) -> int:
+        """Number of rigid motions."""
+        return self.flexibility.rigid.shape[1]
+
+
+def _wave(system: System, n_modes: int | None, max_frequency: float | None) -> float:
+    """Wavenumber [rad/m] of the shortest wave among the modes wanted."""
+    mesh, frame = system.mesh, system.frame
+    if max_frequency is not None:
+        softest = system.softness * frame.inertia / frame.stiffness
+        return float((softest * (2.0 * np.pi * max_frequency) ** 2) ** 0.25)
+    assert n_modes is not None
+    if mesh.dimension == 1:
+        return float(np.pi * (n_modes + 1) / np.ptp(mesh.points))
+    # Weyl's law: the number of modes grows with the area; a held edge lowers it, a free edge raises it
+    edge = mesh.perimeter * EDGE_TERM["hinged"]
+    if system.rim is not None:
+        ends = system.rim.points[system.rim.facets]
+        length = frame.length * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        edge = float(length @ [EDGE_TERM[kind] for kind in system.rim.kinds])
+    return float((edge + np.sqrt(edge**2 + 16.0 * np.pi * mesh.area * n_modes)) / (2.0 * mesh.area))
+
+
+def solve(system: System, n_modes: int | None, max_frequency: float | None) -> Spectrum:
+    """Find the lowest modes on the mesh as it is: a given number, or all below a frequency [Hz], counted by inertia."""
+    flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
+    n_rigid, rate = system.rigid.shape[1], system.frame.rate
+    limit = None if max_frequency is None else (2.0 * np.pi * max_frequency / rate) ** 2
+    if n_modes is None:
+        assert limit is not None
+        n_modes = count_below(system.K, system.M, limit)
+        if n_modes == 0:
+            raise ValueError(f"max_frequency must reach the first mode; there is none below {max_frequency:g} Hz")
+    if n_modes <= n_rigid:
+        values, vectors = np.zeros(0), np.zeros((system.n_dofs, 0))
+    else:
+        n = n_modes - n_rigid
+        many = system.element == "hermite" and n > FIRST_SLICE
+        values, vectors = by_slices(flexibility, n) if many else _counted(system, flexibility, n, limit)
+        values, vectors = sharpened(system, values, vectors)
+    omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
+    vectors = np.column_stack([system.rigid, vectors])[:, :n_modes]
+    return Spectrum(system, flexibility, omega, vectors, _claimed(system, omega, vectors))
+
+
+def kept(system: System, n_modes: int | None, max_frequency: float | None, path: Path) -> Spectrum:
+    """Call `solve` and save the result in a file; a later call for the same modes and matrices reads the file."""
+    asked = repr((n_modes, max_frequency)).encode()
+    key = hashlib.sha256(b"".join([asked, system.K.data.tobytes(), system.M.data.tobytes()])).hexdigest()
+    names = ("omega", "vectors", "parts")
+    try:
+        with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
+            if str(file["key"]) == key:
+                flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
+                return Spectrum(system, flexibility, *(file[name] for name in names))
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError, MemoryError):
+        pass  # the file is missing, damaged or of another kind: solve again and overwrite it
+    found = solve(system, n_modes, max_frequency)
+    with replacing(path) as temporary, open(temporary, "wb") as file:  # savez would add .npz to a path
+        np.savez(file, key=key, **{name: getattr(found, name) for name in names})
+    return found
+
+
+def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Estimated relative errors of frequencies (`Spectrum.parts`); the third is rounding and unresolved corners."""
+    parts, flexible = np.zeros((3, len(omega))), omega > 0.0
+    if not flexible.any():
+        return parts
+    values, vectors = (omega[flexible] / system.frame.rate) ** 2, vectors[:, flexible]
+    if system.element == "morley":
+        wave = (system.softness * values) ** 0.25 * np.sqrt(2.0 * system.mesh.area / len(system.mesh.cells))
+        parts[0, flexible] = CLAIMED * MORLEY_ERROR * (wave / system.frame.length) ** 2
+    else:
+        parts[:2, flexible] = CLAIMED * 0.5 * residual.energy_errors(system, vectors, vectors * values) / values
+    squares = system.K.multiply(system.K)
+    rounding = 0.5 * np.finfo(float).eps * np.sqrt(np.einsum("ij,ij->j", vectors**2, squares @ vectors**2)) / values
+    parts[2, flexible] = ROUNDED * rounding + LEAST + (system.unresolved if system.unresolved > SAY else 0.0)
+    return parts
+
+
+def _counted(system: System, flexibility: Flexibility, n: int, limit: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """Find the n lowest flexible eigenpairs without missing any.
+
+    If a limit is given, n is the number of modes below it. Otherwise inertia confirms the number below a gap after the
+    last mode. In a dense cluster the first search may miss some modes; it is then repeated for more modes, with a
+    stricter residual.
+    """
+    n_rigid = flexibility.rigid.shape[1]
+    available = system.n_dofs - n_rigid
+    if n > available:
+        raise ValueError(f"n_modes must not exceed the {system.n_dofs} unknowns of this mesh; refine it")
+    more, residual = min(n + (SPARE if limit is None else 0), available), RESIDUAL
+    for _ in range(SEARCHES):
+        values, vectors = lowest(flexibility, more, residual)
+        if more == available:
+            return values[:n], vectors[:, :n]
+        if limit is not None:
+            below, found = n, int((values < limit * (1.0 + 1e-12)).sum())
+        else:
+            gaps = np.diff(values[n - 1 :]) / values[n - 1 : -1]
+            at = n - 1 + int(gaps.argmax())
+            below, found = count_below(system.K, system.M, 0.5 * (values[at] + values[at + 1])) - n_rigid, at + 1
+        if below == found:
+            return values[:n], vectors[:, :n]
+        more, residual = min(max(below, more) + 4 * SPARE, available), STRICT
+    raise check.SimulationError(
+        f"{below} flexible modes lie below {np.sqrt(values[min(n, more) - 1]) * system.frame.rate / 2 / np.pi:g} Hz, "
+        f"but {found} were found; ask for a few more modes"
+    )
+
+
+def sharpened(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues recomputed from the strain energy, which is more accurate than K if there are tiny triangles."""
+    if system.strain is None or not len(values):
+        return values, vectors
+    energy = system.strain.energy(system, vectors)
+    mass = np.einsum("ij,ij->j", vectors, system.M @ vectors)
+    order = np.argsort(energy / mass, kind="stable")
+    return (energy / mass)[order], vectors[:, order]
+
+
+def fine_enough(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> System:
+    """The system on a mesh that resolves the shortest wave wanted; unchanged if the user chose the mesh size."""
+    size = size_for(system, n_modes, max_frequency, tolerance)
+    if system.mesh.size_stated or size >= system.mesh.size:
+        return system
+    finer = system.mesh.refined(system.mesh.size / size)
+    # a mesh file's largest triangle sets its size, so a mesh refined to a smaller size can still have fewer cells
+    return reassemble(system, finer) if len(finer.cells) > len(system.mesh.cells) else system
+
+
+def resolves(system: System, max_frequency: float) -> bool:
+    """Whether the mesh is fine enough for waves up to a frequency [Hz]."""
+    return system.mesh.size <= WAVE_PER_ELEMENT[system.element] / _wave(system, None, max_frequency)
+
+
+def size_for(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> float:
+    """Size [m] of elements that resolve the shortest wave wanted."""
+    wave = _wave(system, n_modes, max_frequency)
+    size = WAVE_PER_ELEMENT[system.element] / wave
+    if system.element == "argyris" and tolerance is not None:
+        size = _wave_per_element(AIM * tolerance) / wave
+    elif system.element == "argyris":  # a few modes cost little, so find them more accurately
+        affordable = (2.3 * system.mesh.area / CHEAP_CELLS) ** 0.5
+        size = min(size, max(affordable, FINE_WAVE / wave))
+    if isinstance(system.section, Plate) and system.section.tension:  # resolve the narrow bending layer at the edge
+        layer = (system.frame.stiffness / system.section.tension) ** 0.5
+        size = min(size, max(LAYERS * layer, system.frame.length / FINEST_LAYER))
+    return size
+
+
+def _wave_per_element(error: float) -> float:
+    """Wavenumber times element size [rad] at which the highest frequency of a smooth plate has this relative error."""
+    factor, bend = ERROR_OF_WAVE
+
+    def excess(log: float) -> float:
+        return float(np.log(factor / error) + 8.0 * log - np.log1p((np.exp(log) / bend) ** 3))
+
+    return float(np.exp(brentq(excess, -10.0, 10.0)))
+
+
+def refine(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> Spectrum:
+    """Find modes with an estimated relative error below a tolerance, refining the mesh as often as needed.
+
+    The shortest wave sets the size of the first mesh. If edges or corners need a finer one, the estimated errors set
+    the size of the next.
+    """
+    if system.mesh.recipe is None:
+        raise ValueError(
+            "tolerance needs a mesh that can be refined; make it with fi.mesh or load it with fi.mesh.load"
+        )
+    found, size = solve(_start(system, n_modes, max_frequency, tolerance), n_modes, max_frequency), np.inf
+    for left in reversed(range(MOST_MESHES + 1)):
+        if float(found.error.max()) <= tolerance:
+            return found
+        mesh = found.system.mesh
+        step = _needed(found.parts, MARGIN * tolerance)
+        if (
+            not left
+            or not step < np.inf
+            or found.system.n_dofs * step**mesh.dimension > MOST_UNKNOWNS
+            or mesh.size >= size
+        ):
+            break
+        size = mesh.size
+        found = solve(reassemble(system, mesh.refined(step)), n_modes, max_frequency)
+    mode = int(found.error.argmax())
+    raise check.SimulationError(
+        f"tolerance = {tolerance:g} is not met: mode {mode + 1} is uncertain by {found.error[mode]:.1e} with "
+        f"{found.system.n_dofs} unknowns; raise the tolerance or ask for fewer modes"
+    )
+
+
+def _needed(parts: np.ndarray, goal: float) -> float:
+    """Factor [-] to divide the element size by so that errors (3, n_modes) meet a goal; infinity if no mesh can."""
+    if float(parts[2].max()) >= goal:
+        return np.inf
+
+    def excess(log: float) -> float:
+        return float((np.exp(-log * np.array(ORDERS)) @ parts[:2] + parts[2]).max()) - goal
+
+    return max(LEAST_STEP, float(np.exp(brentq(excess, 0.0, MOST_STEPS)))) if excess(0.0) > 0.0 else LEAST_STEP
+
+
+def _start(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> System:
+    """The system on the mesh expected to meet a tolerance if its edges and corners need no finer one."""
+    mesh, size = system.mesh, size_for(system, n_modes, max_frequency, tolerance)
+    if mesh.size_stated:
+        return system
+    if size < mesh.size:
+        finer = mesh.refined(mesh.size / size)
+        return reassemble(system, finer) if len(finer.cells) > len(mesh.cells) else system
+    if size > STEP * mesh.size and len(mesh.cells) > CHEAP_CELLS:  # a mesh file much finer than needed
+        coarse = mesh.refined(mesh.size / size)
+        if len(coarse.cells) < len(mesh.cells):
+            return reassemble(system, coarse)
+    return system
+
+
+def _step(coarse: Mesh, fine: Mesh) -> float:
+    """Ratio [-] of the element sizes of a coarse and a fine mesh."""
+    return (len(fine.cells) / len(coarse.cells)) ** (1.0 / fine.dimension)
+
+
+def enclosure(found: Spectrum) -> np.ndarray | None:
+    """Guaranteed bounds of each frequency, (n_modes, 2) [rad/s], or None if no proof covers the body.
+
+    Argyris elements on straight edges are conforming, so their eigenvalues are upper bounds. An eigenvalue lambda of
+    Morley elements gives the lower bound lambda / (1 + c**2 lambda h**4 / (1 - nu)), where h is the longest side and
+    c = 0.2574578 the constant of the Morley interpolation error. Without a free edge, nu counts as 0 here.
+
+    References
+    ----------
+    Carstensen and Gallistl (2014), Numer. Math. 126, 33-51; Liu (2015), Appl. Math. Comput. 267, 341-355.
+    """
+    system = found.system
+    plate, mesh = system.section, system.mesh
+    if not isinstance(plate, Plate) or callable(plate.thickness) or plate.material.E_across is not None:
+        return None
+    if mesh.curved.any() or system.point_masses or system.element != "argyris" or plate.tension:
+        return None
+    if system.rim is None or not all(isinstance(kind, str) for kind in system.supports.values()):
+        return None
+    nu, material = plate.material.nu, plate.material
+    if "free" not in system.rim.kinds:  # then nu only changes the rigidity, and nu = 0 gives the best bound
+        nu, material = 0.0, replace(material, E=material.E / (1.0 - nu**2), nu=0.0)
+    if nu < 0.0:
+        return None
+    second = _second_opinion(system, Plate(material, plate.thickness), len(found.omega))
+    longest = _longest(second.system.mesh) / system.frame.length
+    value = (second.omega / system.frame.rate) ** 2
+    lower = value / (1.0 + MORLEY**2 * value * longest**4 / (1.0 - nu))
+    bounds = np.column_stack([np.sqrt(lower) * system.frame.rate, found.omega])
+    bounds *= np.array([1.0 - ALGEBRA, 1.0 + ALGEBRA])
+    return bounds
+
+
+def _second_opinion(system: System, plate: Plate, n_modes: int) -> Spectrum:
+    """Modes of the same body on Morley elements, with about MORLEY_UNKNOWNS unknowns."""
+    mesh = system.mesh
+    morley = assemble(mesh, plate, system.supports, "morley")
+    if mesh.recipe is not None:
+        factor = (MORLEY_UNKNOWNS / morley.n_dofs) ** 0.5
+        if abs(factor - 1.0) > 0.1:
+            morley = reassemble(morley, mesh.refined(factor))
+    return solve(morley, n_modes, None)
+
+
+def _longest(mesh: Mesh) -> float:
+    """Length [m] of the longest side of all triangles."""
+    corners = mesh.points[mesh.cells]
+    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())

@@ -1,0 +1,228 @@
+"""Estimate the error of a finite element solution from its residual in the plate's equation of motion.
+
+Three residuals are squared, weighted by powers of the element size and summed: that of ``div div M = inertia`` in the
+triangles, the jumps of bending moment and effective shear force between triangles, and the violation of the natural
+conditions at the edge. The sum is proportional to the energy error, and for quintic triangles the factor is nearly
+the same for every plate (CALIBRATION). On a curved edge the supports hold the plate exactly only at vertices; the
+work of the reactions on the motion in between is added.
+
+References
+----------
+Verfuerth (2013), A posteriori error estimation techniques, ch. 1 and 3; Beirao da Veiga, Niiranen and Stenberg (2007),
+Numer. Math. 106, 165-179, for Kirchhoff plates.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from ..mesh.facets import powers
+from . import beam_elements
+from .assembly import System
+from .elements import SIDES
+from .springs import along_facets
+from .supports import cells_of_facets
+
+CALIBRATION = 33.0  # [-] weighted squares over the energy error: 20 to 45 for 20 kinds of plates; test_residual.py
+DEGREE = 5  # [-] polynomial degree of the elements
+EDGE_POINTS = 3  # [-] Gauss points on a side
+CELL_POINTS = 3  # [-] Gauss points in each direction of a triangle
+BLOCK = 128  # [-] solutions processed together, to limit memory
+POWERS = np.array([(i, j) for i in range(4) for j in range(4 - i)])  # a quintic deflection has cubic moments
+NODES = 0.8 / 3.0 * POWERS + 0.2 / 3.0 - 1.0 / 3.0  # ten points inside the triangle, enough to define a cubic
+
+
+def _cubic(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
+    """Derivative of the ten monomials of degree 3 at local coordinates (..., 2), shape (..., 10)."""
+    return powers(local[..., 0], 3, dx)[..., POWERS[:, 0]] * powers(local[..., 1], 3, dy)[..., POWERS[:, 1]]
+
+
+FIT = np.linalg.inv(_cubic(NODES, 0, 0))
+
+
+class Moments:
+    """Bending moments of all triangles as cubic polynomials, their derivatives and the edge forces."""
+
+    def __init__(self, system: System) -> None:
+        space: Any = system.space
+        self.space, self.n_cells = space, len(space.origin)
+        cells = np.arange(self.n_cells)
+        x = space.origin[:, None] + NODES @ space.jacobian.transpose(0, 2, 1)
+        hessian = space.functions(cells, x, (2,))[0][:, [0, 2, 1]] * np.array([1.0, 1.0, 2.0])[:, None, None]
+        self.stiffness = _stiffness(system, x)  # (n_cells, n_q, 3, 3)
+        moment = self.stiffness @ hessian.transpose(0, 2, 1, 3)  # (n_cells, n_q, 3, 21)
+        self.coefficients = np.einsum("pq,eqrk->erpk", FIT, moment, optimize=True)  # (n_cells, 3, 10, 21)
+
+    def derivatives(self, cells: np.ndarray, x: np.ndarray, order: int) -> np.ndarray:
+        """Derivatives (n, order + 1, 3, n_q, 21) of the moments xx, yy, xy of cells (n,) at points (n, n_q, 2)."""
+        local = self.space.inner.local(cells, x)
+        raw = np.stack([_cubic(local, order - k, k) for k in range(order + 1)], axis=1)  # (n, order + 1, n_q, 10)
+        if order:
+            chain = self.space.inner.chain(cells, order)
+            raw = (chain @ raw.reshape(*raw.shape[:2], -1)).reshape(raw.shape)
+        return raw[:, :, None] @ self.coefficients[cells][:, None]
+
+    def across(self, cells: np.ndarray, x: np.ndarray, normal: np.ndarray, curvature: Any = 0.0) -> np.ndarray:
+        """Bending moment and effective shear force (n, 2, n_q, 21) on edges with normals (n, n_q, 2)."""
+        moment, slope = self.derivatives(cells, x, 0)[:, 0], self.derivatives(cells, x, 1)
+        nx, ny = (normal[..., i, None] for i in range(2))
+        bending = moment[:, 0] * nx**2 + moment[:, 1] * ny**2 + 2.0 * moment[:, 2] * nx * ny
+        shear = (slope[:, 0, 0] + slope[:, 1, 2]) * nx + (slope[:, 0, 2] + slope[:, 1, 1]) * ny
+        twist = (slope[:, :, 1] - slope[:, :, 0]) * (nx * ny)[:, None] + slope[:, :, 2] * (nx**2 - ny**2)[:, None]
+        along = twist[:, 1] * nx - twist[:, 0] * ny  # of the twisting moment, along the tangent (-ny, nx)
+        turned = curvature * (moment[:, 0] + moment[:, 1] - 2.0 * bending)  # normal and tangent turn on a curve
+        return np.stack([bending, shear + along + turned], axis=1)
+
+    def rigidity(self, cells: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """Bending stiffness (n,) of cells across a direction (n, 2)."""
+        nx, ny = normal.T
+        bend = np.column_stack([nx**2, ny**2, 2.0 * nx * ny])
+        return np.einsum("ei,eij,ej->e", bend, self.stiffness[cells].mean(axis=1), bend)
+
+
+def _stiffness(system: System, x: np.ndarray) -> np.ndarray:
+    """Bending stiffness (n_cells, n_q, 3, 3) at points (n_cells, n_q, 2), in the frame."""
+    frame = system.frame
+    found = system.section.stiffness(frame.centre + frame.length * x.reshape(-1, 2))
+    return found.reshape(*x.shape[:2], 3, 3) / frame.stiffness
+
+
+class Residual:
+    """Residuals of a plate's solutions, as linear operators on the unknowns of each triangle and side."""
+
+    def __init__(self, system: System) -> None:
+        self.system, self.moments = system, Moments(system)
+        self._set_cells()
+        self._set_sides()
+        self._set_rim()
+
+    def _set_cells(self) -> None:
+        space, frame = self.moments.space, self.system.frame
+        cells = np.arange(self.moments.n_cells)
+        node, weight = np.polynomial.legendre.leggauss(CELL_POINTS)
+        a, b = (x.ravel() for x in np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij"))
+        share = 0.25 * np.outer(weight, weight).ravel() * (1.0 - a)
+        local = np.column_stack([a, b * (1.0 - a)]) - 1.0 / 3.0
+        x = space.origin[:, None] + local @ space.jacobian.transpose(0, 2, 1)
+        second = self.moments.derivatives(cells, x, 2)
+        double = np.abs(np.linalg.det(space.jacobian))  # twice the area
+        stiffness = self.moments.stiffness.mean(axis=1)
+        rigidity = np.sqrt(stiffness[:, 0, 0] * stiffness[:, 1, 1])
+        scale = np.sqrt(double[:, None] * share / rigidity[:, None]) * double[:, None] / DEGREE**2
+        inertia = self.system.section.inertia(frame.centre + frame.length * x.reshape(-1, 2)).reshape(scale.shape)
+        value = space.functions(cells, x, (0,))[0]
+        self.inertia = (scale * inertia / frame.inertia)[..., None] * value  # (n_cells, n_q, 21)
+        balance = second[:, 0, 0] + 2.0 * second[:, 1, 2] + second[:, 2, 1]
+        section: Any = self.system.section
+        if section.tension:
+            curve = space.functions(cells, x, (2,))[0]
+            pull = section.tension * frame.length**2 / frame.stiffness
+            balance = balance - pull * (curve[:, 0] + curve[:, 2])
+        self.balance = scale[..., None] * balance
+
+    def _set_sides(self) -> None:
+        space = self.moments.space
+        pairs = np.sort(np.stack([space.vertices[:, side] for side in SIDES], axis=1).reshape(-1, 2), axis=1)
+        key = pairs[:, 0].astype(np.int64) * (int(space.vertices.max()) + 1) + pairs[:, 1]
+        order = np.argsort(key, kind="stable")
+        shared = np.flatnonzero(np.diff(key[order]) == 0)
+        first, second = order[shared], order[shared + 1]
+        self.beside = np.column_stack([first // 3, second // 3])  # (n_sides, 2) cells
+        corners = space.inner.corners
+        start, stop = (corners[first // 3, np.array(SIDES)[first % 3, end]] for end in (0, 1))
+        length = np.linalg.norm(stop - start, axis=1)
+        along = (stop - start) / length[:, None]
+        normal = np.column_stack([along[:, 1], -along[:, 0]])
+        node, weight = np.polynomial.legendre.leggauss(EDGE_POINTS)
+        x = start[:, None] + 0.5 * (node + 1.0)[:, None] * (stop - start)[:, None]
+        every = np.broadcast_to(normal[:, None], x.shape)
+        jump = [self.moments.across(self.beside[:, k], x, every) for k in range(2)]  # (n_sides, 2, n_q, 21)
+        rigidity = np.mean([self.moments.rigidity(self.beside[:, k], normal) for k in range(2)], axis=0)
+        size = length[:, None] / DEGREE * np.column_stack([np.ones(len(length)), (length / DEGREE) ** 2])
+        scale = np.sqrt(0.5 * size[..., None] * length[:, None, None] * 0.5 * weight / rigidity[:, None, None])
+        self.jumps = np.concatenate([jump[0], -jump[1]], axis=3) * scale[..., None]
+        self.jumps = self.jumps.reshape(len(shared), -1, 42)
+
+    def _set_rim(self) -> None:
+        space, rim = self.moments.space, self.system.rim
+        assert rim is not None
+        self.rim_cells = cells_of_facets(rim.facets, space.vertices)[0]
+        x, step = along_facets(space, rim.facets, self.rim_cells)
+        ds = np.linalg.norm(step, axis=2)
+        normal = step / ds[..., None]
+        force = self.moments.across(self.rim_cells, x, normal, rim.curvatures.mean(axis=1)[:, None, None])
+        kinds = np.array(rim.kinds)
+        length = ds.sum(axis=1)
+        rigidity = self.moments.rigidity(self.rim_cells, normal.mean(axis=1))
+        size = (
+            length[:, None] / DEGREE * np.column_stack([kinds != "clamped", (kinds == "free") * (length / DEGREE) ** 2])
+        )
+        scale = np.sqrt(size[..., None] * ds[:, None] / rigidity[:, None, None])
+        value, slope = space.functions(self.rim_cells, x, (0, 1))
+        turn = np.einsum("fqi,fiqk->fqk", normal, slope)
+        held_by = rim.springs[:, ::-1, None, None] * np.stack([turn, -value], axis=1)
+        self.missed = ((force + held_by) * scale[..., None]).reshape(len(ds), -1, 21)
+        held = np.stack([kinds != "free", kinds == "clamped"], axis=1)[:, :, None, None]
+        self.moved = np.stack([value, -turn], axis=1) * held * ds[:, None, :, None]
+        self.reaction = force[:, ::-1]  # the shear force does work on the deflection, the moment on the slope
+
+    def errors(self, vectors: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """Errors (2, n) of `energy_errors` for solutions (n_dofs, n) under the inertia of ``loads`` (n_dofs, n)."""
+        blocks = [slice(i, i + BLOCK) for i in range(0, vectors.shape[1], BLOCK)]
+        return np.concatenate([self._errors(vectors[:, block], loads[:, block]) for block in blocks], axis=1)
+
+    def _errors(self, vectors: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        unknowns, pushed = (_of_cells(self.system, field) for field in (vectors, loads))
+        total = _squares(self.inertia @ pushed - self.balance @ unknowns)
+        total += _squares(self.jumps @ unknowns[self.beside].reshape(len(self.beside), 42, -1))
+        at_rim = unknowns[self.rim_cells]
+        total += _squares(self.missed @ at_rim)
+        moved, reaction = (operator @ at_rim[:, None] for operator in (self.moved, self.reaction))
+        return np.stack([total / CALIBRATION, 2.0 * np.abs(np.einsum("fiqk,fiqk->ik", moved, reaction)).sum(axis=0)])
+
+
+def _of_cells(system: System, vectors: np.ndarray) -> np.ndarray:
+    """Unknowns (n_cells, n_local, n) of each cell, from those of fields (n_dofs, n)."""
+    return (system.expand @ vectors)[system.element_dofs].transpose(1, 0, 2)
+
+
+def energy_errors(
+    system: System, vectors: np.ndarray, loads: np.ndarray, forced: np.ndarray | None = None
+) -> np.ndarray:
+    """Estimated error of the squared energy norm of finite element solutions, (2, n).
+
+    The first row is the error of the elements, which falls with the eighth power of their size if the solution is
+    smooth. The second comes from supports on curved edges, which let the plate move between their nodes; it falls with
+    the fifth or sixth power.
+
+    Parameters
+    ----------
+    system : System, not of Morley elements
+    vectors : ndarray, shape (n_dofs, n), the solutions
+    loads : ndarray, shape (n_dofs, n), fields whose inertia drives the solutions; for a mode, its eigenvalue times it
+    forced : ndarray, shape (n, dimension) [m], optional
+        Points where an additional unit force acts, one for each solution.
+    """
+    if system.mesh.dimension == 2:
+        return Residual(system).errors(vectors, loads)
+    space: Any = system.space
+    frame = system.frame
+    x, _ = beam_elements.quadrature(space)
+    place = (frame.centre + frame.length * x.reshape(-1, 1)).clip(system.mesh.points.min(), system.mesh.points.max())
+    stiffness = system.section.stiffness(place).reshape(x.shape) / frame.stiffness
+    inertia = system.section.inertia(place).reshape(x.shape) / frame.inertia
+    value, bend = space.functions(np.arange(len(x)), x[..., None], (0, 2))
+    moments = np.zeros((*x.shape, vectors.shape[1]))
+    for point, mass in system.point_masses:
+        beyond = (x - frame.local(point[None])[0, 0]).clip(0.0)
+        moments += mass / frame.mass * beyond[..., None] * (system.interpolate(point[None]) @ loads)
+    if forced is not None:
+        moments += (x[..., None] - frame.local(forced)[:, 0]).clip(0.0)
+    load = inertia[..., None] * (value @ _of_cells(system, loads))
+    errors = beam_elements.energy_errors(space, stiffness, bend @ _of_cells(system, vectors), load, moments)
+    return np.stack([errors, np.zeros_like(errors)])
+
+
+def _squares(values: np.ndarray) -> np.ndarray:
+    """Sum of squares over all but the last axis."""
+    return np.einsum("eqk,eqk->k", values, values)

@@ -1,0 +1,206 @@
+"""Materials, plate and beam sections, and elastic supports."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+
+Varying = float | Callable[[np.ndarray], Any]
+
+
+@dataclass(frozen=True)
+class Material:
+    """Linear elastic material; `Material.orthotropic` makes wood and composites.
+
+    Parameters
+    ----------
+    E : float [Pa]
+        Young's modulus; along the grain if orthotropic.
+    nu : float [-]
+        Poisson's ratio: contraction across the grain divided by stretch along it. If isotropic, above -1 and at most
+        0.5.
+    rho : float [kg/m^3]
+    E_across, G : float [Pa], optional
+        Young's modulus across the grain and shear modulus; the material is isotropic without them.
+    angle : float [rad]
+        Direction of the grain, anticlockwise from the x axis.
+    """
+
+    E: float
+    nu: float
+    rho: float
+    E_across: float | None = None
+    G: float | None = None
+    angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        check.positive("E", self.E, "Pa")
+        check.positive("rho", self.rho, "kg/m^3")
+        check.number("angle", self.angle, "rad")
+        nu = check.number("nu", self.nu)
+        if (self.E_across is None) != (self.G is None):
+            raise ValueError("E_across and G must be given together; use Material.orthotropic, or give neither")
+        if self.E_across is None or self.G is None:
+            if not -1.0 < nu < 0.5 and nu != 0.5:
+                raise ValueError(f"nu must be above -1 and at most 0.5, got {nu:g}")
+            return
+        check.positive("E_across", self.E_across, "Pa")
+        check.positive("G", self.G, "Pa")
+        if nu**2 * self.E_across >= self.E:
+            raise ValueError(
+                f"nu must be below sqrt(E/E_across) = {(self.E / self.E_across) ** 0.5:g}, got {nu:g}: "
+                "otherwise deforming the material would release energy"
+            )
+
+    @classmethod
+    def orthotropic(cls, *, E_along, E_across, nu, G, rho, angle=0.0) -> "Material":
+        """Orthotropic material such as tonewood.
+
+        Parameters
+        ----------
+        E_along, E_across : float [Pa]
+            Young's moduli along and across the grain.
+        nu : float [-]
+            Contraction across the grain divided by stretch along it (nu_LR for wood); nu**2 < E_along / E_across.
+        G : float [Pa]
+            Shear modulus in the plane of the plate.
+        rho : float [kg/m^3]
+        angle : float [rad]
+            Direction of the grain, anticlockwise from the x axis.
+        """
+        for name, value in (("E_along", E_along), ("E_across", E_across), ("G", G)):
+            check.positive(name, value, "Pa")
+        return cls(E_along, nu, rho, E_across, G, angle)
+
+    @property
+    def plane_stress(self) -> np.ndarray:
+        """Plane-stress stiffness (3, 3) [Pa] on strains (xx, yy, 2 xy), in the axes of the plate."""
+        E, nu = self.E, self.nu
+        across = E if self.E_across is None else self.E_across
+        G = E / (2.0 * (1.0 + nu)) if self.G is None else self.G
+        inner = 1.0 - nu**2 * across / E
+        local = np.array([[E, nu * across, 0.0], [nu * across, across, 0.0], [0.0, 0.0, G * inner]]) / inner
+        if self.E_across is None:
+            return local
+        c, s = np.cos(self.angle), np.sin(self.angle)
+        turn = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
+        return turn.T @ local @ turn
+
+
+def evaluate(name: str, value: Varying, points: np.ndarray, unit: str) -> np.ndarray:
+    """Values (n_points,) of a number or function at points (n_points, dimension); raise ValueError if not positive."""
+    points = check.array("points", points, (None, None), "m")
+    if not callable(value):
+        return np.full(len(points), check.positive(name, value, unit))
+    field = check.field(name, value, points, unit)
+    worst = int(np.argmin(field))
+    if field[worst] <= 0.0:
+        where = ", ".join(f"{x:g}" for x in points[worst])
+        raise ValueError(f"{name} must be positive everywhere, got {field[worst]:g} {unit} at ({where}) m")
+    return field
+
+
+@dataclass(frozen=True, eq=False)
+class Plate:
+    """Thin (Kirchhoff) plate.
+
+    Parameters
+    ----------
+    material : Material
+    thickness : float or function of points (n_points, 2) returning (n_points,) [m]
+    tension : float [N/m]
+        Uniform in-plane tension, as in a drumhead; the whole edge must be supported.
+    """
+
+    material: Material
+    thickness: Varying
+    tension: float = 0.0
+
+    def __post_init__(self) -> None:
+        check.instance("material", self.material, Material)
+        if not callable(self.thickness):
+            check.positive("thickness", self.thickness, "m")
+        check.non_negative("tension", self.tension, "N/m")
+
+    def stiffness(self, points: np.ndarray) -> np.ndarray:
+        """Bending stiffness (n_points, 3, 3) [N m] on curvatures (xx, yy, 2 xy)."""
+        thickness = evaluate("thickness", self.thickness, points, "m")
+        return (thickness**3 / 12.0)[:, None, None] * self.material.plane_stress
+
+    def inertia(self, points: np.ndarray) -> np.ndarray:
+        """Mass per area (n_points,) [kg/m^2]."""
+        return self.material.rho * evaluate("thickness", self.thickness, points, "m")
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """Elastic support of an edge: springs against deflection and optionally against rotation.
+
+    Parameters
+    ----------
+    stiffness : float
+        Force per deflection and length of a plate's edge [N/m^2]; force per deflection at a beam's end [N/m].
+    rotation : float
+        Moment per angle and length of a plate's edge [N]; moment per angle at a beam's end [N m].
+    """
+
+    stiffness: float
+    rotation: float = 0.0
+
+    def __post_init__(self) -> None:
+        check.non_negative("stiffness", self.stiffness, "N/m^2")
+        check.non_negative("rotation", self.rotation, "N")
+
+
+@dataclass(frozen=True, eq=False)
+class Beam:
+    """Slender (Euler-Bernoulli) beam; make it with `Beam.rectangular` or `Beam.circular`.
+
+    Parameters
+    ----------
+    material : Material
+    width : float or function of points (n_points, 1) [m]
+        Perpendicular to the blow.
+    height : float or function of points [m]
+        In the direction of the blow.
+    round : bool
+        Whether the section is round; width and height are then both the diameter.
+    """
+
+    material: Material
+    width: Varying
+    height: Varying
+    round: bool = False
+
+    def __post_init__(self) -> None:
+        check.instance("material", self.material, Material)
+        check.flag("round", self.round)
+        for name, value in (("width", self.width), ("height", self.height)):
+            if not callable(value):
+                check.positive(name, value, "m")
+
+    @classmethod
+    def rectangular(cls, material: Material, *, width: Varying, height: Varying) -> "Beam":
+        """Beam of rectangular section; the blow acts along its height."""
+        return cls(material, width, height)
+
+    @classmethod
+    def circular(cls, material: Material, *, diameter: Varying) -> "Beam":
+        """Beam of circular section."""
+        if not callable(diameter):
+            check.positive("diameter", diameter, "m")
+        return cls(material, diameter, diameter, round=True)
+
+    def stiffness(self, points: np.ndarray) -> np.ndarray:
+        """Bending stiffness E I, (n_points,) [N m^2]."""
+        height = evaluate("height", self.height, points, "m")
+        width = evaluate("width", self.width, points, "m")
+        return self.material.E * width * height**3 * (np.pi / 64.0 if self.round else 1.0 / 12.0)
+
+    def inertia(self, points: np.ndarray) -> np.ndarray:
+        """Mass per length (n_points,) [kg/m]."""
+        area = evaluate("height", self.height, points, "m") * evaluate("width", self.width, points, "m")
+        return self.material.rho * area * (np.pi / 4.0 if self.round else 1.0)

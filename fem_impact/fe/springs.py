@@ -1,0 +1,67 @@
+"""Springs along the edges of a body, and checks of its point masses."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
+
+from .._base import check
+from .section import Elastic
+
+FACET_POINTS = 8  # [-] Gauss points on a boundary facet; exact for products of quintics
+
+
+def along_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points on boundary facets (n, 2) of cells (n,), and outward normals times ds, both (n, n_q, 2)."""
+    node, weight = np.polynomial.legendre.leggauss(FACET_POINTS)
+    s = 0.5 * (node + 1.0)[:, None]
+    corner = space.vertices[cells][:, None]  # (n, 1, 3)
+    first, last = (np.equal(corner, facets[:, end, None, None]).astype(float) for end in (0, 1))
+    area = (1.0 - s) * first + s * last  # (n, n_q, 3)
+    reference = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) - 1.0 / 3.0
+    corners = space.origin[cells, None] + reference @ space.jacobian[cells].transpose(0, 2, 1)
+    x, gradient = area @ corners, corners.transpose(0, 2, 1)[:, None]
+    if space.bent is not None:
+        moved, turned = space.bent.shift(cells, area)
+        x, gradient = x + moved, gradient + turned
+    tangent = (gradient @ (last - first)[..., None])[..., 0]
+    return x, np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * 0.5 * weight[:, None]
+
+
+def edge_springs(supports: Sequence[Any], frame: Any) -> np.ndarray:
+    """Support stiffness (n_facets, 2) against deflection and slope of each facet, in the frame's units."""
+    pairs = [(kind.stiffness, kind.rotation) if isinstance(kind, Elastic) else (0.0, 0.0) for kind in supports]
+    return np.array(pairs) * [frame.length**3, frame.length] / frame.stiffness
+
+
+def plate_springs(space: Any, facets: np.ndarray, cells: np.ndarray, springs: np.ndarray) -> np.ndarray:
+    """Stiffness (n, 21, 21) that the springs (n, 2) of facets (n, 2) add to the cells (n,) they belong to."""
+    x, normal = along_facets(space, facets, cells)
+    ds = np.linalg.norm(normal, axis=2)
+    value, slope = space.functions(cells, x, (0, 1))
+    across = np.einsum("nqi,niqk->nqk", normal / ds[..., None], slope)
+    push, turn = springs.T
+    pushed = (value * (push[:, None] * ds)[..., None]).transpose(0, 2, 1) @ value
+    return pushed + (across * (turn[:, None] * ds)[..., None]).transpose(0, 2, 1) @ across
+
+
+def beam_springs(dofs: list[tuple[int, int]], held: list[Elastic], frame: Any, n_all: int) -> csr_matrix:
+    """Stiffness (n_all, n_all) of elastic supports, on the deflection and slope at the ends of a beam."""
+    numbers = np.array(dofs, int).ravel()
+    pairs = [[s.stiffness * frame.length**3, s.rotation * frame.length] for s in held]
+    values = np.array(pairs).ravel() / frame.stiffness
+    return coo_matrix((values, (numbers, numbers)), shape=(n_all, n_all)).tocsr()
+
+
+def check_masses(point_masses: Any, dimension: int) -> list[tuple[np.ndarray, float]]:
+    """Check a sequence of (point, mass) pairs; return points (dimension,) [m] and masses [kg]."""
+    if isinstance(point_masses, (str, dict)) or not isinstance(point_masses, Sequence):
+        raise ValueError(f"point_masses must be a list of (point, mass) pairs, got {check.shown(point_masses)}")
+    result = []
+    for i, entry in enumerate(point_masses):
+        if not isinstance(entry, Sequence) or len(entry) != 2:
+            raise ValueError(f"point_masses[{i}] must be a pair (point in m, mass in kg), got {check.shown(entry)}")
+        point = check.array(f"point of point_masses[{i}]", entry[0], (dimension,), "m", lift=True)
+        result.append((point, check.positive(f"mass of point_masses[{i}]", entry[1], "kg")))
+    return result

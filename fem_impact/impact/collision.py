@@ -1,0 +1,787 @@
+"""`strike` and `collide`: run a blow so that its error stays below the tolerance."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.special import gamma
+
+from .._base import check
+from .._base.check import SimulationError
+from ..modes.modal import Modes, left_out
+from . import accuracy
+from .compiled import build, record
+from .compiled.collocation import run_collocation
+from .compiled.energy import run_energy
+from .contact import Contact
+from .quantities import asked_for
+from .response import Dip, Error, History, Response
+from .striker import Striker
+
+TOLERANCE = 1e-4  # [-] default tolerance
+SCHEMES = ("A", "A4", "collocation")
+MAX_STEPS = 500_000  # [-] of one run: takes about one second
+MAX_WORK = 500_000_000  # [-] modes times steps of one run: takes about one second
+PLAIN_WORK = 300_000  # [-] modes times steps of one run, if the kernels are not compiled
+FIRST_STEPS = 24.0  # [-] with 24 steps per contact, A4 errs by less than FIRST_ERROR; cheapest first run of 12 to 32
+FIRST_ERROR = 1e-4  # [-] error of A4 with FIRST_STEPS
+AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
+AVERAGED = 0.5  # [-] fraction of the usual steps that these quantities need
+GRAZE = 2.0  # [-] a touch or gap below 2 tolerance times the deepest approach may be a numerical error
+GRAZES = 3  # [-] step halvings to decide whether such a touch is real
+FEW = 20  # [-] no such check after more impacts: chatter always ends with a contact that barely touches
+DOUBLINGS = 7  # [-] step halvings before the run gives up
+# [-] Difference of two runs over the error of the finer one: first for speeds and impulse, then for contact time and
+# peak force. These two depend on one instant, and modes faster than the step lower the order of A4 there.
+RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 4.0), "collocation": (1.0, 1.0)}
+MISFIT = 1.5, 12.0  # [-] error of the peak force over the misfit in `_force_missed`, without and with loss
+NEAR_PEAK = 0.8, 0.35  # [-] that misfit counts only above this fraction of the peak force, without and with loss
+RINGING = 0.5  # [-] modes with a damping ratio above this do not ring
+RESOLVED = 2.0  # [rad] largest phase of a ringing mode in one step of the coarser run
+COLLOCATION_BELOW = 1e-7  # [-] below this tolerance, collocation needs less work than A4
+BAND_POINTS = 257  # [-] number of frequencies at which two spectra are compared
+NODES = 5  # [-] of collocation; more gain nothing, because the force is not smooth at onset and release
+RESOLVABLE = 0.3  # [-] largest contact stiffness times residual compliance for which the error estimate holds
+# [-] An error estimate below 30 % of the predicted one is replaced by that 30 %, because two runs can agree by chance;
+# 30 % is the median over many blows.
+AT_LEAST = 0.3
+THINNED = 1.4, 2.0  # [-] two extra runs divide the highest kept frequency by these, to estimate the truncation error
+FALLING = 2.0  # [-] the truncation error falls at least with this power of the highest kept frequency
+REST_FLOOR = 1e-12  # [-] residual compliance below this fraction of the total is rounding
+# [-] by dimension: frequency of the replacement mode over the last, sqrt(sum u**2/w**2 / sum u**2/w**4) of those above
+REST_ABOVE = {1: 1.53, 2: 1.73}
+# [-] the replacement mode under a lossy contact: frequency over the last mode's, and damping ratio
+LOSSY_ABOVE, LOSSY_DAMPING = 30.0, 1.0
+LOSSY_STRIKER = 30.0  # [-] a lossy contact multiplies the truncation error of a striker by this: its modes are sparse
+STRIKER_SHARE = 0.05  # [-] fraction of the tolerance for the striker's left-out modes: keeping them is cheap
+SILENT = 1e-15  # [-] a mode with less than this fraction of the largest shape at the contact rests there
+NOISE = 1e-16  # [-] an approach below this times duration times speed is rounding: the bodies merely touch
+STILL = 1e-12  # [-] a rigid approach slower than this times the speed is rounding: no contact follows
+ROUNDING = 1e-13  # [-] smaller differences of two runs are rounding
+NEGLIGIBLE = 1e-4  # [-] mesh errors below this fraction of the tolerance need no extra run
+LARGEST_ERROR = 0.5  # [-] frequency errors are capped at this in that run
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A possible contact between two bodies of `collide`, and its contact law."""
+
+    law: Contact
+    first: int  # index of the first body; its positive direction is towards the second
+    second: int | None  # index of the second body; None for a rigid wall
+    first_at: Any = None  # point on the first body [m]
+    second_at: Any = None  # point on the second body [m]
+
+    def __post_init__(self) -> None:
+        check.instance("law", self.law, Contact)
+        check.count("first", self.first, low=0)
+        if self.second is not None:
+            check.count("second", self.second, low=0)
+
+
+@dataclass(frozen=True, eq=False)
+class _System:
+    """The modes of all bodies in one list, and their contacts: the input of a kernel."""
+
+    omega: np.ndarray
+    zeta: np.ndarray
+    shape: np.ndarray
+    offset: np.ndarray
+    bias: np.ndarray
+    law: np.ndarray
+    start_q: np.ndarray
+    start_p: np.ndarray
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)  # always: numba would compile the kernels again for writable arrays
+
+
+@dataclass(frozen=True)
+class _Options:
+    """When to stop, how accurate to be, and which scheme to use."""
+
+    tolerance: float
+    horizon: float
+    n_max: int
+    scheme: str | None
+    dt: float | None
+    quantities: Mapping[str, float | None]  # that must meet the tolerance, each with its band [Hz]
+
+    @classmethod
+    def checked(cls, tolerance, duration, max_impacts, scheme, dt, quantity) -> "_Options":
+        return cls(
+            check.between("tolerance", tolerance, 1e-12, 1.0),
+            np.inf if duration is None else check.positive("duration", duration, "s"),
+            0 if max_impacts is None else check.count("max_impacts", max_impacts),
+            None if scheme is None else check.one_of("scheme", scheme, SCHEMES),
+            None if dt is None else check.positive("dt", dt, "s"),
+            asked_for(quantity),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """One body, reduced to its modes and contacts."""
+
+    omega: np.ndarray  # (n_modes,)
+    zeta: np.ndarray  # (n_modes,)
+    rows: np.ndarray  # (n_ends, n_modes) shapes at its contacts
+    touched: tuple[tuple[int, float], ...]  # contact, and sign: 1 for its first body, -1 for its second
+    rest: np.ndarray  # (n_ends, n_ends) [m/N] residual compliance of the left-out modes
+    doubt: np.ndarray  # (n_ends,) [m/N] estimated error of its diagonal
+    q: np.ndarray
+    p: np.ndarray
+    bias: np.ndarray
+    force: float  # [N] constant force at its first contact
+    points: np.ndarray  # (n_ends, dimension) [m] contact points
+
+
+@check.typed
+def strike(
+    modes: Modes,
+    striker: Striker,
+    contact: Contact,
+    *,
+    at: Any,
+    speed: float,
+    tolerance: float = TOLERANCE,
+    quantity: Any = None,
+    residual: bool = True,
+    duration: float | None = None,
+    max_impacts: int | None = None,
+    scheme: str | None = None,
+    dt: float | None = None,
+    striker_force: float = 0.0,
+    target_force: float = 0.0,
+) -> Response:
+    """Strike a body at rest and follow both bodies until their final separation.
+
+    Parameters
+    ----------
+    modes : Modes
+        The struck body. The left-out modes act by their static compliance.
+    striker : Striker
+        Arrives in rigid motion.
+    contact : Contact
+    at : strike point, (dimension,) [m]
+    speed : float [m/s]
+        Speed of the striker's contact point towards the body.
+    tolerance : float [-]
+        Largest accepted error: absolute for the restitution, relative for impulse, contact time and peak force.
+    quantity : str, sequence of str or mapping of str to frequency [Hz], optional
+        The quantities that must meet the tolerance; by default "restitution", "impulse", "contact_time", "force" and
+        "n_impacts". Others: "spectrum=5000", the force spectrum up to 5 kHz relative to its largest value, and
+        "sound=5000".
+    residual : bool
+        Whether the residual compliance acts; False uses the given modes only.
+    duration : float [s], optional
+        Time at which the run stops at the latest.
+    max_impacts : int, optional
+        The run stops after this many impacts.
+    scheme : {"A", "A4", "collocation"}, optional
+        Time integration scheme; by default, the tolerance decides.
+    dt : float [s], optional
+        Time step in contact. If given, the step error is only estimated and may exceed the tolerance.
+    striker_force, target_force : float [N]
+        Constant forces at the contact points, positive along the blow; for example the weight of a falling ball.
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    ValueError
+        If an argument is invalid.
+    SimulationError
+        If the tolerance cannot be met, or if the bodies do not separate for good and no other end was given.
+    """
+    speed = check.non_negative("speed", speed, "m/s")
+    forces = [
+        check.number(name, x, "N") for name, x in (("striker_force", striker_force), ("target_force", target_force))
+    ]
+    point = modes.point("at", at)
+    options = _Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
+    rows = modes.shapes.at(point)
+    rest = left_out(modes, point, rows) if residual and modes.dimension else None
+    struck = _part(modes, ((0, -1.0),), point, rows, rest, forces[1])
+
+    def blow(striker: Striker) -> Response:
+        touch = Touch(contact, 0, 1, striker.at[None] if striker.modes.dimension else None, point)
+        rest = striker.left_out if residual and striker.modes.dimension else None
+        end = striker.at[None] if striker.modes.dimension else np.zeros((1, 0))
+        motion = speed * striker.motion
+        arriving = _part(striker.modes, ((0, 1.0),), end, striker.shape[None], rest, forces[0], motion)
+        return _follow((striker.modes, modes), [touch], [arriving, struck], speed, options, striker, point[0])
+
+    if striker.fixed or not residual or speed == 0.0:
+        return blow(striker)
+    needed = striker_modes(striker, contact=contact, speed=speed, tolerance=options.tolerance)[0]
+    hit = blow(shortened(striker, needed))
+    return hit if hit.error.truncation <= 0.5 * options.tolerance else blow(striker)
+
+
+@check.typed
+def collide(
+    bodies: Sequence[Modes],
+    contacts: Sequence[Touch],
+    *,
+    speeds: Sequence[float] | None = None,
+    states: Sequence[tuple[Any, Any]] | None = None,
+    tolerance: float = TOLERANCE,
+    quantity: Any = None,
+    residual: bool = True,
+    duration: float | None = None,
+    max_impacts: int | None = None,
+    scheme: str | None = None,
+    dt: float | None = None,
+    forces: Sequence[float] | None = None,
+) -> Response:
+    """Collide any number of bodies at any number of contacts.
+
+    Parameters
+    ----------
+    bodies : sequence of Modes
+    contacts : sequence of Touch
+    speeds : sequence of float [m/s], (n_bodies,)
+        Speed of each body's first contact point; the body arrives in rigid motion. Positive from the first body of a
+        touch towards the second.
+    states : sequence of (q, p), optional
+        Initial modal displacements and velocities of each body; ``speeds`` adds to them.
+    forces : sequence of float [N], (n_bodies,)
+        Constant force at each body's first contact point, with the sign convention of the speeds.
+    tolerance, quantity, residual, duration, max_impacts, scheme, dt
+        As in `strike`.
+
+    Returns
+    -------
+    Response
+    """
+    options = _Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
+    bodies, contacts = check.several("bodies", bodies, Modes), check.several("contacts", contacts, Touch)
+    parts, arriving = _parts(bodies, contacts, speeds, states, forces, residual)
+    return _follow(bodies, contacts, parts, arriving, options)
+
+
+def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> Response:
+    """Run the blow to the required tolerance and estimate the remaining errors."""
+    system = _joined(parts, contacts)
+    endless = not np.isfinite(options.horizon) and not options.n_max
+    if endless and (system.bias @ system.shape.T > 0.0).any():
+        raise ValueError(
+            "duration or max_impacts must be given, because a constant force keeps pressing the bodies together"
+        )
+    pace = _pace(system)
+    _check_way(system, pace[0] * pace[1], options.tolerance)
+    last = options.horizon, options.n_max
+    differ = partial(_difference, options.quantities)
+    history, step_error, ran, coarse, size = _controlled(
+        system, options.scheme, options.dt, options.tolerance, options.quantities, pace, *last
+    )
+    truncation, resolvable = _truncation(parts, contacts, system, coarse, ran, size, differ, pace, *last)
+    mesh_error = _mesh_error(bodies, parts, contacts, system, coarse, ran, size, differ, options.tolerance, pace, last)
+    error = Error(step_error, truncation, mesh_error, resolvable, sensitivity=_sensitivity(coarse, history))
+    laws = tuple(touch.law for touch in contacts)
+    dips = tuple(_dip(part, system) for part in parts)
+    return Response(tuple(bodies), laws, history, speed, options.tolerance, ran, error, striker, at, dips)
+
+
+def _check_way(system: _System, depth: float, tolerance: float) -> None:
+    """Raise ValueError if rounding of a large offset would spoil the approach in contact, about ``depth`` [m]."""
+    way = float(np.abs(system.offset).max())
+    if np.finfo(float).eps * way > tolerance * depth:
+        raise ValueError(
+            f"gap and constant forces must be smaller: with an offset of {way:.3g} m, rounding spoils an approach of "
+            f"{depth:.3g} m beyond the tolerance of {tolerance:g}; start nearer to contact"
+        )
+
+
+def _dip(part: _Part, system: _System) -> Dip | None:
+    """Where the left-out modes of a body deflect; a constant force counts only if a series spring replaces them."""
+    if not part.rest.any():
+        return None
+    series = len(part.touched) == 1 and system.law[part.touched[0][0], 2] == 0.0
+    return Dip(part.points, part.touched, part.force if series else 0.0)
+
+
+def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Part], float]:
+    """Every body as a `_Part`, and the speed of the first body that moves."""
+    if states is not None:
+        wrong = not isinstance(states, (list, tuple)) or len(states) != len(bodies)
+        if wrong or any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in states):
+            raise ValueError(
+                f"states must hold one pair (q, p) for each of {len(bodies)} bodies, got {check.shown(states)}"
+            )
+    speeds = np.zeros(len(bodies)) if speeds is None else check.array("speeds", speeds, (len(bodies),), "m/s")
+    forces = np.zeros(len(bodies)) if forces is None else check.array("forces", forces, (len(bodies),), "N")
+    ends: list[list] = [[] for _ in bodies]  # (contact, sign, point) on each body
+    for i, touch in enumerate(contacts):
+        for body, at, sign in ((touch.first, touch.first_at, 1.0), (touch.second, touch.second_at, -1.0)):
+            if body is None:
+                continue
+            if not 0 <= body < len(bodies):
+                raise ValueError(f"contacts must name bodies from 0 to {len(bodies) - 1}, got {body}")
+            ends[body].append((i, sign, bodies[body].point("at", at)))
+    parts, arriving = [], 0.0
+    for body, modes in enumerate(bodies):
+        points = np.vstack([point for _, _, point in ends[body]] or [np.zeros((0, modes.dimension))])
+        rows = np.atleast_2d(modes.shapes.at(points)) if ends[body] else np.zeros((0, modes.n_modes))
+        rest = left_out(modes, points, rows) if residual and modes.dimension and ends[body] else None
+        part = _part(modes, tuple((i, sign) for i, sign, _ in ends[body]), points, rows, rest, float(forces[body]))
+        if states is not None:
+            q, p = (check.array(f"states[{body}]", value, (modes.n_modes,)) for value in states[body])
+            part = replace(part, q=q, p=p)
+        speed = float(speeds[body])
+        if speed != 0.0:
+            if not ends[body] or not rows[0, modes.omega == 0.0].any():
+                raise ValueError(f"speeds must be zero for a body that cannot move rigidly, got {speed:g} m/s")
+            part = replace(part, p=part.p + speed * modes.rigid_motion(points[:1] if modes.dimension else None))
+        arriving = arriving or speed
+        parts.append(part)
+    return parts, arriving
+
+
+def _part(
+    modes: Modes,
+    touched: tuple,
+    points: np.ndarray,
+    rows: np.ndarray,
+    left_out: tuple[np.ndarray, np.ndarray] | None,
+    force: float,
+    motion: np.ndarray | None = None,
+) -> _Part:
+    """One undeformed body, at rest or moving, with its shapes and residual compliance at its contacts."""
+    n_ends = len(touched)
+    rest, doubt = (np.zeros((n_ends, n_ends)), np.zeros(n_ends)) if left_out is None else left_out
+    rest = 0.5 * (rest + rest.T)
+    carried = np.square(rows / np.where(modes.omega > 0.0, modes.omega, np.inf)).sum()
+    largest = rest[0, 0] if n_ends == 1 else np.linalg.eigvalsh(rest)[-1] if n_ends else 0.0
+    if largest <= REST_FLOOR * (np.trace(rest) + carried):
+        rest = np.zeros_like(rest)
+    still = np.zeros(modes.n_modes)
+    bias = force * rows[0] if force else still
+    velocity = still if motion is None else motion
+    return _Part(modes.omega, modes.damping_ratio, rows, touched, rest, doubt, still, velocity, bias, force, points)
+
+
+def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
+    """Join the modes of all bodies; series springs or replacement modes stand in for the left-out modes.
+
+    A series spring is exact only for a body with one lossless contact. Otherwise each eigenvector of the residual
+    compliance becomes a mode above the last kept one, so that loss and other contacts act on it too.
+    """
+    law = np.array([[t.law.stiffness, t.law.exponent, t.law.loss, 0.0] for t in contacts])
+    offset = np.array([-t.law.gap for t in contacts])
+    n_modes = sum(len(part.omega) for part in parts)
+    shape = np.zeros((len(contacts), n_modes))
+    extra: list[tuple[float, float, np.ndarray]] = []  # frequency, damping ratio, signed shape (n_contacts,)
+    start = 0
+    for part in parts:
+        for (i, sign), row in zip(part.touched, part.rows):
+            shape[i, start : start + len(row)] += sign * row
+        start += len(part.omega)
+        if not part.rest.any():
+            continue
+        first, sign = part.touched[0]
+        if len(part.touched) == 1 and law[first, 2] == 0.0:
+            law[first, 3] += part.rest[0, 0]
+            offset[first] += sign * part.rest[0, 0] * part.force
+            continue
+        above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], bool((law[:, 2] > 0.0).any()))
+        size, vectors = np.linalg.eigh(part.rest)
+        for value, vector in zip(size, vectors.T):
+            if value > REST_FLOOR * size[-1]:
+                column = np.zeros(len(law))
+                for (i, sign), share in zip(part.touched, vector):
+                    column[i] += sign * share * np.sqrt(value) * above
+                extra.append((above, damping, column))
+    lists: list[list] = [
+        [part.omega for part in parts],
+        [part.zeta for part in parts],
+        [part.bias for part in parts],
+        [part.q for part in parts],
+        [part.p for part in parts],
+    ]
+    if extra:
+        shape = np.ascontiguousarray(np.hstack([shape, *(column[:, None] for _, _, column in extra)]))
+        added = [[omega for omega, _, _ in extra], [zeta for _, zeta, _ in extra], *[[0.0] * len(extra)] * 3]
+        lists = [[*one, np.array(more)] for one, more in zip(lists, added)]
+    omega, zeta, bias, q, p = (np.concatenate(one) for one in lists)
+    return _System(omega, zeta, shape, offset, bias, law, q, p)
+
+
+def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[float, float]:
+    """Frequency [rad/s] and damping ratio [-] of the mode that replaces those above the last kept one.
+
+    A lossy force depends on the approach rate, in which an undamped mode just above the last one would ring. A
+    critically damped mode far above behaves like a series spring and takes almost no energy.
+    """
+    if lossy:
+        return LOSSY_ABOVE * omega, LOSSY_DAMPING
+    return REST_ABOVE[min(dimension, 2)] * omega, float(zeta)
+
+
+def _thinned(part: _Part, wanted: float) -> tuple[_Part, float]:
+    """The body with its upper modes replaced by their compliance, and the ratio of old to new highest frequency."""
+    flexible = part.omega[part.omega > 0.0]
+    if not part.rest.any() or len(flexible) < 2:
+        return part, np.inf
+    limit = max(flexible[-1] / wanted, flexible[0])
+    n = int(np.searchsorted(part.omega, limit, side="right"))
+    gone = part.rows[:, n:] / part.omega[n:]
+    thin = replace(
+        part, omega=part.omega[:n], zeta=part.zeta[:n], rows=part.rows[:, :n], rest=part.rest + gone @ gone.T,
+        q=part.q[:n], p=part.p[:n], bias=part.bias[:n],
+    )  # fmt: skip
+    return thin, float(flexible[-1] / part.omega[n - 1])
+
+
+def _pace(system: _System) -> tuple[float, float]:
+    """Shortest expected duration [s] of an undisturbed contact, and its approach speed [m/s]."""
+    rate = system.omega * np.maximum(1.0, 2.0 * system.zeta)  # an overdamped mode acts as a dashpot, not as a mass
+    order = np.argsort(rate, kind="stable")
+    omega = rate[order]
+    last = np.concatenate([omega[1:] > omega[:-1], [True]])  # the last mode of each distinct frequency
+    beyond = np.concatenate([omega[last][1:], [np.inf]])
+    shortest, fastest = np.inf, 0.0
+    for i, (k, exponent, _, compliance) in enumerate(system.law):
+        mobile = np.cumsum(system.shape[i, order] ** 2)[last]  # [1/kg] sum over the modes up to each
+        above, mobile = beyond[mobile > 0.0], mobile[mobile > 0.0]
+        if not mobile.size:
+            continue
+        approach = system.offset[i] + float(system.shape[i] @ system.start_q)
+        pull = max(0.0, float(system.shape[i] @ system.bias))  # [m/s**2]
+        speed = float(np.abs(system.shape[i]) @ np.abs(system.start_p))
+        speed = max(speed, np.sqrt(2.0 * pull * max(0.0, -approach)))
+        speed = max(speed, np.sqrt(pull * (pull / (k * mobile[-1])) ** (1.0 / exponent)))
+        if approach > 0.0:
+            speed = max(speed, approach * np.sqrt(k * approach ** (exponent - 1.0) * mobile[-1]))
+        if speed == 0.0:
+            continue
+        free = _wall_duration(k, exponent, mobile, speed)
+        if exponent == 1.0:
+            free = free * np.sqrt(1.0 + k * compliance)
+        shortest = min(shortest, float(free[np.argmax(np.pi / free < above)]))
+        fastest = max(fastest, float(speed))
+    if not np.isfinite(shortest):
+        k, exponent = system.law[0, :2]
+        return float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0
+    return shortest, fastest
+
+
+def _wall_duration(k: float, exponent: float, mobility: np.ndarray, speed: float) -> np.ndarray:
+    """Contact times [s] of masses 1/mobility on a rigid wall; logarithms avoid overflow."""
+    q = 1.0 / (exponent + 1.0)
+    deepest = np.exp(q * (2.0 * np.log(speed) - np.log(2.0 * q * k) - np.log(mobility)))
+    return 2.0 * np.sqrt(np.pi) * gamma(1.0 + q) / gamma(0.5 + q) * deepest / speed
+
+
+def _scheme_for(tolerance: float, exponent: float) -> str:
+    """The scheme that meets a tolerance with the least work."""
+    return "collocation" if tolerance < COLLOCATION_BELOW and exponent >= 1.0 else "A4"
+
+
+def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float | None]) -> float:
+    """Steps per contact in the first run."""
+    count = FIRST_STEPS * (FIRST_ERROR / tolerance) ** (0.5 if scheme == "A" else 0.25)
+    return max(6.0, count * (AVERAGED if set(quantities) <= AVERAGES else 1.0))
+
+
+def steps_for(
+    contact: Contact,
+    duration: float,
+    tolerance: float,
+    quantities: Mapping[str, float | None],
+    scheme: str | None = None,
+    dt: float | None = None,
+) -> tuple[str, float]:
+    """Scheme and first time step [s] of `strike`; ``duration`` is the contact time on a rigid wall [s]."""
+    scheme = scheme or _scheme_for(tolerance, contact.exponent)
+    if scheme in ("A", "A4"):
+        return scheme, dt or duration / _first_count(scheme, tolerance, quantities)
+    return scheme, dt or duration / (2.0 if scheme == "collocation" else 1.0)
+
+
+def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance: float) -> tuple[int, float]:
+    """How many striker modes a blow needs, and the expected error [-] of leaving out the others.
+
+    That error may take only STRIKER_SHARE of the tolerance, because striker modes cost little.
+    """
+    modes = striker.modes
+    law: dict[str, Any] = {"contact": contact, "mass": striker.felt_mass, "speed": speed}
+    allowed = STRIKER_SHARE * tolerance / (LOSSY_STRIKER if contact.loss else 1.0)
+    omega_0 = np.pi / accuracy.contact_duration(**law)
+    whole = modes.truncated(n_modes=modes.n_rigid).residual_compliance(striker.at[None])[0, 0]
+    if striker.felt_mass * omega_0**2 * whole <= allowed:
+        return modes.n_rigid, allowed
+    limit = accuracy.cutoff_frequency(modes, striker.at, tolerance=allowed, **law)
+    kept = min(modes.n_modes, max(modes.n_rigid + 2, int(np.searchsorted(modes.frequencies, limit, side="right"))))
+    return kept, striker_error(striker, kept, contact=contact, speed=speed)
+
+
+def striker_error(striker: Striker, n_modes: int, *, contact: Contact, speed: float) -> float:
+    """Expected error [-] if a striker keeps only its first ``n_modes`` modes."""
+    highest = float(striker.modes.frequencies[max(n_modes - 1, 1)])
+    law: dict[str, Any] = {"contact": contact, "mass": striker.felt_mass, "speed": speed}
+    return accuracy.truncation_error(striker.modes, striker.at, highest, **law) * (
+        LOSSY_STRIKER if contact.loss else 1.0
+    )
+
+
+def shortened(striker: Striker, n_modes: int) -> Striker:
+    """The striker with its first modes only; the others act as a spring."""
+    if n_modes >= striker.modes.n_modes:
+        return striker
+    return Striker.flexible(striker.modes.truncated(n_modes=n_modes), at=striker.at)
+
+
+def _controlled(
+    system, scheme, dt, tolerance, quantities, pace, horizon, n_max
+) -> tuple[History, float, str, History, float]:
+    """Refine until two successive runs agree to the tolerance.
+
+    Returns the finer history, its estimated error, the scheme, the coarser history and its step size.
+    """
+    differ = partial(_difference, quantities)
+    missed = _force_missed if "force" in quantities else lambda _: 0.0
+    free = scheme is None and dt is None
+    scheme = scheme or _scheme_for(tolerance, float(system.law[:, 1].min()))
+    if scheme == "collocation" and (system.law[:, 1] < 1.0).any():
+        raise ValueError(f"scheme collocation needs exponents of at least 1, got {system.law[:, 1].min():g}; use A4")
+    over = RICHARDSON[scheme]
+    if scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
+        over = over[0], over[1] / (1.0 + 2.0 * pace[1] * system.law[:, 2].max())
+    shortest = min(pace[0], horizon)  # or the horizon could cut both runs to one step, and they would always agree
+    if dt is not None:
+        dt = min(dt, 0.5 * horizon)
+        fine = _run(system, scheme, dt, pace, horizon, n_max)
+        coarse = _run(system, scheme, 2.0 * dt, pace, horizon, n_max)
+        return fine, max(differ(coarse, fine, over), missed(fine)), scheme, coarse, 2.0 * dt
+    if scheme == "collocation":
+        sizes = [max(1e-15, tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)]
+    else:
+        first = min(
+            2.0 * shortest / _first_count(scheme, tolerance, quantities), _longest_lossy(system, pace, tolerance)
+        )
+        sizes = [first * 0.5**n for n in range(DOUBLINGS + 1)]
+    coarse = _run(system, scheme, sizes[0], pace, horizon, n_max)
+    best, met, grazes = np.inf, None, 0 if quantities.keys() & {"n_impacts", "contact_time"} else GRAZES
+    for before, size in pairwise(sizes):
+        fine = _run(system, scheme, size, pace, horizon, n_max)
+        estimate = max(differ(coarse, fine, over), missed(fine))
+        if estimate <= tolerance:
+            met = fine, estimate, scheme, coarse, before
+            if grazes == GRAZES or not _grazes(fine, GRAZE * tolerance * (size / sizes[1]) ** 3):
+                return met
+        grazes += met is not None
+        best, last = min(best, estimate), (coarse, fine)
+        coarse = fine
+        if 2 * len(fine.steps) > _most_steps(system):
+            break  # the next run would exceed the step limit
+        if grazes > GRAZES:
+            break
+    if met is not None:
+        return met
+    if free and scheme == "A4" and (system.law[:, 1] >= 1.0).all():
+        return _controlled(system, "collocation", dt, tolerance, quantities, pace, horizon, n_max)
+    hint = ""
+    if len(fine.contacts) > 1:
+        hint = f"; small errors grow {_sensitivity(*last):.1g}-fold over {len(fine.contacts)} impacts"
+    raise SimulationError(
+        f"the step error stays at {best:.1e}, above the tolerance {tolerance:.1e}, with {len(fine.steps)} steps{hint}; "
+        "raise tolerance, or give duration or max_impacts"
+    )
+
+
+def _longest_lossy(system: _System, pace: tuple[float, float], tolerance: float) -> float:
+    """Longest step [s] that resolves the modes whose ringing shows in a lossy contact force; infinite without loss.
+
+    A lossy force depends on the approach rate. A force that rises like a spring's makes each mode ring in that rate,
+    with stiffness times u**2 / omega**2 of the approach speed.
+    """
+    longest = np.inf
+    slow = system.omega <= np.pi / pace[0]
+    fastest = np.argsort(-system.omega, kind="stable")[: np.count_nonzero(system.omega)]
+    order = fastest[system.zeta[fastest] < RINGING]
+    omega = system.omega[order]
+    for shape, loss in zip(system.shape, system.law[:, 2]):
+        number = loss * pace[1]
+        if number > 0.0 and len(omega):
+            stiffness = (1.0 + number) * (np.pi / pace[0]) ** 2 / max(float(shape[slow] @ shape[slow]), 1e-300)
+            ringing = number / (1.0 + number) * stiffness * np.cumsum((shape[order] / omega) ** 2)
+            heard = np.searchsorted(ringing, tolerance)
+            if heard < len(omega):
+                longest = min(longest, RESOLVED / float(omega[heard]))
+    return longest
+
+
+def _most_steps(system: _System) -> int:
+    """Steps after which a run gives up."""
+    if build.COMPILED:
+        return min(MAX_STEPS, max(1000, MAX_WORK // len(system.omega)))
+    return max(100, PLAIN_WORK // len(system.omega))
+
+
+def _run(system: _System, scheme: str, size: float, pace: tuple[float, float], horizon: float, n_max: int) -> History:
+    """One run; ``size`` is the step in contact [s], for collocation the allowed misfit [-]."""
+    parts = (
+        system.omega, system.zeta, system.shape, system.offset, system.bias, system.law, system.start_q, system.start_p
+    )  # fmt: skip
+    noise = NOISE * pace[0] * pace[1], STILL * pace[1]
+    most = _most_steps(system)
+    if scheme == "collocation":
+        nodes, powers = _gauss(NODES)
+        result = run_collocation(
+            *parts, nodes, powers, pace[0] / 2.0, pace[1], float(size), *noise, float(horizon), n_max, most
+        )
+    else:
+        result = run_energy(*parts, int(scheme == "A4"), float(size), *noise, float(horizon), n_max, most)
+    time, status = result[5], result[6]
+    if status == record.EXHAUSTED:
+        raise SimulationError(
+            f"no final separation was reached in {most} steps, up to {time:.4g} s; give duration or max_impacts"
+        )
+    if status == record.FAILED:
+        raise SimulationError(
+            f"scheme {scheme} found no valid next step at {time:.4g} s; use scheme A4, or check the units of the scene"
+        )
+    return History(*parts, *result)
+
+
+def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss nodes on [0, 1] with 1 appended, (count + 1,), and Lagrange polynomials in powers, (count, count)."""
+    nodes = 0.5 * (np.polynomial.legendre.leggauss(count)[0] + 1.0)
+    powers = np.linalg.inv(np.vander(nodes, increasing=True)).T
+    return np.append(nodes, 1.0), np.ascontiguousarray(powers)
+
+
+def _difference(
+    quantities: Mapping[str, float | None], coarse: History, fine: History, over: tuple[float, float] = (1.0, 1.0)
+) -> float:
+    """Largest difference of two runs in the requested quantities; 1 if their impact counts differ.
+
+    ``over[0]`` divides the differences of speeds, impulse and spectrum, ``over[1]`` those of contact time and peak
+    force.
+    """
+    if len(coarse.contacts) != len(fine.contacts) or coarse.status != fine.status:
+        return 1.0
+    momentum = _size(fine.start_p) or _size(fine.end_p) or 1.0
+    speed = np.abs(coarse.end_p[coarse.omega == 0.0] - fine.end_p[fine.omega == 0.0])
+    found = {"restitution": float(speed.max(initial=0.0)) / momentum / over[0]}
+    if len(fine.contacts):
+        one, two = (_totals(history) for history in (coarse, fine))
+        shares = {"impulse": over[0], "contact_time": over[1], "force": over[1]}
+        found |= {name: abs(x - y) / (y or 1.0) / shares[name] for name, x, y in zip(shares, one, two)}
+    for name, band in quantities.items():
+        if band is not None:
+            frequencies = np.linspace(0.0, band, BAND_POINTS)
+            first, second = (_force_spectrum(history, frequencies) for history in (coarse, fine))
+            found[name] = float(np.abs(first - second).max() / (np.abs(second).max() or 1.0)) / over[0]
+    return max(ROUNDING, *(float(found.get(name, 0.0)) for name in quantities))
+
+
+def _grazes(history: History, least: float) -> bool:
+    """Whether the bodies touch or separate by so little that a numerical error may decide it.
+
+    A small error of the approach is then a large error of the contact time, which goes with its square root.
+    """
+    if not 0 < len(history.contacts) <= FEW or history.bias.any():
+        return False
+    return record.nearest_turn(history.steps, history.now, 3 + history.n_coefficients) < least
+
+
+def _size(vector: np.ndarray) -> float:
+    return float(vector @ vector) ** 0.5
+
+
+def _force_missed(history: History) -> float:
+    """Error [-] of the peak force if steps are too long for its ripples; two runs may agree on it by chance.
+
+    Compares the mean force of each step with Simpson's rule for the contact law on the cubic through both ends.
+    """
+    if history.n_coefficients > 2 or not len(history.contacts):
+        return 0.0
+    worst, peak, part = 0.0, history.contacts[:, 2].max(), np.array([0.0, 0.5, 1.0])
+    mean = history.impulses / np.maximum(history.steps[:, 1:2], np.finfo(float).tiny)
+    for i, loss in enumerate(history.law[:, 2]):
+        closed = np.flatnonzero(history.pressed[:, i])
+        force = history.force(closed, i, part)  # (n_closed, 3)
+        near = force.max(axis=1, initial=0.0) > NEAR_PEAK[bool(loss)] * peak
+        missed = np.abs(mean[closed, i] - force @ [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0])[near]
+        worst = max(worst, MISFIT[bool(loss)] * missed.max(initial=0.0) / peak)
+    return float(worst)
+
+
+def _totals(history: History) -> tuple[float, float, float]:
+    """Impulse [N s], contact time [s] and peak force [N] of a run with impacts."""
+    rows = history.contacts.tolist()
+    return sum(row[3] for row in rows), sum(row[1] - row[0] for row in rows), max(row[2] for row in rows)
+
+
+def _force_spectrum(history: History, frequencies: np.ndarray) -> np.ndarray:
+    return Response((), (), history, 1.0, 1.0, "", Error(0.0, 0.0, 0.0)).spectrum(frequencies)
+
+
+def _sensitivity(coarse: History, fine: History) -> float:
+    """Growth [-] of the difference of two runs between the end of the first and of the last impact."""
+    if len(coarse.contacts) != len(fine.contacts):
+        return float("inf")
+    if len(fine.contacts) < 2:
+        return 1.0
+    one, two = (np.sort(history.contacts[:, 1]) for history in (coarse, fine))
+    least = ROUNDING * two[-1]
+    return max(1.0, float((abs(one[-1] - two[-1]) + least) / (abs(one[0] - two[0]) + least)))
+
+
+def _truncation(parts, contacts, system: _System, whole: History, scheme, size, differ, pace, horizon, n_max):
+    """Estimated error [-] of leaving out modes, and whether the estimate can be trusted.
+
+    Repeats the run with the upper modes of one body replaced by their compliance. The error falls at least with the
+    power FALLING of the highest kept frequency, so the change bounds the error of the modes already left out. Two such
+    runs and a minimum, AT_LEAST of the predicted error, guard against a change that is small by chance.
+    """
+    if not any(part.rest.any() for part in parts):
+        return 0.0, True
+    omega_0 = np.pi / pace[0]
+    mobility = np.maximum((system.shape**2) @ (system.omega <= omega_0), 1e-300)
+    softness, expected = np.zeros(len(contacts)), 0.0
+    for part in parts:
+        ratio = omega_0 / max(omega_0, part.omega[-1])
+        for (i, _), rest in zip(part.touched, np.diag(part.rest)):
+            soft = omega_0**2 / mobility[i] * rest
+            softness[i] += soft
+            expected += accuracy.left_out_error(soft, ratio, contacts[i].law.exponent, part.points.shape[1])
+    resolvable = bool((softness <= RESOLVABLE).all())
+    found = 0.0
+    for i, part in enumerate(parts):
+        guesses = [0.0]
+        for wanted in THINNED:
+            thin, ratio = _thinned(part, wanted)
+            if 1.0 < ratio < np.inf:
+                less = [*parts[:i], thin, *parts[i + 1 :]]
+                change = differ(_run(_joined(less, contacts), scheme, size, pace, horizon, n_max), whole)
+                guesses.append(change / (ratio**FALLING - 1.0))
+        found += max(guesses)
+    return max(found, AT_LEAST * float(expected)), resolvable
+
+
+def _mesh_error(bodies, parts, contacts, system: _System, coarse: History, scheme, size, differ, tolerance, pace, last):
+    """Estimated error [-] due to the mesh errors of frequencies and static compliances.
+
+    Repeats the run with every frequency lowered and every compliance raised by its error, so that the estimate grows
+    over several impacts as the true error does.
+    """
+    softer, matters = [], False
+    mobility = np.maximum((system.shape**2) @ (system.omega <= np.pi / pace[0]), 1e-300)
+    for modes, part in zip(bodies, parts):
+        soft = [(np.pi / pace[0]) ** 2 / mobility[i] * doubt for (i, _), doubt in zip(part.touched, part.doubt)]
+        error = np.zeros(modes.n_modes) if modes.frequency_error is None else modes.frequency_error
+        matters |= max(error.max(), *soft, 0.0) > NEGLIGIBLE * tolerance
+        lower = part.omega * (1.0 - np.minimum(error, LARGEST_ERROR))
+        softer.append(replace(part, omega=lower, rest=part.rest + np.diag(part.doubt)))
+    if not matters:
+        return 0.0
+    return differ(_run(_joined(softer, contacts), scheme, size, pace, *last), coarse)

@@ -1,0 +1,399 @@
+"""A run with the energy-exact schemes A and A4 (see `schemes`): flight, step, event, record.
+
+The modes move exactly; the contact forces are constant (A) or linear (A4) over the step. So one step costs a sum over
+the modes before and after one scalar equation per contact, whatever the number of modes. The step in contact has a
+fixed length, shortened to end at onsets and releases; in flight there are no steps.
+"""
+
+import numpy as np
+
+from .build import LOOSE, WHOLE, ZERO, inner, outer
+from .events import (
+    EVENT_LIMIT,
+    LET_GO,
+    LOCATE_LIMIT,
+    begin,
+    dipped,
+    enclose,
+    first_crossing,
+    first_letting_go,
+    land,
+    narrow,
+    settle,
+)
+from .flight import GLIDES, any_of, find_onset
+from .law import at, spring_of
+from .propagation import N_LANE, lane_table
+from .record import EXHAUSTED, FAILED, FINISHED, HORIZON, IMPACTS, SETTLED, resized, total_energy
+from .schemes import Free, Own, linear_guess, point_of, solve_constants, solve_ramp, solve_ramps
+
+LEVELS = 40  # [-] halvings of the step that may be cached
+
+
+@inner(fastmath=LOOSE)
+def contact_sums(shape, lanes, h, out_sums):
+    """Sums over the modes of u_i u_j times b1, c1, B0, B1, b2, c2: (6, n_contacts, n_contacts)."""
+    n_contacts, n_modes = shape.shape
+    for i in range(n_contacts):
+        for j in range(i + 1):
+            s1 = 0.0
+            s4 = 0.0
+            s5 = 0.0
+            s6 = 0.0
+            for n in range(n_modes):
+                uu = shape[i, n] * shape[j, n]
+                s1 += uu * lanes[1, n]
+                s4 += uu * lanes[4, n]
+                s5 += uu * lanes[5, n]
+                s6 += uu * lanes[6, n]
+            out_sums[0, i, j] = h * s4
+            out_sums[1, i, j] = h * (s5 - 0.5 * s4)
+            out_sums[2, i, j] = h * s5
+            out_sums[3, i, j] = h * s6
+            out_sums[4, i, j] = s1
+            out_sums[5, i, j] = s4 - 0.5 * s1
+            for r in range(6):
+                out_sums[r, j, i] = out_sums[r, i, j]
+
+
+@inner(fastmath=LOOSE)
+def predict(shape, tables, slot, h, twice, offset, bias, q, p, out_q, out_p, out_end):
+    """Free motion over one step: the new state and, per contact, end approach, mean approach and end rate (3, m).
+
+    ``twice`` is 2 zeta omega of every mode, ``tables[slot]`` the step's `lane_table`.
+    """
+    n_contacts, n_modes = shape.shape
+    lanes = tables[slot]
+    part = 1.0 / h
+    for n in range(n_modes):
+        out_q[n] = lanes[0, n] * q[n] + lanes[1, n] * p[n] + h * lanes[4, n] * bias[n]
+        out_p[n] = lanes[2, n] * q[n] + lanes[3, n] * p[n] + lanes[1, n] * bias[n]
+    for i in range(n_contacts):
+        end = 0.0
+        mean = 0.0
+        rate = 0.0
+        for n in range(n_modes):
+            u = shape[i, n]
+            end += u * out_q[n]
+            rate += u * out_p[n]
+            drift = lanes[4, n] * (p[n] + twice[n] * q[n]) + h * lanes[5, n] * bias[n]
+            mean += u * (part * lanes[1, n] * q[n] + drift)
+        out_end[0, i] = offset[i] + end
+        out_end[1, i] = offset[i] + mean
+        out_end[2, i] = rate
+
+
+@inner(fastmath=LOOSE)
+def commit(shape, tables, slot, h, force, slope, free_q, free_p, out_q, out_p):
+    """Add the motion the step's forces (mean, slope) cause to the free motion."""
+    n_contacts, n_modes = shape.shape
+    lanes = tables[slot]
+    for n in range(n_modes):
+        out_q[n] = free_q[n]
+        out_p[n] = free_p[n]
+    for i in range(n_contacts):
+        f = force[i] - 0.5 * slope[i]
+        s = slope[i]
+        if force[i] != 0.0 or s != 0.0:
+            for n in range(n_modes):
+                u = shape[i, n]
+                out_q[n] -= u * h * (f * lanes[4, n] + s * lanes[5, n])
+                out_p[n] -= u * (f * lanes[1, n] + s * lanes[4, n])
+
+
+@inner(fastmath=LOOSE)
+def advance(shape, tables, slot, h, twice, offset, bias, force, slope, q, p, free_q, free_p, out_end):
+    """`commit` into q and p, then `predict` the next step of the same length, for one contact in one pass."""
+    lanes = tables[slot]
+    part = 1.0 / h
+    f = force[0] - 0.5 * slope[0]
+    s = slope[0]
+    end = 0.0
+    mean = 0.0
+    rate = 0.0
+    for n in range(q.size):
+        u = shape[0, n]
+        a12 = lanes[1, n]
+        first = lanes[4, n]
+        second = lanes[5, n]
+        x = free_q[n] - u * h * (f * first + s * second)
+        v = free_p[n] - u * (f * a12 + s * first)
+        q[n] = x
+        p[n] = v
+        g = bias[n]
+        new_x = lanes[0, n] * x + a12 * v + h * first * g
+        new_v = lanes[2, n] * x + lanes[3, n] * v + a12 * g
+        free_q[n] = new_x
+        free_p[n] = new_v
+        end += u * new_x
+        rate += u * new_v
+        mean += u * (part * a12 * x + first * (v + twice[n] * x) + h * second * g)
+    out_end[0, 0] = offset[0] + end
+    out_end[1, 0] = offset[0] + mean
+    out_end[2, 0] = rate
+
+
+@inner()
+def solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate):
+    """Solve one step of length h from its prediction; 0 where a contact pushes by A (asked for or fallen to)."""
+    m = y.size
+    sums = all_sums[slot]
+    if m == 1 and ramp and (now[0, 0] > 0.0 or end[0, 0] > 0.0):
+        start, spring = point_of(now, 0), spring_of(law, 0)
+        own = Own(sums[0, 0, 0], sums[1, 0, 0], sums[2, 0, 0], sums[3, 0, 0], sums[4, 0, 0], sums[5, 0, 0])
+        free = Free(end[0, 0], end[1, 0], end[2, 0])
+        guess = linear_guess(start, free, own, spring)
+        settled, point, f[0], s[0] = solve_ramp(guess, h, start, now[4, 0], free, own, spring)
+        if settled:
+            y[0] = point.approach
+            rate[0] = free.rate - own.rate * f[0] - own.rate_ramp * s[0]
+            return 1
+    solve_constants(h, now, law, end[0], sums, work, y, f)
+    pressed = False
+    for i in range(m):
+        s[i] = 0.0
+        if f[i] > 0.0:
+            pressed = True
+    fine = 0 if pressed else 1
+    if ramp and pressed and m > 1:
+        keep = work[4, 1]
+        for i in range(m):
+            keep[i] = y[i]
+            keep[m + i] = f[i]
+        if solve_ramps(h, now, law, end[0], end[1], end[2], sums, work, y, f, s):
+            fine = 1
+        else:
+            for i in range(m):
+                y[i] = keep[i]
+                f[i] = keep[m + i]
+                s[i] = 0.0
+    for i in range(m):
+        v = end[2, i]
+        for j in range(m):
+            v -= sums[4, i, j] * f[j] + sums[5, i, j] * s[j]
+        rate[i] = v
+    return fine
+
+
+@inner()
+def record(row, time, h, blind, sums, now, pressed, end, y, f, s, done):
+    """Write a step of the energy-exact schemes to a row of the steps, and add up its work."""
+    row[0] = time
+    row[1] = h
+    row[2] = 1.0 if blind else 0.0
+    for i in range(y.size):
+        row[3 + 5 * i] = now[0, i]
+        row[4 + 5 * i] = now[4, i]
+        row[5 + 5 * i] = 1.0 if f[i] > 0.0 or pressed[i] else 0.0
+        row[6 + 5 * i] = f[i] - 0.5 * s[i]
+        row[7 + 5 * i] = s[i]
+        mean = end[1, i]
+        for j in range(y.size):
+            mean -= sums[2, i, j] * f[j] + sums[3, i, j] * s[j]
+        done[i] += f[i] * (y[i] - now[0, i]) + s[i] * (0.5 * (now[0, i] + y[i]) - mean)
+
+
+@outer()
+def run_energy(
+    omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, base, depth, still, horizon, max_impacts, max_steps
+):
+    """Follow bodies in contact with the energy-exact schemes A (ramp 0) or A4 (ramp 1).
+
+    Parameters: omega, zeta, bias, start_q, start_p (n_modes,); shape (n_contacts, n_modes), the signed shapes at the
+    contacts; offset (n_contacts,) approach at zero state; law (n_contacts, 4): stiffness, exponent, loss, compliance;
+    base: the longest step in contact; depth [m] and still [m/s]: approaches and speeds that are rounding;
+    horizon: where to stop at the latest; max_impacts: stop after so many releases.
+
+    Returns (steps, q, p, now, done, time, status, n_fallback, n_blind). Each row of steps is a step or a flight:
+    start, length, blind; then per contact start approach, start rate, whether it is closed, and the force as powers of
+    the fraction of the step. now (5, n_contacts) ends with the last approach, .., rate; done (n_contacts,) is the
+    integral of force times rate [J]. A finished run ends at the last separation.
+    """
+    m, n_modes = shape.shape
+    q = start_q.copy()
+    p = start_p.copy()
+    free_q = np.empty(n_modes)
+    free_p = np.empty(n_modes)
+    twice = np.empty(n_modes)
+    for n in range(n_modes):
+        twice[n] = 2.0 * zeta[n] * omega[n]
+    tables = np.empty((LEVELS + 1, N_LANE, n_modes))
+    all_sums = np.empty((LEVELS + 1, 6, m, m))
+    known = np.zeros(LEVELS + 1)
+    odd = known.size - 1  # where the table of a step of any other length is kept
+    now = np.zeros((5, m))
+    end = np.empty((3, m))
+    work = np.zeros((5, max(4, 2 * m), max(4, 2 * m)))
+    y = np.empty(m)
+    f = np.empty(m)
+    s = np.empty(m)
+    rate = np.empty(m)
+    pressed = np.zeros(m, np.bool_)
+    bracket = np.empty(6)
+    flights = np.empty((GLIDES + 1, N_LANE, n_modes))
+    flown = np.zeros(GLIDES + 1)
+    done = np.zeros(m)
+    steps = np.zeros((64, 3 + 5 * m))
+    n_steps = ZERO
+    n_fallback = 0
+    n_blind = 0
+    n_released = 0
+    n_looks = 0
+    level = 0
+    events = 0
+    ready = -1  # slot of the table with which the coming step is predicted already
+    reset = 0.0
+    pause = 0.0  # until when events are passed, not located
+    respite = base  # how long the next such time will be
+    time = 0.0
+    status = EXHAUSTED
+    quiet = not any_of(bias)
+    lossy = False
+    for i in range(m):
+        if law[i, 2] > 0.0:
+            lossy = True
+    begin(shape, offset, q, p, now, pressed)
+    start_energy = total_energy(omega, bias, law, q, p, now)
+    while n_steps < max_steps:
+        if time >= horizon:
+            status = HORIZON
+            break
+        if 0 < max_impacts <= n_released:
+            status = IMPACTS
+            break
+        if n_steps + 1 >= steps.shape[0]:
+            steps = resized(steps, n_steps, 2 * steps.shape[0])
+        if time >= pause and not any_of(pressed):
+            elapsed, first, found = find_onset(
+                omega, zeta, shape, offset, bias, horizon - time, base, 1e-3 * base, depth, still, flights, flown, q, p
+            )
+            ready = -1
+            if found == 1:
+                status = FINISHED
+            if found == 1 or found == 4:
+                break
+            land(shape, offset, time, elapsed, first, found, steps[n_steps], 5, now, pressed, q, p)
+            if elapsed > 0.0:
+                n_steps += 1
+                time += elapsed
+            if found == 0:
+                events += 1
+            if found == 3:
+                events = EVENT_LIMIT + 1
+            else:
+                continue
+        if events > EVENT_LIMIT:
+            pause = max(time + respite, np.nextafter(time, np.inf))  # or a late step would never be blind
+            respite *= 2.0
+            events = 0
+        blind = time < pause
+        if blind:
+            level = 0
+        h = base * 0.5**level
+        slot = level
+        if h > horizon - time:
+            h = horizon - time
+            slot = odd
+        if slot == odd or known[slot] == 0.0:
+            lane_table(omega, zeta, h, WHOLE, tables[slot])
+            contact_sums(shape, tables[slot], h, all_sums[slot])
+            known[slot] = 1.0
+        if ready != slot:
+            predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, end)
+        ready = -1
+        for i in range(m):
+            point = at(now[0, i], spring_of(law, i))
+            now[1, i] = point.compression
+            now[2, i] = point.force
+            now[3, i] = point.energy
+        fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
+        target = -1
+        if not blind:
+            shorter = 0
+            for i in range(m):
+                if pressed[i] and y[i] <= 0.0 and now[0, i] == 0.0:
+                    if now[4, i] > still:
+                        shorter = max(shorter, 3 if level == 0 else 1)
+                elif dipped(now, pressed, y, rate, h, i):
+                    shorter = max(shorter, 1)
+            if shorter > 0:
+                level += shorter
+                if level >= LEVELS:
+                    events = EVENT_LIMIT + 1
+                continue
+            target, guess = first_crossing(now, pressed, y, rate, h, depth, still)
+        if target >= 0:
+            enclose(now, y, rate, h, target, bracket)
+            slot = odd
+            for _ in range(LOCATE_LIMIT):
+                h = guess
+                lane_table(omega, zeta, h, WHOLE, tables[slot])
+                contact_sums(shape, tables[slot], h, all_sums[slot])
+                predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, end)
+                fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
+                target, guess = narrow(now, pressed, y, rate, h, depth, still, target, bracket)
+                if guess == 0.0:
+                    break
+            if not abs(y[target]) <= 1e-9 * bracket[2]:
+                if h < 1e-3 * base:
+                    events = EVENT_LIMIT + 1
+                    continue
+                target = -1
+                blind = True
+        letting, guess = -1, h
+        if lossy and not blind:
+            letting, guess = first_letting_go(now, law, y, rate, h)
+        if letting >= 0:
+            target = -1
+            slot = odd
+            bracket[0] = 0.0
+            bracket[1] = h
+            bracket[3] = h
+            bracket[4] = 1.0 + law[letting, 2] * rate[letting]
+            start = 1.0 + law[letting, 2] * now[4, letting]
+            for _ in range(LOCATE_LIMIT):
+                h = guess
+                lane_table(omega, zeta, h, WHOLE, tables[slot])
+                contact_sums(shape, tables[slot], h, all_sums[slot])
+                predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, end)
+                fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
+                miss = 1.0 + law[letting, 2] * rate[letting]
+                if abs(miss) <= 0.1 * LET_GO or bracket[1] - bracket[0] <= 1e-9 * bracket[1]:
+                    break
+                bracket[0 if miss * start > 0.0 else 1] = h
+                guess = h - miss * (h - bracket[3]) / (miss - bracket[4]) if miss != bracket[4] else 0.0
+                bracket[3] = h
+                bracket[4] = miss
+                if not bracket[0] < guess < bracket[1]:
+                    guess = 0.5 * (bracket[0] + bracket[1])
+        total = 0.0
+        for i in range(m):
+            total += abs(y[i]) + abs(rate[i]) + f[i]
+        if not total < 1e300:
+            status = FAILED
+            break
+        record(steps[n_steps], time, h, blind, all_sums[slot], now, pressed, end, y, f, s, done)
+        n_steps += 1
+        if ramp and fine == 0:
+            n_fallback += 1
+        if blind:
+            n_blind += 1
+        time += h
+        n_released += settle(now, pressed, y, rate, target, depth, still)
+        if target >= 0:
+            events += 1
+        elif level > 0 and letting < 0:
+            level -= 1
+        if m == 1 and slot == level and pressed[0] and time + h <= horizon:
+            advance(shape, tables, slot, h, twice, offset, bias, f, s, q, p, free_q, free_p, end)
+            ready = slot
+        else:
+            commit(shape, tables, slot, h, f, s, free_q, free_p, q, p)
+        if time - reset > base:
+            reset = time
+            events = 0
+        n_looks += 1
+        if quiet and n_looks % 512 == 0 and total_energy(omega, bias, law, q, p, now) <= 1e-24 * start_energy:
+            status = SETTLED
+            break
+    return resized(steps, n_steps, n_steps), q, p, now, done, time, status, n_fallback, n_blind

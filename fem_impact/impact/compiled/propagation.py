@@ -1,0 +1,434 @@
+"""Exact motion of modes over a step, free and under polynomial forces.
+
+Every mode obeys ``q'' + 2 zeta omega q' + omega**2 q = -u F(t)``. Its impulse response g and the matrix that carries
+(q, q') over a step are known in closed form, so a step of any length is exact for a force that is a polynomial of time.
+What the force does follows from moments ``m_k = h**(-k-1) integral of (h-t)**(k-1)/(k-1)! g(t)``, m_0 = g(h)/h; they
+obey ``(omega h)**2 m_(k+1) = 1/k! - 2 zeta omega h m_k - m_(k-1)``. The recursion cancels where omega h is small; there
+the moments come from power series. Heavily damped modes split into two exponentials.
+
+Sines and cosines use Cody and Waite's argument reduction and the polynomials of fdlibm, so that the compiler can run
+them in parallel lanes; sine and cosine of one angle come from the same reduced argument, or the energy would drift.
+"""
+
+import numpy as np
+
+from .build import WHOLE, inner, outer
+
+SERIES_LIMIT = 1.0  # [-] below this omega*h the moment recursion cancels and a power series takes over
+LIGHT = 0.9  # [-] damping ratio up to which a mode takes the fast lanes
+SERIES_END = 3.0  # [-] omega*h below which the fast lanes sum a power series: 13 terms leave 3e-17
+ANGLE_LIMIT = 1e6  # [-] angle up to which the reduction in `waves` is exact
+OVERDAMPED = 1.2  # [-] damping ratio from which the two decay rates are far enough apart for partial fractions
+N_TABLE = 12  # rows of a step table, in the order of `step_table`
+N_LANE = 7  # rows of what a run keeps of it, in the order of `lane_table`
+
+
+@inner()
+def mode_matrix(w, z, h):
+    """Exact free motion of one flexible mode: a11, a12, a22 of the state's step, then slow and fast rate and half gap.
+
+    The rates are those of an overdamped mode, zero below; a21 is -w**2 a12.
+    """
+    x = z * w * h
+    if z < 1.0:
+        damped = w * np.sqrt((1.0 - z) * (1.0 + z))
+        decay = np.exp(-x)
+        s = decay * np.sin(damped * h) / damped
+        c = decay * np.cos(damped * h)
+        return c + z * w * s, s, c - z * w * s, 0.0, 0.0, 0.0
+    if z == 1.0:
+        decay = np.exp(-x)
+        return decay * (1.0 + x), decay * h, decay * (1.0 - x), w, w, 0.0
+    root = w * np.sqrt((z - 1.0) * (z + 1.0))
+    fast = z * w + root
+    slow = w * (w / fast)
+    e1 = np.exp(-slow * h)
+    s = e1 * (-np.expm1(-2.0 * root * h)) / (2.0 * root)
+    return e1 + slow * s, s, np.exp(-fast * h) - slow * s, slow, fast, root
+
+
+@inner()
+def exponential_sums(z, out_sums):
+    """phi_k of -z, k = 1 .. out_sums.size, z >= 0: the integrals of (1-r)**(k-1)/(k-1)! exp(-z r) over [0, 1].
+
+    Upwards by recursion while that keeps digits (k <= z), downwards from a power series at the top.
+    """
+    count = out_sums.size
+    upward = min(count, int(min(z, 1e6)))
+    inverse = 1.0
+    if upward > 0:
+        out_sums[0] = -np.expm1(-z) / z
+        for k in range(1, upward):
+            out_sums[k] = (inverse - out_sums[k - 1]) / z
+            inverse /= k + 1.0
+    if upward < count:
+        term = 1.0
+        for k in range(2, count + 1):
+            term /= k
+        inverse = term * count
+        total = 0.0
+        for j in range(1, 60):
+            total += term
+            term *= -z / (count + j)
+            if abs(term) < 1e-18 * total:
+                break
+        out_sums[count - 1] = total
+        for k in range(count - 1, upward, -1):
+            out_sums[k - 1] = inverse - z * out_sums[k]
+            inverse *= k
+
+
+@inner()
+def mode_moments(w, z, h, out_moments, work):
+    """Exact step of one mode: a11, a12, a22, and in out_moments the moments of its impulse response g.
+
+    Moment k is ``h**(-k-1)`` times the integral over [0, h] of ``(h-t)**(k-1)/(k-1)! g(t)``, k = 0 being
+    g(h)/h. They obey ``th**2 m[k+1] = 1/k! - 2 x m[k] - m[k-1]`` with ``th = w h``, ``x = z th``: upwards while
+    k < th, downwards from a power series above; heavily damped modes take partial fractions.
+    """
+    count = out_moments.size - 1
+    if w == 0.0:
+        value = 1.0
+        for k in range(count + 1):
+            out_moments[k] = value
+            value /= k + 2.0
+        return 1.0, h, 1.0
+    th = w * h
+    x = z * th
+    a11, a12, a22, slow, fast, root = mode_matrix(w, z, h)
+    out_moments[0] = a12 / h
+    heavy = z >= OVERDAMPED and fast * h >= SERIES_LIMIT
+    if heavy:
+        exponential_sums(slow * h, work[0])
+        exponential_sums(fast * h, work[1])
+        for k in range(1, count + 1):
+            out_moments[k] = (work[0, k - 1] - work[1, k - 1]) / (2.0 * root * h)
+        return a11, a12, a22
+    upward = min(count, int(min(th, 1e6)))
+    inverse = 1.0
+    before = a22
+    for k in range(upward):
+        if k == 0 and z == 0.0:
+            half = np.sin(0.5 * th) / th
+            new = 2.0 * half * half
+        else:
+            new = (inverse - 2.0 * x * out_moments[k] - before) / (th * th)
+        before = out_moments[k]
+        out_moments[k + 1] = new
+        inverse /= k + 1.0
+    if upward < count:
+        factor = 1.0
+        for k in range(2, count + 2):
+            factor /= k
+        inverse = factor * (count + 1.0)
+        last = 0.0
+        now = 1.0
+        top = 0.0
+        above = 0.0
+        for j in range(1, 80):
+            top += now * factor
+            factor /= count + j + 1.0
+            above += now * factor
+            last, now = now, -2.0 * x * now - th * th * last
+            if (abs(now) + abs(last)) * factor < 1e-19 * abs(top):
+                break
+        out_moments[count] = top
+        for k in range(count, upward + 1, -1):
+            out_moments[k - 1] = inverse - 2.0 * x * out_moments[k] - th * th * above
+            above = out_moments[k]
+            inverse *= k
+    return a11, a12, a22
+
+
+@inner(fastmath={"contract"})
+def waves(angle, out_sin, out_cos):
+    """Sine and cosine of many angles from 0 to ANGLE_LIMIT, within 1.5 units in the last place, in parallel lanes.
+
+    Cody and Waite's reduction by multiples of pi/2 in three parts, then the polynomials of Sun's fdlibm.
+    """
+    for n in range(angle.size):
+        turns = np.floor(angle[n] * 0.6366197723675814 + 0.5)
+        r = angle[n] - turns * 1.57079632673412561417e00
+        r -= turns * 6.07710050630396597660e-11
+        r -= turns * 2.02226624879595063154e-21
+        z = r * r
+        sine = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10
+        sine = 2.75573137070700676789e-06 + z * sine
+        sine = -1.98412698298579493134e-04 + z * sine
+        sine = 8.33333333332248946124e-03 + z * sine
+        sine = r + r * z * (-1.66666666666666324348e-01 + z * sine)
+        cosine = 2.08757232129817482790e-09 + z * -1.13596475577881948265e-11
+        cosine = -2.75573143513906633035e-07 + z * cosine
+        cosine = 2.48015872894767294178e-05 + z * cosine
+        cosine = -1.38888888888741095749e-03 + z * cosine
+        cosine = 4.16666666666666019037e-02 + z * cosine
+        cosine = 1.0 - (0.5 * z - z * z * cosine)
+        quarter = turns - 4.0 * np.floor(0.25 * turns)
+        odd = (quarter == 1.0) or (quarter == 3.0)
+        s = cosine if odd else sine
+        c = sine if odd else cosine
+        out_sin[n] = -s if quarter >= 2.0 else s
+        out_cos[n] = -c if (quarter == 1.0) or (quarter == 2.0) else c
+
+
+@inner(allocates=True, fastmath={"contract"})
+def decays(exponent, out_decay):
+    """exp(-x) of many x >= 0 within two units in the last place, in parallel lanes; zero beyond 700."""
+    bits = np.empty(exponent.size, np.int64)
+    for n in range(exponent.size):
+        x = min(exponent[n], 700.0)
+        turns = np.floor(0.5 - x * 1.4426950408889634)
+        r = -x - turns * 6.93147180369123816490e-01
+        r -= turns * 1.90821492927058770002e-10
+        e = 1.0 + r * (1.0 / 13.0)
+        e = 1.0 + r * (1.0 / 12.0) * e
+        e = 1.0 + r * (1.0 / 11.0) * e
+        e = 1.0 + r * (1.0 / 10.0) * e
+        e = 1.0 + r * (1.0 / 9.0) * e
+        e = 1.0 + r * (1.0 / 8.0) * e
+        e = 1.0 + r * (1.0 / 7.0) * e
+        e = 1.0 + r * (1.0 / 6.0) * e
+        e = 1.0 + r * (1.0 / 5.0) * e
+        e = 1.0 + r * (1.0 / 4.0) * e
+        e = 1.0 + r * (1.0 / 3.0) * e
+        e = 1.0 + r * (1.0 / 2.0) * e
+        out_decay[n] = 1.0 + r * e
+        bits[n] = (np.int64(turns) + 1023) << 52
+    scale = bits.view(np.float64)
+    for n in range(exponent.size):
+        out_decay[n] = out_decay[n] * scale[n] if exponent[n] < 700.0 else 0.0
+
+
+@inner(allocates=True, fastmath={"contract"})
+def free_table(omega, zeta, h, out_free, out_double):
+    """Exact free motion of every mode over h: rows a11, a12, a21, a22 of out_free (4 or more, n_modes).
+
+    out_double (n_modes,) receives twice the damping exponent zeta omega h, zero for modes beyond the fast lanes;
+    returns the number of those and of damped modes.
+    """
+    n_modes = omega.size
+    n_single = 0
+    n_damped = 0
+    for n in range(n_modes):
+        n_single += 1 if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT else 0
+        n_damped += 1 if zeta[n] != 0.0 else 0
+    angle = np.empty(n_modes)
+    if n_damped == 0:
+        for n in range(n_modes):
+            angle[n] = omega[n] * h
+            out_double[n] = 0.0
+    else:
+        for n in range(n_modes):
+            z = zeta[n] if zeta[n] <= LIGHT else 0.0
+            angle[n] = omega[n] * h * np.sqrt((1.0 - z) * (1.0 + z))
+            out_double[n] = z * omega[n] * h
+    if n_single > 0:
+        for n in range(n_modes):
+            angle[n] = min(angle[n], ANGLE_LIMIT)
+    waves(angle, out_free[1], out_free[0])
+    if n_damped == 0:
+        for n in range(n_modes):
+            y = angle[n]
+            c = out_free[0, n]
+            out_free[1, n] = h * (out_free[1, n] / y if y > 0.0 else 1.0)
+            out_free[3, n] = c
+    else:
+        decays(out_double, out_free[3])
+        for n in range(n_modes):
+            y = angle[n]
+            decay = out_free[3, n]
+            x = out_double[n]
+            s = decay * (out_free[1, n] / y if y > 0.0 else 1.0)
+            c = decay * out_free[0, n]
+            out_free[0, n] = c + x * s
+            out_free[1, n] = h * s
+            out_free[3, n] = c - x * s
+            out_double[n] = 2.0 * x
+    if n_single > 0:
+        for n in range(n_modes):
+            if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT:
+                a11, a12, a22, _, _, _ = mode_matrix(omega[n], zeta[n], h)
+                out_free[0, n] = a11
+                out_free[1, n] = a12
+                out_free[3, n] = a22
+    for n in range(n_modes):
+        out_free[2, n] = -omega[n] * omega[n] * out_free[1, n]
+    return n_single, n_damped
+
+
+@inner(allocates=True, fastmath={"contract"})
+def near_moments(omega, h, double, n_damped, out_moments):
+    """Moments 2 and 3 (rows 5 and 6 of out_moments) by power series, for every mode with omega h < SERIES_END."""
+    n_modes = omega.size
+    square = np.empty(n_modes)
+    for n in range(n_modes):
+        th = min(omega[n] * h, SERIES_END)
+        square[n] = th * th
+    if n_damped == 0:
+        for n in range(n_modes):
+            t2 = square[n]
+            odd = 1.0 - t2 * (1.0 / 812.0)
+            odd = 1.0 - t2 * (1.0 / 702.0) * odd
+            odd = 1.0 - t2 * (1.0 / 600.0) * odd
+            odd = 1.0 - t2 * (1.0 / 506.0) * odd
+            odd = 1.0 - t2 * (1.0 / 420.0) * odd
+            odd = 1.0 - t2 * (1.0 / 342.0) * odd
+            odd = 1.0 - t2 * (1.0 / 272.0) * odd
+            odd = 1.0 - t2 * (1.0 / 210.0) * odd
+            odd = 1.0 - t2 * (1.0 / 156.0) * odd
+            odd = 1.0 - t2 * (1.0 / 110.0) * odd
+            odd = 1.0 - t2 * (1.0 / 72.0) * odd
+            odd = 1.0 - t2 * (1.0 / 42.0) * odd
+            out_moments[5, n] = (1.0 / 6.0) * (1.0 - t2 * (1.0 / 20.0) * odd)
+            even = 1.0 - t2 * (1.0 / 756.0)
+            even = 1.0 - t2 * (1.0 / 650.0) * even
+            even = 1.0 - t2 * (1.0 / 552.0) * even
+            even = 1.0 - t2 * (1.0 / 462.0) * even
+            even = 1.0 - t2 * (1.0 / 380.0) * even
+            even = 1.0 - t2 * (1.0 / 306.0) * even
+            even = 1.0 - t2 * (1.0 / 240.0) * even
+            even = 1.0 - t2 * (1.0 / 182.0) * even
+            even = 1.0 - t2 * (1.0 / 132.0) * even
+            even = 1.0 - t2 * (1.0 / 90.0) * even
+            even = 1.0 - t2 * (1.0 / 56.0) * even
+            out_moments[6, n] = (1.0 / 24.0) * (1.0 - t2 * (1.0 / 30.0) * even)
+        return
+    now = np.empty(n_modes)
+    last = np.empty(n_modes)
+    for n in range(n_modes):
+        now[n] = 1.0
+        last[n] = 0.0
+        out_moments[5, n] = 0.0
+        out_moments[6, n] = 0.0
+    factor = 1.0 / 6.0
+    for j in range(1, 30):
+        after = factor / (j + 3.0)
+        for n in range(n_modes):
+            value = now[n]
+            out_moments[5, n] += value * factor
+            out_moments[6, n] += value * after
+            now[n] = -min(double[n], 2.0 * SERIES_END) * value - square[n] * last[n]
+            last[n] = value
+        factor = after
+
+
+@inner(allocates=True, fastmath={"contract"})
+def lane_table(omega, zeta, h, whole, out_lanes):
+    """Coefficients of one exact step of length h for every mode, (N_LANE, n_modes), all that others follow from.
+
+    Rows: a11, a12, a21, a22 of the state's step; h times the moments 1 and 2 (see `mode_moments`) and times moment 3
+    less half of moment 2. Lightly damped modes take parallel lanes: their moments by a power series below SERIES_END,
+    by recursion above; the others go one by one. Where it is not asked for the whole, free motion without a constant
+    force is all that is made.
+    """
+    n_modes = omega.size
+    double = np.empty(n_modes)
+    n_single, n_damped = free_table(omega, zeta, h, out_lanes, double)
+    if not whole:
+        for n in range(n_modes):
+            out_lanes[4, n] = 0.0
+        return
+    near_moments(omega, h, double, n_damped, out_lanes)
+    part = 1.0 / h
+    for n in range(n_modes):
+        th = omega[n] * h
+        near = th < SERIES_END
+        inverse = 1.0 / (1.0 if near else th * th)
+        first = out_lanes[1, n] * part
+        m1 = (1.0 - double[n] * first - out_lanes[3, n]) * inverse
+        m2 = (1.0 - double[n] * m1 - first) * inverse
+        m3 = (0.5 - double[n] * m2 - m1) * inverse
+        m2 = out_lanes[5, n] if near else m2
+        m3 = out_lanes[6, n] if near else m3
+        m1 = 0.5 - double[n] * m2 - th * th * m3 if near else m1
+        out_lanes[4, n] = h * m1
+        out_lanes[5, n] = h * m2
+        out_lanes[6, n] = h * (m3 - 0.5 * m2)
+    if n_single > 0:
+        work = np.empty((2, 3))
+        m = np.empty(4)
+        for n in range(n_modes):
+            if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT:
+                mode_moments(omega[n], zeta[n], h, m, work)
+                out_lanes[4, n] = h * m[1]
+                out_lanes[5, n] = h * m[2]
+                out_lanes[6, n] = h * (m[3] - 0.5 * m[2])
+
+
+@outer()
+def step_table(omega, zeta, h, out_table):
+    """Coefficients of one exact step of length h for every mode, (12, n_modes).
+
+    Rows: a11, a12, a21, a22; b1, b2 (constant force); c1, c2 (ramp t/h - 1/2); the step averages of the free motion
+    A1, A2 and of the two forces B0, B1.
+    """
+    lanes = np.empty((N_LANE, omega.size))
+    lane_table(omega, zeta, h, WHOLE, lanes)
+    for n in range(omega.size):
+        for k in range(4):
+            out_table[k, n] = lanes[k, n]
+        out_table[4, n] = h * lanes[4, n]
+        out_table[5, n] = lanes[1, n]
+        out_table[6, n] = h * (lanes[5, n] - 0.5 * lanes[4, n])
+        out_table[7, n] = lanes[4, n] - 0.5 * lanes[1, n]
+        out_table[8, n] = lanes[1, n] / h + 2.0 * zeta[n] * omega[n] * lanes[4, n]
+        out_table[9, n] = lanes[4, n]
+        out_table[10, n] = h * lanes[5, n]
+        out_table[11, n] = h * lanes[6, n]
+
+
+@inner(allocates=True)
+def push(omega, zeta, shape, bias, row, n_coefficients, length, q, p, out_q, out_p):
+    """State after a part of a step, (n_modes,), from the step's start; exact for its polynomial forces."""
+    if length <= 0.0:
+        for n in range(q.size):
+            out_q[n] = q[n]
+            out_p[n] = p[n]
+        return
+    m = shape.shape[0]
+    stride = 3 + n_coefficients
+    moments = np.empty(n_coefficients + 1)
+    work = np.empty((2, n_coefficients))
+    weights = np.zeros((n_coefficients, m))
+    active = False
+    for i in range(m):
+        scale = 1.0
+        for k in range(n_coefficients):
+            weights[k, i] = row[6 + stride * i + k] * scale
+            scale *= (k + 1.0) * length / row[1]
+            if weights[k, i] != 0.0:
+                active = True
+    for n in range(q.size):
+        q0 = q[n]
+        a11, a12, a22 = mode_moments(omega[n], zeta[n], length, moments, work)
+        x = bias[n] * moments[1]
+        v = bias[n] * moments[0]
+        if active:
+            for i in range(m):
+                for k in range(n_coefficients):
+                    x -= shape[i, n] * weights[k, i] * moments[k + 1]
+                    v -= shape[i, n] * weights[k, i] * moments[k]
+        out_q[n] = a11 * q0 + a12 * p[n] + length * length * x
+        out_p[n] = -omega[n] * omega[n] * a12 * q0 + a22 * p[n] + length * v
+
+
+@outer()
+def replay(omega, zeta, shape, bias, start_q, start_p, steps, n_coefficients, times, out_q, out_p):
+    """States (n_times, n_modes) at ascending times, from the start state and the recorded forces; exact in between."""
+    n_steps = steps.shape[0]
+    q = start_q.copy()
+    p = start_p.copy()
+    flight = np.zeros(steps.shape[1])
+    flight[1] = 1.0
+    begin = 0.0
+    k = 0
+    for j in range(n_steps + 1):
+        row = flight if j == n_steps else steps[j]
+        ends = np.inf if j == n_steps else begin + row[1]
+        while k < times.size and times[k] < ends:
+            push(omega, zeta, shape, bias, row, n_coefficients, times[k] - begin, q, p, out_q[k], out_p[k])
+            k += 1
+        if k >= times.size or j == n_steps:
+            return
+        push(omega, zeta, shape, bias, row, n_coefficients, row[1], q, p, q, p)
+        begin = steps[j + 1, 0] if j + 1 < n_steps else begin + row[1]

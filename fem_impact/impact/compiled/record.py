@@ -1,0 +1,197 @@
+"""What a run leaves behind, and the impacts read from it.
+
+A row of ``steps`` is a step or a flight: start, length, whether events were passed; then for each contact approach and
+rate at its start, whether it is closed, and the force as powers of the fraction of the step. Between the ends the
+approach is the cubic through both.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from .build import ZERO, inner, outer
+from .events import hermite_root, letting_go, lowest
+from .law import at, spring_of, stored
+
+FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = 0, 1, 2, 3, 4, 5  # why a run ended
+
+
+@inner(allocates=True)
+def resized(array, n, length):
+    """The first n rows of an array in a new one of another length."""
+    result = np.empty((length, array.shape[1]))
+    for i in range(n):
+        for j in range(array.shape[1]):
+            result[i, j] = array[i, j]
+    return result
+
+
+@inner()
+def total_energy(omega, bias, law, q, p, now):
+    """Kinetic and strain energy less the work of the bias force, and what the contacts store."""
+    total = 0.0
+    for n in range(q.size):
+        total += 0.5 * (p[n] * p[n] + (omega[n] * q[n]) ** 2) - bias[n] * q[n]
+    return total + stored(now[0], law)
+
+
+@inner()
+def force_within(steps, now, law, n_coefficients, row, i, part):
+    """Force of contact i at a fraction of a step: the law on the cubic through both ends, or a higher polynomial."""
+    first = 3 + (3 + n_coefficients) * i
+    if n_coefficients > 2:
+        value = 0.0
+        for k in range(n_coefficients - 1, -1, -1):
+            value = value * part + steps[row, first + 3 + k]
+        return max(value, 0.0)
+    last = row + 1 == steps.shape[0]
+    h = steps[row, 1]
+    d0 = steps[row, first]
+    v0 = steps[row, first + 1]
+    d1 = now[0, i] if last else steps[row + 1, first]
+    v1 = now[4, i] if last else steps[row + 1, first + 1]
+    a = 2.0 * (d0 - d1) + h * (v0 + v1)
+    b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
+    d = d0 + part * (h * v0 + part * (b + part * a))
+    if d <= 0.0:
+        return 0.0
+    rate = v0 + part * (2.0 * b + 3.0 * a * part) / h
+    return max(at(d, spring_of(law, i)).force * (1.0 + law[i, 2] * rate), 0.0)
+
+
+@inner()
+def pushing(steps, now, law, n_coefficients, row, i):
+    """Fractions of a step between which contact i pushes, by the cubic through both ends; (0, 0) if it does not.
+
+    A lossy contact stops pushing while the bodies still overlap, when they part as fast as 1 / loss.
+    """
+    first = 3 + (3 + n_coefficients) * i
+    if steps[row, first + 2] == 0.0:
+        return 0.0, 0.0
+    final = row + 1 == steps.shape[0]
+    h = steps[row, 1]
+    d0 = steps[row, first]
+    v0 = steps[row, first + 1]
+    d1 = now[0, i] if final else steps[row + 1, first]
+    v1 = now[4, i] if final else steps[row + 1, first + 1]
+    lower = 0.0
+    upper = 1.0
+    if d0 < 0.0 < d1:
+        lower = hermite_root(d0, v0, d1, v1, h) / h
+    elif d1 < 0.0 < d0:
+        upper = hermite_root(d0, v0, d1, v1, h) / h
+    loss = law[i, 2]
+    start = 1.0 + loss * v0
+    end = 1.0 + loss * v1
+    if start <= 0.0 and end <= 0.0:
+        return 0.0, 0.0
+    if start < 0.0 or end < 0.0:
+        at = letting_go(loss, d0, v0, d1, v1, h)
+        if start < 0.0:
+            lower = max(lower, at)
+        else:
+            upper = min(upper, at)
+    return lower, upper
+
+
+@outer()
+def nearest_turn(steps, now, width):
+    """How near to zero an approach turns back, over the farthest it ever turns; infinity where none does.
+
+    ``width`` numbers of a step belong to each contact, the approach and its rate first.
+    """
+    nearest = np.inf
+    farthest = 0.0
+    for i in range(now.shape[1]):
+        first = 3 + width * i
+        for row in range(steps.shape[0]):
+            d0 = steps[row, first]
+            v0 = steps[row, first + 1]
+            d1 = now[0, i]
+            v1 = now[4, i]
+            if row + 1 < steps.shape[0]:
+                d1 = steps[row + 1, first]
+                v1 = steps[row + 1, first + 1]
+            if (v0 < 0.0 < v1) or (v1 < 0.0 < v0):
+                side = 1.0 if v0 < 0.0 else -1.0
+                turn = side * lowest(side * d0, side * v0, side * d1, side * v1, steps[row, 1])
+                nearest = min(nearest, abs(turn))
+                farthest = max(farthest, turn)
+    return nearest / farthest if farthest > 0.0 else np.inf
+
+
+@outer()
+def find_impacts(steps, now, law, n_coefficients, looks, touch):
+    """Every unbroken push, (n_impacts, 5): start, end, peak force, impulse, contact; contact by contact.
+
+    Bodies that touch and approach no faster than ``touch`` [m/s] before the first push press from the start of that
+    time. The peak is sought with ``looks`` per step about the largest of a few, and refined by parabolas.
+    """
+    n_steps = steps.shape[0]
+    m = law.shape[0]
+    width = 3 + n_coefficients
+    result = np.empty((8, 5))
+    count = ZERO
+    for i in range(m):
+        first = 3 + width * i
+        row: Any = ZERO
+        while row < n_steps:
+            lower, upper = pushing(steps, now, law, n_coefficients, row, i)
+            if lower >= upper:
+                row += 1
+                continue
+            if count == result.shape[0]:
+                result = resized(result, count, 2 * count)
+            begin = row
+            start = steps[row, 0] + lower * steps[row, 1]
+            end = start
+            impulse = 0.0
+            peak = 0.0
+            peak_row = row
+            peak_part = 0.0
+            while upper > lower:
+                for k in range(n_coefficients):
+                    impulse += steps[row, 1] * steps[row, first + 3 + k] / (k + 1.0)
+                for look in range(n_coefficients):
+                    f = force_within(steps, now, law, n_coefficients, row, i, look / n_coefficients)
+                    if f > peak:
+                        peak = f
+                        peak_row = row
+                end = steps[row, 0] + upper * steps[row, 1]
+                row += 1
+                if upper < 1.0 or row == n_steps:
+                    break
+                lower, upper = pushing(steps, now, law, n_coefficients, row, i)
+                if lower > 0.0:
+                    break
+            last = row - 1
+            for near in range(max(begin, peak_row - 1), min(last, peak_row + 1) + 1):
+                for look in range(looks + 1):
+                    f = force_within(steps, now, law, n_coefficients, near, i, look / looks)
+                    if f >= peak:
+                        peak = f
+                        peak_row = near
+                        peak_part = look / looks
+            if steps[begin, first] == 0.0:
+                while begin > 0 and steps[begin - 1, first] == 0.0 and abs(steps[begin - 1, first + 1]) <= touch:
+                    begin -= 1
+                    start = steps[begin, 0]
+            spread = 1.0 / looks
+            for _ in range(4):
+                middle = min(max(peak_part, spread), 1.0 - spread)
+                low = force_within(steps, now, law, n_coefficients, peak_row, i, middle - spread)
+                top = force_within(steps, now, law, n_coefficients, peak_row, i, middle)
+                high = force_within(steps, now, law, n_coefficients, peak_row, i, middle + spread)
+                bend = low - 2.0 * top + high
+                if bend >= 0.0:
+                    break
+                peak_part = middle + min(max(0.5 * (low - high) / bend, -1.0), 1.0) * spread
+                peak = max(peak, force_within(steps, now, law, n_coefficients, peak_row, i, peak_part))
+                spread *= 0.125
+            result[count, 0] = start
+            result[count, 1] = end
+            result[count, 2] = peak
+            result[count, 3] = impulse
+            result[count, 4] = i
+            count += 1
+    return resized(result, count, count)

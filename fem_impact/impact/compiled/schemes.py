@@ -1,0 +1,406 @@
+"""The equations of one step: schemes A and A4, for one contact and for several that share modes.
+
+Scheme A holds each contact force constant over the step and gives it the work it does: with approaches ``d0`` at the
+step's start and ``y`` at its end, stored energies ``V0`` and ``V1``, the force is ``f = (V1 - V0) / (y - d0)``, and
+``y = e - b f``, where ``e`` is the approach at the end if nothing pushed and ``b`` what a unit force takes from it.
+The energy after the step is that before it, whatever the step's length; the error falls with its square. The equation
+has exactly one root, as f rises with y.
+
+Scheme A4 lets the force change linearly, ``f + s (t/h - 1/2)``, with ``s = F(y) - F(d0)`` and the mean f such that the
+work ``f (y - d0) + s ((d0 + y)/2 - mean approach)`` is again ``V1 - V0``: order 4, and the same energy. It has no root
+where the step is long against the contact; such a step goes to scheme A.
+
+With loss (Hunt and Crossley 1975, J. Appl. Mech. 42, 440) the force is ``F(d) (1 + loss d')``: its mean gains
+``loss (V1 - V0) / h`` and its slope ``loss (F1 v1 - F0 v0)``, so that no step creates energy.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .build import inner
+from .law import Point, at, compressed, slopes, spring_of
+
+SOLVES = 30  # [-] iterations of the equation of a step at most
+WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it
+
+
+class Free(NamedTuple):
+    """The approach of a contact if nothing pushed during the step."""
+
+    end: float  # [m]
+    mean: float  # [m] over the step
+    rate: float  # [m/s] at the end
+
+
+class Own(NamedTuple):
+    """What a unit of the step's force takes from them; `_ramp` for the force t/h - 1/2."""
+
+    end: float
+    end_ramp: float
+    mean: float
+    mean_ramp: float
+    rate: float
+    rate_ramp: float
+
+
+@inner()
+def point_of(now, i):
+    """Where contact i stands: ``now`` (5, n_contacts) holds approach, compression, force, energy and rate."""
+    return Point(now[0, i], now[1, i], now[2, i], now[3, i])
+
+
+@inner()
+def solve_constant(start, e, b, loss, spring):
+    """Scheme A: the point at the step's end and the force >= 0, with ``y = e - b force``; always exists, unique.
+
+    ``loss`` is the Hunt-Crossley factor over the step length [1/m].
+    """
+    d0, v0 = start.approach, start.energy
+    k, a, c = spring.stiffness, spring.exponent, spring.compliance
+    if d0 <= 0.0 and e <= 0.0:
+        return at(e, spring), 0.0
+    if d0 > 0.0 and b * (v0 / d0 - loss * v0) >= e:  # it opens: all of V0 is given back
+        free = e - d0 + b * loss * v0
+        root = np.sqrt(free * free + 4.0 * b * v0)
+        gap = 0.5 * (root - free) if free <= 0.0 else 2.0 * b * v0 / (root + free)
+        f = v0 / gap - loss * v0 if gap > 0.0 else 0.0
+        return (at(d0 - gap, spring), f) if f > 0.0 else (at(e, spring), 0.0)
+    if a == 1.0 and loss == 0.0:
+        half = 0.5 * b * k / (1.0 + k * c)
+        if d0 >= 0.0:
+            y = (e - half * d0) / (1.0 + half)
+        else:
+            s = e + d0
+            root = np.sqrt(max(0.0, s * s - 4.0 * (1.0 + half) * e * d0))
+            y = 0.5 * (s + root) / (1.0 + half) if s >= 0.0 else -2.0 * e * d0 / (root - s)
+        end = at(y, spring)
+        return end, slopes(start, end, spring)[0]
+    high = e if loss == 0.0 else max(e, e + b * loss * v0)
+    y = high
+    if loss == 0.0 and c == 0.0 and e > 0.0 and b > 0.0:
+        share = e - d0 if d0 <= 0.0 else 1.0
+        y = min(high, ((a + 1.0) * e * share / (b * k)) ** (1.0 / (a + (1.0 if d0 <= 0.0 else 0.0))))
+        y *= 1.0 + 1e-15
+    low = 0.0
+    f = 0.0
+    end = at(y, spring)
+    for _ in range(300):
+        end = at(y, spring)
+        g, slope = slopes(start, end, spring)
+        f = g + loss * (end.energy - v0)
+        r = y - e + b * f
+        if r > 0.0:
+            high = y
+        else:
+            low = y
+        span = y - d0
+        turn = (end.force - g) / span if abs(span) > 1e-6 * (abs(y) + abs(d0)) else 0.5 * slope
+        new = y - r / (1.0 + b * (turn + loss * end.force))
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        if abs(new - y) <= 4e-16 * abs(y):
+            break
+        y = new
+    return end, max(0.0, f)
+
+
+@inner()
+def linear_guess(start, free, own, spring):
+    """Compression at the end of a step if the spring were linear from its start on."""
+    if start.approach <= 0.0:
+        return 0.5 * free.end
+    steep = spring.exponent * start.force / start.compression
+    tangent = steep / (1.0 + spring.compliance * steep)
+    half = 0.5 * own.end * tangent
+    y = (free.end - own.end * start.force + half * start.approach) / (1.0 + half)
+    if spring.compliance == 0.0:
+        return y
+    return start.compression + (y - start.approach) / (1.0 + spring.compliance * steep)
+
+
+@inner()
+def solve_ramp(guess, h, start, rate0, free, own, spring):
+    """Scheme A4 for one contact: whether it settled, the point at the step's end, mean force and slope.
+
+    The unknown is the compression at the end, from ``guess``, by Newton's method; with loss by secants. Not settled
+    where that fails, the force would pull or the contact would give energy.
+    """
+    d0, loss = start.approach, spring.loss
+    a, c = spring.exponent, spring.compliance
+    scale = max(abs(free.end), abs(d0))
+    x = guess if guess > -scale else 0.5 * free.end
+    old_x = 0.0
+    old_r = 0.0
+    f = 0.0
+    s = 0.0
+    end = compressed(x, spring)
+    close = False
+    last = False
+    for iteration in range(SOLVES):
+        end = compressed(x, spring)
+        y = end.approach
+        g, d = slopes(start, end, spring)
+        middle = 0.5 * (d0 + y)
+        right = g + d * (free.mean - middle)
+        s = end.force - start.force
+        stiffening = 1.0 + d * own.mean
+        if loss == 0.0:
+            f = (right - d * own.mean_ramp * s) / stiffening
+        else:  # mean and slope depend on each other through the rate at the end: two equations
+            right += loss * (end.energy - start.energy) / h
+            top = s + loss * (end.force * free.rate - start.force * rate0)
+            part = loss * end.force
+            two = 1.0 + part * own.rate_ramp
+            f = (right * two - d * own.mean_ramp * top) / (stiffening * two - d * own.mean_ramp * part * own.rate)
+            s = (top - part * own.rate * f) / two
+        r = y - free.end + own.end * f + own.end_ramp * s
+        if last or r == 0.0 or (close and abs(r) <= 1e-15 * max(scale, abs(y))):
+            work = f * (y - d0) + s * (middle - (free.mean - own.mean * f - own.mean_ramp * s))
+            lost = work - (end.energy - start.energy)
+            slack = 0.0 if loss > 0.0 else WORK_ERROR * (start.energy + end.energy)
+            return f >= 0.0 and -slack <= lost and (loss > 0.0 or lost <= slack), end, f, s
+        if loss == 0.0 or iteration == 0:
+            steep = a * end.force / x if x > 0.0 else 0.0  # dF/dx; over the approach it is less
+            tangent = steep / (1.0 + c * steep)
+            span = y - d0
+            turn = 0.5 * d
+            bend = 0.0
+            if abs(span) > 1e-6 * (abs(y) + abs(d0)):
+                turn = (end.force - g) / span
+                bend = (tangent - d) / span
+            rise = turn + bend * (free.mean - own.mean_ramp * s - middle - own.mean * f)
+            rise -= d * (own.mean_ramp * tangent + 0.5)
+            slope = (1.0 + own.end * rise / stiffening + own.end_ramp * tangent) * (1.0 + c * steep)
+        else:
+            slope = (r - old_r) / (x - old_x)
+        step = -r / slope
+        if not abs(step) < 1e300:
+            break
+        old_x = x
+        old_r = r
+        x += step
+        size = max(abs(x), 1e-2 * scale)
+        close = abs(step) <= 1e-7 * size or x == old_x
+        last = x == old_x or abs(step) <= 2e-15 * size
+    return False, end, f, s
+
+
+@inner()
+def solve_linear(matrix, vector, n):
+    """Solve the leading n x n system in place by elimination with row exchange; False where it is singular."""
+    for i in range(n):
+        best = i
+        for r in range(i + 1, n):
+            if abs(matrix[r, i]) > abs(matrix[best, i]):
+                best = r
+        if not abs(matrix[best, i]) > 0.0:
+            return False
+        if best != i:
+            for j in range(n):
+                matrix[i, j], matrix[best, j] = matrix[best, j], matrix[i, j]
+            vector[i], vector[best] = vector[best], vector[i]
+        for r in range(i + 1, n):
+            factor = matrix[r, i] / matrix[i, i]
+            if factor != 0.0:
+                for j in range(i, n):
+                    matrix[r, j] -= factor * matrix[i, j]
+                vector[r] -= factor * vector[i]
+    for i in range(n - 1, -1, -1):
+        total = vector[i]
+        for j in range(i + 1, n):
+            total -= matrix[i, j] * vector[j]
+        vector[i] = total / matrix[i, i]
+    return True
+
+
+@inner()
+def mean_force(h, y, now, law, i):
+    """Mean force of scheme A for one contact ending at approach y, and its slope; the force never pulls."""
+    spring = spring_of(law, i)
+    start, end = point_of(now, i), at(y, spring)
+    g, d = slopes(start, end, spring)
+    loss = spring.loss / h
+    f = g + loss * (end.energy - start.energy)
+    if f <= 0.0:
+        return 0.0, 0.0
+    span = y - start.approach
+    turn = (end.force - g) / span if abs(span) > 1e-6 * (abs(y) + abs(start.approach)) else 0.5 * d
+    return f, turn + loss * end.force
+
+
+@inner()
+def sweep_constants(h, now, law, e, sums, out_y, out_f):
+    """Solve scheme A's equations one contact at a time, the others' forces held; the largest relative change."""
+    m = e.size
+    change = 0.0
+    for i in range(m):
+        rest = e[i]
+        for j in range(m):
+            if j != i:
+                rest -= sums[0, i, j] * out_f[j]
+        old = out_f[i]
+        end, out_f[i] = solve_constant(point_of(now, i), rest, sums[0, i, i], law[i, 2] / h, spring_of(law, i))
+        out_y[i] = end.approach
+        if out_f[i] != old:
+            change = max(change, abs(out_f[i] - old) / max(abs(out_f[i]), abs(old)))
+    return change
+
+
+@inner()
+def solve_constants(h, now, law, e, sums, work, out_y, out_f):
+    """Scheme A for several contacts, whose equations minimise a convex function of the forces g.
+
+    The function is g.B g / 2 + the sum of the contacts' work at the approaches e - B g; Newton's method with a search
+    along each direction descends on it, sweeps over the contacts one by one begin and end it. ``now`` holds approach,
+    compression, force, energy and rate of each contact, (5, n_contacts).
+    """
+    m = e.size
+    for i in range(m):
+        out_f[i] = 0.0
+    for _ in range(4):
+        if sweep_constants(h, now, law, e, sums, out_y, out_f) <= 1e-15 or m == 1:
+            return
+    matrix = work[0]
+    step = work[2, 0]
+    slope = work[2, 1]
+    best = np.inf
+    for _ in range(60):
+        worst = 0.0
+        for i in range(m):
+            y = e[i]
+            for j in range(m):
+                y -= sums[0, i, j] * out_f[j]
+            force, slope[i] = mean_force(h, y, now, law, i)
+            step[i] = force - out_f[i]
+            if step[i] != 0.0:
+                worst = max(worst, abs(step[i]) / max(force, abs(out_f[i])))
+        if worst <= 1e-15 or (worst <= 1e-11 and worst >= 0.5 * best):
+            break
+        best = min(best, worst)
+        for i in range(m):
+            for j in range(m):
+                matrix[i, j] = slope[i] * sums[0, i, j]
+            matrix[i, i] += 1.0
+        if not solve_linear(matrix, step, m):
+            break
+        begin = 0.0
+        low = 0.0
+        high = 0.0
+        t = 1.0
+        for look in range(40):
+            rise = 0.0
+            for i in range(m):
+                y = e[i]
+                lift = 0.0
+                for j in range(m):
+                    y -= sums[0, i, j] * (out_f[j] + (t if look > 0 else 0.0) * step[j])
+                    lift += sums[0, i, j] * step[j]
+                force, _ = mean_force(h, y, now, law, i)
+                rise += lift * (out_f[i] + (t if look > 0 else 0.0) * step[i] - force)
+            if look == 0:
+                begin = rise
+                continue
+            if abs(rise) <= 0.5 * abs(begin):
+                break
+            if rise > 0.0:
+                high = t
+            else:
+                low = t
+            t = 0.5 * (low + high) if high > 0.0 else 2.0 * t
+        for i in range(m):
+            out_f[i] = out_f[i] + t * step[i]
+    for _ in range(200):
+        if sweep_constants(h, now, law, e, sums, out_y, out_f) <= 1e-15:
+            break
+
+
+@inner()
+def ramp_forces(h, y, now, law, e, ea, vf, sums, work, out_f, out_s, out_r):
+    """Mean and slope of the forces of scheme A4 if the step ended at approaches y, and the residual in y."""
+    m = law.shape[0]
+    matrix = work[0]
+    vector = work[2, 2]
+    for i in range(m):
+        spring = spring_of(law, i)
+        start, end = point_of(now, i), at(y[i], spring)
+        g, d = slopes(start, end, spring)
+        loss, f1 = spring.loss, end.force
+        for j in range(m):
+            matrix[i, j] = d * sums[2, i, j]
+            matrix[i, m + j] = d * sums[3, i, j]
+            matrix[m + i, j] = loss * f1 * sums[4, i, j]
+            matrix[m + i, m + j] = loss * f1 * sums[5, i, j]
+        matrix[i, i] += 1.0
+        matrix[m + i, m + i] += 1.0
+        vector[i] = g + d * (ea[i] - 0.5 * (start.approach + y[i])) + loss * (end.energy - start.energy) / h
+        vector[m + i] = f1 - start.force + loss * (f1 * vf[i] - start.force * now[4, i])
+    if not solve_linear(matrix, vector, 2 * m):
+        return False
+    for i in range(m):
+        out_f[i] = vector[i]
+        out_s[i] = vector[m + i]
+    for i in range(m):
+        r = y[i] - e[i]
+        for j in range(m):
+            r += sums[0, i, j] * out_f[j] + sums[1, i, j] * out_s[j]
+        out_r[i] = r
+    return True
+
+
+@inner()
+def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
+    """Scheme A4: mean and slope of the forces of one step, starting from the approaches of scheme A in out_y.
+
+    Returns False where the iteration does not settle or a force would pull; the step then belongs to scheme A.
+    """
+    m = e.size
+    r = work[3, 0]
+    r2 = work[3, 1]
+    f2 = work[3, 2]
+    s2 = work[3, 3]
+    y2 = work[4, 0]
+    jacobian = work[1]
+    settled = False
+    for _ in range(20):
+        if not ramp_forces(h, out_y, now, law, e, ea, vf, sums, work, out_f, out_s, r):
+            return False
+        if settled:
+            break
+        for j in range(m):
+            for i in range(m):
+                y2[i] = out_y[i]
+            shift = 1e-7 * max(abs(out_y[j]), 1e-3 * abs(now[0, j]))
+            y2[j] += shift
+            shift = y2[j] - out_y[j]
+            if not shift > 0.0:
+                return False
+            if not ramp_forces(h, y2, now, law, e, ea, vf, sums, work, f2, s2, r2):
+                return False
+            for i in range(m):
+                jacobian[i, j] = (r2[i] - r[i]) / shift
+        if not solve_linear(jacobian, r, m):
+            return False
+        settled = True
+        for i in range(m):
+            out_y[i] -= r[i]
+            if not abs(r[i]) < 1e300:
+                return False
+            if abs(r[i]) > 4e-15 * max(abs(out_y[i]), 1e-2 * abs(now[0, i])):
+                settled = False
+    if not settled:
+        return False
+    for i in range(m):
+        if not out_f[i] >= 0.0:
+            return False
+        v1 = at(out_y[i], spring_of(law, i)).energy
+        mean = ea[i]
+        for j in range(m):
+            mean -= sums[2, i, j] * out_f[j] + sums[3, i, j] * out_s[j]
+        work_done = out_f[i] * (out_y[i] - now[0, i]) + out_s[i] * (0.5 * (now[0, i] + out_y[i]) - mean)
+        lost = work_done - (v1 - now[3, i])
+        if lost < (0.0 if law[i, 2] > 0.0 else -WORK_ERROR * (v1 + now[3, i])):
+            return False
+        if law[i, 2] == 0.0 and lost > WORK_ERROR * (v1 + now[3, i]):
+            return False
+    return True

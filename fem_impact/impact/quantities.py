@@ -1,0 +1,56 @@
+"""The quantities a user can ask of a blow, and how to name them."""
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+from .._base import check
+
+QUANTITIES = ("restitution", "impulse", "contact_time", "force", "n_impacts", "spectrum", "sound")
+BANDED = ("spectrum", "sound")  # quantities that need an upper frequency
+USUAL = MappingProxyType(dict.fromkeys(("restitution", "impulse", "contact_time", "force", "n_impacts")))
+
+
+def asked_for(quantity: Any) -> Mapping[str, float | None]:
+    """The quantities asked for, each with its upper frequency [Hz], or None if it has no band.
+
+    Parameters
+    ----------
+    quantity : None, str, sequence of str or mapping of str to frequency [Hz]
+        Names from QUANTITIES; ``"spectrum=5000"`` is the spectrum up to 5 kHz. None means all without a band.
+    """
+    if quantity is None:
+        return USUAL
+    if isinstance(quantity, str):
+        quantity = (quantity,)
+    pairs = quantity.items() if isinstance(quantity, Mapping) else (_pair(item) for item in _listed(quantity))
+    found: dict[str, float | None] = {}
+    for name, limit in pairs:
+        check.one_of("quantity", name, QUANTITIES)
+        if (name in BANDED) != (limit is not None):
+            rule = "needs a frequency, such as" if name in BANDED else "has no frequency, write"
+            raise ValueError(f"quantity {name} {rule} '{name}{'=5000' if name in BANDED else ''}'")
+        found[name] = None if limit is None else check.positive(f"frequency of {name}", limit, "Hz")
+    if not found:
+        raise ValueError(f"quantity must name one of {', '.join(QUANTITIES)}, got none")
+    return MappingProxyType(found)
+
+
+def _listed(quantity: Any) -> Sequence[Any]:
+    if not isinstance(quantity, Sequence):
+        raise ValueError(f"quantity must be names of {', '.join(QUANTITIES)}, got {check.shown(quantity)}")
+    return quantity
+
+
+def _pair(item: Any) -> tuple[str, float | None]:
+    if not isinstance(item, str):
+        raise ValueError(f"quantity must be names of {', '.join(QUANTITIES)}, got {check.shown(item)}")
+    name, equals, limit = item.partition("=")
+    if not equals:
+        return name.strip(), None
+    try:
+        return name.strip(), float(limit)
+    except ValueError:
+        raise ValueError(
+            f"frequency of {name.strip()} must be a number in Hz, got {check.shown(limit.strip())}"
+        ) from None

@@ -1,0 +1,605 @@
+"""The result of a blow: the force history, the scalars derived from it, and the motion of all bodies at any time."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy import fft, special
+
+from .._base import check, markup
+from ..modes.modal import Modes
+from .compiled import build, law, many_blows, propagation, record
+from .contact import Contact
+from .striker import Striker
+
+CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more than this factor
+TOUCH = 1e-12  # [-] of the largest approach rate: bodies that touch and approach more slowly count as pressed
+LEAST_SAMPLES = 800.0  # [-] per impact: its spectrum errs by less than 1e-3 up to the thirtieth lobe
+PEAK_LOOKS = 16  # [-] samples per step in the search for the peak force; misses (pi/11/16)**2/8 before the parabola
+MOST_TERMS = 2 * 10**7  # [-] pieces times frequencies of a spectrum summed directly: takes three seconds; above it, FFT
+MOST_PERIODS = 2.0**18  # [-] periods of the highest frequency in a blow: the FFT then takes half a gigabyte
+GRID = 8  # [-] time cells per half period of the highest frequency, in the FFT of a long blow
+WINDOW, BETA = 6, 28.1  # [-] half width and shape of the window for an FFT of twice the length: errs by 1e-11
+DIP_BLOCK = 8  # [-] points per static solution: each is a load, and the cost grows with the pairs of points
+
+
+@dataclass(frozen=True)
+class Impact:
+    """One impact: an unbroken contact."""
+
+    start: float  # [s]
+    end: float  # [s]
+    peak_force: float  # [N]
+    impulse: float  # [N s]
+    contact: int = 0  # index of the contact
+
+    @property
+    def duration(self) -> float:
+        """Time in contact [s]."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True)
+class Error:
+    """Estimated errors: absolute for the restitution, relative for impulse, contact time and peak force."""
+
+    step: float  # [-] of the time integration
+    truncation: float  # [-] of leaving out modes
+    mesh: float  # [-] of the finite elements
+    resolvable: bool = True  # False: the left-out modes govern the contact itself, and no estimate holds
+    idealisation: float = 0.0  # [-] of treating the target as rigid or infinite
+    sensitivity: float = 1.0  # [-] growth of a small difference from first to last impact
+
+    @property
+    def total(self) -> float:
+        """The sum [-]; infinite if the modes cannot resolve the contact."""
+        return self.step + self.truncation + self.mesh + self.idealisation if self.resolvable else float("inf")
+
+    def __float__(self) -> float:
+        return self.total
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """The modal system of a run, its start and every step."""
+
+    omega: np.ndarray  # (n_modes,) [rad/s] modes of all bodies
+    zeta: np.ndarray  # (n_modes,) [-]
+    shape: np.ndarray  # (n_contacts, n_modes) [kg**-0.5] signed: the approach is offset + shape @ q
+    offset: np.ndarray  # (n_contacts,) [m]
+    bias: np.ndarray  # (n_modes,) [N kg**-0.5] constant modal forces
+    law: np.ndarray  # (n_contacts, 4) stiffness, exponent, loss, series compliance [m/N]
+    start_q: np.ndarray  # (n_modes,) [m kg**0.5]
+    start_p: np.ndarray  # (n_modes,) [m kg**0.5/s]
+    steps: np.ndarray  # (n_steps, 3 + (3 + n_coefficients) n_contacts), see `energy.run_energy`
+    end_q: np.ndarray  # (n_modes,)
+    end_p: np.ndarray  # (n_modes,)
+    now: np.ndarray  # (5, n_contacts) at the end; row 0 approach [m], row 4 rate [m/s]
+    work: np.ndarray  # (n_contacts,) [J] integral of force times approach rate
+    end_time: float  # [s]
+    status: int  # why the run ended, see `record`
+    n_fallback: int  # [-] steps in which scheme A4 fell back to A
+    n_blind: int  # [-] steps that passed over contact events without locating them
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+
+    @property
+    def n_coefficients(self) -> int:
+        """Number of coefficients of each step's force polynomial, per contact."""
+        return (self.steps.shape[1] - 3) // self.n_contacts - 3
+
+    def _column(self, first: int) -> np.ndarray:
+        return self.steps[:, 3 + first :: 3 + self.n_coefficients]
+
+    @cached_property
+    def impulses(self) -> np.ndarray:
+        """Impulse of every step and contact [N s], (n_steps, n_contacts)."""
+        mean = sum(self._column(3 + k) / (k + 1.0) for k in range(self.n_coefficients))
+        return self.steps[:, 1:2] * mean
+
+    @property
+    def n_contacts(self) -> int:
+        return len(self.offset)
+
+    @cached_property
+    def ends(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Approach [m] and rate [m/s] at the start and at the end of every step, four arrays (n_steps, n_contacts)."""
+        d0, v0 = self._column(0), self._column(1)
+        d1 = np.vstack([d0[1:], self.now[:1]])
+        v1 = np.vstack([v0[1:], self.now[4:5]])
+        return d0, v0, d1, v1
+
+    @cached_property
+    def pressed(self) -> np.ndarray:
+        """True where a contact carries force in a step, (n_steps, n_contacts)."""
+        return self._column(2) > 0.0
+
+    def approach(self, steps: np.ndarray, contact: int, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Approach [m] and rate [m/s] at fractions of steps, (n_steps, n_parts), from cubics through both ends."""
+        d0, v0, d1, v1 = (end[steps, contact][:, None] for end in self.ends)
+        h = self.steps[steps, 1][:, None]
+        a = 2.0 * (d0 - d1) + h * (v0 + v1)
+        b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
+        return d0 + part * (h * v0 + part * (b + part * a)), v0 + part * (2.0 * b + 3.0 * a * part) / h
+
+    def force(self, steps: np.ndarray, contact: int, part: np.ndarray) -> np.ndarray:
+        """Contact force [N] at fractions of steps, (n_steps, n_parts)."""
+        if self.n_coefficients > 2:
+            first = 6 + contact * (3 + self.n_coefficients)
+            terms = self.steps[steps, first : first + self.n_coefficients]
+            return np.maximum(np.polynomial.polynomial.polyval(part[0], terms.T), 0.0)
+        approach, rate = self.approach(steps, contact, part)
+        k, exponent, loss, c = self.law[contact]
+        pressed = np.maximum(approach, 0.0)
+        if c:
+            pressed = law.compressions(pressed.ravel(), k, exponent, c).reshape(pressed.shape)
+        return np.maximum(k * pressed**exponent * (1.0 + loss * rate), 0.0)
+
+    def force_at(self, times: np.ndarray, contact: int) -> tuple[np.ndarray, np.ndarray]:
+        """Contact force [N] and its rate [N/s] at any times, (n_times,) each; zero after the end."""
+        if not len(self.steps):
+            return np.zeros(len(times)), np.zeros(len(times))
+        rows = np.clip(np.searchsorted(self.steps[:, 0], times, side="right") - 1, 0, None)
+        h = self.steps[rows, 1]
+        part = np.clip((times - self.steps[rows, 0]) / h, 0.0, 1.0)
+        if self.n_coefficients > 2:
+            first = 6 + contact * (3 + self.n_coefficients)
+            terms = self.steps[rows, first : first + self.n_coefficients]  # (n_times, n_coefficients)
+            order = np.arange(self.n_coefficients)
+            force = (terms * part[:, None] ** order).sum(axis=1)
+            rate = (terms[:, 1:] * order[1:] * part[:, None] ** order[:-1]).sum(axis=1) / h
+        else:
+            approach, speed = (x[:, 0] for x in self.approach(rows, contact, part[:, None]))
+            d0, v0, d1, v1 = (end[rows, contact] for end in self.ends)
+            turn = (
+                6.0 * (d1 - d0) * (1.0 - 2.0 * part) - h * (v0 * (4.0 - 6.0 * part) + v1 * (2.0 - 6.0 * part))
+            ) / h**2
+            k, exponent, loss, c = self.law[contact]
+            x = np.maximum(approach, 1e-300)
+            x = law.compressions(x, k, exponent, c) if c else x
+            tangent = exponent * k * x ** (exponent - 1.0)
+            force = k * x**exponent * (1.0 + loss * speed)
+            rate = tangent / (1.0 + c * tangent) * speed * (1.0 + loss * speed) + k * x**exponent * loss * turn
+            force = np.where(approach > 0.0, force, 0.0)
+        acts = self.pressed[rows, contact] & (force > 0.0) & (times <= self.end_time)
+        return np.where(acts, force, 0.0), np.where(acts, rate, 0.0)
+
+    @cached_property
+    def contacts(self) -> np.ndarray:
+        """All impacts, (n_impacts, 5): start, end, peak force, impulse, contact index; sorted by contact."""
+        rate = np.abs(self._column(1)).max(initial=0.0)
+        return record.find_impacts(self.steps, self.now, self.law, self.n_coefficients, PEAK_LOOKS, TOUCH * rate)
+
+    @cached_property
+    def impacts(self) -> tuple[Impact, ...]:
+        """All impacts in order of their start."""
+        rows = self.contacts.tolist()
+        found = [Impact(start, end, peak, impulse, int(i)) for start, end, peak, impulse, i in rows]
+        return tuple(sorted(found, key=lambda impact: (impact.start, impact.contact)))
+
+
+@dataclass(frozen=True, eq=False)
+class Dip:
+    """Where forces act on a body whose kept modes lack part of its static compliance."""
+
+    points: np.ndarray  # (n_ends, dimension) [m]
+    touched: tuple[tuple[int, float], ...]  # contact, and sign: 1 for its first body, -1 for its second
+    force: float  # [N] constant force at the first point
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """The result of `strike` or `collide`. Histories are exact between steps and after the end."""
+
+    bodies: tuple[Modes, ...]
+    contacts: tuple[Contact, ...]
+    history: History
+    speed: float  # [m/s] of the striker's contact point at the start; in `collide`, of the first moving body
+    tolerance: float  # [-] requested
+    scheme: str  # the scheme used
+    error: Error
+    striker: Striker | None = None
+    at: np.ndarray | None = None  # (dimension,) [m] strike point
+    dips: tuple[Dip | None, ...] = ()  # one per body; None if its modes are complete
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+
+    @property
+    def target(self) -> Modes:
+        """The struck body; in `collide` the last one."""
+        return self.bodies[-1]
+
+    @property
+    def contact(self) -> Contact:
+        """The contact law; in `collide` the first one."""
+        return self.contacts[0]
+
+    @property
+    def impacts(self) -> tuple[Impact, ...]:
+        """All impacts in order of their start."""
+        return self.history.impacts
+
+    @property
+    def n_impacts(self) -> int:
+        """Number of impacts."""
+        return len(self.impacts)
+
+    @property
+    def contact_time(self) -> float:
+        """Total time in contact [s]."""
+        return float(sum(impact.duration for impact in self.impacts))
+
+    @property
+    def impulse(self) -> float:
+        """Total impulse of the contact forces [N s]."""
+        return float(sum(impact.impulse for impact in self.impacts))
+
+    @property
+    def peak_force(self) -> float:
+        """Largest contact force [N]."""
+        return max((impact.peak_force for impact in self.impacts), default=0.0)
+
+    @cached_property
+    def _samples(self) -> tuple[np.ndarray, np.ndarray]:
+        steps = self.history.steps
+        if not len(steps):
+            return np.zeros(1), np.zeros((1, self.history.n_contacts))
+        busy = np.asarray(self.history.pressed.any(axis=1))
+        per_step = 4.0
+        if busy.any():
+            per_impact = busy.sum() / max(1, len({impact.start for impact in self.impacts}))
+            per_step = np.clip(
+                np.ceil(max((3.0 / max(self.tolerance, 1e-10)) ** 0.5, LEAST_SAMPLES) / per_impact), 4, 4096
+            )
+        part = np.arange(int(per_step)) / per_step
+        times, forces = [], []
+        edges = np.flatnonzero(np.diff(np.concatenate([[-1], busy.astype(int)])))
+        for first, last in zip(edges, np.append(edges[1:], len(steps))):
+            rows = np.arange(first, last)
+            if busy[first]:
+                times.append((steps[rows, :1] + part * steps[rows, 1:2]).ravel())
+                forces.append(np.stack([self._within(rows, i, part) for i in range(self.history.n_contacts)], axis=1))
+            else:
+                times.append(steps[rows, 0])
+                forces.append(np.zeros((len(rows), self.history.n_contacts)))
+        times.append(np.array([self.history.end_time]))
+        last_row = np.array([len(steps) - 1])
+        forces.append(np.array([[self._within(last_row, i, np.ones(1))[0] for i in range(self.history.n_contacts)]]))
+        return np.concatenate(times), np.concatenate(forces)
+
+    def _within(self, rows: np.ndarray, i: int, part: np.ndarray) -> np.ndarray:
+        return np.where(self.history.pressed[rows, i][:, None], self.history.force(rows, i, part[None]), 0.0).ravel()
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times [s] of `force`, (n_times,)."""
+        return self._samples[0]
+
+    @property
+    def force(self) -> np.ndarray:
+        """Contact force [N] at `time`, (n_times,); for several contacts (n_times, n_contacts)."""
+        force = self._samples[1]
+        return force[:, 0] if force.shape[1] == 1 else force
+
+    def spectrum(self, frequencies: Any) -> np.ndarray:
+        """Fourier transform of the force, integral of F exp(-i omega t) [N s], (n_frequencies,), complex.
+
+        Exact for a force that is linear between the samples.
+        """
+        asked = check.array("frequencies", frequencies, (None,), "Hz", lift=True)
+        t, h, f0, f1 = self._pieces()
+        if len(t) * len(asked) > MOST_TERMS and 0.0 < np.abs(asked).max() * (t[-1] + h[-1]) < MOST_PERIODS:
+            return self._long_spectrum(asked, t[-1] + h[-1])
+        omega = 2.0 * np.pi * asked
+        total = np.zeros(len(omega), complex)
+        for block in np.array_split(np.arange(len(omega)), max(1, len(omega) * len(h) // 2**20)):
+            x = omega[block, None] * h  # (n_block, n_pieces)
+            small = np.abs(x) < 1e-2
+            safe = np.where(small, 1.0, x)
+            edge = np.exp(-1j * safe)
+            mean = np.where(small, 1.0 - 0.5j * x - x**2 / 6.0 + 1j * x**3 / 24.0, (1.0 - edge) / (1j * safe))
+            ramp = np.where(
+                small, 0.5 - 1j * x / 3.0 - x**2 / 8.0 + 1j * x**3 / 30.0, (edge * (1.0 + 1j * safe) - 1.0) / safe**2
+            )
+            start = np.exp(-1j * omega[block, None] * t)
+            total[block] = (start * h * (f0 * mean + (f1 - f0) * ramp)).sum(axis=1)
+        return total
+
+    def _pieces(self) -> tuple[np.ndarray, ...]:
+        """Start [s], length [s], first and last force [N] of all straight pieces that carry force."""
+        time, force = self._samples
+        force = force.sum(axis=1)
+        keep = (force[1:] != 0.0) | (force[:-1] != 0.0)
+        return time[:-1][keep], np.diff(time)[keep], force[:-1][keep], force[1:][keep]
+
+    def spectral_centroid(self, max_frequency: float) -> float:
+        """Mean frequency [Hz] of the force spectrum's magnitude from zero to ``max_frequency`` [Hz]."""
+        limit = check.positive("max_frequency", max_frequency, "Hz")
+        span = max((impact.end for impact in self.impacts), default=0.0)
+        if span == 0.0:
+            raise ValueError("spectral_centroid needs a contact, but the bodies never touched; check gap and speed")
+        if limit * span > MOST_PERIODS:
+            raise ValueError(f"max_frequency must be at most {MOST_PERIODS / span:.4g} Hz for a blow of {span:.4g} s")
+        frequencies = np.linspace(0.0, limit, int(np.clip(32.0 * limit * span, 512, 65536)))
+        t, h, f0, f1 = self._pieces()
+        if build.COMPILED and len(t) * len(frequencies) <= MOST_TERMS:
+            spectrum = np.zeros(len(frequencies), complex)
+            many_blows.straight_spectrum(2.0 * np.pi * frequencies[1], t, h, f0, f1, spectrum)
+        else:
+            spectrum = self.spectrum(frequencies)
+        size = np.abs(spectrum)
+        return float(np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies))
+
+    def _long_spectrum(self, frequencies: np.ndarray, span: float) -> np.ndarray:
+        """The spectrum by FFT, (n_frequencies,), for a blow of so many pieces that the direct sum would take minutes.
+
+        The force is replaced by its exact impulses in equal time cells; aliasing is small because the band ends far
+        below the cell rate. A Kaiser-Bessel window interpolates from the FFT frequencies to the requested ones.
+        """
+        t, h, f0, f1 = self._pieces()
+        before = np.concatenate([[0.0], np.cumsum(0.5 * h * (f0 + f1))])
+        step = min(0.5 / (GRID * np.abs(frequencies).max()), span / LEAST_SAMPLES)
+        edges = step * np.arange(int(span / step) + 2)
+        row = np.clip(np.searchsorted(t, edges, side="right") - 1, 0, None)
+        part = np.clip((edges - t[row]) / h[row], 0.0, 1.0)
+        impulse = np.diff(before[row] + h[row] * part * (f0[row] + 0.5 * (f1 - f0)[row] * part))
+        middle, length = 0.5 * (len(impulse) - 1), fft.next_fast_len(2 * len(impulse))
+        root = np.sqrt(BETA**2 - (2.0 * np.pi * WINDOW / length * (np.arange(len(impulse)) - middle)) ** 2)
+        even = fft.fft(impulse * root / (2.0 * WINDOW * np.sinh(root)), length)
+        place = frequencies * step * length
+        near = np.floor(place).astype(int)[:, None] + np.arange(1 - WINDOW, WINDOW + 1)  # (n_frequencies, 2 WINDOW)
+        weight = special.i0(BETA * np.sqrt(np.clip(1.0 - ((place[:, None] - near) / WINDOW) ** 2, 0.0, None)))
+        turn = np.exp(2j * np.pi * middle / length * near)
+        found = (weight * turn * even[near % length]).sum(axis=1)
+        return found * np.exp(-2j * np.pi * frequencies * step * (middle + 0.5)) / np.sinc(frequencies * step)
+
+    def body_slice(self, body: int) -> slice:
+        """The columns of a body's modes in the history's arrays."""
+        start = sum(modes.n_modes for modes in self.bodies[:body])
+        return slice(start, start + self.bodies[body].n_modes)
+
+    def modal_state(self, times: Any, *, body: int = -1) -> tuple[np.ndarray, np.ndarray]:
+        """Modal displacements and velocities of the target at any times, in any order.
+
+        Parameters
+        ----------
+        times : array_like, shape (n_times,) [s]
+            Not negative; after the end of the run the bodies move freely.
+        body : int
+            Index of the body; the target is the last.
+
+        Returns
+        -------
+        q, p : ndarray, shape (n_times, n_modes) [m kg**0.5], [m kg**0.5/s]
+        """
+        n = len(self.bodies)
+        check.count("body", body, low=-n, high=n - 1)
+        times = check.array("times", times, (None,), "s", lift=True)
+        if times.size and times.min() < 0.0:
+            raise ValueError(f"times must not be before the blow at 0 s, got {times.min():g} s")
+        order = np.argsort(times, kind="stable")
+        h = self.history
+        q = np.empty((len(times), len(h.omega)))
+        p = np.empty_like(q)
+        propagation.replay(
+            h.omega, h.zeta, h.shape, h.bias, h.start_q, h.start_p, h.steps, h.n_coefficients, times[order], q, p
+        )  # fmt: skip
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        part = self.body_slice(body % len(self.bodies))
+        n_modes = self.bodies[body].n_modes
+        return q[back, part][:, :n_modes], p[back, part][:, :n_modes]
+
+    @check.typed
+    def displacement(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
+        """Displacement [m] of the target, (n_times, n_points); positive in the direction of the blow.
+
+        Parameters
+        ----------
+        points : array_like, shape (n_points, dimension) [m]
+        times : array_like, shape (n_times,) [s]
+        body : int
+            Index of the body; the target is the last.
+        residual : bool
+            Whether to add the static deflection of the left-out modes under the contact forces, if the blow used it.
+            It matters within about one wavelength of the last mode from a contact, and costs one static solution per
+            point.
+        """
+        q, _ = self.modal_state(times, body=body)
+        motion = q @ self.bodies[body].shape_at(points).T  # (n_times, n_modes) @ (n_modes, n_points)
+        return motion + self._dip(points, times, body)[0] if residual else motion
+
+    @check.typed
+    def velocity(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
+        """Velocity [m/s] of the target, (n_times, n_points); parameters as in `displacement`."""
+        _, p = self.modal_state(times, body=body)
+        motion = p @ self.bodies[body].shape_at(points).T
+        return motion + self._dip(points, times, body)[1] if residual else motion
+
+    def _dip(self, points: Any, times: Any, body: int) -> tuple[Any, Any]:
+        """Static deflection [m] of the left-out modes and its rate [m/s], (n_times, n_points); 0 if there are none."""
+        dip = self.dips[body] if self.dips else None
+        if dip is None:
+            return 0.0, 0.0
+        modes, n_ends = self.bodies[body], len(dip.points)
+        times = check.array("times", times, (None,), "s", lift=True)
+        found = [self.history.force_at(times, i) for i, _ in dip.touched]
+        sign = np.array([sign for _, sign in dip.touched])
+        force, rate = (-sign * np.stack([pair[k] for pair in found], axis=1) for k in (0, 1))  # (n_times, n_ends)
+        force[:, 0] += dip.force
+        asked = modes.points("points", points)
+        if not force.any() or not len(asked):
+            return 0.0, 0.0
+        blocks = [asked[i : i + DIP_BLOCK] for i in range(0, len(asked), DIP_BLOCK)]
+        rest = np.vstack(
+            [modes.residual_compliance(np.vstack([dip.points, block]))[n_ends:, :n_ends] for block in blocks]
+        )  # (n_points, n_ends)
+        return force @ rest.T, rate @ rest.T
+
+    @property
+    def speeds(self) -> tuple[float, ...]:
+        """Final speed [m/s] of each body's rigid motion at its first contact point."""
+        h = self.history
+        result = []
+        for body, modes in enumerate(self.bodies):
+            part = slice(self.body_slice(body).start, self.body_slice(body).start + modes.n_rigid)
+            rows = [i for i in range(h.n_contacts) if (h.shape[i, self.body_slice(body)] != 0.0).any()]
+            sign = self._sign(body, rows[0]) if rows else 1.0
+            result.append(sign * float(h.shape[rows[0], part] @ h.end_p[part]) if rows else 0.0)
+        return tuple(result)
+
+    def _sign(self, body: int, contact: int) -> float:
+        later = any((self.history.shape[contact, self.body_slice(other)] != 0.0).any() for other in range(body))
+        return -1.0 if later else 1.0
+
+    @property
+    def restitution(self) -> float:
+        """Minus final over initial speed of the striker's rigid motion, at its contact point [-]."""
+        return -self.speeds[0] / self.speed if self.speed else 0.0
+
+    @cached_property
+    def _balance(self) -> dict[str, float]:
+        h = self.history
+
+        def modal(q: np.ndarray, p: np.ndarray, part: slice) -> float:
+            kinetic = 0.5 * (p[part] @ p[part]) + 0.5 * ((h.omega[part] * q[part]) @ (h.omega[part] * q[part]))
+            return float(kinetic - h.bias[part] @ q[part])
+
+        def stored(d: np.ndarray) -> float:
+            return float(law.stored(d, h.law))
+
+        everything = slice(0, len(h.omega))
+        start_contact = stored(h.offset + h.shape @ h.start_q)
+        end_contact = stored(np.atleast_1d(h.now[0]))
+        start = modal(h.start_q, h.start_p, everything)
+        end = modal(h.end_q, h.end_p, everything)
+        work = float(h.work.sum())
+        return {
+            "start": start + start_contact,
+            "end": end + end_contact,
+            "contact": end_contact,
+            "contact_loss": work - (end_contact - start_contact),
+            "modal_loss": -(end - start) - work,
+            "scale": max(
+                0.5 * float(h.start_p @ h.start_p), 0.5 * float(h.end_p @ h.end_p), start_contact, abs(start), abs(end)
+            ),
+        }
+
+    @property
+    def energies(self) -> dict[str, float]:
+        """Final energies [J]: striker and target (or body 0, 1, ...), contact, and the dissipated energy.
+
+        They add up to the initial energy to within `energy_error`.
+        """
+        h = self.history
+        names = ["striker", "target"] if len(self.bodies) == 2 else [f"body {i}" for i in range(len(self.bodies))]
+        result = {}
+        for body, name in enumerate(names):
+            part = self.body_slice(body)
+            q, p = h.end_q[part], h.end_p[part]
+            result[name] = float(0.5 * (p @ p + (h.omega[part] * q) @ (h.omega[part] * q)) - h.bias[part] @ q)
+        rest = slice(self.body_slice(len(self.bodies) - 1).stop, None)  # modes that replace the left-out ones
+        q, p = h.end_q[rest], h.end_p[rest]
+        result["contact"] = self._balance["contact"] + float(0.5 * (p @ p + (h.omega[rest] * q) @ (h.omega[rest] * q)))
+        result["dissipated"] = sum(self.dissipated.values())
+        return result
+
+    @property
+    def dissipated(self) -> dict[str, float]:
+        """Energy [J] lost to modal damping and to the contacts; exactly zero without damping or contact loss."""
+        lossy = bool((self.history.law[:, 2] > 0.0).any())
+        damped = bool(((self.history.zeta > 0.0) & (self.history.omega > 0.0)).any())
+        return {
+            "modes": self._balance["modal_loss"] if damped else 0.0,
+            "contact": self._balance["contact_loss"] if lossy else 0.0,
+        }
+
+    @property
+    def energy_error(self) -> float:
+        """Energy that numerical error created or destroyed, over the largest energy in the blow [-]."""
+        balance, lost = self._balance, self.dissipated
+        unexplained = [balance["modal_loss"] - lost["modes"], balance["contact_loss"] - lost["contact"]]
+        unexplained += [min(0.0, value) for value in lost.values()]
+        return float(sum(abs(value) for value in unexplained) / balance["scale"]) if balance["scale"] else 0.0
+
+    @property
+    def momentum_error(self) -> float:
+        """Largest momentum change of a rigid motion that the forces do not explain, over the largest momentum [-]."""
+        h = self.history
+        rigid = h.omega == 0.0
+        if not rigid.any():
+            return 0.0
+        impulses = h.impulses.sum(axis=0)  # (n_contacts,)
+        wanted = h.start_p + h.bias * h.end_time - impulses @ h.shape
+        scale = max(np.abs(h.start_p[rigid]).max(), np.abs(impulses @ np.abs(h.shape[:, rigid])).max())
+        return float(np.abs(h.end_p - wanted)[rigid].max() / scale) if scale else 0.0
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run proved that the bodies never touch again."""
+        return self.history.status == record.FINISHED
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the force curve and a table of results."""
+        rows = [
+            ("impacts", f"{self.n_impacts}, {self.outcome}"),
+            ("peak force", f"{self.peak_force:.5g} N"),
+            ("contact time", f"{self.contact_time:.5g} s"),
+            ("impulse", f"{self.impulse:.5g} N s"),
+            ("restitution", f"{self.restitution:.5f}"),
+            ("estimated error", f"{self.error.total:.1e} of {self.tolerance:.0e} accepted"),
+        ]
+        end = self.impacts[-1].end if self.impacts else np.inf
+        shown = self.time <= end
+        force = self.force if self.force.ndim == 1 else self.force.sum(axis=1)
+        said = f"Contact force over time: {self.n_impacts} impacts, peak {self.peak_force:.4g} N"
+        return markup.side_by_side(
+            markup.curve(self.time[shown], force[shown], label="force", unit="N", title=said), markup.table(rows)
+        )
+
+    def summary(self) -> str:
+        """The blow in a few readable lines."""
+        lines = [f"{self.n_impacts} impact{'s' if self.n_impacts != 1 else ''}, {self.outcome}"]
+        lines += [
+            f"  {impact.start * 1e3:9.4f} to {impact.end * 1e3:9.4f} ms: peak {impact.peak_force:.5g} N, "
+            f"impulse {impact.impulse:.5g} N s"
+            for impact in self.impacts[:20]
+        ]
+        if self.n_impacts > 20:
+            lines.append(f"  ... and {self.n_impacts - 20} more")
+        total = self._balance["start"]
+        shares = ", ".join(f"{name} {value / total:.2%}" for name, value in self.energies.items()) if total else "none"
+        error = self.error
+        lines += [
+            f"contact time {self.contact_time * 1e3:.5g} ms, peak force {self.peak_force:.5g} N, "
+            f"impulse {self.impulse:.5g} N s",
+            f"restitution {self.restitution:.5f} at {self.speed:g} m/s",
+            f"energy {total:.5g} J: {shares}",
+            f"estimated error {error.total:.1e} (step {error.step:.1e}, truncation {error.truncation:.1e}, "
+            f"mesh {error.mesh:.1e}, idealisation {error.idealisation:.1e}); energy error {self.energy_error:.1e}",
+        ]
+        if error.sensitivity > CHAOTIC:
+            lines.append(
+                f"chaotic: small differences grow {error.sensitivity:.0e}-fold from the first impact to the last; "
+                "trust the number of impacts and averages, not single values"
+            )
+        if not error.resolvable:
+            lines.append("not resolvable: the left-out modes govern this contact; keep more modes")
+        return "\n".join(lines)
+
+    @property
+    def outcome(self) -> str:
+        """How the run ended, in words."""
+        words = {
+            record.FINISHED: "then final separation (proved)",
+            record.HORIZON: "stopped at the given duration",
+            record.IMPACTS: "stopped after max_impacts",
+            record.SETTLED: "then everything came to rest",
+        }
+        return words[self.history.status]

@@ -1,0 +1,67 @@
+"""Frequency domain: the mobility of a structure, and the half-sine pulse of the simple theory of bouncing."""
+
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from ..modes.modal import Modes
+
+
+@check.typed
+def mobility(modes: Modes, at: Any, to: Any, frequencies: Any) -> np.ndarray:
+    """Velocity at ``to`` per unit force at ``at``, over frequency.
+
+    Parameters
+    ----------
+    modes : Modes
+    at, to : array_like, shape (dimension,) [m]
+        Points of the force and of the velocity.
+    frequencies : array_like, shape (n_frequencies,) [Hz]
+        All positive.
+
+    Returns
+    -------
+    mobility : ndarray, shape (n_frequencies,), complex [m/(N s)]
+
+    Notes
+    -----
+    The kept modes are summed; the others add i omega times their residual compliance. Reciprocal in ``at`` and ``to``.
+    Infinite at the frequency of an undamped mode. Valid below the last kept mode.
+    """
+    frequency = check.array("frequencies", frequencies, (None,), "Hz", lift=True)
+    if (frequency <= 0.0).any():
+        raise ValueError(f"frequencies must be positive, got {frequency.min():g} Hz")
+    force, place = modes.point("at", at), modes.point("to", to)
+    product = modes.shape_at(force)[0] * modes.shape_at(place)[0]  # (n_modes,)
+    rest = modes.residual_compliance(np.vstack([force, place]))[0, 1]
+    omega = 2.0 * np.pi * frequency[:, None]  # (n_frequencies, 1)
+    stiffness = modes.omega**2 - omega**2 + 2j * modes.damping_ratio * modes.omega * omega
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return (1j * omega * product / stiffness).sum(axis=1) + 1j * omega[:, 0] * rest
+
+
+def half_sine_spectrum(frequencies: Any, contact_frequency: float) -> np.ndarray:
+    """Magnitude of the spectrum of a half-sine pulse, divided by its value at zero frequency.
+
+    Parameters
+    ----------
+    frequencies : array_like [Hz]
+    contact_frequency : float [Hz]
+        Frequency of the sine; the pulse lasts half a period.
+
+    Returns
+    -------
+    magnitude : ndarray [-]
+        pi / 4 at the contact frequency; the first zero is at three times that frequency.
+
+    References
+    ----------
+    Euphonics 2.2.6 and 12.1.
+    """
+    frequency = check.finite("frequencies", check.numbers("frequencies", frequencies, "Hz"), "Hz")
+    x = frequency / check.positive("contact_frequency", contact_frequency, "Hz")
+    near = np.abs(x - 1.0) < 1e-4  # both cos and 1 - x**2 vanish at 1: use the series of their ratio
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        far = np.abs(np.cos(0.5 * np.pi * x) / (1.0 - x**2))
+    return np.where(near, 0.25 * np.pi * (1.0 - 0.5 * (x - 1.0)), far)

@@ -1,0 +1,116 @@
+"""Strikers: a rigid mass, a sphere, a stick or any body with modes, and its contact point."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from ..fe.section import Material
+from ..modes.analytic import beam
+from ..modes.modal import Modes, left_out
+
+SPHERES = 1e-9, 1e9  # [m] radius, from a few atoms to a star
+STICK_MODES = 96  # [-] bending modes of a stick; each blow keeps as many of them as it needs
+MOST_MODES = 1000  # [-] of a stick: higher modes have wavelengths as short as its thickness, where beam theory fails
+
+
+@dataclass(frozen=True, eq=False)
+class Striker:
+    """A body and the point it strikes with; it arrives in rigid motion, undeformed.
+
+    Its speed is the speed of its contact point: a body hinged at its far end turns about the hinge, a free body moves
+    in a straight line.
+    """
+
+    modes: Modes
+    at: np.ndarray  # (dimension,) [m] the contact point
+    material: Material | None = None  # of a sphere, for `Contact.between`
+    radius: float | None = None  # [m] of a sphere
+    fixed: bool = True  # True: a blow keeps all modes; False: only those its tolerance needs
+
+    def __post_init__(self) -> None:
+        check.instance("modes", self.modes, Modes)
+        if self.material is not None:
+            check.instance("material", self.material, Material)
+        if self.radius is not None:
+            check.positive("radius", self.radius, "m")
+        if self.modes.n_rigid == 0:
+            raise ValueError(
+                f"striker must be able to move rigidly, but its lowest mode is at {self.modes.frequencies[0]:g} Hz; "
+                "leave it free or support it by one hinge"
+            )
+        at = self.modes.point("at", self.at)[0]
+        object.__setattr__(self, "at", at)
+        shape = self.modes.shape_at(at[None] if self.modes.dimension else None)[0]
+        if not (shape[: self.modes.n_rigid] != 0.0).any():
+            raise ValueError(
+                "at must be a point that moves when the striker moves rigidly, got one at rest; move it off the hinge"
+            )
+        check.lock_arrays(self)
+
+    @classmethod
+    def rigid(cls, mass: float) -> "Striker":
+        """A rigid mass [kg]."""
+        return cls(Modes.rigid(mass), np.zeros(0))
+
+    @classmethod
+    def sphere(cls, material: Material, radius: float) -> "Striker":
+        """A rigid solid sphere, radius in m; `Contact.between` computes its Hertz stiffness from the material."""
+        check.instance("material", material, Material)
+        radius = check.between("radius", radius, *SPHERES, "m")
+        return cls(Modes.rigid(4.0 / 3.0 * np.pi * radius**3 * material.rho), np.zeros(0), material, radius)
+
+    @classmethod
+    def stick(cls, mass: float, first_frequency: float, *, n_modes: int | None = None) -> "Striker":
+        """A uniform stick, hinged at its far end, that strikes with its free end like a drumstick.
+
+        Parameters
+        ----------
+        mass : float [kg]
+            The mass felt at the tip of a rigid stick is a third of this.
+        first_frequency : float [Hz]
+            Frequency of its first bending mode.
+        n_modes : int, optional
+            Number of bending modes kept, besides the rigid rotation; the others act by their residual compliance. By
+            default, each blow keeps as many as its tolerance needs.
+        """
+        kept = STICK_MODES if n_modes is None else check.count("n_modes", n_modes, high=MOST_MODES)
+        modes = beam(1.0, ends=("hinged", "free"), mass=mass, first_frequency=first_frequency, n_modes=1 + kept)
+        return cls(modes, np.ones(1), fixed=n_modes is not None)
+
+    @classmethod
+    def flexible(cls, modes: Modes, *, at: Any) -> "Striker":
+        """Any body that can move rigidly; it strikes with its point ``at`` [m]."""
+        return cls(modes, at)
+
+    @property
+    def mass(self) -> float:
+        """Mass of the body [kg]."""
+        return self.modes.mass
+
+    @property
+    def _points(self) -> np.ndarray:
+        return self.at[None] if self.modes.dimension else np.zeros((1, 0))
+
+    @cached_property
+    def shape(self) -> np.ndarray:
+        """Mass-normalised shapes at the contact point, (n_modes,) [kg**-0.5]."""
+        return self.modes.shapes.at(self._points)[0]
+
+    @cached_property
+    def motion(self) -> np.ndarray:
+        """Modal velocities per unit speed of the contact point on arrival, (n_modes,) [kg**0.5]."""
+        return self.modes.rigid_motion(self._points if self.modes.dimension else None)
+
+    @cached_property
+    def left_out(self) -> tuple[np.ndarray, np.ndarray]:
+        """Residual compliance at the contact point, (1, 1) [m/N], and its estimated error, (1,)."""
+        return left_out(self.modes, self._points, self.shape[None])
+
+    @property
+    def felt_mass(self) -> float:
+        """Mass felt at the contact point if the striker is rigid [kg]."""
+        rigid = self.shape[: self.modes.n_rigid]
+        return 1.0 / float(rigid @ rigid)

@@ -1,0 +1,128 @@
+"""The kinetic-energy criterion: the contact resonance above which a hammer cannot rebound after one impact."""
+
+from typing import Any
+
+import numpy as np
+from scipy import optimize
+
+from .._base import check
+from ..modes.modal import Modes
+from .spectra import half_sine_spectrum
+
+STEP = 1.01  # [-] ratio of neighbouring frequencies in the search: much finer than the lobes of the pulse's spectrum
+HARDEST = np.log(1e70)  # [-] log of the highest contact frequency tried [rad/s]: above it, the threshold is infinite
+SETTLED = 40.0  # [-] above this many contact frequencies, cos**2 is replaced by its mean: changes the sum by 1e-7
+
+
+@check.typed
+def required_energy(modes: Modes, at: Any, contact_frequency: float) -> float:
+    """Twice the energy that a half-sine pulse of unit impulse leaves in the body [1/kg].
+
+    Parameters
+    ----------
+    modes : Modes
+    at : strike point, (dimension,) [m]
+    contact_frequency : float [Hz]
+        Frequency of the half sine.
+
+    Notes
+    -----
+    The sum runs over the kept modes. The residual compliance at the point gives the share of the other modes: beyond
+    the last kept mode, the squared shapes per unit omega fall as omega**-s, with s = 0 on plates and 1/2 on beams.
+    """
+    omega_c = 2.0 * np.pi * check.positive("contact_frequency", contact_frequency, "Hz")
+    return _energy(*_participation(modes, at), omega_c)
+
+
+def _participation(modes: Modes, at: Any) -> tuple[np.ndarray, np.ndarray, float, float]:
+    """Omega and squared shapes of the kept modes; A and s of the density A omega**-s [1/(kg rad/s)] beyond them."""
+    point = modes.point("at", at)
+    squared = modes.shape_at(point)[0] ** 2
+    exponent = {1: 0.5}.get(modes.dimension, 0.0)
+    rest = max(0.0, float(modes.residual_compliance(point)[0, 0]))
+    complete = rest + float(modes.modal_compliance(point)[0, 0])
+    if rest <= 1e-12 * complete:  # no modes are left out, or only rounding remains
+        return modes.omega, squared, 0.0, exponent
+    return modes.omega, squared, (1.0 + exponent) * rest * modes.omega[-1] ** (1.0 + exponent), exponent
+
+
+def _energy(omega: np.ndarray, squared: np.ndarray, density: float, exponent: float, omega_c: float) -> float:
+    total = float(squared @ half_sine_spectrum(omega, omega_c) ** 2)
+    if density == 0.0:
+        return total
+    last = omega[-1] / omega_c
+    settled = max(SETTLED, last)
+    tail = 0.5 * settled ** (-3.0 - exponent) / (3.0 + exponent)
+    if last < settled:
+        pieces = np.append(np.arange(last, settled, 2.0), settled)
+        nodes, weights = np.polynomial.legendre.leggauss(12)
+        half = 0.5 * np.diff(pieces)[:, None]
+        x = pieces[:-1, None] + half * (nodes + 1.0)
+        tail += float(np.sum(half * weights * half_sine_spectrum(x, 1.0) ** 2 * x**-exponent))
+    return total + density * omega_c ** (1.0 - exponent) * tail
+
+
+@check.typed
+def threshold_frequency(modes: Modes, at: Any, mass: float) -> float | None:
+    """Lowest contact resonance at which the struck body absorbs all the energy of a rigid hammer.
+
+    Parameters
+    ----------
+    modes : Modes
+    at : strike point, (dimension,) [m]
+    mass : float [kg]
+        Mass of the hammer.
+
+    Returns
+    -------
+    frequency : float [Hz] or None
+        None if the hammer does not rebound even from the softest contact: a free body whose mass felt at the point is
+        at most the hammer's. Infinite if it rebounds from every contact: the body has too few modes to absorb the
+        energy.
+
+    Notes
+    -----
+    The force is a half-sine pulse of contact frequency f, and momentum is conserved: the hammer stops when
+    mass * required_energy(f) = 1. Use it as a trend only: multiple impacts already occur well below this frequency.
+
+    References
+    ----------
+    Euphonics 12.1.2; here the rigid motions of free bodies are included.
+    """
+    mass = check.positive("mass", mass, "kg")
+    omega, squared, density, exponent = _participation(modes, at)
+    if mass * squared[omega == 0.0].sum() >= 1.0:
+        return None
+
+    def excess(log_omega: float) -> float:
+        return mass * _energy(omega, squared, density, exponent, np.exp(log_omega)) - 1.0
+
+    if density == 0.0 and mass * squared.sum() <= 1.0:
+        return float("inf")
+    low = np.log(_harmless(omega, squared, density, exponent, mass))
+    while excess(low) > 0.0:
+        low -= 1.0
+    high = low
+    while excess(high) <= 0.0:
+        if high > HARDEST:
+            return float("inf")
+        # above omega[-1], all modes lie in the first lobe, so the energy only grows with the contact frequency
+        low, high = high, high + np.log(STEP if high < np.log(omega[-1]) else 2.0)
+    return float(np.exp(optimize.brentq(excess, low, high, xtol=1e-13)) / (2.0 * np.pi))
+
+
+def _harmless(omega: np.ndarray, squared: np.ndarray, density: float, exponent: float, mass: float) -> float:
+    """A contact frequency [rad/s] up to which no pulse takes all the hammer's energy, from an upper bound.
+
+    The bound grows with the contact frequency. The half-sine spectrum is at most 1, and above twice the contact
+    frequency at most 4/3 (contact frequency / frequency)**2.
+    """
+    flexible = omega > 0.0
+    ends, shares = omega[flexible], squared[flexible]
+    beyond = density * ends[-1] ** (-3.0 - exponent) / (3.0 + exponent)
+    fourth = shares / ends**4
+    above = beyond + np.append(np.cumsum(fourth[::-1])[::-1][1:], 0.0)  # sum over the modes above each one
+    half = 0.5 * ends
+    bound = squared[~flexible].sum() + np.cumsum(shares) + 16.0 / 9.0 * half**4 * above
+    safe = int(np.argmax(mass * bound >= 1.0)) if (mass * bound >= 1.0).any() else len(ends)
+    return float(half[safe - 1]) if safe else 1e-3 * float(ends[0])

@@ -1,0 +1,351 @@
+"""Read outlines from SVG, DXF, shapely polygons and lists of points; curves stay curves."""
+
+import math
+import re
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from xml.parsers import expat
+
+import numpy as np
+
+from .._base import check, isolated
+from .loops import (
+    MOST_PIECES,
+    Arc,
+    Bezier,
+    Loop,
+    Outline,
+    Piece,
+    crossed,
+    extent,
+    polyline,
+    segment,
+    signed_area,
+    tangent,
+)
+from .mesh_files import FARTHEST, LARGEST, UNITS
+from .smooth_edges import smooth_runs
+
+PIXEL = 0.0254 / 96.0  # [m] one SVG px: 1/96 inch by the CSS standard
+DXF_UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 13: 1e-6, 14: 0.1}  # $INSUNITS code -> [m]
+CLOSED = 1e-9  # [-] gaps below this fraction of the extent are rounding and count as closed
+BRIDGED = 1e-3  # [-] gaps below this fraction of the extent are closed and noted
+LONGEST_NAME = 100  # [-] characters kept of an edge name
+SHORT = 1e-7  # [-] pieces shorter than this fraction of the extent are dropped
+CORNER = 0.1  # [rad] in a drawing without names, a sharper turn than this starts a new edge
+
+
+def read(source: Any, unit: str | None) -> tuple[Outline, list[str]]:
+    """Outline [m] from a file name, a shapely polygon or points (n, 2), and notes on what was assumed."""
+    notes: list[str] = []
+    if isinstance(source, (str, Path)):
+        path = check.path("source", source)
+        if not path.is_file():
+            raise ValueError(f"source must name an .svg or .dxf file, got {str(source)!r}; there is no such file")
+        readers = {".svg": _svg, ".dxf": _dxf}
+        if path.suffix.lower() not in readers:
+            raise ValueError(f"source must be an .svg or .dxf file, got {path.name!r}; meshes are read by fi.mesh.load")
+        return _nested(path.name, readers[path.suffix.lower()](path, unit, notes)), notes
+    scale = 1.0 if unit is None else UNITS[check.one_of("unit", unit, UNITS)]
+    if hasattr(source, "geom_type"):
+        if source.geom_type != "Polygon":
+            raise ValueError(f"source must be one shapely Polygon, got a {source.geom_type}; mesh its parts one by one")
+        rings = [source.exterior.coords, *(ring.coords for ring in source.interiors)]
+    else:
+        rings = [source]
+    rings = [check.array("source", ring, (None, None), "m") for ring in rings]
+    loops = [_smoothed(ring[:, :2] * scale, notes) for ring in rings]
+    return _nested("source", loops), notes
+
+
+def _smoothed(points: np.ndarray, notes: list[str]) -> Loop:
+    """Loop through points (n, 2): a smooth curve where the turns are small, straight lines elsewhere."""
+    points = check.array("source", points, (None, 2), "m")
+    if len(points) > 1 and np.array_equal(points[0], points[-1]):
+        points = points[:-1]
+    if not 3 <= len(points) <= MOST_PIECES:
+        raise ValueError(f"source must have 3 to {MOST_PIECES} points, got {len(points)}")
+    if np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).min() == 0.0:
+        raise ValueError("source has the same point twice in a row; remove one")
+    if signed_area(points) < 0.0:
+        points = points[::-1]
+    pieces: list[Piece] = []
+    for place, tangents, curvatures, circle in smooth_runs(points):
+        if circle is not None:
+            centre, radius = circle
+            start = math.atan2(*(place[0] - centre)[::-1])
+            turns = np.unwrap(np.arctan2(*(place - centre).T[::-1]))
+            axes = np.array([radius, 0.0]), np.array([0.0, radius])
+            pieces.append(Arc(centre, *axes, start, float(turns[-1] - turns[0])))
+        elif not curvatures.any():
+            pieces += [segment(a, b) for a, b in pairwise(place)]
+        else:
+            pieces += _quintics(place, tangents, curvatures)
+    n_curved = sum(not isinstance(piece, Bezier) or len(piece.control) > 2 for piece in pieces)
+    if n_curved:
+        notes.append(
+            "points along gentle bends were joined by smooth curves; fi.mesh.polygon joins points by straight lines"
+        )
+    return tuple(pieces)
+
+
+def _quintics(place: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> list[Piece]:
+    """Quintics through points (n + 1, 2) with tangents (n, 2, 2) and curvatures (n, 2) given at both ends."""
+    pieces: list[Piece] = []
+    for a, b, (t0, t1), (k0, k1) in zip(place[:-1], place[1:], tangents, curvatures):
+        length = float(np.linalg.norm(b - a))
+        normal = np.array([[-t0[1], t0[0]], [-t1[1], t1[0]]])
+        c1 = a + length / 5.0 * t0
+        c2 = 2.0 * c1 - a + length**2 / 20.0 * k0 * normal[0]
+        c4 = b - length / 5.0 * t1
+        c3 = 2.0 * c4 - b + length**2 / 20.0 * k1 * normal[1]
+        pieces.append(Bezier(np.array([a, c1, c2, c3, c4, b])))
+    return pieces
+
+
+def svg_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Pieces and size of an SVG file; runs in the reader process (see `isolated`)."""
+    import svgelements
+
+    _refuse_entities(path)
+    isolated.confine(path)
+    drawing = svgelements.SVG.parse(str(path))
+    if not isinstance(drawing, svgelements.SVG):
+        raise ValueError("it contains no <svg> element")
+    found: list[Piece] = []
+    for shape in drawing.elements():
+        if isinstance(shape, svgelements.Shape):
+            whole = svgelements.Path(shape)
+            whole.reify()
+            found += _svg_pieces(whole, svgelements, str(shape.id) if shape.id else "")
+            _check_number(path.name, found)
+    box = drawing.viewbox.width if drawing.viewbox is not None and drawing.viewbox.width else drawing.width
+    stated = re.fullmatch(r"\s*([\d.eE+-]+)\s*(mm|cm|in)\s*", str(drawing.values.get("width", "")))
+    # parsed here because svgelements rounds its millimetre to seven digits
+    width = float(stated[1]) * UNITS[stated[2]] if stated else np.nan
+    return {**_packed(found), "size": np.array([float(box), float(drawing.width), width])}
+
+
+def _refuse_entities(path: Path) -> None:
+    """Raise ValueError if an XML file declares entities: they can expand to gigabytes or pull in other files."""
+
+    def refuse(*_: Any) -> None:
+        raise ValueError("it declares XML entities; save it as plain SVG")
+
+    parser = expat.ParserCreate()
+    parser.EntityDeclHandler = refuse
+    with open(path, "rb") as file:
+        parser.ParseFile(file)
+
+
+def _svg(path: Path, unit: str | None, notes: list[str]) -> list[Loop]:
+    """Closed loops [m] of all shapes in an SVG file, y upward."""
+    drawn = isolated.read(path, "SVG", "mesh.drawings:svg_arrays")
+    box, pixels, width = drawn["size"].tolist()
+    scale = PIXEL
+    if unit is not None:
+        scale = UNITS[check.one_of("unit", unit, UNITS)] * box / pixels if pixels else math.nan
+    elif not math.isnan(width):
+        scale = width / pixels if pixels else math.nan
+    else:
+        notes.append(f"{path.name} states no unit; assumed px of 1/96 inch, pass unit= to change that")
+    if not (math.isfinite(scale) and scale > 0.0):
+        raise ValueError(f"{path.name} has no usable width and viewBox; set both to positive numbers")
+    return _chained(path.name, _unpacked(path.name, drawn, np.diag([scale, -scale])), notes)
+
+
+def _svg_pieces(whole: Any, svgelements: Any, name: str) -> list[Piece]:
+    pieces: list[Piece] = []
+    for part in whole:
+        if isinstance(part, svgelements.Arc):
+            centre, a, b = (np.array([p.x, p.y]) for p in (part.center, part.prx, part.pry))
+            pieces.append(Arc(centre, a - centre, b - centre, float(part.get_start_t()), float(part.sweep), name))
+        elif isinstance(part, svgelements.CubicBezier):
+            control = [part.start, part.control1, part.control2, part.end]
+            pieces.append(Bezier(np.array([[p.x, p.y] for p in control], float), name))
+        elif isinstance(part, svgelements.QuadraticBezier):
+            control = [part.start, part.control, part.end]
+            pieces.append(Bezier(np.array([[p.x, p.y] for p in control], float), name))
+        elif (
+            isinstance(part, (svgelements.Line, svgelements.Close)) and part.start is not None and part.end is not None
+        ):
+            pieces.append(segment((part.start.x, part.start.y), (part.end.x, part.end.y), name))
+    return pieces
+
+
+def dxf_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Pieces and unit of a DXF file; runs in the reader process (see `isolated`)."""
+    import ezdxf
+
+    isolated.confine(path)
+    drawing = ezdxf.readfile(path)
+    found: list[Piece] = []
+    for entity in drawing.modelspace():
+        found += _dxf_pieces(entity)
+        _check_number(path.name, found)
+    return {**_packed(found), "unit": np.array(int(drawing.header.get("$INSUNITS", 0)))}
+
+
+def _dxf(path: Path, unit: str | None, notes: list[str]) -> list[Loop]:
+    """Closed loops [m] of the lines, arcs, ellipses, polylines and splines in a DXF file's model space."""
+    drawn = isolated.read(path, "DXF", "mesh.drawings:dxf_arrays")
+    if unit is not None:
+        scale = UNITS[check.one_of("unit", unit, UNITS)]
+    else:
+        scale = DXF_UNITS.get(int(drawn["unit"]), 0.0)
+        if not scale:
+            scale = 1.0
+            notes.append(f"{path.name} states no unit; assumed metres, pass unit= to change that")
+    loops = _chained(path.name, _unpacked(path.name, drawn, scale * np.eye(2)), notes)
+    size = max(extent(loop) for loop in loops)
+    if unit is None and size > LARGEST:
+        raise ValueError(
+            f"{path.name} extends over {size:g} m, which looks like millimetres read as metres; "
+            "pass unit='mm' to load it, or unit='m' if it is that large"
+        )
+    return loops
+
+
+def _dxf_pieces(entity: Any) -> list[Piece]:
+    kind, name = entity.dxftype(), "" if entity.dxf.get("layer", "0") == "0" else str(entity.dxf.layer)
+
+    def flat(point: Any) -> np.ndarray:
+        return np.array([point[0], point[1]], float)
+
+    if kind == "LINE":
+        return [segment(flat(entity.dxf.start), flat(entity.dxf.end), name)]
+    if kind in ("ARC", "CIRCLE"):
+        start = math.radians(entity.dxf.start_angle) if kind == "ARC" else 0.0
+        stop = math.radians(entity.dxf.end_angle) if kind == "ARC" else 2.0 * math.pi
+        sweep = (stop - start) % (2.0 * math.pi) or 2.0 * math.pi
+        side = -1.0 if entity.dxf.extrusion.z < 0.0 else 1.0  # drawn from below: x is mirrored
+        radius = float(entity.dxf.radius)
+        centre = flat(entity.dxf.center) * [side, 1.0]
+        return [Arc(centre, np.array([side * radius, 0.0]), np.array([0.0, radius]), start, sweep, name)]
+    if kind == "ELLIPSE":
+        a, b = flat(entity.dxf.major_axis), flat(entity.minor_axis)
+        start = float(entity.dxf.start_param)
+        sweep = (float(entity.dxf.end_param) - start) % (2.0 * math.pi) or 2.0 * math.pi
+        return [Arc(flat(entity.dxf.center), a, b, start, sweep, name)]
+    if kind in ("LWPOLYLINE", "POLYLINE"):
+        return [piece for part in entity.virtual_entities() for piece in _dxf_pieces(part)]
+    if kind == "SPLINE":
+        curve = entity.construction_tool()
+        if curve.is_rational:
+            parts = [part.control_points for part in curve.cubic_bezier_approximation(level=8)]
+        else:
+            parts = list(curve.bezier_decomposition())
+        return [Bezier(np.array([flat(p) for p in part]), name) for part in parts]
+    return []
+
+
+def _check_number(name: str, pieces: list[Piece]) -> None:
+    if len(pieces) > MOST_PIECES:
+        raise ValueError(f"{name} has more than {MOST_PIECES} lines and curves; simplify the drawing")
+
+
+def _packed(pieces: list[Piece]) -> dict[str, np.ndarray]:
+    """Pieces as arrays: all numbers concatenated, how many belong to each piece, which are arcs, and the names."""
+    rows = [
+        np.concatenate([p.centre, p.a, p.b, [p.start, p.sweep]]) if isinstance(p, Arc) else p.control.ravel()
+        for p in pieces
+    ]
+    return {
+        "numbers": np.concatenate([np.zeros(0), *rows]),
+        "lengths": np.array([len(row) for row in rows], int),
+        "arcs": np.array([isinstance(piece, Arc) for piece in pieces], bool),
+        "names": np.array([piece.name[:LONGEST_NAME] for piece in pieces], str),
+    }
+
+
+def _unpacked(name: str, drawn: dict[str, np.ndarray], matrix: np.ndarray) -> list[Piece]:
+    """Pieces from the arrays of `_packed`, transformed by a matrix (2, 2)."""
+    if not np.isfinite(drawn["numbers"]).all():
+        raise ValueError(f"{name} has coordinates that are not finite numbers; correct the drawing")
+    rows = np.split(drawn["numbers"], np.cumsum(drawn["lengths"])[:-1])
+    pieces: list[Piece] = []
+    for row, arc, edge in zip(rows, drawn["arcs"], drawn["names"].tolist()):
+        if arc:
+            pieces.append(Arc(row[:2], row[2:4], row[4:6], float(row[6]), float(row[7]), edge))
+        else:
+            pieces.append(Bezier(row.reshape(-1, 2), edge))
+    return [piece.moved(matrix, np.zeros(2)) for piece in pieces]
+
+
+def _chained(name: str, pieces: list[Piece], notes: list[str]) -> list[Loop]:
+    """Join pieces end to end into closed loops."""
+    corners = np.array([piece.at(np.linspace(0.0, 1.0, 5)) for piece in pieces]).reshape(-1, 2)
+    if not (np.abs(corners) < FARTHEST).all():
+        raise ValueError(f"{name} has coordinates beyond {FARTHEST:g} m; correct the drawing")
+    span = float(np.ptp(corners, axis=0).max(initial=0.0)) if pieces else 0.0
+    left = [piece for piece in pieces if extent((piece,)) > SHORT * span]
+    if not left:
+        raise ValueError(f"{name} has no outline; draw it with paths, lines, arcs or splines")
+    starts, stops = (np.array([end(piece) for piece in left]) for end in (_start, _stop))
+    free = np.ones(len(left), bool)
+    loops: list[Loop] = []
+    while free.any():
+        last = int(free.argmax())
+        chain, start, stop = [left[last]], starts[last], stops[last]
+        free[last] = False
+        while np.linalg.norm(stop - start) > CLOSED * span:
+            onward, back = (np.where(free, np.hypot(*(ends - stop).T), np.inf) for ends in (starts, stops))
+            gaps = np.minimum(onward, back)
+            best, home = int(gaps.argmin()), float(np.linalg.norm(start - stop))
+            if gaps[best] <= min(BRIDGED * span, home):
+                ahead = onward[best] <= gaps[best]
+                chain.append(left[best] if ahead else left[best].reversed())
+                stop, free[best] = stops[best] if ahead else starts[best], False
+            elif home <= BRIDGED * span:
+                notes.append(f"{name}: a gap of {home:g} m was closed")
+                break
+            else:
+                raise ValueError(
+                    f"{name} has an open outline: it ends at ({stop[0]:g}, {stop[1]:g}) m, "
+                    f"{home:g} m from its start; close the path there"
+                )
+        loops.append(tuple(chain))
+    return loops
+
+
+def _start(piece: Piece) -> np.ndarray:
+    return piece.at(np.zeros(1))[0]
+
+
+def _stop(piece: Piece) -> np.ndarray:
+    return piece.at(np.ones(1))[0]
+
+
+def _nested(name: str, loops: list[Loop]) -> Outline:
+    """The largest loop becomes the outline, the others its holes; unnamed edges get names."""
+    areas = [abs(signed_area(polyline(loop, extent(loop) / 50.0))) for loop in loops]
+    order = np.argsort(areas)[::-1]
+    outer = loops[order[0]]
+    outline = Outline.around(outer, tuple(loops[i] for i in order[1:]))
+    problem = crossed(outline)
+    if problem:
+        raise ValueError(f"{name}: {problem}")
+    holes = tuple(tuple(_renamed(p, f"hole{i}") for p in loop) for i, loop in enumerate(outline.holes))
+    return Outline(_edges(outline.outer), holes)
+
+
+def _renamed(piece: Piece, name: str) -> Piece:
+    return piece if piece.name else piece.named(name)
+
+
+def _edges(loop: Loop) -> Loop:
+    """Name unnamed pieces edge0, edge1 ...; each corner starts a new edge."""
+    directions = [(tangent(piece, np.zeros(1))[0], tangent(piece, np.ones(1))[0]) for piece in loop]
+    sharp = []
+    for i, (first, _) in enumerate(directions):
+        before = directions[i - 1][1]
+        angle = math.atan2(before[0] * first[1] - before[1] * first[0], float(before @ first))
+        sharp.append(abs(angle) > CORNER)
+    start = sharp.index(True) if any(sharp) else 0
+    number, result = -1, []
+    for i in [*range(start, len(loop)), *range(start)]:
+        if sharp[i] or number < 0:
+            number += 1
+        result.append(_renamed(loop[i], f"edge{number}"))
+    return tuple(result)

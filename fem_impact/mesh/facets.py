@@ -1,0 +1,113 @@
+"""Curved boundary facets, written as a height above the chord."""
+
+import numpy as np
+from scipy.special import comb
+
+HALVING = 12  # [-] iterations to find the middle of a facet; each gains two digits if it turns less than 0.25 rad
+
+
+def powers(x: np.ndarray, highest: int, order: int) -> np.ndarray:
+    """The ``order``-th derivative of x**0 ... x**highest, (..., highest + 1)."""
+    result = np.zeros((*x.shape, highest + 1))
+    factor = 1.0
+    for k in range(order, highest + 1):
+        factor = float(np.prod(np.arange(k - order + 1, k + 1))) if order else 1.0
+        result[..., k] = factor * x ** (k - order)
+    return result
+
+
+class Curves:
+    """The curved facets of a mesh, each given by its height above the chord.
+
+    The height is s (1 - s) p(s) [m] with s from 0 to 1 along the chord. The quartic p matches tangent and curvature at
+    both ends and the given middle point. Inside a triangle, p times the product of the two area coordinates of the
+    ends bends the triangle to follow its facet.
+    """
+
+    def __init__(self, ends, middles, tangents, curvatures) -> None:
+        chord = ends[:, 1] - ends[:, 0]  # (n, 2)
+        self.length = np.linalg.norm(chord, axis=1)
+        self.along = chord / self.length[:, None]
+        self.out = np.column_stack([self.along[:, 1], -self.along[:, 0]])
+        self.centre = ends.mean(axis=1)
+        lean = np.einsum("nei,ni->ne", tangents, self.out) / np.einsum("nei,ni->ne", tangents, self.along)
+        slope = lean * self.length[:, None]
+        bend = -curvatures * (1.0 + lean**2) ** 1.5 * self.length[:, None] ** 2
+        height = ((middles - self.centre) * self.out).sum(axis=1)
+        start, stop = slope[:, 0], -slope[:, 1]  # p(0), p(1)
+        values = np.column_stack([start, stop, 0.5 * bend[:, 0] + start, -0.5 * bend[:, 1] - stop, 4.0 * height])
+        k = np.arange(5.0)
+        conditions = np.array([k == 0, np.ones(5), k == 1, k, 0.5**k], float)
+        self.p = np.linalg.solve(conditions, values.T).T  # (n, 5) ascending powers of s
+
+    def graph(self, rows: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """p and dp/ds for curves ``rows`` (n,) at s (n, n_q)."""
+        p = self.p[rows][:, None]
+        return (p * powers(s, 4, 0)).sum(axis=2), (p * powers(s, 4, 1)).sum(axis=2)
+
+    def middle(self) -> tuple[np.ndarray, np.ndarray]:
+        """Middle point (n, 2) of each curve and the outward unit normal (n, 2) there."""
+        p, dp = (a[:, 0] for a in self.graph(np.arange(len(self.p)), np.full((len(self.p), 1), 0.5)))
+        normal = self.out - (0.25 * dp / self.length)[:, None] * self.along
+        return self.centre + (0.25 * p)[:, None] * self.out, normal / np.linalg.norm(normal, axis=1)[:, None]
+
+    def at(self, share: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points (n, 2), unit tangents (n, 2) and curvatures (n,) at chord parameters s = ``share`` (n,)."""
+        s = np.asarray(share, float)[:, None]
+        p, dp, d2p = ((self.p[:, None] * powers(s, 4, k)).sum(axis=2) for k in range(3))
+        bump, slope = s * (1.0 - s), 1.0 - 2.0 * s
+        length = self.length[:, None]
+        point = self.centre + (s - 0.5) * length * self.along + bump * p * self.out
+        lean = (slope * p + bump * dp) / length
+        second = (-2.0 * p + 2.0 * slope * dp + bump * d2p) / length**2
+        stretch = np.hypot(1.0, lean)
+        return point, (self.along + lean * self.out) / stretch, (-second / stretch**3)[:, 0]
+
+    def controls(self) -> np.ndarray:
+        """Control points (n, 7, 2) of the curves as Bezier pieces of degree six."""
+        a, b, chord = self.p, np.zeros((len(self.p), 1)), self.along * self.length[:, None]
+        rise = np.concatenate([b, a, b], axis=1) - np.concatenate([b, b, a], axis=1)  # s (1 - s) p, ascending powers
+        power = rise[:, :, None] * self.out[:, None]  # (n, 7, 2)
+        power[:, 0] += self.centre - 0.5 * chord
+        power[:, 1] += chord
+        k = np.arange(7)
+        return np.einsum("ik,nkd->nid", comb(k[:, None], k) / comb(6, k), power)
+
+    def halfway(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """Point (n, 2) of each part from s = ``low`` to ``high`` that lies equally far from both ends of the part."""
+        a, b = self.at(low)[0], self.at(high)[0]
+        chord = b - a
+        share = 0.5 * (low + high)
+        for _ in range(HALVING):
+            short = ((self.at(share)[0] - 0.5 * (a + b)) * chord).sum(axis=1) / (chord**2).sum(axis=1)
+            share = share - (high - low) * short
+        return self.at(share)[0]
+
+
+def divided(ends, middles, tangents, curvatures, share: float):
+    """Cut facets in two at the chord parameter s = ``share``.
+
+    Returns
+    -------
+    point, tangent, curvature : ndarray, shapes (n, 2), (n, 2), (n,), at the cut
+    first, second : ndarray, shape (n, 2), middle points of the two parts
+    """
+    chord = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    straight = np.linalg.norm(middles - ends.mean(axis=1), axis=1) <= 1e-9 * chord
+    plain = ends[:, 0] + share * (ends[:, 1] - ends[:, 0])
+    if straight.all():
+        return plain, tangents[:, 0], 0.0 * chord, 0.5 * (ends[:, 0] + plain), 0.5 * (plain + ends[:, 1])
+    curves = Curves(ends, middles, tangents, curvatures)
+    cut, zero = np.full(len(ends), share), np.zeros(len(ends))
+    point, tangent, curvature = curves.at(cut)
+    first, second = curves.halfway(zero, cut), curves.halfway(cut, zero + 1.0)
+    point = np.where(straight[:, None], plain, point)
+    first = np.where(straight[:, None], 0.5 * (ends[:, 0] + point), first)
+    second = np.where(straight[:, None], 0.5 * (point + ends[:, 1]), second)
+    return (
+        point,
+        np.where(straight[:, None], tangents[:, 0], tangent),
+        np.where(straight, 0.0, curvature),
+        first,
+        second,
+    )

@@ -1,0 +1,257 @@
+"""Exact outline of a plate: arcs and Bezier pieces joined into loops, each piece part of a named edge."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from .._base import check
+
+SLENDER = 1e4  # [-] largest area / half width**2: the mesher is fast up to 4e3 and hangs from 4e4
+FINEST = 16  # [-] half widths tested are extent / 4**k for k < FINEST; the smallest is near rounding
+TURN = 0.25  # [rad] largest turn within one facet: puts 26 facets on a circle
+MOST_PIECES = 2000  # [-] most pieces in an outline: several times what tracing programs write
+HALVINGS = 60  # [-] most iterations of the search: bisection alone then reaches the last digit
+HERE = 1e-15  # [-] the search ends when the parameter moves by no more than this: rounding
+SAMPLES = 256  # [-] intervals per piece for integrating its length and turning
+
+
+@dataclass(frozen=True, eq=False)
+class Arc:
+    """Arc of a circle or ellipse: centre + a cos(angle) + b sin(angle)."""
+
+    centre: np.ndarray  # (2,) [m]
+    a: np.ndarray  # (2,) [m]
+    b: np.ndarray  # (2,) [m]
+    start: float  # [rad]
+    sweep: float  # [rad]
+    name: str = ""
+
+    def at(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """Points (n, 2) at parameters (n,) between 0 and 1, or a derivative with respect to the parameter."""
+        angle = self.start + self.sweep * np.asarray(t)[..., None] + 0.5 * np.pi * derivative
+        swept = self.sweep**derivative * (np.cos(angle) * self.a + np.sin(angle) * self.b)
+        return swept + (self.centre if derivative == 0 else 0.0)
+
+    def reversed(self) -> "Arc":
+        """The same piece traversed backwards."""
+        return replace(self, start=self.start + self.sweep, sweep=-self.sweep)
+
+    def named(self, name: str) -> "Arc":
+        """The same piece as part of a named edge."""
+        return replace(self, name=name)
+
+    def moved(self, matrix: np.ndarray, shift: np.ndarray) -> "Arc":
+        """The piece transformed by ``matrix`` (2, 2), then shifted by ``shift`` (2,) [m]."""
+        return replace(self, centre=matrix @ self.centre + shift, a=matrix @ self.a, b=matrix @ self.b)
+
+
+@dataclass(frozen=True, eq=False)
+class Bezier:
+    """Bezier piece of any degree; two control points make a straight line."""
+
+    control: np.ndarray  # (n, 2) [m]
+    name: str = ""
+
+    def at(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """Points (n, 2) at parameters (n,) between 0 and 1, or a derivative with respect to the parameter."""
+        control = self.control
+        for _ in range(derivative):
+            control = (len(control) - 1) * np.diff(control, axis=0)
+            if not len(control):
+                return np.zeros((*np.shape(t), 2))
+        t, degree = np.asarray(t)[..., None], len(control) - 1
+        k = np.arange(degree + 1)
+        return np.array([math.comb(degree, int(i)) for i in k]) * t**k * (1.0 - t) ** (degree - k) @ control
+
+    def reversed(self) -> "Bezier":
+        """The same piece traversed backwards."""
+        return replace(self, control=self.control[::-1].copy())
+
+    def named(self, name: str) -> "Bezier":
+        """The same piece as part of a named edge."""
+        return replace(self, name=name)
+
+    def moved(self, matrix: np.ndarray, shift: np.ndarray) -> "Bezier":
+        """The piece transformed by ``matrix`` (2, 2), then shifted by ``shift`` (2,) [m]."""
+        return replace(self, control=self.control @ matrix.T + shift)
+
+
+Piece = Arc | Bezier
+Loop = tuple[Piece, ...]
+
+
+def segment(start, end, name: str = "") -> Bezier:
+    """Straight piece from ``start`` to ``end``, both (2,) [m]."""
+    return Bezier(np.array([start, end], float), name)
+
+
+def circle(centre, radius: float, name: str = "") -> Loop:
+    """A full circle, anticlockwise."""
+    return (Arc(np.array(centre, float), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, 2.0 * np.pi, name),)
+
+
+def is_straight(piece: Piece) -> bool:
+    """Whether a piece is a straight line."""
+    if isinstance(piece, Arc):
+        return False
+    along = piece.control[-1] - piece.control[0]
+    across = (piece.control - piece.control[0]) @ np.array([along[1], -along[0]])
+    return bool((np.abs(across) <= 1e-12 * (along @ along)).all())
+
+
+def tangent(piece: Piece, t: np.ndarray) -> np.ndarray:
+    """Unit tangents (n, 2) at parameters (n,); if the derivative vanishes at an end, the value just inside."""
+    t = np.asarray(t, float)
+    speed = piece.at(t, 1)
+    length = np.linalg.norm(speed, axis=-1, keepdims=True)
+    still = length[..., 0] < 1e-9 * np.abs(piece.at(np.linspace(0, 1, 5), 1)).max()
+    if still.any():
+        inside = piece.at(np.where(t < 0.5, t + 1e-4, t - 1e-4), 1)
+        speed = np.where(still[..., None], inside, speed)
+        length = np.linalg.norm(speed, axis=-1, keepdims=True)
+    return speed / np.where(length > 0.0, length, 1.0)
+
+
+def curvature(piece: Piece, t: np.ndarray) -> np.ndarray:
+    """Signed curvature (n,) [1/m], positive where the piece turns left."""
+    if is_straight(piece):
+        return np.zeros(np.shape(t))
+    first, second = piece.at(t, 1), piece.at(t, 2)
+    speed = np.linalg.norm(first, axis=-1)
+    fastest = np.linalg.norm(piece.at(np.linspace(0.0, 1.0, 9), 1), axis=1).max()
+    cross = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    return cross / np.maximum(speed, 1e-6 * fastest) ** 3
+
+
+def divide(piece: Piece, size: float) -> np.ndarray:
+    """Parameters (n + 1,) from 0 to 1 that cut a piece into facets of at most ``size`` [m] and `TURN` [rad]."""
+    if isinstance(piece, Bezier) and len(piece.control) == 2:
+        length = float(np.linalg.norm(piece.control[1] - piece.control[0]))
+        return np.linspace(0.0, 1.0, max(1, math.ceil(length / size * (1.0 - 1e-6))) + 1)
+    t = np.linspace(0.0, 1.0, SAMPLES + 1)
+    points = piece.at(t)
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    direction = tangent(piece, t)
+    cross = direction[:-1, 0] * direction[1:, 1] - direction[:-1, 1] * direction[1:, 0]
+    turning = np.abs(np.arctan2(cross, (direction[:-1] * direction[1:]).sum(axis=1)))
+    need = np.maximum(steps / size, 0.0 if is_straight(piece) else turning / TURN)
+    total = np.concatenate([[0.0], np.cumsum(need + 1e-9 * need.sum())])
+    n = max(1, int(np.ceil(total[-1] * (1.0 - 1e-6))))
+    inner = np.interp(np.arange(1, n) * total[-1] / n, total, t)
+    return np.concatenate([[0.0], inner, [1.0]])
+
+
+def crossing(piece: Piece, start: np.ndarray, end: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Parameters (n,) where the piece lies above ``share`` (n,) [-] of its chord from ``start`` to ``end`` (n,)."""
+    if isinstance(piece, Bezier) and len(piece.control) == 2:
+        return start + share * (end - start)
+    a, b = piece.at(start), piece.at(end)
+    chord = b - a
+    wanted = a + share[:, None] * chord
+    low, high, t, moved = start.copy(), end.copy(), start + share * (end - start), end - start
+    for _ in range(HALVINGS):  # Newton; bisection where the step leaves the bracket or does not shrink
+        ahead = ((piece.at(t) - wanted) * chord).sum(axis=1)
+        low, high = np.where(ahead < 0.0, t, low), np.where(ahead < 0.0, high, t)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            better = t - ahead / (piece.at(t, 1) * chord).sum(axis=1)
+        good = (better >= low) & (better <= high) & (np.abs(better - t) <= 0.5 * moved)
+        better = np.where(good, better, 0.5 * (low + high))
+        moved, t = np.abs(better - t), better
+        if moved.max(initial=0.0) <= HERE:
+            break
+    return t
+
+
+def polyline(loop: Loop, size: float) -> np.ndarray:
+    """Points (n, 2) along a loop, at most ``size`` [m] apart; the first point is not repeated at the end."""
+    return np.concatenate([piece.at(divide(piece, size)[:-1]) for piece in loop])
+
+
+def signed_area(points: np.ndarray) -> float:
+    """Area [m^2] of a closed polygon (n, 2), positive if anticlockwise."""
+    shifted = points - points[0]
+    after = np.roll(shifted, -1, axis=0)
+    return 0.5 * float((shifted[:, 0] * after[:, 1] - shifted[:, 1] * after[:, 0]).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """One outer loop and any number of holes; the body lies on the left of every loop."""
+
+    outer: Loop
+    holes: tuple[Loop, ...] = ()
+
+    @classmethod
+    def around(cls, outer: Loop, holes: tuple[Loop, ...] = ()) -> "Outline":
+        """An outline from loops of any orientation."""
+        span = extent(outer)
+        return cls(_turned(outer, span, True), tuple(_turned(hole, span, False) for hole in holes))
+
+    @property
+    def loops(self) -> tuple[Loop, ...]:
+        return (self.outer, *self.holes)
+
+
+def extent(loop: Loop) -> float:
+    """The longer side [m] of the bounding box of a loop."""
+    return float(max(np.ptp(np.concatenate([piece.at(np.linspace(0, 1, 33)) for piece in loop]), axis=0)))
+
+
+def _turned(loop: Loop, span: float, anticlockwise: bool) -> Loop:
+    if (signed_area(polyline(loop, span / 20.0)) > 0.0) == anticlockwise:
+        return loop
+    return tuple(piece.reversed() for piece in reversed(loop))
+
+
+def straight_loop(name: str, corners, label: str) -> Loop:
+    """Closed polygon through corners (n, 2) [m]; in ``label``, ``{}`` becomes the number of the side's first corner."""
+    points = check.array(name, corners, (None, 2), "m")
+    if len(points) > 1 and np.array_equal(points[0], points[-1]):
+        points = points[:-1]
+    if not 3 <= len(points) <= MOST_PIECES:
+        raise ValueError(f"{name} must have 3 to {MOST_PIECES} corners, got {len(points)}")
+    after = np.roll(points, -1, axis=0)
+    gap = np.linalg.norm(after - points, axis=1)
+    if gap.min() <= 1e-12 * gap.max():
+        i = int(gap.argmin())
+        raise ValueError(f"{name} has corners {i} and {(i + 1) % len(points)} at the same place; remove one")
+    return tuple(segment(a, b, label.format(i)) for i, (a, b) in enumerate(zip(points, after)))
+
+
+def crossed(outline: Outline) -> str:
+    """Why an outline cannot be meshed, as an error text; an empty string if it can."""
+    size = extent(outline.outer) / 30.0
+    outer = shapely.Polygon(polyline(outline.outer, size))
+    if not outer.is_valid:
+        return f"outline must not cross or touch itself: {shapely.is_valid_reason(outer)}"
+    holes: list[shapely.Polygon] = []
+    for i, loop in enumerate(outline.holes):
+        hole = shapely.Polygon(polyline(loop, min(size, extent(loop) / 8.0)))
+        if not hole.is_valid:
+            return f"holes[{i}] must not cross or touch itself: {shapely.is_valid_reason(hole)}"
+        if not outer.contains_properly(hole):
+            return f"holes[{i}] must lie inside the outline and not touch it"
+        for j, other in enumerate(holes):
+            if hole.intersects(other):
+                return f"holes[{i}] must not overlap or touch holes[{j}]"
+        holes.append(hole)
+    return _slender(outer.difference(shapely.union_all(holes)) if holes else outer)
+
+
+def _slender(whole: shapely.Polygon) -> str:
+    """Error text if the body, or a strip of it, is far too slender to fill with triangles; else empty."""
+    span = max(np.ptp(np.reshape(whole.bounds, (2, 2)), axis=0))
+    if whole.area * SLENDER < span**2:
+        return "outline must not be a thousand times longer than wide; widen it"
+    for k in range(1, FINEST):
+        width = span * 4.0**-k
+        if SLENDER * width**2 >= whole.area:  # no room for so long a strip; the test would be slow
+            continue
+        body = whole.simplify(0.05 * width)  # finer detail does not matter at this width
+        rest = body.difference(body.buffer(-width, quad_segs=1).buffer(1.001 * width, quad_segs=2))
+        if rest.area > SLENDER * width**2:  # a strip SLENDER / 2 half widths long
+            x, y = max(getattr(rest, "geoms", [rest]), key=lambda part: part.area).representative_point().coords[0]
+            return f"outline must not be a thousand times longer than wide near ({x:g}, {y:g}) m; widen it there"
+    return ""

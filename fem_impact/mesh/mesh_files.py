@@ -1,0 +1,335 @@
+"""Read triangles and named edges from a file; repair what is safe to repair, refuse the rest with a reason."""
+
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from .._base import check
+from . import meshio_reader
+
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "km": 1e3}
+FARTHEST = 1e12  # [-] largest coordinate accepted: products of larger ones lose digits or overflow
+LARGEST = 20.0  # [m] a plate larger than this was probably drawn in millimetres
+SAME = 1e-9  # [-] nodes closer than this fraction of the extent are merged
+CROWD = 16  # [-] a file with more than this many nodes per point on average is refused as damaged
+THIN = 1e-9  # [-] a triangle with a smaller ratio of height to longest side has no area
+PLANE = ("triangle", "triangle6", "quad")
+NODES = {"line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4}  # nodes per cell of the types read here
+
+
+def read(path: Any, unit: str | None) -> tuple[np.ndarray, np.ndarray, dict, dict, list[str]]:
+    """Read and repair a mesh file.
+
+    Returns
+    -------
+    points : ndarray, shape (n_points, 2) [m]
+    cells : ndarray, shape (n_cells, 3)
+    middles : dict, sorted pair of vertices -> middle of their side (2,) [m]; empty if all sides are straight
+    names : dict, edge name -> set of sorted pairs of vertices
+    notes : list of str, what was repaired
+    """
+    path = check.path("path", path)
+    data = meshio_reader.read(path)
+    raw, notes = _plane_points(path, data, unit)
+    cells, nodes = _triangles(path, data)
+    names = _named_pairs(path, data)
+    points, cells, number = _mend(path, raw, cells, notes)
+    middles = {_pair(number[a], number[b]): raw[node] for (a, b), node in nodes.items()}
+    pairs = {name: {_pair(number[a], number[b]) for a, b in found} for name, found in names.items()}
+    cells = _hanging(points, cells, pairs, notes)
+    _refuse_overlap(path, points, cells)
+    return points, cells, middles, pairs, notes
+
+
+def _pair(a: int, b: int) -> tuple[int, int]:
+    return (int(a), int(b)) if a < b else (int(b), int(a))
+
+
+def _plane_points(path: Path, data: meshio_reader.Raw, unit: str | None) -> tuple[np.ndarray, list[str]]:
+    """Coordinates (n_points, 2) [m] in the plane of the mesh, and notes."""
+    name, notes = path.name, []
+    points = data.points
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise ValueError(f"{name} must have points with two or three coordinates, got shape {points.shape}")
+    used = np.unique(np.concatenate([np.zeros(0, int), *(nodes.ravel() for _, nodes, _ in data.blocks)]))
+    lost = used[(used < 0) | (used >= len(points))]
+    if lost.size:
+        raise ValueError(f"{name} has a cell with node {lost[0]} but only {len(points)} nodes; export it again")
+    bad = used[~np.isfinite(points[used]).all(axis=1)]
+    if bad.size:
+        raise ValueError(
+            f"{name} has a coordinate that is not a number at node {bad[0]}: {points[bad[0]]}; correct that node"
+        )
+    far = used[np.abs(points[used]).max(axis=1, initial=0.0) > FARTHEST]
+    if far.size:
+        raise ValueError(
+            f"{name} has a coordinate beyond {FARTHEST:g} at node {far[0]}: {points[far[0]]}; correct that node"
+        )
+    if points.shape[1] == 3:
+        spread = np.ptp(points[used], axis=0) if used.size else np.zeros(3)
+        flat = int(spread.argmin())
+        if spread[flat] > 1e-6 * spread.max():
+            raise ValueError(
+                f"{name} is not flat: it extends over {spread[0]:g} x {spread[1]:g} x {spread[2]:g}; "
+                "a plate needs triangles in one plane z = constant"
+            )
+        if flat != 2:
+            notes.append(f"the mesh lies in the plane {'xyz'[flat]} = constant; its other two coordinates are used")
+        points = np.delete(points, flat, axis=1)
+    if unit is not None:
+        points = points * UNITS[check.one_of("unit", unit, UNITS)]
+    elif used.size and np.ptp(points[used], axis=0).max() > LARGEST:
+        x, y = np.ptp(points[used], axis=0)
+        raise ValueError(
+            f"{name} extends over {x:g} x {y:g} m, which looks like millimetres read as metres; "
+            "pass unit='mm' to load it, or unit='m' if it is that large"
+        )
+    return points, notes
+
+
+def _triangles(path: Path, data: meshio_reader.Raw) -> tuple[np.ndarray, dict]:
+    """Triangles (n_cells, 3) and the mid-side nodes of quadratic ones (pair of vertices -> node)."""
+    name = path.name
+    kinds = sorted({kind for kind, nodes, _ in data.blocks if len(nodes)})
+    solid = [kind for kind in kinds if kind.startswith(("tetra", "hexahedron", "wedge", "pyramid"))]
+    if not set(kinds) & set(PLANE):
+        found = ", ".join(kinds) or "no cells"
+        hint = (
+            "make a beam with fi.mesh.line" if any(k.startswith("line") for k in kinds) else "a plate needs triangles"
+        )
+        raise ValueError(f"{name} contains {found} but no triangles; mesh the surface with triangles ({hint})")
+    if solid:
+        raise ValueError(f"{name} contains volume cells ({', '.join(solid)}); export only the flat surface")
+    cells, middles = [], {}
+    for kind, nodes, _ in data.blocks:
+        if kind in NODES and nodes.shape[1:] != (NODES[kind],):
+            raise ValueError(f"{name} has a {kind} without exactly {NODES[kind]} nodes; export it again")
+        if kind == "triangle":
+            cells.append(nodes)
+        elif kind == "quad":
+            cells += [nodes[:, [0, 1, 2]], nodes[:, [0, 2, 3]]]
+        elif kind == "triangle6":
+            cells.append(nodes[:, :3])
+            for row in nodes.tolist():
+                for k, (a, b) in enumerate(((0, 1), (1, 2), (2, 0))):
+                    middles[row[a], row[b]] = row[3 + k]
+    return np.concatenate(cells), middles
+
+
+def _named_pairs(path: Path, data: meshio_reader.Raw) -> dict[str, set[tuple[int, int]]]:
+    """Edge name -> sides, from physical groups, cell sets and numbered line cells."""
+    names: dict[str, set[tuple[int, int]]] = {}
+
+    def add(name: str, row: np.ndarray) -> None:
+        names.setdefault(name, set()).add((int(row[0]), int(row[1])))
+
+    for i, (kind, nodes, tags) in enumerate(data.blocks):
+        if kind not in ("line", "line3"):
+            continue
+        for row, tag in zip(nodes, () if tags is None else tags.tolist()):
+            if tag in data.labels or tag != 0:
+                add(data.labels.get(tag, f"edge{tag}"), row)
+        for name, members in data.sets.items():
+            chosen = members[i]
+            for number in () if chosen is None else chosen.tolist():
+                if not 0 <= number < len(nodes):
+                    raise ValueError(
+                        f"{path.name} has no line {number}, named by set {check.line(name)}; export it again"
+                    )
+                add(name, nodes[number])
+    return names
+
+
+def _mend(path: Path, points: np.ndarray, cells: np.ndarray, notes: list[str]):
+    """Merge duplicate nodes, drop degenerate and duplicate triangles, flip inverted ones and renumber the nodes."""
+    name = path.name
+    used = np.unique(cells)
+    span = float(np.ptp(points[used], axis=0).max())
+    if span == 0.0:
+        raise ValueError(f"{name} has all its nodes at one point; export it again")
+    leader = np.arange(len(points))
+    tree = cKDTree(points[used])
+    if tree.count_neighbors(tree, SAME * span) > CROWD * len(used):  # counts each node as its own neighbour
+        raise ValueError(f"{name} has most of its nodes at a few points; export it again")
+    for a, b in sorted(map(tuple, tree.query_pairs(SAME * span))):
+        leader[used[b]] = min(leader[used[b]], leader[used[a]])
+    doubles = int((leader != np.arange(len(points))).sum())
+    if doubles:
+        notes.append(f"{doubles} duplicate nodes were merged")
+    cells = leader[cells]
+    collapsed = (cells[:, 0] == cells[:, 1]) | (cells[:, 1] == cells[:, 2]) | (cells[:, 0] == cells[:, 2])
+    if collapsed.any():
+        notes.append(f"{int(collapsed.sum())} triangles with two corners at one point were removed")
+        cells = cells[~collapsed]
+    _, first = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)
+    if len(first) < len(cells):
+        notes.append(f"{len(cells) - len(first)} duplicate triangles were removed")
+        cells = cells[np.sort(first)]
+    corner = points[cells]
+    u, v = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    area = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    longest = np.maximum(np.maximum((u**2).sum(1), (v**2).sum(1)), ((u - v) ** 2).sum(1))
+    flat = np.flatnonzero(2.0 * np.abs(area) <= THIN * longest)
+    if flat.size:
+        x, y = corner[flat[0]].mean(axis=0)
+        raise ValueError(
+            f"{name} has {flat.size} triangles with zero area, the first near ({x:g}, {y:g}) m between nodes "
+            f"{cells[flat[0]].tolist()}; remove them or mesh the outline again"
+        )
+    turned = area < 0.0
+    if turned.any() and not turned.all():
+        notes.append(f"{int(turned.sum())} inverted triangles were flipped")
+    cells = np.where(turned[:, None], cells[:, [0, 2, 1]], cells)
+    used = np.unique(cells)
+    number = np.full(len(points), -1)
+    number[used] = np.arange(len(used))
+    return points[used], number[cells], number[leader]
+
+
+def boundary(cells: np.ndarray) -> np.ndarray:
+    """Sides (n_facets, 2) of a single triangle, body on the left; the cells must be anticlockwise."""
+    sides = np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])
+    _, index, counts = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
+    return sides[index[counts == 1]]
+
+
+def _hanging(points: np.ndarray, cells: np.ndarray, names: dict, notes: list[str]) -> np.ndarray:
+    """Split triangles at hanging nodes, the vertices of neighbours that lie on their sides, until none is left."""
+    count = 0
+    for _ in range(64):
+        rim = boundary(cells)
+        corners = np.unique(rim)
+        tree = cKDTree(points[corners])
+        a, b = points[rim[:, 0]], points[rim[:, 1]]
+        length = np.linalg.norm(b - a, axis=1)
+        near = tree.query_ball_point(0.5 * (a + b), 0.5 * length)
+        split: dict[tuple[int, int], int] = {}
+        for i, candidates in enumerate(near):
+            others = [corners[c] for c in candidates if corners[c] not in rim[i]]
+            for node in others:
+                along = (points[node] - a[i]) @ (b[i] - a[i]) / length[i] ** 2
+                off = abs(np.linalg.det(np.array([b[i] - a[i], points[node] - a[i]]))) / length[i]
+                if 1e-9 < along < 1.0 - 1e-9 and off <= 1e-8 * length[i]:
+                    split[_pair(*rim[i])] = int(node)
+                    break
+        if not split:
+            break
+        fresh = []
+        for c, cell in enumerate(cells.tolist()):
+            for k in range(3):
+                p, q, r = cell[k], cell[(k + 1) % 3], cell[(k + 2) % 3]
+                node = split.pop(_pair(p, q), None)
+                if node is not None:
+                    cells[c] = [p, node, r]
+                    fresh.append([node, q, r])
+                    for found in names.values():
+                        if _pair(p, q) in found:
+                            found |= {_pair(p, node), _pair(node, q)}
+                    count += 1
+                    break
+        cells = np.concatenate([cells, np.array(fresh, int).reshape(-1, 3)])
+    if count:
+        notes.append(f"{count} triangles were split at hanging nodes, where a neighbour's vertex lies on their side")
+    return cells
+
+
+def _refuse_overlap(path: Path, points: np.ndarray, cells: np.ndarray) -> None:
+    """Raise ValueError if triangles overlap, branch or form several pieces."""
+    name = path.name
+    sides = np.sort(np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]]), axis=1)
+    unique, inverse, counts = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    if (counts > 2).any():
+        x, y = points[unique[counts > 2][0]].mean(axis=0)
+        raise ValueError(f"{name} has a side shared by three triangles near ({x:g}, {y:g}) m; remove the extra one")
+    owner = np.tile(np.arange(len(cells)), 3)[np.argsort(inverse.ravel(), kind="stable")]
+    starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
+    inner = starts[counts == 2]
+    links = coo_matrix((np.ones(len(inner)), (owner[inner], owner[inner + 1])), shape=(len(cells), len(cells)))
+    n_pieces, piece = connected_components(links, directed=False)
+    if n_pieces > 1:
+        where = [points[cells[piece == i]].mean(axis=(0, 1)) for i in range(min(n_pieces, 4))]
+        text = ", ".join(f"({x:g}, {y:g})" for x, y in where)
+        raise ValueError(
+            f"{name} has {n_pieces} pieces that share no side (around {text} m); connect them, or export only one piece"
+        )
+    rim = boundary(cells)
+    if not len(rim):
+        raise ValueError(f"{name} has triangles that form a closed surface; a plate must have a boundary")
+    if not np.array_equal(np.sort(rim[:, 0]), np.sort(rim[:, 1])):
+        raise ValueError(
+            f"{name} has triangles that overlap: two of them lie on the same side of their common edge; mesh it again"
+        )
+    vertex, visits = np.unique(rim, return_counts=True)
+    if (visits > 2).any():
+        x, y = points[vertex[visits > 2][0]]
+        raise ValueError(f"{name} is connected only by the node at ({x:g}, {y:g}) m; connect it along a side")
+    # all triangles are anticlockwise, so they overlap exactly if the rim crosses itself
+    loops = [shapely.LinearRing(points[loop]) for loop in loops_of(rim)]
+    crossed = [a for i, a in enumerate(loops) if not a.is_simple or any(a.intersects(b) for b in loops[:i])]
+    if crossed:
+        x, y = crossed[0].coords[0]
+        raise ValueError(f"{name} has triangles that overlap at the rim through ({x:g}, {y:g}) m; mesh it again")
+
+
+def loops_of(rim: np.ndarray) -> list[list[int]]:
+    """Closed loops of vertices from boundary facets (n_facets, 2), in the order of their first facets."""
+    after = dict(rim.tolist())
+    loops = []
+    while after:
+        start, node = next(iter(after.items()))
+        loop = [start]
+        del after[start]
+        while node != start:
+            loop.append(node)
+            node = after.pop(node)
+        loops.append(loop)
+    return loops
+
+
+def write(path: Path, points, cells, facets, middles, curved, edges: dict[str, np.ndarray]) -> None:
+    """Write triangles and named edges as binary Gmsh 2.2; a curved rim makes all triangles quadratic.
+
+    Parameters
+    ----------
+    path : str or Path ending in .msh
+    points, cells, facets, middles, edges : as in a `Mesh`
+    curved : ndarray, shape (n_facets,), bool
+    """
+    path = check.path("path", path)
+    if path.suffix != ".msh":
+        raise ValueError(f"path must end in .msh, got {path.name!r}")
+    own = [name for name in edges if name not in ("boundary", "outer")] or ["boundary"]
+    tag = np.zeros(len(facets), int)
+    for i, name in enumerate(own):
+        tag[edges[name]] = i + 1
+    names = {name: np.array([i + 1, 1]) for i, name in enumerate(own)} | {"plate": np.array([len(own) + 1, 2])}
+    place = [points]
+    blocks: list[tuple[str, np.ndarray]] = [("line", facets), ("triangle", cells)]
+    if curved.any():
+        sides = np.sort(np.stack([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]], axis=1).reshape(-1, 2), axis=1)
+        unique, inverse = np.unique(sides, axis=0, return_inverse=True)
+        halfway = points[unique].mean(axis=1)
+        key = unique[:, 0] * len(points) + unique[:, 1]
+        ends = np.sort(facets, axis=1)
+        on_rim = np.searchsorted(key, ends[:, 0] * len(points) + ends[:, 1])
+        halfway[on_rim] = middles
+        place.append(halfway)
+        blocks = [
+            ("line3", np.column_stack([facets, len(points) + on_rim])),
+            ("triangle6", np.column_stack([cells, len(points) + inverse.reshape(-1, 3)])),
+        ]
+    import meshio  # imported here because it takes 0.1 s and only saving needs it
+
+    flat = np.concatenate(place)
+    number = [tag, np.full(len(cells), len(own) + 1)]
+    data = {"gmsh:physical": number, "gmsh:geometrical": number}
+    made = meshio.Mesh(np.column_stack([flat, np.zeros(len(flat))]), blocks, cell_data=data, field_data=names)
+    with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+        made.write(path, file_format="gmsh22", binary=True)

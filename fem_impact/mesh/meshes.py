@@ -1,0 +1,395 @@
+"""The mesh of a plate or beam: its elements, its named edges on the exact curve and how to refine it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._base import check, markup
+from . import drawings, mesh_files, smooth_edges
+from .facets import Curves, divided
+from .loops import Bezier, Outline, circle, crossed, extent, polyline, signed_area, straight_loop
+from .triangulation import triangulate
+
+LONG_DIVISIONS = 64  # [-] at most this many along a rectangle, however slender it is
+MOST_CELLS = 200_000  # [-] most triangles allowed: several times what `find_modes` can solve
+SMALLEST_HOLE = 1e-6  # [-] smallest hole radius over disk radius: a smaller hole is lost in rounding
+OVERSHOOT = 1.45  # [-] split a loaded mesh if its triangles end up less than this factor too small, else mesh anew
+LONGEST = 1.5  # [-] longest side over requested size: 1.4 to 1.6 on rectangles, disks and a guitar
+DEFAULT_DIVISIONS = 8  # [-] default elements across a rectangle or any other outline; `find_modes` refines them
+BEAM_DIVISIONS = 4  # [-] default elements along a beam: few, because their degree is high
+MOST_BEAM_CELLS = 5000  # [-] most beam elements allowed: more are never needed at that degree
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles in the plane or elements on a line, with named edges.
+
+    Boundary facets run with the body on their left; normals point outward. Each facet is a curve through its ends and
+    middle with the given end tangents and curvatures; its distance from the true curve falls as length**6.
+    """
+
+    points: np.ndarray  # (n_points, dimension) [m]
+    cells: np.ndarray  # (n_cells, dimension + 1) vertex numbers
+    facets: np.ndarray  # (n_facets, dimension) vertex numbers of the boundary facets
+    edges: dict[str, np.ndarray]  # name -> facet numbers; "boundary" is all of them
+    middles: np.ndarray  # (n_facets, dimension) [m] middle of each facet on the true curve
+    tangents: np.ndarray  # (n_facets, 2, 2) unit tangent at both ends of each facet; zero on a line
+    curvatures: np.ndarray  # (n_facets, 2) [1/m] at both ends, positive where convex
+    recipe: Callable[..., "Mesh"] | None = field(default=None, repr=False)  # recipe(size=...) meshes the same body anew
+    size: float = 0.0  # [m] requested element size
+    size_stated: bool = True  # True if the user chose the size; otherwise find_modes may change it
+    notes: tuple[str, ...] = ()  # what was repaired or assumed
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+
+    @property
+    def dimension(self) -> int:
+        """2 for a plate, 1 for a beam."""
+        return self.points.shape[1]
+
+    @property
+    def curved(self) -> np.ndarray:
+        """Which facets are curved, (n_facets,) bool."""
+        if self.dimension == 1:
+            return np.zeros(len(self.facets), bool)
+        ends = self.points[self.facets]  # (n_facets, 2, 2)
+        chord = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        return np.linalg.norm(self.middles - ends.mean(axis=1), axis=1) > 1e-9 * chord
+
+    @property
+    def perimeter(self) -> float:
+        """Length of the boundary [m], measured along the chords of curved edges."""
+        return float(np.linalg.norm(np.diff(self.points[self.facets], axis=1), axis=2).sum())
+
+    @property
+    def area(self) -> float:
+        """Area [m^2] of a plate, up to the chords of curved edges; length [m] of a beam."""
+        corner = self.points[self.cells]
+        sides = corner[:, 1:] - corner[:, :1]
+        return float(np.abs(np.linalg.det(sides)).sum()) / self.dimension
+
+    def _repr_html_(self) -> str:
+        """Notebook view: the outline and a table of its size and edges."""
+        kind = "triangles" if self.dimension == 2 else "elements"
+        edges = ", ".join(name for name in self.edges if name != "boundary")
+        extent = " x ".join(f"{size:.4g} m" for size in np.ptp(self.points, axis=0))
+        rows = [("extent", extent), ("points", len(self.points)), (kind, len(self.cells)), ("edges", edges)]
+        return markup.side_by_side(markup.body(self, title=f"Outline of a body of {extent}"), markup.table(rows))
+
+    def refined(self, factor: float = 2.0) -> "Mesh":
+        """The same body with elements smaller by ``factor``, fitted to the exact outline if it is known."""
+        if self.recipe is None:
+            raise ValueError(
+                "this mesh has no outline and cannot be refined; make it with fi.mesh, or load a finer file"
+            )
+        return self.recipe(size=self.size / check.positive("factor", factor))
+
+
+def straight(points: np.ndarray, cells: np.ndarray, facets: np.ndarray, edges: dict, **rest) -> Mesh:
+    """A plane mesh with straight edges only."""
+    ends = points[facets]
+    along = ends[:, 1] - ends[:, 0]
+    unit = along / np.linalg.norm(along, axis=1, keepdims=True)
+    return Mesh(
+        points,
+        cells,
+        facets,
+        edges,
+        ends.mean(axis=1),
+        np.stack([unit, unit], axis=1),
+        np.zeros((len(facets), 2)),
+        **rest,
+    )
+
+
+def _element_size(size: float | None, default: float) -> tuple[float, bool]:
+    return (default, False) if size is None else (check.positive("size", size, "m"), True)
+
+
+def _check_affordable(cells: float, size: float, most: int = MOST_CELLS) -> None:
+    if cells > most:
+        raise ValueError(f"size must be larger: {size:g} m gives about {cells:.1g} elements, more than {most}")
+
+
+def rectangle(length: float, width: float, *, size: float | None = None) -> Mesh:
+    """Rectangle [0, length] x [0, width] [m]; edges left, right (x = 0, length), bottom, top (y = 0, width).
+
+    Without ``size``, `find_modes` chooses one fine enough for the requested modes.
+    """
+    length = check.positive("length", length, "m")
+    width = check.positive("width", width, "m")
+    short, long = sorted((length, width))
+    size, stated = _element_size(size, max(short / DEFAULT_DIVISIONS, long / LONG_DIVISIONS))
+    _check_affordable(2.0 * (length / size + 1.0) * (width / size + 1.0), size)
+    least = 1 if stated else 2
+    nx, ny = max(least, round(length / size)), max(least, round(width / size))
+    x, y = np.meshgrid(np.linspace(0.0, length, nx + 1), np.linspace(0.0, width, ny + 1), indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel()])
+    number = np.arange((nx + 1) * (ny + 1)).reshape(nx + 1, ny + 1)
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    odd = (np.add.outer(np.arange(nx), np.arange(ny)) % 2).astype(bool)[..., None]
+    # alternating diagonals give the mesh the symmetries of the plate
+    first = np.where(odd, np.stack([a, b, d], axis=-1), np.stack([a, b, c], axis=-1))
+    second = np.where(odd, np.stack([b, c, d], axis=-1), np.stack([a, c, d], axis=-1))
+    cells = np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)])
+    sides = {
+        "left": number[0, ::-1],
+        "right": number[-1, :],
+        "bottom": number[:, 0],
+        "top": number[::-1, -1],
+    }
+    facets, edges, start = [], {}, 0
+    for name, line in sides.items():
+        facets.append(np.column_stack([line[:-1], line[1:]]))
+        edges[name] = np.arange(start, start + len(line) - 1)
+        start += len(line) - 1
+    edges["boundary"] = np.arange(start)
+    recipe = partial(rectangle, length, width)
+    return straight(points, cells, np.concatenate(facets), edges, recipe=recipe, size=size, size_stated=stated)
+
+
+def line(length: float, *, size: float | None = None) -> Mesh:
+    """Line [0, length] [m] for a beam; edges left (x = 0) and right (x = length)."""
+    length = check.positive("length", length, "m")
+    size, stated = _element_size(size, length / BEAM_DIVISIONS)
+    _check_affordable(length / size, size, MOST_BEAM_CELLS)
+    n = max(1, round(length / size))
+    cells = np.column_stack([np.arange(n), np.arange(1, n + 1)])
+    edges = {"left": np.array([0]), "right": np.array([1]), "boundary": np.array([0, 1])}
+    return Mesh(
+        np.linspace(0.0, length, n + 1)[:, None],
+        cells,
+        np.array([[0], [n]]),
+        edges,
+        np.array([[0.0], [length]]),
+        np.zeros((2, 2, 2)),
+        np.zeros((2, 2)),
+        recipe=partial(line, length),
+        size=size,
+        size_stated=stated,
+    )
+
+
+def fill(outline: Outline, *, size: float | None = None) -> Mesh:
+    """Mesh any outline; without ``size``, `find_modes` chooses one."""
+    problem = crossed(outline)
+    if problem:
+        raise ValueError(problem)
+    size, stated = _element_size(size, extent(outline.outer) / DEFAULT_DIVISIONS)
+    around = polyline(outline.outer, extent(outline.outer) / 50.0)
+    _check_affordable(2.0 * abs(signed_area(around)) / size / size, size)
+    arrays = triangulate(outline, size)
+    return Mesh(**arrays, recipe=partial(fill, outline), size=size, size_stated=stated)
+
+
+def disk(radius: float, hole: float = 0.0, *, size: float | None = None) -> Mesh:
+    """Disk or annulus around the origin with radii ``radius`` and ``hole`` [m]; edges outer, inner, boundary (both)."""
+    radius = check.positive("radius", radius, "m")
+    hole = check.non_negative("hole", hole, "m")
+    if hole >= radius:
+        raise ValueError(f"hole must be smaller than radius = {radius:g} m, got {hole:g} m")
+    if 0.0 < hole < SMALLEST_HOLE * radius:
+        raise ValueError(f"hole must be zero or at least {SMALLEST_HOLE:g} of radius = {radius:g} m, got {hole:g} m")
+    inner = (circle((0.0, 0.0), hole, "inner"),) if hole else ()
+    return fill(Outline.around(circle((0.0, 0.0), radius, "outer"), inner), size=size)
+
+
+def polygon(corners: Any, holes: Sequence[Any] = (), *, size: float | None = None) -> Mesh:
+    """Polygon with holes.
+
+    Parameters
+    ----------
+    corners : array_like, shape (n, 2) [m]
+        In order, clockwise or anticlockwise.
+    holes : sequence of array_like, shape (n, 2) [m]
+        Corners of each hole.
+    size : float [m], optional
+        Element size; by default `find_modes` chooses one fine enough for the requested modes.
+
+    Returns
+    -------
+    Mesh
+        Edge "edge0" runs from the first corner to the second, and so on; "hole0" is the rim of the first hole, "outer"
+        the whole outer rim, "boundary" both.
+    """
+    outer = straight_loop("corners", corners, "edge{}")
+    if not isinstance(holes, (list, tuple, np.ndarray)):
+        raise ValueError(f"holes must be a list with the corners of each hole, got {check.shown(holes)}")
+    inner = [straight_loop(f"holes[{i}]", hole, f"hole{i}") for i, hole in enumerate(holes)]
+    return fill(Outline.around(outer, tuple(inner)), size=size)
+
+
+def outline(source: Any, *, size: float | None = None, unit: str | None = None) -> Mesh:
+    """Plate from a drawing; its curves stay curves.
+
+    Parameters
+    ----------
+    source : str, Path, shapely Polygon or array_like (n, 2) [m]
+        An .svg or .dxf file (needs ``pip install 'fem-impact[cad]'``), or geometry. The largest closed loop is the
+        outline, loops inside it are holes. Points along gentle bends are joined by smooth curves.
+    size : float [m], optional
+        Element size; by default `find_modes` chooses one fine enough for the requested modes.
+    unit : str, optional
+        Unit of the numbers in the source: "m", "cm", "mm", "um", "in" or "km". By default SVG uses the unit of its
+        width, or px of 1/96 inch; DXF uses $INSUNITS.
+
+    Returns
+    -------
+    Mesh
+        Edges take their name from the id of an SVG shape or the layer of a DXF entity. Otherwise they are called
+        "edge0", "edge1" ... from corner to corner, and "hole0" ... for holes. `Mesh.notes` says what was assumed.
+
+    Raises
+    ------
+    ValueError
+        If the outline is open, crosses itself, or looks like millimetres read as metres.
+    """
+    curve, notes = drawings.read(source, unit)
+    return replace(fill(curve, size=size), notes=tuple(notes))
+
+
+def load(path: Any, *, unit: str | None = None) -> Mesh:
+    """Plate from a mesh file: Gmsh .msh, .vtu, .vtk and any other format that meshio reads.
+
+    Parameters
+    ----------
+    path : str or Path
+    unit : str, optional
+        Unit of the numbers in the file: "m" (default), "cm", "mm", "um", "in" or "km".
+
+    Returns
+    -------
+    Mesh
+        Physical groups of lines, cell sets and numbered line cells become named edges ("edge7" for number 7 without a
+        name); "outer", "hole0" ... are the loops of the rim and "boundary" is all of it. A rim with only small turns
+        at its vertices becomes a smooth curve. `Mesh.notes` says what was repaired or assumed.
+
+        If the modes need another element size, `find_modes` splits each triangle in four or meshes the inside of the
+        rim anew, whichever takes fewer triangles. If the thickness varies, it only splits: the triangles of the file
+        may follow steps of the thickness.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, is not one flat connected set of triangles, or looks like millimetres.
+    """
+    points, cells, given, pairs, notes = mesh_files.read(path, unit)
+    rim = mesh_files.boundary(cells)
+    follower = {int(a): int(b) for a, b in rim}
+    loops = [np.array([(a, follower[a]) for a in loop]) for loop in mesh_files.loops_of(rim)]
+    loops.sort(key=lambda loop: -float(np.ptp(points[loop[:, 0]], axis=0).max()))
+    facets = np.concatenate(loops)
+    number = {(min(a, b), max(a, b)): i for i, (a, b) in enumerate(facets.tolist())}
+    curve = smooth_edges.follow(points, loops, {number[pair]: at for pair, at in given.items() if pair in number})
+    if curve.n_curved and not given:
+        notes.append(f"{curve.n_curved} sides of the rim were replaced by smooth curves through their ends")
+    edges = {name: np.array(sorted(number[p] for p in found if p in number), int) for name, found in pairs.items()}
+    edges = {name: found for name, found in edges.items() if len(found)}
+    inside = sorted(set(pairs) - set(edges))
+    if inside:
+        notes.append(f"{', '.join(inside)}: not on the rim, so it cannot be supported")
+    start = 0
+    for i, loop in enumerate(loops):
+        edges.setdefault("outer" if i == 0 else f"hole{i - 1}", np.arange(start, start + len(loop)))
+        start += len(loop)
+    edges["boundary"] = np.arange(len(facets))
+    longest = np.linalg.norm(points[cells] - points[np.roll(cells, 1, axis=1)], axis=2).max(axis=1)
+    made = Mesh(
+        points,
+        cells,
+        facets,
+        edges,
+        curve.middles,
+        curve.tangents,
+        curve.curvatures,
+        size=float(longest.max()) / LONGEST,
+        size_stated=False,
+        notes=tuple(f"{Path(path).name}: {note}" for note in notes),
+    )
+    return replace(made, recipe=partial(_resized, made))
+
+
+@check.typed
+def aligned(mesh: Mesh) -> Mesh:
+    """The mesh, set to be refined only by splitting: the triangles of a file may follow steps of the thickness."""
+    recipe = mesh.recipe
+    refilled = isinstance(recipe, partial) and recipe.func is _resized
+    return replace(mesh, recipe=partial(_divided, mesh)) if refilled else mesh
+
+
+@check.typed
+def save(path: Any, mesh: Mesh) -> None:
+    """Write the mesh of a plate and its named edges to a Gmsh file (.msh), readable by `load` and other programs."""
+    if not isinstance(mesh, Mesh) or mesh.dimension != 2:
+        raise ValueError("mesh must be the mesh of a plate, got a beam; make a beam with fi.mesh.line")
+    mesh_files.write(path, mesh.points, mesh.cells, mesh.facets, mesh.middles, mesh.curved, mesh.edges)
+
+
+def _resized(mesh: Mesh, *, size: float) -> Mesh:
+    """A mesh from a file with triangles of about ``size`` [m]: split in four, or new ones inside the same rim."""
+    ratio = mesh.size / size
+    if ratio >= 1.0 - 1e-9 and 2.0 ** np.ceil(np.log2(ratio) - 1e-9) < OVERSHOOT * ratio:
+        return replace(_divided(mesh, size=size), recipe=partial(_resized, mesh))
+    names = [str(i) for i in range(len(mesh.facets))]
+    ends = mesh.points[mesh.facets]
+    control = list(Curves(ends, mesh.middles, mesh.tangents, mesh.curvatures).controls())
+    pieces = [Bezier(curve if bent else end, name) for curve, bent, end, name in zip(control, mesh.curved, ends, names)]
+    start = {int(facet[0]): piece for facet, piece in zip(mesh.facets, pieces)}
+    loops = [tuple(start[vertex] for vertex in loop) for loop in mesh_files.loops_of(mesh.facets)]
+    around = Outline(loops[0], tuple(loops[1:]))
+    _check_affordable(2.0 * mesh.area / size / size, size)
+    try:
+        arrays = None if crossed(around) else triangulate(around, size)
+    except check.SimulationError:
+        arrays = None
+    if arrays is None:  # fall back on splitting the file's own triangles, which only costs more
+        return replace(_divided(mesh, size=size), recipe=partial(_divided, mesh))
+    parts = arrays["edges"]
+    edges = {name: np.concatenate([parts[names[i]] for i in numbers]) for name, numbers in mesh.edges.items()}
+    recipe = partial(_resized, mesh)
+    return Mesh(**{**arrays, "edges": edges}, recipe=recipe, size=size, notes=mesh.notes)
+
+
+def _divided(mesh: Mesh, *, size: float) -> Mesh:
+    """The mesh with its triangles split in four until their size is at most ``size`` [m]."""
+    _check_affordable(len(mesh.cells) * (mesh.size / size) ** 2, size)
+    fine = mesh
+    for _ in range(max(0, int(np.ceil(np.log2(mesh.size / size) - 1e-9)))):
+        fine = _quartered(fine)
+    return replace(fine, size_stated=True, recipe=partial(_divided, mesh))
+
+
+def _quartered(mesh: Mesh) -> Mesh:
+    """Each triangle split in four; new boundary points lie on the curve of their facet."""
+    cells, n = mesh.cells, len(mesh.points)
+    sides = np.sort(np.stack([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]], axis=1).reshape(-1, 2), axis=1)
+    unique, inverse = np.unique(sides, axis=0, return_inverse=True)
+    m = n + inverse.reshape(-1, 3)
+    a, b, c = cells.T
+    new = [[a, m[:, 0], m[:, 2]], [m[:, 0], b, m[:, 1]], [m[:, 2], m[:, 1], c], [m[:, 0], m[:, 1], m[:, 2]]]
+    points = np.concatenate([mesh.points, mesh.points[unique].mean(axis=1)])
+    keys = unique[:, 0] * n + unique[:, 1]
+    ends = np.sort(mesh.facets, axis=1)
+    middle = n + np.searchsorted(keys, ends[:, 0] * n + ends[:, 1])
+    known = mesh.points[mesh.facets], mesh.middles, mesh.tangents, mesh.curvatures
+    points[middle], tangent, bend, first, second = divided(*known, 0.5)
+    both = np.arange(2 * len(mesh.facets)).reshape(-1, 2)
+    rim = np.stack([mesh.facets[:, 0], middle, middle, mesh.facets[:, 1]], axis=1).reshape(-1, 2)
+    tangents = np.stack([mesh.tangents[:, 0], tangent, tangent, mesh.tangents[:, 1]], axis=1).reshape(-1, 2, 2)
+    curvatures = np.stack([mesh.curvatures[:, 0], bend, bend, mesh.curvatures[:, 1]], axis=1).reshape(-1, 2)
+    return replace(
+        mesh,
+        points=points,
+        cells=np.concatenate([np.stack(part, axis=1) for part in new]),
+        facets=rim,
+        edges={name: both[numbers].ravel() for name, numbers in mesh.edges.items()},
+        middles=np.stack([first, second], axis=1).reshape(-1, 2),
+        tangents=tangents,
+        curvatures=curvatures,
+        size=0.5 * mesh.size,
+    )

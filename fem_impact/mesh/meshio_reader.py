@@ -1,0 +1,93 @@
+"""Read nodes, cells and names of a mesh file with meshio, in a separate process (see `isolated`)."""
+
+import json
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._base import isolated
+
+TAGS = ("gmsh:physical", "medit:ref", "edge", "cell_tags")  # meshio's keys for the numbers of cells, preferred first
+
+
+@dataclass(frozen=True, eq=False)
+class Raw:
+    """Contents of a mesh file, unchecked."""
+
+    points: np.ndarray  # (n_points, 2 or 3)
+    blocks: list[tuple[str, np.ndarray, np.ndarray | None]]  # cell type, nodes (n_cells, n), tags (n_cells,)
+    labels: dict[int, str]  # tag of line cells -> name
+    sets: dict[str, list[np.ndarray | None]]  # name -> cell numbers in each block
+
+
+def read(path: Path) -> Raw:
+    """Read a mesh file; ValueError names the file and the fault."""
+    arrays = isolated.read(path, "a mesh", "mesh.meshio_reader:arrays")
+    index = json.loads(arrays["index"].tobytes())
+    blocks = [(kind, arrays[f"cells{i}"], arrays.get(f"tags{i}")) for i, kind in enumerate(index["kinds"])]
+    sets = {name: [arrays.get(f"set{s}_{i}") for i in range(len(blocks))] for s, name in enumerate(index["sets"])}
+    return Raw(arrays["points"], blocks, {int(number): name for number, name in index["labels"]}, sets)
+
+
+def arrays(path: Path) -> dict[str, np.ndarray]:
+    """The parts of a `Raw`, as arrays; runs in the reader process."""
+    import meshio
+
+    with suppress(ImportError):
+        import h5py
+
+        h5py.File = _closed_file(h5py, path)
+    isolated.confine(path)
+    known = sorted(meshio.extension_to_filetypes)
+    if not set(path.suffixes) & set(known):
+        raise ValueError(f"its ending is {path.suffix!r}, but meshio reads {', '.join(known)}")
+    mesh = meshio.read(path)
+    found: dict[str, np.ndarray] = {"points": np.asarray(mesh.points, float)}
+    tags = next((key for key in TAGS if key in mesh.cell_data), None)
+    for i, block in enumerate(mesh.cells):
+        found[f"cells{i}"] = np.asarray(block.data, np.int64)
+        if tags is not None:
+            found[f"tags{i}"] = np.asarray(mesh.cell_data[tags][i], np.int64).ravel()
+    sets = [name for name in mesh.cell_sets if not name.startswith("gmsh:")]
+    for s, name in enumerate(sets):
+        for i, members in enumerate(mesh.cell_sets[name]):
+            if members is not None:
+                found[f"set{s}_{i}"] = np.asarray(members, np.int64).ravel()
+    labels = [(int(v[0]), name) for name, v in mesh.field_data.items() if len(v) == 2 and int(v[1]) == 1]
+    index = {"kinds": [block.type for block in mesh.cells], "sets": sets, "labels": labels}
+    found["index"] = np.frombuffer(json.dumps(index).encode(), np.uint8)
+    return found
+
+
+def _closed_file(h5py: Any, path: Path) -> Any:
+    """A read-only h5py.File that opens only files in the folder of ``path`` and refuses references to other files.
+
+    Without it, an HDF5 file could link to any file on the disk or map its bytes.
+    """
+    own, folder = path.resolve(), path.parent.resolve()
+
+    class File(h5py.File):
+        def __init__(self, name: Any, mode: str = "r", **options: Any) -> None:
+            place = Path(name).resolve()
+            if place != own and not place.is_relative_to(folder):
+                raise PermissionError("it refers to a file outside its folder")
+            super().__init__(name, "r", **options)
+            self._refuse_references(self)
+
+        def _refuse_references(self, group: Any) -> None:
+            for name in group:
+                link = group.get(name, getlink=True)
+                if isinstance(link, h5py.ExternalLink):
+                    raise PermissionError("it links to another file")
+                if isinstance(link, h5py.SoftLink):
+                    continue
+                item = group[name]
+                if isinstance(item, h5py.Group):
+                    self._refuse_references(item)
+                elif isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
+                    raise PermissionError("it stores its data in another file")
+
+    return File

@@ -1,0 +1,109 @@
+"""Fill an outline with triangles whose boundary follows it."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from netgen.geom2d import SplineGeometry
+from netgen.meshing import NgException
+
+from .._base import check
+from .loops import Outline, Piece, crossing, curvature, divide, extent, is_straight, tangent
+from .smooth_edges import join
+
+SPREAD = 1.3  # [-] inner sides may be this much longer than the requested size before the mesher divides them
+REMEDY = "remove very thin necks or spikes, or pass another size"
+GRADING = 0.35  # [-] netgen's growth rate of elements away from small ones
+
+
+def triangulate(outline: Outline, size: float) -> dict[str, Any]:
+    """Fill an outline with triangles.
+
+    Parameters
+    ----------
+    outline : Outline
+        Must have passed `loops.crossed`.
+    size : float [m]
+        Approximate longest side of a triangle; triangles are smaller where the outline turns quickly.
+
+    Returns
+    -------
+    dict
+        The fields of a `Mesh`: points, cells, facets, edges, middles, tangents, curvatures.
+    """
+    span = extent(outline.outer)
+    centre = outline.outer[0].at(np.zeros(1))[0]
+    geometry = SplineGeometry()
+    chords: list[tuple[Piece, float, float]] = []
+    for loop in outline.loops:
+        first, start = len(chords), len(chords)
+        for piece in loop:
+            t = divide(piece, size)
+            chords += [(piece, a, b) for a, b in pairwise(t)]
+        places = np.array([piece.at(np.array([a]))[0] for piece, a, _ in chords[first:]])
+        numbers = [geometry.AppendPoint(*point) for point in (places - centre) / span]
+        for i, number in enumerate(numbers):
+            line = ["line", number, numbers[(i + 1) % len(numbers)]]
+            geometry.Append(line, leftdomain=1, rightdomain=0, bc=start + i + 1)
+    try:
+        made = geometry.GenerateMesh(maxh=SPREAD * size / span, grading=GRADING, quad_dominated=False)
+    except NgException as error:
+        raise check.SimulationError(f"the mesher could not fill the outline ({error}); {REMEDY}") from None
+    points = np.array([p.p for p in made.Points()])[:, :2] * span + centre
+    cells = made.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
+    facets = np.array([[e.points[0].nr - 1, e.points[1].nr - 1] for e in made.Elements1D()])
+    owner = np.array([e.index - 1 for e in made.Elements1D()])
+    if not len(cells) or set(owner.tolist()) != set(range(len(chords))):
+        raise check.SimulationError(f"the mesher could not fill the outline; {REMEDY}")
+    return _follow(points, cells, facets, owner, chords, outline.outer)
+
+
+def _follow(
+    points: np.ndarray, cells: np.ndarray, facets: np.ndarray, owner: np.ndarray, chords: list, outer: tuple
+) -> dict:
+    """Move the boundary points onto the true curve and take tangents and curvatures from it."""
+    middles, tangents, curvatures = (
+        np.zeros((len(facets), 2)),
+        np.zeros((len(facets), 2, 2)),
+        np.zeros((len(facets), 2)),
+    )
+    place = points.copy()
+    edges: dict[str, list[int]] = {}
+    pieces = list({id(piece): piece for piece, _, _ in chords}.values())
+    rank = {id(piece): k for k, piece in enumerate(pieces)}
+    kind = np.array([rank[id(piece)] for piece, _, _ in chords])[owner]
+    order = np.argsort(kind, kind="stable")
+    for piece, mine in zip(pieces, np.split(order, np.searchsorted(kind[order], np.arange(1, len(pieces))))):
+        low, high = np.array([chords[j][1:] for j in owner[mine]]).T
+        ends = points[facets[mine]]  # (n, 2, 2)
+        a, b = piece.at(low), piece.at(high)
+        along = ((ends - a[:, None]) * (b - a)[:, None]).sum(axis=2) / ((b - a) ** 2).sum(axis=1)[:, None]
+        t = np.stack([low, high], axis=1)
+        for end in (0, 1):
+            cut = np.abs(along[:, end] - end) >= 1e-9  # a vertex that the mesher added on the chord
+            if cut.any():
+                t[cut, end] = crossing(piece, low[cut], high[cut], along[cut, end])
+            place[facets[mine, end]] = piece.at(t[:, end])
+        middles[mine] = piece.at(crossing(piece, t[:, 0], t[:, 1], np.full(len(mine), 0.5)))
+        if is_straight(piece):
+            middles[mine] = place[facets[mine]].mean(axis=1)
+        for end in (0, 1):
+            tangents[mine, end] = tangent(piece, t[:, end])
+            curvatures[mine, end] = curvature(piece, t[:, end])
+        edges.setdefault(piece.name, []).extend(mine.tolist())
+    follower = {int(a): i for i, a in enumerate(facets[:, 0])}
+    leader = {int(b): i for i, b in enumerate(facets[:, 1])}
+    join(np.array([[leader[v], follower[v]] for v in follower]), tangents, curvatures)
+    named = {name: np.array(sorted(numbers)) for name, numbers in edges.items() if name}
+    if "outer" not in named:
+        named["outer"] = np.flatnonzero([any(chords[j][0] is piece for piece in outer) for j in owner])
+    named["boundary"] = np.arange(len(facets))
+    return {
+        "points": place,
+        "cells": cells,
+        "facets": facets,
+        "edges": named,
+        "middles": middles,
+        "tangents": tangents,
+        "curvatures": curvatures,
+    }

@@ -1,0 +1,183 @@
+"""Two simple targets, a rigid body and an infinite plate, and the errors of using them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..impact import threshold
+from ..mesh.meshes import Mesh
+from ..modes.modal import Modes, SampledShapes
+
+PULSE = 1.77  # [-] peak response of an oscillator to a half sine, over its static response
+SOFTEST = 10.2158  # [-] first eigenvalue (k r)**2 of a clamped disk; any body that contains the disk has a lower one
+LIVELY = {False: 4.0, True: 16.0}  # [-] largest squared shape times mass; False: no free edge, True: some edge is free
+RIM = 2.0  # [-] factor on Weyl's edge term, an upper bound: free edges need 1.7
+HEAVIEST = 0.3  # [-] damping ratio of the contact with an infinite plate; below it, the striker always rebounds
+NEAREST = 2.0  # [-] least clearance**2 / (rate contact time); below it, the echo returns during the contact
+ECHO = 1.2  # [-] error of one straight edge over ratio / nearness**2; measured 0.1 to 0.4, at a disk's centre 4
+FADED = 1e-12  # [-] fraction of its deflection that the infinite plate's mode loses during a contact
+INSTANT = 1e9  # [-] relaxation rate of that mode times the contact time; the error is a third of the inverse
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """A plate as seen from the strike point."""
+
+    area: float  # [m**2]
+    perimeter: float  # [m]
+    clearance: float  # [m] from the point to the nearest edge
+    edges: np.ndarray  # (n, 2) distance [m] and length [m] of every piece of the edge
+
+    @classmethod
+    def seen(cls, mesh: Mesh, at: np.ndarray) -> "Surroundings | None":
+        """The view from a point (2,) [m]; None if the point is not clearly on the body."""
+        corners = mesh.points[mesh.cells]
+        sides = np.roll(corners, -1, axis=1) - corners
+        off = at - corners
+        inside = (sides[..., 0] * off[..., 1] - sides[..., 1] * off[..., 0]) * np.sign(_turn(corners))[:, None] >= 0.0
+        if not inside.all(axis=1).any():
+            return None
+        ends = np.stack([mesh.points[mesh.facets[:, 0]], mesh.middles, mesh.points[mesh.facets[:, 1]]], axis=1)
+        start, along = ends[:, :-1].reshape(-1, 2), np.diff(ends, axis=1).reshape(-1, 2)
+        length = np.linalg.norm(along, axis=1)
+        part = np.clip(((at - start) * along).sum(axis=1) / length**2, 0.0, 1.0)
+        distance = np.linalg.norm(at - start - part[:, None] * along, axis=1)
+        chord = ends[:, 2] - ends[:, 0]
+        bulge = ends[:, 1] - 0.5 * (ends[:, 0] + ends[:, 2])
+        segments = 2.0 / 3.0 * float((chord[:, 1] * bulge[:, 0] - chord[:, 0] * bulge[:, 1]).sum())  # body on the left
+        return cls(
+            mesh.area + segments, float(length.sum()), float(distance.min()), np.column_stack([distance, length])
+        )
+
+    def mirrors(self, nearness: float) -> float:
+        """Number of straight edges, at least 1, that reflect as much as all edges near the nearest one."""
+        zone = self.clearance * (1.0 + 0.5 / nearness)
+        straight = 2.0 * self.clearance / np.sqrt(nearness)
+        return max(1.0, float(self.edges[self.edges[:, 0] <= zone, 1].sum()) / straight)
+
+
+def _turn(corners: np.ndarray) -> np.ndarray:
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def unyielding(point: np.ndarray, mass: float) -> Modes:
+    """A rigid, fixed body of a mass [kg], struck at a point (dimension,) [m]: one mode that is zero there."""
+    nothing = np.zeros((1, 1))
+    return Modes(np.ones(1), np.zeros(1), SampledShapes(point[None], nothing, nothing), mass)
+
+
+def endless(point: np.ndarray, mass: float, mobility: float, duration: float) -> Modes:
+    """An infinite plate struck at a point (2,) [m]: the velocity there is mobility [m/(N s)] times force.
+
+    Notes
+    -----
+    One strongly overdamped mode, which follows the force at once and does not spring back. The displacement of an
+    infinite Kirchhoff plate after a unit impulse is a step of 1 / (8 sqrt(rigidity mass-per-area)), the mobility.
+
+    References
+    ----------
+    Cremer, Heckl and Petersson, Structure-Borne Sound, 3rd ed. (2005), section 5.3; Zener (1941), Phys. Rev. 59, 669.
+    """
+    rate = INSTANT / duration  # 2 zeta omega
+    omega = np.sqrt(FADED / duration * rate)
+    shape = np.sqrt(mobility * rate)
+    shapes = SampledShapes(point[None], np.array([[shape]]), np.array([[(shape / omega) ** 2]]))
+    return Modes(np.array([omega]), np.array([0.5 * rate / omega]), shapes, mass)
+
+
+def rigid_error(modes: Modes, at: np.ndarray, mass: float, duration: float) -> float:
+    """Error [-] of treating a body with known modes as rigid.
+
+    Parameters
+    ----------
+    modes : Modes
+        Modes of the body up to several times the contact frequency.
+    at : strike point, (dimension,) [m]
+    mass : float [kg]
+        Mass of the striker felt at its contact point.
+    duration : float [s]
+        Contact time on a rigid wall.
+
+    Notes
+    -----
+    The larger of two errors: the energy left in the body changes the restitution, and the body's deflection changes
+    contact time and peak force. Each mode responds to a half-sine force with the least of its impulsive, quasi-static
+    and drift responses. The result is 0.9 to 3 times the measured error, for Hertz and linear contacts.
+    """
+    omega_0 = np.pi / duration
+    point = at[None]
+    squared = modes.shape_at(point)[0] ** 2
+    ratio = omega_0 / np.maximum(modes.omega, 1e-9 * omega_0)
+    beyond = max(0.0, float(modes.residual_compliance(point)[0, 0]))
+    yields = float(squared @ np.minimum(np.pi, np.minimum(2.0 * ratio, PULSE * ratio**2)) + PULSE * omega_0**2 * beyond)
+    return mass * max(yields, 2.2 * threshold.required_energy(modes, at, 0.5 / duration))
+
+
+def rigid_bound(view: Surroundings, body_mass: float, rate: float, free: bool, mass: float, duration: float) -> float:
+    """Upper bound [-] of `rigid_error` for a plate without known modes.
+
+    Parameters
+    ----------
+    view : Surroundings
+    body_mass : float [kg]
+    rate : float [m**2/s]
+        sqrt(rigidity / mass per area), or less.
+    free : bool
+        Whether some edge is free.
+    mass, duration : as in `rigid_error`
+
+    Notes
+    -----
+    Weyl's mode count with twice its edge term, plus three rigid motions; every mode has the largest possible shape at
+    the strike point.
+    """
+    omega_0 = np.pi / duration
+    ratio = np.geomspace(1e-6, 1e6, 4001)  # omega / omega_0
+    omega = ratio * omega_0
+    number = view.area * omega / (4.0 * np.pi * rate) + RIM * view.perimeter * np.sqrt(omega / rate) / (4.0 * np.pi)
+    yields = np.minimum(np.pi, np.minimum(2.0 / ratio, PULSE / ratio**2))
+    total = 3.0 * np.pi + float(np.sum(0.5 * (yields[1:] + yields[:-1]) * np.diff(number)))
+    return LIVELY[free] * mass / body_mass * total
+
+
+def slowest_rate(view: Surroundings, first_frequency: float) -> float:
+    """Lower bound [m**2/s] of sqrt(rigidity / mass per area) for a plate with this first flexible frequency [Hz].
+
+    A disk of radius area / perimeter fits into any simply connected outline; clamped, it has a higher first frequency.
+    """
+    return 2.0 * np.pi * first_frequency * (view.area / view.perimeter) ** 2 / SOFTEST
+
+
+def endless_error(view: Surroundings, mobility: float, rate: float, mass: float, duration: float) -> float:
+    """Error [-] of treating a plate as infinite; inf if the echo may reach the striker.
+
+    Parameters
+    ----------
+    view : Surroundings
+    mobility : float [m/(N s)]
+        Mobility of the infinite plate.
+    rate : float [m**2/s]
+        sqrt(rigidity / mass per area).
+    mass, duration : as in `rigid_error`
+
+    Notes
+    -----
+    An edge at distance d adds the ``Si(d**2 / (rate t))`` term of its image to the displacement. The smooth pulse
+    averages the ripple of this term down to the inverse square of ``d**2 / (rate T)``. The striker cannot touch again
+    if, when the echo returns, it is farther away than all modes in phase could lift the plate.
+    """
+    ratio = 0.5 * mass * mobility * np.pi / duration  # damping ratio of a linear contact
+    if ratio > HEAVIEST:
+        return float("inf")
+    contact = duration * (1.0 + ratio)
+    nearness = view.clearance**2 / (rate * contact)
+    if nearness < NEAREST:
+        return float("inf")
+    restitution = np.exp(-np.pi * ratio / np.sqrt(1.0 - ratio**2))
+    first = 15.5 * rate / view.area  # [rad/s] hinged disk of this area; other supported plates are higher
+    lift = mobility * (1.0 + 8.0 / np.pi * np.log(max(1.0, 3.0 * np.pi / (duration * first))))
+    echo = view.clearance**2 / rate
+    if restitution * (echo - contact) < (1.0 + restitution) * mass * lift:
+        return float("inf")
+    return ECHO * view.mirrors(nearness) * ratio / nearness**2

@@ -1,0 +1,5 @@
+"""`Modes` describes a vibrating body; every later stage works on it alone.
+
+Start with `modal`, which defines `Modes` and computes them by finite elements. `analytic` has closed forms for
+rectangles, beams and disks; `universal_files` reads and writes the files of modal testing.
+"""

@@ -1,0 +1,707 @@
+"""Modes from closed formulas, in the same type as FE modes, so that each can check the other."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from scipy import special
+from scipy.optimize import elementwise
+
+from .._base import check
+from ..fe.section import Beam, Plate
+from .modal import Damping, Modes, damping_ratios
+
+IMAGES = 6  # [-] image forces beyond each shorter side of a hinged plate; the n-th contributes exp(-2 pi n)
+NEAR_POLE = 1.0  # [-] distance x below which polylogarithms are summed as power series, which converge up to 2 pi
+POWERS = np.append(2, np.arange(3, 60, 2))  # [-] exponents of these series; all other coefficients are zero
+SERIES = (
+    (-1.0) ** POWERS * special.bernoulli(60)[POWERS - 1] / (POWERS - 1.0) / special.factorial(POWERS)
+)  # zeta(2-k)/k!
+POLYLOG_TERMS = 40  # [-] terms of the direct sum used beyond NEAR_POLE; the next one is about exp(-40)
+DISK_TERMS = 100_000  # [-] most terms summed at the edge of a disk, where they only fall as n**-3; error 5e-11
+MOST_MODES = 1_000_000  # [-] largest number of modes of a rectangle or beam; they take a few seconds
+MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a root search
+MOST_PAIRS = 4 * MOST_MODES  # [-] half-wave number pairs tried on a rectangle; MOST_MODES never needs half of them
+DISK_SCAN = 0.5  # [-] step in z = k radius when scanning for roots; roots of one order are about pi apart
+ENDS = ("clamped", "hinged", "free")
+
+
+def _finished(
+    shapes: Any,
+    values: np.ndarray,
+    mass: float | None,
+    first_frequency: float | None,
+    physical: tuple[float, float] | None,
+    damping_ratio: Damping,
+) -> Modes:
+    """Modes for a section, or for a mass and first frequency, scaled from omega**2 at unit mass and rigidity."""
+    if physical is not None:
+        mass, factor = physical
+    else:
+        mass = check.positive("mass", mass, "kg")
+        first = check.positive("first_frequency", first_frequency, "Hz")
+        factor = 2.0 * np.pi * first / np.sqrt(values[values > 0.0][0])
+    omega = np.sqrt(values)
+    unit = Modes(omega, np.zeros(len(omega)), shapes, mass=1.0)
+    scaled = unit.scaled(mass=mass, first_frequency=factor * unit.frequencies[omega > 0.0][0])
+    return scaled.damped(damping_ratios(damping_ratio, scaled.omega))
+
+
+def _check_scale(section: Any, kind: type, mass: float | None, first_frequency: float | None) -> None:
+    """Raise ValueError unless the caller gave either a section or both mass and first frequency."""
+    given = mass is not None, first_frequency is not None
+    if (section is None and not all(given)) or (section is not None and any(given)):
+        raise ValueError("give either section, or both mass [kg] and first_frequency [Hz]")
+    if section is not None:
+        check.instance("section", section, kind)
+
+
+def _check_number(about: float, most: int = MOST_MODES) -> None:
+    """Raise ValueError if more than ``most`` modes lie below max_frequency."""
+    if about > most:
+        raise ValueError(f"max_frequency must give at most {most} modes of this body, got about {about:.2g}; lower it")
+
+
+def _enough(
+    n_modes: int | None, max_frequency: float | None, per_unit: Callable[[float], float], most: int = MOST_MODES
+) -> tuple[int, float]:
+    """Largest number of modes and largest omega (at unit mass and rigidity); the one not asked for is no limit."""
+    if (n_modes is None) == (max_frequency is None):
+        raise ValueError("give either n_modes or max_frequency [Hz]")
+    if n_modes is not None:
+        return check.count("n_modes", n_modes, high=most), np.inf
+    return 10**9, per_unit(check.positive("max_frequency", max_frequency, "Hz"))
+
+
+def _unit_omega(physical: tuple[float, float] | None, first_frequency: float | None, first: float) -> Callable:
+    """Function that converts a frequency [Hz] to omega at unit mass and rigidity, where ``first`` is the lowest."""
+
+    def convert(frequency: float) -> float:
+        if physical is not None:
+            return 2.0 * np.pi * frequency / physical[1]
+        return frequency / check.positive("first_frequency", first_frequency, "Hz") * first
+
+    return convert
+
+
+@dataclass(frozen=True, eq=False)
+class RectangleShapes:
+    """Sine shapes of a hinged rectangle of unit mass and rigidity with one corner at the origin."""
+
+    length: float  # [m]
+    width: float  # [m]
+    numbers: np.ndarray  # (n_modes, 2) half waves along length and width
+    dimension: int = 2
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        phase = np.pi * points / (self.length, self.width)  # (n_points, 2)
+        return (
+            2.0 * np.sin(np.outer(phase[:, 0], self.numbers[:, 0])) * np.sin(np.outer(phase[:, 1], self.numbers[:, 1]))
+        )
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        slack = 1e-9 * max(self.length, self.width)
+        inside = (points >= -slack) & (points <= np.array([self.length, self.width]) + slack)
+        return np.asarray(inside.all(axis=1))
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        return self.deflection(points, points)
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros(len(points))
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Sum of closed-form deflections of an infinite strip (`_strip`); images make the shorter sides hinged."""
+        sides = np.array([self.length, self.width])
+        across, along = (1, 0) if self.width < self.length else (0, 1)  # the strip runs along the longer sides
+        scale = sides[across]
+        place, load = points[:, None, None] / scale, loads[None, :, None] / scale  # (n_points, n_loads, n_images, 2)
+        images = 2.0 * sides[along] / scale * np.arange(-IMAGES, IMAGES + 1)
+        total = sum(
+            sign * _strip(place[..., along] - sign * load[..., along] + images, place[..., across], load[..., across])
+            for sign in (1.0, -1.0)
+        )
+        return np.where(_inside(points, sides)[:, None] & _inside(loads, sides), scale**2 * total, 0.0)
+
+    def take(self, n_modes: int) -> "RectangleShapes":
+        return replace(self, numbers=self.numbers[:n_modes])
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        n = (48, 32)
+        x, y = np.meshgrid(np.linspace(0, self.length, n[0] + 1), np.linspace(0, self.width, n[1] + 1), indexing="ij")
+        node = np.arange(x.size).reshape(x.shape)
+        a, b, c, d = node[:-1, :-1].ravel(), node[1:, :-1].ravel(), node[1:, 1:].ravel(), node[:-1, 1:].ravel()
+        return np.column_stack([x.ravel(), y.ravel()]), np.vstack([np.c_[a, b, c], np.c_[a, c, d]])
+
+
+def _inside(points: np.ndarray, sides: np.ndarray) -> np.ndarray:
+    """Whether points (n, 2) lie strictly inside a rectangle, (n,) bool."""
+    return np.asarray((np.minimum(points, sides - points) > 0.0).all(axis=1))
+
+
+def _strip(shift: np.ndarray, place: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Deflection of an infinite hinged strip of unit width and rigidity under forces, summed over the last axis.
+
+    ``shift`` is the distance along the strip. Each force adds the sum over m of 2 sin(m pi place) sin(m pi load)
+    (1 + z) exp(-z) / (4 (m pi)**3), z = m pi shift. This is a difference of polylogarithms in which the constant and
+    linear terms cancel.
+    """
+    x = np.pi * np.abs(shift)
+    near, far = np.broadcast_arrays(np.pi * np.abs(place - load), np.pi * (place + load), x)[:2]
+    both = _decaying_cosines(x, near) - _decaying_cosines(x, np.minimum(far, 2.0 * np.pi - far))
+    return both.sum(axis=-1) / (4.0 * np.pi**3)
+
+
+def _decaying_cosines(x: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Sum over m of cos(m angle) (1 + m x) exp(-m x) / m**3, without the part that does not depend on the angle.
+
+    The sum is Re Li3(exp(mu)) + x Re Li2(exp(mu)), mu = -x + i angle, for angles from 0 to pi and x >= 0.
+
+    References
+    ----------
+    Wood (1992), The computation of polylogarithms, eq. 9.3, for the power series about mu = 0.
+    """
+    result = np.empty(x.shape)
+    near = x < NEAR_POLE
+    gap, u = x[near], -x[near] + 1j * angle[near]
+    log = np.log(np.where(u == 0.0, 1.0, -u))
+    series = (SERIES * (gap[:, None] + u[:, None] / (POWERS + 1.0)) * u[:, None] ** POWERS).sum(axis=1)
+    result[near] = (0.5 * u**2 * (1.5 - log) + gap * u * (1.0 - log) + series).real
+    m = np.arange(1, POLYLOG_TERMS + 1)
+    z = x[~near][:, None] * m
+    result[~near] = (np.exp(-z) * (1.0 + z) * (np.cos(angle[~near][:, None] * m) - 1.0) / m**3).sum(axis=1)
+    return result
+
+
+def rectangle(
+    length: float,
+    width: float,
+    *,
+    mass: float | None = None,
+    first_frequency: float | None = None,
+    section: Any = None,
+    n_modes: int | None = None,
+    max_frequency: float | None = None,
+    damping_ratio: Damping = 0.0,
+) -> Modes:
+    """Modes of a hinged (simply supported) rectangular Kirchhoff plate with corners (0, 0) and (length, width) [m].
+
+    Parameters
+    ----------
+    length, width : float [m]
+    mass, first_frequency : float [kg], [Hz]
+        Give both of these, or a section.
+    section : Plate, isotropic and of constant thickness
+    n_modes : int, or max_frequency : float [Hz]
+    damping_ratio : float, array (n_modes,) or function of frequency [Hz]
+
+    Returns
+    -------
+    Modes, with frequencies exact to rounding
+
+    Raises
+    ------
+    ValueError
+        If a size is not positive, or if both or neither of two alternatives are given.
+
+    References
+    ----------
+    Leissa (1969), Vibration of plates, NASA SP-160, eq. 4.20; Timoshenko and Woinowsky-Krieger, art. 35 (static sum).
+    """
+    length, width = check.positive("length", length, "m"), check.positive("width", width, "m")
+    _check_scale(section, Plate, mass, first_frequency)
+    physical = _plate_scale(section, length * width)
+    # with unit mass and unit D the mass per area is 1 / area, so omega = wavenumber**2 * sqrt(area)
+    root_area = np.sqrt(length * width)
+
+    def omega(m, n):
+        return np.pi**2 * ((m / length) ** 2 + (n / width) ** 2) * root_area
+
+    count, reach = _enough(n_modes, max_frequency, _unit_omega(physical, first_frequency, float(omega(1, 1))))
+    if not np.isfinite(reach):  # start from Weyl's law, then raise the limit until there are enough modes
+        reach = 4.0 * np.pi * (count + 2.0) / root_area
+        while _lattice(length, width, reach / root_area, count)[0].size < count:
+            reach *= 1.3
+    m, n = _lattice(length, width, reach / root_area, count)
+    _check_number(min(len(m), count))
+    order = np.lexsort((n, m, omega(m, n)))[:count]
+    if not order.size:
+        raise ValueError(f"max_frequency must reach the first mode, got {max_frequency:g} Hz")
+    numbers = np.column_stack([m[order], n[order]])
+    values = omega(*numbers.T) ** 2
+    return _finished(RectangleShapes(length, width, numbers), values, mass, first_frequency, physical, damping_ratio)
+
+
+def _lattice(length: float, width: float, wavenumber_squared: float, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """Half-wave numbers (m, n), each at most ``most``, with wavenumber**2 up to ``wavenumber_squared`` [1/m^2]."""
+    limit = wavenumber_squared * (1.0 + 1e-12)
+    size = [int(min(most, side * np.sqrt(limit) / np.pi + 1.0)) for side in (length, width)]
+    if size[0] * size[1] > MOST_PAIRS:
+        _check_number(size[0] * size[1])
+    m, n = (grid.ravel() for grid in np.meshgrid(*(np.arange(1, k + 1) for k in size), indexing="ij"))
+    keep = np.pi**2 * ((m / length) ** 2 + (n / width) ** 2) <= limit
+    return m[keep], n[keep]
+
+
+def _plate_scale(section: Any, area: float) -> tuple[float, float] | None:
+    """Mass [kg] and the factor that turns omega at unit mass and rigidity into omega of the section."""
+    if section is None:
+        return None
+    material, thickness = section.material, section.thickness
+    if callable(thickness) or material.E_across is not None or section.tension:
+        raise ValueError("section must be isotropic, of constant thickness and without tension; else use find_modes")
+    mass = material.rho * thickness * area
+    rigidity = material.E * thickness**3 / (12.0 * (1.0 - material.nu**2))
+    return mass, float(np.sqrt(rigidity / mass))
+
+
+def _beam_roots(ends: tuple[str, str], n: int) -> np.ndarray:
+    """The first n flexible roots kL, from cos kL = +-1/cosh kL, tan kL = tanh kL or sin kL = 0."""
+    i = np.arange(1, n + 1)
+    pair = frozenset(ends)
+    if pair == {"hinged"}:
+        return i * np.pi
+    if pair in ({"clamped", "hinged"}, {"hinged", "free"}):
+        root = (i + 0.25) * np.pi
+        for _ in range(4):  # Newton on sin - cos tanh, whose slope is about sqrt(2)
+            root = root - (np.sin(root) - np.cos(root) * np.tanh(root)) / (np.cos(root) + np.sin(root) * np.tanh(root))
+        return root
+    sign = -1.0 if len(pair) == 2 else 1.0  # clamped-free against clamped-clamped and free-free
+    root = (i + 0.5 * sign) * np.pi
+    for _ in range(6):
+        sech = 1.0 / np.cosh(np.minimum(root, 700.0))
+        root = root - (np.cos(root) - sign * sech) / (-np.sin(root) + sign * sech * np.tanh(root))
+    return root
+
+
+@dataclass(frozen=True, eq=False)
+class BeamShapes:
+    """Shapes of a uniform Euler-Bernoulli beam of unit mass, length and rigidity over x / length in 0 ... 1.
+
+    A flexible shape is A cos kx + B sin kx + C exp(-kx) + D exp(k (x - 1)): bounded terms, so that mode 1000 keeps
+    its digits where cosh and sinh would cancel.
+    """
+
+    length: float  # [m]
+    ends: tuple[str, str]
+    k: np.ndarray  # (n_modes,) wavenumber times length; 0 for rigid motions
+    weights: np.ndarray  # (n_modes, 4)
+    dimension: int = 1
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        x = points[:, :1] / self.length  # (n_points, 1)
+        flexible = self.k > 0.0
+        k, (a, b, c, d) = self.k[flexible], self.weights[flexible].T
+        values = np.empty((len(points), len(self.k)))
+        values[:, flexible] = a * np.cos(k * x) + b * np.sin(k * x) + c * np.exp(-k * x) + d * np.exp(k * (x - 1.0))
+        values[:, ~flexible] = self.weights[~flexible, 0] + x * self.weights[~flexible, 1]
+        return values
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.all((points >= -1e-9 * self.length) & (points <= (1 + 1e-9) * self.length), axis=1)
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        result = self.deflection(points, points)
+        return 0.5 * (result + result.T)
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros(len(points))
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Exact static deflection under each load; a beam that can move rigidly gets inertia relief."""
+        x = points[:, 0] / self.length
+        return np.column_stack([_beam_green(self.ends, load)(x) for load in loads[:, 0] / self.length])
+
+    def take(self, n_modes: int) -> "BeamShapes":
+        return replace(self, k=self.k[:n_modes], weights=self.weights[:n_modes])
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        node = np.arange(129)
+        return self.length * node[:, None] / 128.0, np.column_stack([node[:-1], node[1:]])
+
+
+VANISHING = {"clamped": (0, 1), "hinged": (0, 2), "free": (2, 3)}  # orders of the derivatives that are zero at an end
+
+
+def _beam_rigid(ends: tuple[str, str]) -> np.ndarray:
+    """Rigid shapes c0 + c1 x of a beam of unit mass and length, (n_rigid, 2)."""
+    if ends == ("free", "free"):
+        return np.array([[1.0, 0.0], [-np.sqrt(3.0), np.sqrt(12.0)]])
+    if ends == ("hinged", "free"):
+        return np.array([[0.0, np.sqrt(3.0)]])
+    if ends == ("free", "hinged"):
+        return np.array([[np.sqrt(3.0), -np.sqrt(3.0)]])
+    return np.zeros((0, 2))
+
+
+@lru_cache(maxsize=64)
+def _beam_green(ends: tuple[str, str], load: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Deflection of the unit beam under a unit force at ``load`` in 0 ... 1, without its rigid motion.
+
+    The deflection is a polynomial that meets the conditions at the left end, plus a cubic in the distance beyond the
+    force. The beam is mirrored if need be so that the force is in its left half: near a clamped end the deflection is
+    of the order of the distance cubed, and mirroring keeps its digits.
+    """
+    if load > 0.5:
+        mirrored = _beam_green(ends[::-1], 1.0 - load)
+        return lambda x: mirrored(1.0 - x)
+    rigid = _beam_rigid(ends)
+    carried = -rigid.T @ (rigid @ [1.0, load])  # inertia force c0 + c1 x that balances the unit force
+    powers = np.array([0.0, 0.0, 0.0, 0.0, carried[0] / 24.0, carried[1] / 120.0])
+    beyond = np.polynomial.Polynomial([-load, 1.0]) ** 3 / 6.0
+
+    def slopes(coefficients: np.ndarray) -> np.ndarray:
+        """Derivatives of the polynomial at the right end that must vanish there."""
+        whole = np.polynomial.Polynomial(coefficients)
+        return np.array([whole.deriv(k)(1.0) if k else whole(1.0) for k in VANISHING[ends[1]]])
+
+    free = np.setdiff1d(np.arange(4), VANISHING[ends[0]])
+    matrix = np.column_stack([slopes(np.eye(4)[k]) for k in free])
+    powers[free] = np.linalg.lstsq(matrix, -slopes(powers) - slopes(beyond.coef), rcond=None)[0]
+    poly = np.polynomial.Polynomial(powers)
+
+    def bare(x):
+        return poly(x) + (x - load).clip(0.0) ** 3 / 6.0
+
+    node, weight = np.polynomial.legendre.leggauss(6)  # exact to degree 11 on either side of the force
+    x = np.concatenate([0.5 * load * (node + 1.0), load + 0.5 * (1.0 - load) * (node + 1.0)])
+    w = np.concatenate([0.5 * load * weight, 0.5 * (1.0 - load) * weight])
+    share = (rigid @ np.vstack([np.ones_like(x), x])) @ (w * bare(x))  # (n_rigid,)
+    return lambda x: bare(x) - (share @ rigid) @ np.vstack([np.ones_like(x), x])
+
+
+def beam(
+    length: float,
+    *,
+    ends: tuple[str, str] = ("hinged", "free"),
+    mass: float | None = None,
+    first_frequency: float | None = None,
+    section: Any = None,
+    n_modes: int | None = None,
+    max_frequency: float | None = None,
+    damping_ratio: Damping = 0.0,
+) -> Modes:
+    """Modes of a uniform Euler-Bernoulli beam from x = 0 to x = length [m], including rigid motions.
+
+    Parameters
+    ----------
+    length : float [m]
+    ends : two of "clamped", "hinged", "free", for x = 0 and x = length
+    mass, first_frequency : float [kg], [Hz] of the lowest bending mode
+        Give both of these, or a section.
+    section : Beam of constant section
+    n_modes : int (rigid motions included), or max_frequency : float [Hz]
+    damping_ratio : float, array (n_modes,) or function of frequency [Hz]
+
+    Returns
+    -------
+    Modes, with frequencies exact to rounding; at a free end the squared shape is 4 / mass for every bending mode
+
+    Raises
+    ------
+    ValueError
+        If a size is not positive, an end is unknown, or both or neither of two alternatives are given.
+
+    References
+    ----------
+    Bishop and Johnson (1960), The mechanics of vibration, ch. 7.
+    """
+    length = check.positive("length", length, "m")
+    if not isinstance(ends, (list, tuple)) or len(ends) != 2:
+        raise ValueError(f"ends must be two words, one for each end, got {check.shown(ends)}")
+    pair = (check.one_of("ends", ends[0], ENDS), check.one_of("ends", ends[1], ENDS))
+    rigid = _beam_rigid(pair)
+    _check_scale(section, Beam, mass, first_frequency)
+    physical = _beam_scale(section, length)
+    first = float(_beam_roots(pair, 1)[0] ** 2)
+    count, reach = _enough(n_modes, max_frequency, _unit_omega(physical, first_frequency, first))
+    if np.isfinite(reach):
+        _check_number(np.sqrt(reach) / np.pi)
+        count = len(rigid) + int(np.count_nonzero(_beam_roots(pair, int(np.sqrt(reach) / np.pi) + 2) ** 2 <= reach))
+    if count <= len(rigid):
+        raise ValueError(f"n_modes must exceed the {len(rigid)} rigid motions; max_frequency must reach a bending mode")
+    k = _beam_roots(pair, count - len(rigid))
+    shapes = BeamShapes(
+        length,
+        pair,
+        np.concatenate([np.zeros(len(rigid)), k]),
+        np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), _beam_weights(pair, k)]),
+    )
+    values = np.concatenate([np.zeros(len(rigid)), k**4])
+    return _finished(shapes, values, mass, first_frequency, physical, damping_ratio)
+
+
+def _beam_weights(ends: tuple[str, str], k: np.ndarray) -> np.ndarray:
+    """Weights (n, 4) of cos, sin and the two exponentials that meet the end conditions, for unit mass."""
+    far = np.exp(-k)
+    one, nought = np.ones_like(k), np.zeros_like(k)
+    c, s = np.cos(k), np.sin(k)
+    left = [  # derivatives 0 to 3 over k**order, at x = 0
+        [one, nought, one, far],
+        [nought, one, -one, far],
+        [-one, nought, one, far],
+        [nought, -one, -one, far],
+    ]
+    right = [[c, s, far, one], [-s, c, -far, one], [-c, -s, far, one], [s, -c, -far, one]]
+    orders = {"clamped": (0, 1), "hinged": (0, 2), "free": (2, 3)}
+    rows = [left[i] for i in orders[ends[0]]] + [right[i] for i in orders[ends[1]]]
+    matrix = np.moveaxis(np.array(rows), 2, 0)  # (n, 4, 4)
+    weights = np.linalg.svd(matrix)[2][:, 3, :]
+    value, slope, curve, shear = (np.einsum("in,ni->n", np.array(r), weights) for r in right)
+    norm = 0.25 * (value**2 - 2.0 * slope * shear + curve**2)  # Rayleigh's identity for the integral of the square
+    weights = weights / np.sqrt(norm)[:, None]
+    start = np.einsum("in,ni->n", np.array(left[0]), weights)
+    turn = np.einsum("in,ni->n", np.array(left[1]), weights)
+    clear = np.where(np.abs(start) > 1e-6, start, np.where(np.abs(turn) > 1e-6, turn, weights[:, 0]))
+    return weights * np.where(clear < 0.0, -1.0, 1.0)[:, None]
+
+
+def _beam_scale(section: Any, length: float) -> tuple[float, float] | None:
+    if section is None:
+        return None
+    if callable(section.width) or callable(section.height):
+        raise ValueError("section must be constant along the beam; else use find_modes")
+    middle = np.array([[0.5 * length]])
+    mass = float(section.inertia(middle)[0]) * length
+    return mass, float(np.sqrt(section.stiffness(middle)[0] / (mass * length**3)))
+
+
+def _bessel(n: Any, z: Any) -> tuple[Any, ...]:
+    """J, J', I exp(-z), I' exp(-z) of order n at z."""
+    j, dj = special.jv(n, z), special.jvp(n, z)
+    i = special.ive(n, z)
+    di = 0.5 * (special.ive(n - 1, z) + special.ive(n + 1, z))
+    return j, dj, i, di
+
+
+def _disk_rows(edge: str, nu: float, n: Any, z: Any) -> tuple[Any, ...]:
+    """The two edge conditions on J and on I exp(-z): (first_j, first_i, second_j, second_i)."""
+    j, dj, i, di = _bessel(n, z)
+    moment_j = -(1 - nu) * z * dj + ((1 - nu) * n**2 - z**2) * j
+    moment_i = -(1 - nu) * z * di + ((1 - nu) * n**2 + z**2) * i
+    if edge == "clamped":
+        return j, i, dj, di
+    if edge == "hinged":
+        return j, i, moment_j / z**2, moment_i / z**2
+    shear_j = -(z**3) * dj - (1 - nu) * n**2 * (z * dj - j)
+    shear_i = z**3 * di - (1 - nu) * n**2 * (z * di - i)
+    return moment_j / z**2, moment_i / z**2, shear_j / z**3, shear_i / z**3
+
+
+def _disk_roots(edge: str, nu: float, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All roots z = k radius up to ``reach``, ascending, with their order n and weight, (n_roots,) each.
+
+    The shape is J(z r) + weight I(z r) exp(-z).
+    """
+
+    def determinant(z, n):
+        a, b, c, d = _disk_rows(edge, nu, n, z)
+        return a * d - b * c
+
+    found = []
+    for n in range(int(reach) + 3):
+        low = max(0.3, 0.5 * n)  # there is no root below, and J underflows
+        scan = np.linspace(low, reach, 16 + int(max(0.0, reach - low) / DISK_SCAN))
+        values = determinant(scan, n)
+        turns = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
+        found.append(np.column_stack([scan[turns], scan[turns + 1], np.full(len(turns), n)]))
+    low, high, order = np.vstack(found).T
+    z = elementwise.find_root(determinant, (low, high), args=(order,)).x
+    a, b, c, d = _disk_rows(edge, nu, order, z)
+    weight = np.where(np.abs(b) > np.abs(d), -a / b, -c / d)
+    rank = np.lexsort((order, z))
+    return z[rank], order[rank], weight[rank]
+
+
+def _disk_count(z: np.ndarray, order: np.ndarray, reach: float = np.inf) -> int:
+    """Number of modes for the roots up to ``reach``: one for a root of order 0, two for any other."""
+    return int(np.sum(np.where(order == 0, 1, 2)[z <= reach]))
+
+
+@dataclass(frozen=True, eq=False)
+class DiskShapes:
+    """Bessel shapes of a disk of unit mass and rigidity centred at the origin, computed on the unit disk."""
+
+    radius: float  # [m]
+    edge: str
+    nu: float
+    z: np.ndarray  # (n_modes,) wavenumber times radius; 0 for rigid motions
+    order: np.ndarray  # (n_modes,) nodal diameters
+    weight: np.ndarray  # (n_modes,) of I exp(-z) relative to J
+    phase: np.ndarray  # (n_modes,) 0 for cos, pi/2 for sin
+    scale: np.ndarray  # (n_modes,)
+    dimension: int = 2
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        r = np.hypot(points[:, 0], points[:, 1])[:, None] / self.radius
+        angle = np.arctan2(points[:, 1], points[:, 0])[:, None]
+        z, n = self.z, self.order
+        growth = np.exp(z * (r - 1.0))
+        radial = special.jv(n, z * r) + self.weight * special.ive(n, z * r) * growth
+        radial = np.where(z == 0.0, np.where(n == 0, 1.0, r), radial)
+        return self.scale * radial * np.cos(n * angle - self.phase)
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.hypot(points[:, 0], points[:, 1]) <= (1 + 1e-9) * self.radius
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        return self.deflection(points, points)
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros(len(points))
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        x, y = points / self.radius, loads / self.radius
+        return np.array([[_disk_green(self.edge, self.nu, place, load) for load in y] for place in x])
+
+    def take(self, n_modes: int) -> "DiskShapes":
+        kept = {name: getattr(self, name)[:n_modes] for name in ("z", "order", "weight", "phase", "scale")}
+        return replace(self, **kept)
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        rings, spokes = 20, 72
+        r = np.repeat(np.arange(1, rings + 1) / rings, spokes) * self.radius
+        angle = np.tile(2 * np.pi * np.arange(spokes) / spokes, rings)
+        points = np.vstack([np.zeros((1, 2)), np.column_stack([r * np.cos(angle), r * np.sin(angle)])])
+        here = np.arange(spokes)
+        there = (here + 1) % spokes
+        cells = [np.column_stack([np.zeros(spokes, int), 1 + here, 1 + there])]
+        for ring in range(rings - 1):
+            a, b = 1 + ring * spokes + here, 1 + ring * spokes + there
+            cells += [np.column_stack([a, a + spokes, b + spokes]), np.column_stack([a, b + spokes, b])]
+        return points, np.vstack(cells)
+
+
+def _disk_green(edge: str, nu: float, place: np.ndarray, load: np.ndarray) -> float:
+    """Deflection of the unit disk (D = 1) at ``place`` under a unit force at ``load``; if free, with inertia relief."""
+    r, rho = min(1.0, float(np.hypot(*place))), min(1.0, float(np.hypot(*load)))
+    gamma = float(np.arctan2(place[1], place[0]) - np.arctan2(load[1], load[0]))
+    s = float(np.sum((place - load) ** 2))
+    t = 1.0 + (r * rho) ** 2 - 2.0 * r * rho * np.cos(gamma)
+    q = 1.0 - rho**2
+    clamped = ((1.0 - r**2) * q + (s * np.log(s / t) if s > 0.0 else 0.0)) / (16.0 * np.pi)  # Boggio 1905
+    if edge == "clamped":
+        return clamped
+    decay = r * rho
+    terms = DISK_TERMS if decay > 1.0 - 4e-4 else int(np.log(1e-17) / np.log(max(decay, 1e-3))) + 6
+    n = np.arange(terms)
+    wave = np.where(n == 0, 1.0, 2.0) * rho**n * np.cos(n * gamma)
+    if edge == "hinged":
+        return clamped + q * (1.0 - r**2) / (4.0 * np.pi) * float(np.sum(wave * r**n / (4.0 * n + 2.0 + 2.0 * nu)))
+    # free edge: terms in r**n and r**(n+2) cancel the clamped solution's edge moment and Kirchhoff shear
+    moment = 4.0 * q * wave / (16.0 * np.pi)
+    shear = moment + 4.0 * (n * q + 1.0 + rho**2) * wave / (16.0 * np.pi)
+    cosine = np.cos(gamma)
+    uniform, linear = -1.0 / np.pi, -4.0 * rho / np.pi  # inertia load uniform + linear r cos(gamma)
+    moment[0] += uniform * (12.0 + 4.0 * nu) / 64.0
+    moment[1] += linear * cosine * (20.0 + 4.0 * nu) / 192.0
+    shear[0] += uniform / 2.0
+    shear[1] += linear * cosine * (3.0 / 8.0 - (1.0 - nu) * 4.0 / 192.0)
+    m1, v1 = (1 - nu) * n * (n - 1.0), -(1 - nu) * n**2 * (n - 1.0)
+    m2 = (n + 2.0) * (n + 1.0) + nu * (n + 2.0 - n**2)
+    v2 = (4.0 * n + 4.0) * n - (1 - nu) * n**2 * (n + 1.0)
+    a, b = np.zeros(terms), np.zeros(terms)
+    det = m1[2:] * v2[2:] - m2[2:] * v1[2:]
+    a[2:] = -(moment[2:] * v2[2:] - m2[2:] * shear[2:]) / det
+    b[2:] = -(m1[2:] * shear[2:] - v1[2:] * moment[2:]) / det
+    b[:2] = -moment[:2] / m2[:2]
+    bent = clamped + uniform * r**4 / 64.0 + linear * cosine * r**5 / 192.0 + float(np.sum((a + b * r**2) * r**n))
+    # remove the rigid motion: project `bent` on 1 and on r cos; reciprocity gives the clamped parts
+    mean = q**2 / 64.0 + uniform * 2.0 * np.pi / (64.0 * 6.0) + b[0] * 2.0 * np.pi / 4.0
+    turn = (rho**5 - 2.0 * rho**3 + rho) / 192.0 + linear * np.pi / (192.0 * 8.0)
+    turn += _first_order(nu, rho) * np.pi / 6.0
+    return bent - mean / np.pi - 4.0 * turn * r * cosine / np.pi
+
+
+def _first_order(nu: float, rho: float) -> float:
+    """Coefficient of r**3 cos(gamma) in the free disk's correction."""
+    moment = 8.0 * (1.0 - rho**2) * rho / (16.0 * np.pi) - 4.0 * rho / np.pi * (20.0 + 4.0 * nu) / 192.0
+    return -moment / (6.0 + 2.0 * nu)
+
+
+def disk(
+    radius: float,
+    *,
+    edge: str = "clamped",
+    nu: float | None = None,
+    mass: float | None = None,
+    first_frequency: float | None = None,
+    section: Any = None,
+    n_modes: int | None = None,
+    max_frequency: float | None = None,
+    damping_ratio: Damping = 0.0,
+) -> Modes:
+    """Modes of a circular Kirchhoff plate centred at the origin, including the rigid motions of a free one.
+
+    Parameters
+    ----------
+    radius : float [m]
+    edge : "clamped", "hinged" or "free"
+    nu : float [-]
+        Poisson's ratio if no section is given, 0.3 by default; the shapes of a clamped disk do not depend on it.
+    mass, first_frequency : float [kg], [Hz] of the lowest flexible mode
+        Give both of these, or a section.
+    section : Plate, isotropic and of constant thickness
+    n_modes : int (rigid motions included), or max_frequency : float [Hz]
+    damping_ratio : float, array (n_modes,) or function of frequency [Hz]
+
+    Returns
+    -------
+    Modes; of two modes with the same nodal diameters the cosine (largest along x) comes first, then the sine
+
+    Raises
+    ------
+    ValueError
+        If a size is not positive, the edge is unknown, or both or neither of two alternatives are given.
+
+    References
+    ----------
+    Leissa (1969), NASA SP-160, ch. 2; Boggio (1905) for the static deflection of the clamped disk.
+    """
+    radius = check.positive("radius", radius, "m")
+    check.one_of("edge", edge, ENDS)
+    if section is not None and nu is not None:
+        raise ValueError("give nu or section, not both: the section's material has its own nu")
+    _check_scale(section, Plate, mass, first_frequency)
+    physical = _plate_scale(section, np.pi * radius**2)
+    if physical is not None:  # the shapes belong to the unit disk
+        physical = physical[0], physical[1] / radius
+    ratio = section.material.nu if section is not None else 0.3 if nu is None else check.between("nu", nu, -0.99, 0.5)
+    n_rigid = 3 if edge == "free" else 0
+    root_area = np.sqrt(np.pi)
+    first = _disk_roots(edge, ratio, 5.0)[0][0] ** 2 * root_area
+    count, reach = _enough(n_modes, max_frequency, _unit_omega(physical, first_frequency, first), MOST_OF_DISK)
+    if np.isfinite(reach):
+        limit = np.sqrt(reach / root_area)
+        _check_number(0.25 * limit**2, MOST_OF_DISK)  # Weyl
+        z, n, weight = _disk_roots(edge, ratio, max(5.0, limit))
+        count = n_rigid + _disk_count(z, n, limit)
+    else:
+        limit = 2.0 * np.sqrt(count) + 5.0  # Weyl's law: about z**2 / 4 modes, plus an edge term
+        z, n, weight = _disk_roots(edge, ratio, limit)
+        while n_rigid + _disk_count(z, n) < count:
+            limit *= 1.2
+            z, n, weight = _disk_roots(edge, ratio, limit)
+    if count <= n_rigid:
+        raise ValueError(f"n_modes must exceed the {n_rigid} rigid motions; max_frequency must reach a flexible mode")
+    rigid = np.array([(0.0, 0, 0.0, 0.0), (0.0, 1, 0.0, 0.0), (0.0, 1, 0.0, np.pi / 2)][:n_rigid]).reshape(-1, 4)
+    twice = np.repeat(np.arange(len(z)), np.where(n == 0, 1, 2))
+    second = np.append(False, twice[1:] == twice[:-1])
+    rows = np.column_stack([z[twice], n[twice], weight[twice], np.where(second, np.pi / 2, 0.0)])
+    wavenumber, order, weights, phases = np.vstack([rigid, rows])[:count].T.copy()
+    scale = np.concatenate(
+        [[1.0, 2.0, 2.0][:n_rigid], _disk_norm(*(x[n_rigid:] for x in (wavenumber, order, weights)))]
+    )
+    shapes = DiskShapes(radius, edge, ratio, wavenumber, order, weights, phases, scale)
+    return _finished(shapes, (wavenumber**2 * root_area) ** 2, mass, first_frequency, physical, damping_ratio)
+
+
+def _disk_norm(z: np.ndarray, n: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Factors (n_modes,) that normalise flexible shapes at unit mass, from Lommel's integrals of their squares."""
+    j, dj, i, di = _bessel(n, z)
+    i, di = weight * i, weight * di
+    ring = (n / z) ** 2
+    square = 0.5 * (dj**2 + (1.0 - ring) * j**2 + (1.0 + ring) * i**2 - di**2) + (j * di - i * dj) / z
+    return 1.0 / np.sqrt(np.where(n == 0, 2.0, 1.0) * square)  # cos**2 and sin**2 average to one half over the circle

@@ -1,0 +1,559 @@
+"""Modes: the description of a structure that every later stage works on, whether computed or measured."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from .._base import check, markup
+from ..fe import point_load, refinement
+from ..fe.assembly import System
+from ..fe.eigenvalues import Flexibility
+from . import universal_files
+
+HIGHEST = 1e74  # [Hz] highest frequency that scaling may produce; its powers must stay finite, see `check.REACH`
+SHOWN = 10  # [-] modes listed in a notebook
+REMEMBERED = 16  # [-] points whose shapes and static deflections are cached, because one blow needs them many times
+ROUNDING = 1e-12  # [-] rounding error of a compliance, relative to itself and to that of the first mode
+SHAPE_ERROR = 10.0  # [-] relative error of a mode's compliance divided by the relative error of its frequency
+
+
+class Shapes(Protocol):
+    """What every source of mode shapes offers: FE solutions, closed formulas and measured points."""
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates of a point: 2 on a plate, 1 on a beam, 0 for a rigid mass."""
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Mass-normalised shapes (n_points, n_modes) [kg**-0.5] at points (n_points, dimension) [m]."""
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        """Whether each point lies on the body, (n_points,) bool."""
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        """Static compliance (n_points, n_points) [m/N] of the complete body, with inertia relief if it is free."""
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        """Estimated relative error (n_points,) [-] of the diagonal of `compliance`."""
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Static deflection (n_points, n_loads) [m/N] of the complete body under unit forces at ``loads``."""
+
+    def take(self, n_modes: int) -> "Shapes":
+        """The same body with its first ``n_modes`` modes only."""
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points (n_points, dimension) [m] and cells (n_cells, dimension + 1) for drawing the body."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScaledShapes:
+    """The shapes of the same body with another mass and stiffness, see `Modes.scaled`."""
+
+    base: Shapes
+    amplitude: float  # [-] new shape divided by old
+    frequency: float  # [-] new frequency divided by old
+
+    @property
+    def dimension(self) -> int:
+        return self.base.dimension
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        return self.amplitude * self.base.at(points)
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self.base.contains(points)
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        return (self.amplitude / self.frequency) ** 2 * self.base.compliance(points)
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return self.base.compliance_error(points)
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return (self.amplitude / self.frequency) ** 2 * self.base.deflection(loads, points)
+
+    def take(self, n_modes: int) -> "ScaledShapes":
+        return replace(self, base=self.base.take(n_modes))
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.base.grid()
+
+
+@dataclass(frozen=True, eq=False)
+class RigidShapes:
+    """A rigid mass that can only translate: one mode of frequency zero, with the same shape everywhere."""
+
+    mass: float  # [kg]
+    n_modes: int = 1
+    dimension: int = 0
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        return np.full((len(points), self.n_modes), self.mass**-0.5)
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.ones(len(points), bool)
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros((len(points), len(points)))
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros(len(points))
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return np.zeros((len(points), len(loads)))
+
+    def take(self, n_modes: int) -> "RigidShapes":
+        return replace(self, n_modes=n_modes)
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros((1, 0)), np.zeros((1, 1), int)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledShapes:
+    """Shapes known only at points, as from a modal test; the striker must hit one of these points."""
+
+    points: np.ndarray  # (n_points, dimension) [m]
+    values: np.ndarray  # (n_points, n_modes) [kg**-0.5]
+    static: np.ndarray  # (n_points, n_points) [m/N] static compliance of the complete body
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+
+    @property
+    def dimension(self) -> int:
+        return self.points.shape[1]
+
+    def _index(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        distance = np.linalg.norm(points[:, None] - self.points[None], axis=2)  # (n, n_points)
+        index = distance.argmin(axis=1)
+        span = float(np.ptp(self.points, axis=0).max(initial=0.0))
+        return index, distance[np.arange(len(points)), index] <= 1e-6 * (span or 1.0)
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        return self.values[self._index(points)[0]]
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self._index(points)[1]
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        return self.deflection(points, points)
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros(len(points))
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return self.static[np.ix_(self._index(points)[0], self._index(loads)[0])]
+
+    def take(self, n_modes: int) -> "SampledShapes":
+        return replace(self, values=self.values[:, :n_modes].copy())
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.points, np.arange(len(self.points))[:, None]
+
+
+Damping = float | np.ndarray | Callable[[np.ndarray], Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Undamped, mass-normalised eigenmodes of one body in ascending order, each with its damping ratio.
+
+    They describe the whole body: `shapes.compliance` includes the static response of the modes left out.
+    Rigid motions are modes of frequency zero.
+    """
+
+    omega: np.ndarray  # (n_modes,) [rad/s]
+    damping_ratio: np.ndarray  # (n_modes,) [-] fraction of critical damping; overdamped above 1
+    shapes: Shapes
+    mass: float  # [kg] of the whole body
+    frequency_error: np.ndarray | None = None  # (n_modes,) [-] estimated relative error; find_modes always gives it
+    bounds: np.ndarray | None = None  # (n_modes, 2) [Hz] guaranteed lower and upper bound of each frequency
+
+    def __post_init__(self) -> None:
+        omega = check.ascending("omega", self.omega, "rad/s")
+        damping = check.array("damping_ratio", self.damping_ratio, omega.shape)
+        if (damping < 0.0).any():
+            raise ValueError(f"damping_ratio must not be negative, got {damping.min():g}")
+        object.__setattr__(self, "omega", omega)
+        object.__setattr__(self, "damping_ratio", damping)
+        check.positive("mass", self.mass, "kg")
+        check.lock_arrays(self)
+
+    @classmethod
+    def rigid(cls, mass: float) -> "Modes":
+        """A rigid mass [kg] free to translate: one mode of frequency zero."""
+        mass = check.positive("mass", mass, "kg")
+        return cls(np.zeros(1), np.zeros(1), RigidShapes(mass), mass)
+
+    @classmethod
+    def from_arrays(cls, frequencies, shapes, *, points, mass, damping_ratio=0.0, compliance=None) -> "Modes":
+        """Modes known only at points, as from a modal test.
+
+        Parameters
+        ----------
+        frequencies : array_like, shape (n_modes,) [Hz], ascending; 0 for rigid motions
+        shapes : array_like, shape (n_points, n_modes) [kg**-0.5], mass-normalised
+        points : array_like, shape (n_points, dimension) [m]
+        mass : float [kg] of the whole body
+        damping_ratio : float, array (n_modes,) or function of frequency [Hz]
+        compliance : array_like, shape (n_points, n_points) [m/N], optional
+            Static compliance of the complete body; by default that of the given modes alone.
+
+        Raises
+        ------
+        ValueError
+            If lengths disagree, a number is not finite or frequencies do not ascend.
+        """
+        omega = 2.0 * np.pi * check.ascending("frequencies", frequencies, "Hz")
+        points = check.array("points", points, (None, None), "m")
+        values = check.array("shapes", shapes, (len(points), len(omega)), "kg**-0.5")
+        if compliance is None:
+            flexible = omega > 0.0
+            scaled = values[:, flexible] / omega[flexible]
+            static = scaled @ scaled.T
+        else:
+            static = check.array("compliance", compliance, (len(points), len(points)), "m/N")
+        damping = damping_ratios(damping_ratio, omega)
+        return cls(omega, damping, SampledShapes(points, values, static), check.positive("mass", mass, "kg"))
+
+    @classmethod
+    def from_uff(cls, path: Any, *, mass: float, direction: str = "z") -> "Modes":
+        """Read measured modes from a universal file (nodes in data set 15 or 2411, shapes in 55); needs pyuff.
+
+        Parameters
+        ----------
+        path : str or Path
+        mass : float [kg] of the whole body
+        direction : "x", "y" or "z", the direction of the strike and of the measurement
+
+        Returns
+        -------
+        Modes
+            Known only at the measured points; shapes are divided by the root of the modal mass in the file.
+        """
+        found = universal_files.read(path, direction)
+        return cls.from_arrays(
+            found["frequencies"],
+            found["shapes"],
+            points=found["points"],
+            mass=mass,
+            damping_ratio=found["damping_ratio"],
+        )
+
+    @property
+    def n_modes(self) -> int:
+        return len(self.omega)
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """Natural frequencies, (n_modes,) [Hz]."""
+        return self.omega / (2.0 * np.pi)
+
+    @property
+    def n_rigid(self) -> int:
+        """Number of rigid motions (modes of frequency zero)."""
+        return int(np.count_nonzero(self.omega == 0.0))
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates of a point on the body: 2 on a plate, 1 on a beam, 0 for a rigid mass."""
+        return self.shapes.dimension
+
+    def _repr_html_(self) -> str:
+        """Table of the first modes, for notebooks."""
+        columns = [self.frequencies[:SHOWN], self.damping_ratio[:SHOWN]]
+        head, forms = ["mode", "frequency", "damping ratio"], ["{:.5g} Hz", "{:.3g}"]
+        if self.frequency_error is not None:
+            columns, head, forms = [*columns, self.frequency_error], [*head, "estimated error"], [*forms, "{:.0e}"]
+        rows = [(i, *map(str.format, forms, row)) for i, row in enumerate(zip(*columns), 1)]
+        more = f" The first {SHOWN}:" if self.n_modes > SHOWN else ""
+        span = f"{self.n_modes} modes up to {self.frequencies[-1]:.5g} Hz of a body of {self.mass:.4g} kg."
+        return f"<p>{span}{more}</p>{markup.table(rows, head)}"
+
+    def points(self, name: str, points: Any) -> np.ndarray:
+        """Return points as (n_points, dimension) [m]; raise ValueError if one is not on the body."""
+        if self.dimension == 0:
+            n_points = 1 if points is None else len(np.atleast_2d(check.numbers(name, points, "m")))
+            return np.zeros((max(1, n_points), 0))
+        raw = check.numbers(name, points, "m")
+        if self.dimension == 1 and (raw.ndim < 2 or raw.shape[-1] != 1):
+            raw = raw.reshape(-1, 1)
+        array = check.array(name, raw, (None, self.dimension), "m", lift=True)
+        inside = self.shapes.contains(array)
+        if not inside.all():
+            lost = ", ".join(f"{x:g}" for x in array[~inside][0])
+            corner = self.shapes.grid()[0]
+            low, high = corner.min(axis=0), corner.max(axis=0)
+            extent = " x ".join(f"[{a:g}, {b:g}]" for a, b in zip(low, high))
+            raise ValueError(f"{name} must lie on the body, got ({lost}) m; the body extends over {extent} m")
+        return array
+
+    def shape_at(self, points: Any) -> np.ndarray:
+        """Mass-normalised shapes at points on the body, (n_points, n_modes) [kg**-0.5]."""
+        return self.shapes.at(self.points("points", points))
+
+    def point(self, name: str, at: Any) -> np.ndarray:
+        """Return one point as (1, dimension) [m]; raise ValueError unless it is a single point on the body."""
+        found = self.points(name, at)
+        if len(found) != 1:
+            raise ValueError(f"{name} must be one point, got {len(found)}")
+        return found
+
+    def rigid_motion(self, at: Any) -> np.ndarray:
+        """Modal velocities (n_modes,) [kg**0.5] of a rigid motion that moves the point ``at`` [m] at unit speed.
+
+        The body translates if its supports allow that; otherwise it turns about its hinge.
+        """
+        point = self.point("at", at)
+        result = np.zeros(self.n_modes)
+        rigid = self.shapes.take(self.n_rigid) if self.n_rigid else None
+        if rigid is None or not rigid.at(point).any():
+            raise ValueError(
+                "at must be a point that moves in a rigid motion, got one at rest; change at or the supports"
+            )
+        corners = self.shapes.grid()[0]
+        everywhere = rigid.at(corners)  # (n_points, n_rigid)
+        straight = np.linalg.lstsq(everywhere, np.ones(len(corners)), rcond=None)[0]
+        if np.abs(everywhere @ straight - 1.0).max() > 1e-6:
+            row = rigid.at(point)[0]
+            straight = row / (row @ row)
+        result[: self.n_rigid] = straight / (rigid.at(point)[0] @ straight)
+        return result
+
+    def modal_compliance(self, points: Any) -> np.ndarray:
+        """Static compliance of the kept modes between points, (n_points, n_points) [m/N]."""
+        return self._carried(self.shape_at(points))
+
+    def residual_compliance(self, points: Any) -> np.ndarray:
+        """Static compliance of the modes left out, (n_points, n_points) [m/N].
+
+        Raises
+        ------
+        SimulationError
+            If the kept modes are softer than the whole body by more than the errors of both allow.
+        """
+        place = self.points("points", points)
+        return left_out(self, place, self.shapes.at(place))[0]
+
+    def _carried(self, rows: np.ndarray, weight: Any = 1.0) -> np.ndarray:
+        flexible = self.omega > 0.0
+        scaled = rows[:, flexible] / self.omega[flexible]
+        return (weight * scaled) @ scaled.T
+
+    def scaled(self, *, mass: float | None = None, first_frequency: float | None = None) -> "Modes":
+        """The same body with another mass [kg] or lowest flexible frequency [Hz]; its size stays the same."""
+        mass = self.mass if mass is None else check.positive("mass", mass, "kg")
+        ratio = 1.0
+        if first_frequency is not None:
+            flexible = self.frequencies[self.omega > 0.0]
+            if not flexible.size:
+                raise ValueError("first_frequency needs a flexible mode; these modes are rigid")
+            ratio = check.positive("first_frequency", first_frequency, "Hz") / flexible[0]
+            if flexible[-1] * ratio > HIGHEST:
+                raise ValueError(
+                    f"first_frequency must keep the last frequency below {HIGHEST:g} Hz, got {first_frequency:g} Hz"
+                )
+        shapes = ScaledShapes(self.shapes, float(self.mass**0.5 / mass**0.5), float(ratio))
+        bounds = None if self.bounds is None else self.bounds * ratio
+        return replace(self, omega=self.omega * ratio, shapes=shapes, mass=mass, bounds=bounds)
+
+    def truncated(self, *, max_frequency: float | None = None, n_modes: int | None = None) -> "Modes":
+        """The lowest modes only, up to a frequency [Hz] or a number; the residual compliance replaces the others."""
+        keep = self.n_modes
+        if max_frequency is not None:
+            limit = check.non_negative("max_frequency", max_frequency, "Hz")
+            keep = int(np.searchsorted(self.frequencies, limit, side="right"))
+        if n_modes is not None:
+            keep = min(keep, check.count("n_modes", n_modes))
+        if keep == 0:
+            raise ValueError(f"max_frequency must reach the first mode at {self.frequencies[0]:g} Hz")
+        return replace(
+            self,
+            omega=self.omega[:keep],
+            damping_ratio=self.damping_ratio[:keep],
+            shapes=self.shapes.take(keep),
+            frequency_error=None if self.frequency_error is None else self.frequency_error[:keep].copy(),
+            bounds=None if self.bounds is None else self.bounds[:keep].copy(),
+        )
+
+    def damped(self, damping_ratio: Damping) -> "Modes":
+        """The same modes with other damping ratios: a number, an array (n_modes,) or a function of frequency [Hz]."""
+        return replace(self, damping_ratio=damping_ratios(damping_ratio, self.omega))
+
+
+def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`Modes.residual_compliance` at points with known shapes (n_points, n_modes), and the error of its diagonal.
+
+    The error is (n_points,) [m/N].
+    """
+    whole = modes.shapes.compliance(place)
+    rest = whole - modes._carried(rows)
+    doubt = np.diag(whole) * (modes.shapes.compliance_error(place) + ROUNDING)
+    if modes.frequency_error is not None:
+        doubt = doubt + np.diag(modes._carried(rows, SHAPE_ERROR * modes.frequency_error[modes.omega > 0.0]))
+    allowed = doubt.copy()
+    if modes.omega[-1] > 0.0:  # at a support both compliances are pure rounding
+        allowed += ROUNDING / (modes.mass * modes.omega[modes.omega > 0.0][0] ** 2)
+    for i in np.flatnonzero(np.diag(rest) < -allowed):
+        where = ", ".join(f"{x:g}" for x in place[i])
+        raise check.SimulationError(
+            f"the modes are softer at ({where}) m than the whole body, {whole[i, i]:.4g} m/N, by "
+            f"{-rest[i, i]:.2g} m/N, which is more than their errors allow; find the modes on a finer mesh"
+        )
+    return rest, doubt
+
+
+def damping_ratios(damping_ratio: Any, omega: np.ndarray) -> np.ndarray:
+    """Return the damping ratio of each mode, (n_modes,) [-]; rigid modes get zero.
+
+    ``damping_ratio`` is a number, an array (n_modes,) or a function of the flexible frequencies [Hz].
+    """
+    result = np.zeros(len(omega))
+    flexible = omega > 0.0
+    if callable(damping_ratio):
+        result[flexible] = check.field("damping_ratio", damping_ratio, omega[flexible] / (2.0 * np.pi))
+    elif isinstance(damping_ratio, (list, tuple)) or (isinstance(damping_ratio, np.ndarray) and damping_ratio.ndim):
+        result = check.array("damping_ratio", damping_ratio, omega.shape)
+    else:
+        result[flexible] = check.non_negative("damping_ratio", damping_ratio)
+        result[~flexible] = 0.0
+    if (result < 0.0).any():
+        raise ValueError(f"damping_ratio must not be negative, got {result.min():g}")
+    return result
+
+
+def rayleigh(mass_factor: float, stiffness_factor: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Damping ratio as a function of frequency [Hz] for C = mass_factor M + stiffness_factor K ([1/s], [s])."""
+    mass_factor = check.non_negative("mass_factor", mass_factor, "1/s")
+    stiffness_factor = check.non_negative("stiffness_factor", stiffness_factor, "s")
+
+    def ratio(frequency: np.ndarray) -> np.ndarray:
+        omega = 2.0 * np.pi * np.asarray(frequency, float)
+        return 0.5 * (mass_factor / omega + stiffness_factor * omega)
+
+    return ratio
+
+
+@dataclass(frozen=True, eq=False)
+class FieldShapes:
+    """Shapes of an FE solution, evaluated anywhere on the body with the shape functions of its elements."""
+
+    system: System
+    vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
+    flexibility: Flexibility
+    _static: dict[bytes, point_load.Deflection] = field(default_factory=dict, repr=False)  # cache, by loads
+    _single: dict[bytes, np.ndarray] = field(default_factory=dict, init=False, repr=False)  # cache, by point
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+
+    @property
+    def dimension(self) -> int:
+        return self.system.mesh.dimension
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        key = points.tobytes() if len(points) == 1 else b""
+        if key and key in self._single:
+            return self._single[key]
+        shapes = self.system.interpolate(points) @ self.vectors * self.system.frame.mass**-0.5
+        if key:
+            if len(self._single) >= REMEMBERED:
+                self._single.clear()
+            shapes.flags.writeable = False
+            self._single[key] = shapes
+        return shapes
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self.system.contains(points)
+
+    def _under(self, loads: np.ndarray) -> point_load.Deflection:
+        key = loads.tobytes()
+        if key not in self._static:
+            if len(self._static) >= REMEMBERED:
+                self._static.clear()
+            self._static[key] = point_load.static_deflection(self.system, loads)
+        return self._static[key]
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        return self._under(points).compliance
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return self._under(points).error
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return self._under(loads).at(points)
+
+    def take(self, n_modes: int) -> "FieldShapes":
+        return replace(self, vectors=self.vectors[:, :n_modes].copy())
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.system.mesh.points, self.system.mesh.cells
+
+
+@check.typed
+def find_modes(
+    system: System,
+    *,
+    n_modes: int | None = None,
+    max_frequency: float | None = None,
+    damping_ratio: Damping = 0.0,
+    tolerance: float | None = None,
+    bounds: bool = False,
+    keep: str | Path | None = None,
+) -> Modes:
+    """Find the lowest modes of a body without missing any; rigid motions come first, with frequency exactly zero.
+
+    Parameters
+    ----------
+    system : System
+    n_modes : int, optional
+        How many modes to find, rigid motions included. Give either this or ``max_frequency``.
+    max_frequency : float [Hz], optional
+        Find all modes up to this frequency.
+    damping_ratio : float, array (n_modes,) or function of frequency [Hz] returning [-]
+    tolerance : float [-], optional
+        Largest relative error accepted in any frequency; the mesh is refined until the estimated error is below it.
+    bounds : bool
+        Whether to compute guaranteed bounds of each frequency (`Modes.bounds`), for isotropic plates of constant
+        thickness with straight edges. A margin, not a proof, covers rounding and the eigensolver.
+    keep : path of an .npz file, optional
+        File where the modes are saved; the same call later reads them from there. Ignored if a tolerance is given.
+
+    Returns
+    -------
+    Modes, always with `frequency_error`
+
+    Raises
+    ------
+    ValueError
+        If neither or both of n_modes and max_frequency are given, or the mesh has too few unknowns.
+    SimulationError
+        If the tolerance is not met, or modes are missing according to the inertia of the factorised matrix.
+    """
+    if (n_modes is None) == (max_frequency is None):
+        raise ValueError("find_modes needs either n_modes or max_frequency")
+    if n_modes is not None:
+        n_modes = check.count("n_modes", n_modes)
+    if max_frequency is not None:
+        max_frequency = check.positive("max_frequency", max_frequency, "Hz")
+    if tolerance is not None:
+        found = refinement.refine(system, n_modes, max_frequency, check.between("tolerance", tolerance, 1e-10, 0.1))
+    else:
+        fine = refinement.fine_enough(system, n_modes, max_frequency, None)
+        wanted = n_modes, max_frequency
+        found = refinement.solve(fine, *wanted) if keep is None else refinement.kept(fine, *wanted, Path(keep))
+    shapes = FieldShapes(found.system, found.vectors.copy(), found.flexibility)
+    damping = damping_ratios(damping_ratio, found.omega)
+    enclosed = refinement.enclosure(found) if bounds else None
+    if bounds and enclosed is None:
+        raise ValueError(
+            "bounds need an isotropic plate of constant thickness with straight edges and nothing attached; "
+            "give a tolerance instead, which works for any body"
+        )
+    in_hertz = None if enclosed is None else enclosed / (2.0 * np.pi)
+    return Modes(found.omega, damping, shapes, system.mass, frequency_error=found.error, bounds=in_hertz)

@@ -1,0 +1,174 @@
+"""Read and write modes as universal files, the format of modal testing (data sets 15, 55, 2411, 2412; needs pyuff)."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._base import check, isolated
+
+NORMAL_MODE, DISPLACEMENT, STRUCTURAL, REAL = 2, 8, 1, 2  # codes of data set 55
+CELL_CODE = {2: 11, 3: 91, 4: 94}  # nodes of a cell -> rod, thin shell triangle, thin shell quadrilateral
+WANTED = (15, 55, 2411)  # data sets to read
+PHASE = 0.3  # [-] largest imaginary over largest real part, at the best phase, of a complex shape taken as real
+DIRECTIONS = {"x": "r1", "y": "r2", "z": "r3"}
+
+
+def _pyuff() -> Any:
+    return check.extra("pyuff", "uff", "a universal file")
+
+
+def write(path: Any, frequencies, damping_ratio, shapes, points, cells) -> None:
+    """Write nodes (data sets 15 and 2411), cells (2412) and one data set 55 for each mode; numbers keep six digits.
+
+    Parameters
+    ----------
+    path : str or Path
+    frequencies : ndarray, shape (n_modes,) [Hz]
+    damping_ratio : ndarray, shape (n_modes,) [-]
+    shapes : ndarray, shape (n_points, n_modes) [kg**-0.5]
+        Mass-normalised deflections, written along z with modal mass 1.
+    points : ndarray, shape (n_points, dimension) [m]
+    cells : ndarray, shape (n_cells, 2, 3 or 4), point numbers
+    """
+    pyuff, path = _pyuff(), check.path("path", path)
+    n_points = len(points)
+    place = np.column_stack([points, np.zeros((n_points, 3 - points.shape[1]))])
+    node = np.arange(1, n_points + 1)
+    zero, one = np.zeros(n_points, int), np.ones(n_points, int)
+    x, y, z = place.T
+    nodes = {"node_nums": node, "def_cs": zero, "disp_cs": zero, "color": one, "x": x, "y": y, "z": z}
+    sets: list[dict[Any, Any]] = [
+        nodes | {"type": 15},
+        nodes | {"type": 2411},
+    ]  # data set 2411 keeps all digits of the coordinates
+    code = CELL_CODE.get(cells.shape[1] if len(cells) else 0)
+    if code is not None:
+        sets.append({"type": 2412, code: [_element(i, code, cell) for i, cell in enumerate(cells.tolist())]})
+    for i, (frequency, damping) in enumerate(zip(frequencies, damping_ratio)):
+        still = np.zeros(n_points)
+        sets.append(
+            {
+                "type": 55,
+                "id1": f"mode {i + 1}",
+                "id2": "mass-normalised, kg**-0.5",
+                "id3": "NONE",
+                "id4": "NONE",
+                "id5": "NONE",
+                "model_type": STRUCTURAL,
+                "analysis_type": NORMAL_MODE,
+                "data_ch": 2,
+                "spec_data_type": DISPLACEMENT,
+                "data_type": REAL,
+                "n_data_per_node": 3,
+                "r1": still,
+                "r2": still,
+                "r3": shapes[:, i].copy(),
+                "load_case": 1,
+                "mode_n": i + 1,
+                "freq": float(frequency),
+                "modal_m": 1.0,
+                "modal_damp_vis": float(damping),
+                "modal_damp_his": 0.0,
+                "node_nums": node,
+            }
+        )
+    path.unlink(missing_ok=True)
+    pyuff.UFF(str(path)).write_sets(sets, mode="add")
+
+
+def _element(i: int, code: int, cell: list[int]) -> dict[str, Any]:
+    element = {"element_nums": i + 1, "fe_descriptor": code, "phys_table": 1, "mat_table": 1, "color": 1}
+    beam = {"beam_orientation": 0, "beam_foreend_cross": 1, "beam_aftend_cross": 1} if code == CELL_CODE[2] else {}
+    return element | beam | {"num_nodes": len(cell), "nodes_nums": [node + 1 for node in cell]}
+
+
+def read(path: Any, direction: str) -> dict[str, np.ndarray]:
+    """Read frequencies [Hz], damping ratios, mass-normalised shapes and points from a universal file.
+
+    Parameters
+    ----------
+    path : str or Path
+    direction : "x", "y" or "z", the direction in which the body was struck and measured
+
+    Returns
+    -------
+    dict
+        frequencies (n_modes,), damping_ratio (n_modes,), shapes (n_points, n_modes), points (n_points, 1 or 2)
+    """
+    return isolated.read(
+        check.path("path", path),
+        "a universal file",
+        "modes.universal_files:arrays",
+        check.one_of("direction", direction, DIRECTIONS),
+    )
+
+
+def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:
+    """The result of `read`, computed in a separate process (see `isolated`)."""
+    import pyuff
+
+    component = DIRECTIONS[direction]
+    file = pyuff.UFF(str(path))
+    kinds = [int(kind) for kind in file.get_set_types()]
+    sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in WANTED]
+    nodes = [s for s in sets if s["type"] == 2411] or [s for s in sets if s["type"] == 15]
+    modes = [s for s in sets if s["type"] == 55 and s.get("analysis_type") in (2, 3)]
+    if not nodes or not modes:
+        found = ", ".join(str(kind) for kind in sorted(set(kinds))) or "none"
+        raise ValueError(f"{path.name} must hold nodes (15 or 2411) and mode shapes (55); its data sets are {found}")
+    numbers = np.concatenate([np.asarray(s["node_nums"], int) for s in nodes])
+    place = np.concatenate([np.column_stack([s["x"], s["y"], s["z"]]) for s in nodes]).astype(float)
+    measured = np.asarray(modes[0]["node_nums"], int)
+    lost = np.setdiff1d(measured, numbers)
+    if lost.size:
+        raise ValueError(f"{path.name} has shapes at node {lost[0]}, which has no coordinates; export it again")
+    row = {int(number): i for i, number in enumerate(numbers)}
+    points = place[[row[int(n)] for n in measured]]
+    others = [i for i, axis in enumerate("xyz") if axis != direction]
+    spread = np.ptp(points[:, others], axis=0)
+    keep = [i for i, wide in zip(others, spread) if wide > 1e-9 * max(spread.max(), 1e-300)] or others[:1]
+    table = [_mode(path.name, i, mode, component, measured) for i, mode in enumerate(modes)]
+    order = np.argsort([entry[0] for entry in table], kind="stable")
+    result = {
+        "frequencies": np.array([table[i][0] for i in order]),
+        "damping_ratio": np.array([table[i][1] for i in order]),
+        "shapes": np.column_stack([table[i][2] for i in order]),
+        "points": points[:, keep],
+    }
+    if len(result["shapes"]) != len(points):
+        raise ValueError(
+            f"{path.name} has shapes at {len(result['shapes'])} nodes but names {len(points)}; export it again"
+        )
+    for what, values in result.items():
+        if not (np.abs(values) <= check.REACH).all() or (what == "frequencies" and values.min() < 0.0):
+            raise ValueError(f"{path.name} has {what} that are negative, too large or not numbers; export it again")
+    return result
+
+
+def _mode(name: str, i: int, mode: dict, component: str, measured: np.ndarray) -> tuple[float, float, np.ndarray]:
+    """Frequency [Hz], damping ratio and mass-normalised shape of one data set 55."""
+    if not np.array_equal(np.asarray(mode["node_nums"], int), measured):
+        raise ValueError(f"{name} has mode {i + 1} at other nodes than mode 1; export all modes at the same nodes")
+    shape = np.asarray(mode[component])
+    if mode["analysis_type"] == 3:
+        pole, scale = complex(mode["eig"]), complex(mode.get("modal_a") or 0.0)
+        frequency, damping = abs(pole) / (2.0 * np.pi), -pole.real / abs(pole)
+        modal_mass = abs(scale) / (2.0 * abs(pole.imag)) if scale else 0.0  # a normal mode has modal A = 2 i omega_d m
+    else:
+        frequency, damping = float(mode["freq"]), float(mode.get("modal_damp_vis") or 0.0)
+        modal_mass = float(mode.get("modal_m") or 0.0)
+    if modal_mass <= 0.0:
+        raise ValueError(
+            f"{name} states no modal mass for mode {i + 1} at {frequency:g} Hz; "
+            "export mass-normalised shapes with modal mass 1, or use Modes.from_arrays"
+        )
+    if np.iscomplexobj(shape):
+        turn = np.exp(-0.5j * np.angle((shape**2).sum()))
+        shape = shape * turn
+        if np.abs(shape.imag).max() > PHASE * np.abs(shape.real).max():
+            raise ValueError(
+                f"{name} has mode {i + 1} at {frequency:g} Hz with phases far from 0 and 180 degrees; export real modes"
+            )
+        shape = shape.real
+    return frequency, max(damping, 0.0), np.asarray(shape, float) / np.sqrt(modal_mass)

@@ -1,0 +1,175 @@
+"""Strikes one scene with other hammers, contacts and strike points, fast enough to follow a slider."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..impact import accuracy, threshold
+from ..impact.collision import strike
+from ..impact.contact import Contact
+from ..impact.response import Response
+from ..mesh.meshes import Mesh
+from ..model import planner
+from ..modes.modal import Modes, SampledShapes
+from ..scenes import maps
+from ..scenes.scene import Scene
+from ..sweeps import grid
+
+TOLERANCE = 1e-3  # [-] of the blows shown: errors smaller than the plots can show
+MAP_TOLERANCE = 1e-2  # [-] of the blows on the map, which only counts impacts
+FIRST_LOOK = 30  # [-] modes found first, to estimate the number needed
+MOST_MODES = 100  # [-] largest number; the residual compliance replaces the rest, and the page shows the error
+CELLS = {
+    False: 24,
+    True: 10,
+}  # [-] along each axis of the map, without and with loss: contacts with loss are struck one by one
+SPANS = {"mass": 20.0, "stiffness": 1000.0, "speed": 10.0, "bending": 20.0}  # [-] slider end over the scene's value
+EXPONENTS = (1.0, 3.0)  # [-] from a linear spring to a felt-covered head
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the sliders set: the hammer, the contact and the strike point."""
+
+    mass: float  # [kg] of the striker
+    stiffness: float  # [-] 1 gives the scene's contact time on a rigid wall
+    exponent: float  # [-]
+    speed: float  # [m/s]
+    bending: float | None  # [Hz] first bending mode of a stick; None for other strikers
+    at: tuple[float, ...]  # [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """The number of impacts of each hammer and contact at one strike point, and the threshold."""
+
+    mass: np.ndarray  # (n,) [kg]
+    stiffness: np.ndarray  # (n,) [-] as in `Settings`
+    n_impacts: np.ndarray  # (n, n) [stiffness, mass]; -1 if the blow failed
+    threshold: np.ndarray  # (n,) [Hz] contact resonance above which the body stops it (kinetic-energy criterion)
+    limit: np.ndarray  # (n,) [-] stiffness that gives this resonance; NaN if there is none
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A struck body with the hammers and contacts of the sliders."""
+
+    scene: Scene
+    mesh: Mesh
+    base: grid.Case
+
+    @classmethod
+    def of(cls, scene: Scene) -> "Bench":
+        """The bench of a scene, with enough modes for its shortest blow, but at most `MOST_MODES`."""
+        plan = scene.plan(target="modal", n_modes=FIRST_LOOK)
+        first = planner.target(plan, planner.Stages())
+        at = np.atleast_1d(np.asarray(scene.blow.values["at"], float))
+        case = grid.Case(first, scene.make_striker(), scene.make_contact(), at, float(scene.blow.values["speed"]))
+        bench = cls(scene, scene.body(), case)
+        hard = replace(bench.start, stiffness=SPANS["stiffness"] ** 0.5, mass=bench.start.mass / SPANS["mass"] ** 0.5)
+        needed = maps.number_of_modes(first, maps.needed_frequency(bench.case(hard), TOLERANCE))
+        if needed <= first.n_modes:
+            return bench
+        more = planner.target(plan.but(n_modes=min(needed, MOST_MODES)), planner.Stages())
+        return replace(bench, base=replace(case, modes=more))
+
+    @cached_property
+    def start(self) -> Settings:
+        """The settings of the scene itself."""
+        striker, law = self.base.striker, self.base.contact
+        flexible = striker.modes.frequencies[striker.modes.omega > 0.0]
+        bending = float(flexible[0]) if self.scene.striker.kind == "stick" else None
+        return Settings(striker.mass, 1.0, law.exponent, self.base.speed, bending, tuple(self.base.at.tolist()))
+
+    def range(self, name: str) -> tuple[float, float]:
+        """Lowest and highest value of a slider."""
+        if name == "exponent":
+            return min(EXPONENTS[0], self.start.exponent), max(EXPONENTS[1], self.start.exponent)
+        value = getattr(self.start, name)
+        return value / SPANS[name], value * SPANS[name]
+
+    def law(self, settings: Settings) -> Contact:
+        """The contact law for these settings."""
+        start, law = self.start, self.base.contact
+        wanted = accuracy.contact_duration(
+            Contact(law.stiffness, law.exponent), self.base.striker.felt_mass, start.speed
+        )
+        unit = accuracy.contact_duration(Contact(1.0, settings.exponent), self.base.striker.felt_mass, start.speed)
+        same = (unit / wanted) ** (settings.exponent + 1.0)  # contact time ~ stiffness**(-1 / (exponent + 1))
+        return replace(law, stiffness=settings.stiffness * same, exponent=settings.exponent)
+
+    def case(self, settings: Settings, rest: float | None = None) -> grid.Case:
+        """The arguments of `strike`; raises ValueError if the strike point is not on the body.
+
+        ``rest`` [m/N] replaces the residual compliance at the strike point: its static solution would take too long
+        while a slider moves.
+        """
+        case = replace(self.base.changed("mass", settings.mass), contact=self.law(settings))
+        if settings.bending is not None:
+            case = case.changed("striker_frequency", settings.bending)
+        if rest is not None:
+            case = replace(case, modes=self._sampled(settings.at, rest))
+        return case.changed("speed", settings.speed).changed("at", settings.at)
+
+    def _sampled(self, at: tuple[float, ...], rest: float) -> Modes:
+        modes, point = self.base.modes, np.array([at])
+        static = modes.modal_compliance(point) + rest
+        return replace(modes, shapes=SampledShapes(point, modes.shape_at(point), static))
+
+    def residual(self, settings: Settings) -> float:
+        """The residual compliance [m/N] at the strike point."""
+        return float(self.base.modes.residual_compliance([settings.at])[0, 0])
+
+    def picture(self, settings: Settings) -> Picture:
+        """The map at these settings, over every mass and stiffness that the sliders reach."""
+        case = self.case(settings)
+        count = CELLS[case.contact.loss > 0.0]
+        mass, stiffness = (np.geomspace(*self.range(name), count) for name in ("mass", "stiffness"))
+        over = {"stiffness": stiffness * case.contact.stiffness / settings.stiffness, "mass": mass}
+        table = grid.sweep(
+            case.modes, case.striker, case.contact, at=case.at, speed=case.speed, over=over, tolerance=MAP_TOLERANCE,
+            workers=1,
+        )  # fmt: skip
+        there = [self.case(replace(settings, mass=float(value), stiffness=1.0)) for value in mass]
+        found = np.array([limit_of(one) for one in there])
+        ratio = found / np.array([resonance_of(one) for one in there])
+        ratio[~((ratio > 0.0) & (ratio < math.inf))] = math.nan
+        # contact resonance ~ stiffness**(1 / (exponent + 1))
+        return Picture(mass, stiffness, np.asarray(table.n_impacts), found, ratio ** (settings.exponent + 1.0))
+
+    def place(self, x: float, y: float) -> tuple[float, ...] | None:
+        """The strike point under a click; None if the click misses the body."""
+        point = (x, y)[: self.base.modes.dimension]
+        try:
+            return tuple(self.base.modes.points("at", point)[0].tolist())
+        except ValueError:
+            return None
+
+
+def blow(case: grid.Case) -> Response:
+    """The blow of a case; raises SimulationError if the integration fails."""
+    return strike(case.modes, case.striker, case.contact, at=case.at, speed=case.speed, tolerance=TOLERANCE)
+
+
+def resonance_of(case: grid.Case) -> float:
+    """Contact resonance [Hz]: 1 / (2 T), with T the contact time on a rigid wall."""
+    law = Contact(case.contact.stiffness, case.contact.exponent)
+    return 0.5 / accuracy.contact_duration(law, case.striker.felt_mass, case.speed)
+
+
+def limit_of(case: grid.Case) -> float:
+    """Contact resonance [Hz] above which the body stops the striker; 0: always stops, inf: never stops."""
+    found = threshold.threshold_frequency(case.modes, case.at, case.striker.felt_mass)
+    return 0.0 if found is None else found
+
+
+def spectrum(hit: Response, frequencies: np.ndarray) -> np.ndarray:
+    """Magnitude of the force spectrum [N s] by the trapezoidal rule: three times as fast as the exact one."""
+    weights = np.zeros(len(hit.time))
+    weights[1:] = 0.5 * np.diff(hit.time)
+    weights[:-1] += 0.5 * np.diff(hit.time)
+    used = hit.force > 0.0
+    turns = np.exp(-2j * np.pi * np.outer(frequencies, hit.time[used]))  # (n_frequencies, n_times)
+    return np.abs(turns @ (weights * hit.force)[used])

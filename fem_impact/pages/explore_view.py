@@ -1,0 +1,420 @@
+"""Lays out the live page: sliders, the body to click on, the plots that follow, and the sound."""
+
+import html
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from .._base.check import SimulationError
+from ..impact.contact import Contact
+from ..impact.response import Response
+from ..scenes.sentences import RAISED, place, power, si
+from ..show import sound
+from ..sweeps.grid import Case
+from . import report
+from .explore_model import Bench, Picture, Settings, blow, limit_of, resonance_of, spectrum
+
+BAND = (20.0, 20e3)  # [Hz] of the spectrum
+SPECTRUM_POINTS = 240  # [-] more points take time but show no more
+DEPTH = 1e-4  # [-] lower end of the spectrum's axis over its largest value
+PLAYED = 2.0  # [s] of sound
+HEIGHT = 270  # [px] of a picture
+COLOURS = ("#9a958c", "#d6e4f0", "#f0c75e", "#e08a1e", "#a63d0c")  # colours of NAMES, in order
+HERE: dict[str, Any] = {
+    "fill_color": "#d55e00",
+    "line_color": "white",
+    "line_width": 2,
+}  # marker of the current blow on body and map
+NAMES = ("failed", "one impact", "two", "three", "more")
+LABELS = {
+    "mass": "Mass",
+    "stiffness": "Stiffness",
+    "exponent": "Exponent",
+    "speed": "Speed",
+    "bending": "First bending mode",
+}
+STEPS = 200  # [-] per slider
+MOMENT = 8  # [ms] during which slider messages are collected before the next blow
+REST = 200  # [ms] without a change before the map is redrawn: a map takes as long as many blows
+SLIDER = """
+.bk-slider-title { display: none; }
+.said { display: flex; justify-content: space-between; font-size: 14px; }
+.noUi-target { margin-block: 8px; background: color-mix(in srgb, var(--ink) 14%, transparent); border: 0; }
+.noUi-target { box-shadow: none !important; }
+.noUi-connects { background: transparent !important; box-shadow: none !important; border: 0 !important; }
+.noUi-connect { background: var(--accent) !important; }
+.noUi-handle { border-radius: 50%; width: 24px !important; height: 24px !important; top: -9px !important; }
+.noUi-handle::before, .noUi-handle::after { display: none; }
+"""
+FOCUS = """
+.noUi-handle:focus-visible, button:focus-visible { outline: 3px solid #3b8fd4 !important; outline-offset: 2px; }
+button.bk-btn { background: var(--accent) !important; color: var(--paper) !important; font-size: 15px; border: 0; }
+"""
+TICKS = """
+    if (unit === "kg" && Math.abs(tick) < 1) { tick *= 1000; unit = "g" }
+    const power = tick ? Math.max(-5, Math.min(4, Math.floor(Math.log10(Math.abs(tick)) / 3 + 1e-9))) : 0
+    const prefix = ["f", "p", "n", "µ", "m", "", "k", "M", "G", "T"][power + 5]  // as in sentences.py
+    return `${+(tick / 10 ** (3 * power)).toPrecision(3)} ${prefix}${unit}`
+"""
+
+
+class Page:
+    """The page of one browser session: its settings, its plots and the handlers that change them."""
+
+    def __init__(self, document: Any, bench: Bench) -> None:
+        self.document, self.bench, self.settings = document, bench, bench.start
+        self.pool = ThreadPoolExecutor(1)
+        self.drawn: Any = None  # the settings that the map was drawn for
+        self.picture: Picture | None = None
+        self.waiting = self.mapping = False
+        self.hit: Response | None = None
+        self.refined, self.rest = (
+            bench.start.at,
+            bench.residual(bench.start),
+        )  # the point with the exact residual compliance
+
+    def show(self) -> None:
+        """Put everything on the page and strike once."""
+        import jinja2
+        from bokeh.models import ColumnDataSource
+
+        title = self.bench.scene.title or self.bench.scene.path.stem
+        columns = {
+            "force-data": "x y", "spectrum-data": "x y", "cells": "left right bottom top colour", "limit": "x y",
+            "here": "x y", "at": "x y", "sound": "uri note", "said": "name title text",
+        }  # fmt: skip
+        self.sources = {
+            name: ColumnDataSource(name=name, data={column: [] for column in names.split()})
+            for name, names in columns.items()
+        }
+        roots = [self._readout(), self._hands(), self._body(), self._map(), self._force(), self._spectrum()]
+        roots[0].tags = [
+            self.sources["sound"],
+            self.sources["said"],
+        ]  # Bokeh sends only what is attached to the page
+        for root in roots:
+            self.document.add_root(root)
+        environment = jinja2.Environment(loader=jinja2.FileSystemLoader(report.WEB), autoescape=True)
+        self.document.title = title
+        self.document.template = environment.get_template("explore.html")
+        self.document.template_variables.update(
+            heading=title,
+            where=f"at {place(self.bench.scene.points[0])}",
+            legend=list(zip(NAMES, COLOURS)),
+            style=(report.WEB / "explore.css").read_text(encoding="utf-8"),
+            script=(report.WEB / "explore.js").read_text(encoding="utf-8"),
+        )
+        self.document.on_session_destroyed(lambda _: self.pool.shutdown(wait=False, cancel_futures=True))
+        self.update()
+
+    def _readout(self) -> Any:
+        from bokeh.models.widgets import Div
+
+        self.readout = Div(name="readout", sizing_mode="stretch_width")
+        return self.readout
+
+    def _hands(self) -> Any:
+        """Sliders and the button."""
+        from bokeh.layouts import column
+        from bokeh.models import InlineStyleSheet
+        from bokeh.models.widgets import Button, Slider
+
+        sheet = InlineStyleSheet(css=SLIDER + FOCUS)
+        self.sliders: dict[str, Any] = {}
+        for name, label in LABELS.items():
+            value = getattr(self.settings, name)
+            if value is None:
+                continue
+            low, high = self.bench.range(name)
+            if name != "exponent":
+                low, high, value = (math.log10(x) for x in (low, high, value))
+            slider = Slider(
+                name=name, title=label, start=low, end=high, value=value, step=(high - low) / STEPS, show_value=False,
+                sizing_mode="stretch_width", stylesheets=[sheet],
+            )  # fmt: skip
+            slider.on_change("value", partial(self._turned, name))
+            self.sliders[name] = slider
+        low, high = self.bench.mesh.points.min(axis=0), self.bench.mesh.points.max(axis=0)
+        for i, letter in enumerate("xy"[: self.bench.mesh.dimension]):
+            slider = Slider(
+                name=letter, title=f"Strike point {letter}", start=low[i], end=high[i], value=self.settings.at[i],
+                step=(high[i] - low[i]) / STEPS, show_value=False, sizing_mode="stretch_width", stylesheets=[sheet],
+            )  # fmt: skip
+            slider.on_change("value", lambda _attr, _old, _new: self._moved())
+            self.sliders[letter] = slider
+        button = Button(name="listen", label="Strike and listen", button_type="primary", stylesheets=[sheet], height=44)
+        button.sizing_mode = "stretch_width"
+        button.on_click(self._listen)
+        return column(*self.sliders.values(), button, name="hands", sizing_mode="stretch_width")
+
+    def _figure(self, name: str, title: str, x: str, y: str, **options: Any) -> Any:
+        from bokeh.plotting import figure
+
+        made: Any = figure(
+            name=name, title=title, x_axis_label=x, y_axis_label=y, height=HEIGHT, sizing_mode="stretch_width",
+            tools="", toolbar_location=None,
+            background_fill_color=None, border_fill_color=None, **options,
+        )  # fmt: skip
+        made.title.text_font_size = "14px"
+        made.axis.axis_label_text_font_style = "normal"
+        return made
+
+    def _formatted(self, axis: Any, unit: str) -> None:
+        from bokeh.models import CustomJSTickFormatter
+
+        if hasattr(axis.ticker, "desired_num_ticks"):
+            axis.ticker.desired_num_ticks = 4
+        axis.formatter = CustomJSTickFormatter(args={"unit": unit}, code=TICKS)
+
+    def _body(self) -> Any:
+        """The struck body from above, or a beam from the side."""
+        mesh = self.bench.mesh
+        if mesh.dimension == 2:
+            plot = self._figure("body", "Strike point", "x", "y", match_aspect=True)
+            ends = mesh.points[mesh.facets]  # (n_facets, 2, 2)
+            cells = mesh.points[mesh.cells]
+            fill = plot.patches(list(cells[:, :, 0]), list(cells[:, :, 1]), line_width=1)
+            plot.multi_line(list(ends[:, :, 0]), list(ends[:, :, 1]), color="#2b6ea3", line_width=2)
+            self._formatted(plot.yaxis[0], "m")
+        else:
+            low, high = float(mesh.points.min()), float(mesh.points.max())
+            plot = self._figure("body", "Strike point", "x", "", y_range=(-0.2, 0.2))
+            fill = plot.quad(left=[low], right=[high], bottom=[-0.02], top=[0.02])
+            plot.yaxis.visible = plot.ygrid.visible = False
+        fill.glyph.name = "body-fill"
+        self._formatted(plot.xaxis[0], "m")
+        plot.scatter("x", "y", source=self.sources["at"], size=15, **HERE)
+        plot.on_event("tap", self._tapped)
+        return plot
+
+    def _map(self) -> Any:
+        ends = {name: self.bench.range(name) for name in ("mass", "stiffness")}
+        plot = self._figure(
+            "map", "Number of impacts", "mass of the striker", "contact stiffness over the scene's", x_axis_type="log",
+            y_axis_type="log", x_range=ends["mass"], y_range=ends["stiffness"],
+        )  # fmt: skip
+        plot.grid.visible = False
+        plot.quad("left", "right", "bottom", "top", color="colour", line_color="colour", source=self.sources["cells"])
+        plot.line("x", "y", source=self.sources["limit"], line_dash="dashed", line_width=2, color="#1d1c1a")
+        plot.scatter("x", "y", source=self.sources["here"], size=15, **HERE)
+        self._formatted(plot.xaxis[0], "kg")
+        plot.on_event("tap", self._chosen)
+        return plot
+
+    def _force(self) -> Any:
+        plot = self._figure("force", "Contact force", "time", "")
+        plot.line("x", "y", source=self.sources["force-data"], line_width=2).glyph.name = "force-line"
+        self._formatted(plot.xaxis[0], "s")
+        self._formatted(plot.yaxis[0], "N")
+        plot.y_range.start = 0.0
+        return plot
+
+    def _spectrum(self) -> Any:
+        from bokeh.models.annotations import Span
+
+        plot = self._figure(
+            "spectrum", "Spectrum of the force", "frequency", "", x_axis_type="log", y_axis_type="log", x_range=BAND,
+            y_range=(1e-6, 1.0),
+        )  # fmt: skip
+        plot.line("x", "y", source=self.sources["spectrum-data"], line_width=2).glyph.name = "spectrum-line"
+        self.resonance = Span(dimension="height", line_color="#009e73", line_width=2, location=1.0)
+        self.threshold = Span(name="limit-span", dimension="height", line_width=2, line_dash="dashed", location=1.0)
+        plot.add_layout(self.resonance)
+        plot.add_layout(self.threshold)
+        self._formatted(plot.xaxis[0], "Hz")
+        self._formatted(plot.yaxis[0], "N s")
+        return plot
+
+    def _turned(self, name: str, _attribute: str, _old: float, value: float) -> None:
+        self._change(**{name: float(value) if name == "exponent" else 10.0 ** float(value)})
+
+    def _moved(self) -> None:
+        """React to a strike-point slider."""
+        at = tuple(float(self.sliders[letter].value) for letter in "xy" if letter in self.sliders)
+        found = self.bench.place(*at, *([0.0] * (2 - len(at))))
+        if found is not None and found != self.settings.at:
+            self._change(at=found)
+
+    def _tapped(self, event: Any) -> None:
+        found = self.bench.place(float(event.x), float(event.y))
+        if found is not None:
+            self._change(at=found)
+            for letter, value in zip("xy", found):
+                self.sliders[letter].value = value
+
+    def _chosen(self, event: Any) -> None:
+        """Take mass and stiffness from a click on the map."""
+        for name, value in (("mass", event.x), ("stiffness", event.y)):
+            low, high = self.bench.range(name)
+            self.sliders[name].value = math.log10(min(max(float(value), low), high))
+
+    def _change(self, **changes: Any) -> None:
+        """Collect changes for `MOMENT`, then strike once: fast slider moves must not queue up blows."""
+        self.settings = replace(self.settings, **changes)
+        if not self.waiting:
+            self.waiting = True
+            self.document.add_timeout_callback(self.update, MOMENT)
+
+    def update(self) -> None:
+        """Strike with the current settings and show the blow."""
+        self.waiting = False
+        settings = self.settings
+        known = self.refined == settings.at
+        case = self.bench.case(settings, None if known else self.rest)
+        self._label(settings, case.contact)
+        at = settings.at if len(settings.at) > 1 else (*settings.at, 0.0)
+        self._put("at", x=[at[0]], y=[at[1]])
+        self._put("here", x=[settings.mass], y=[settings.stiffness])
+        resonance, limit = resonance_of(case), self._limit(case)
+        self.resonance.location, self.threshold.location = resonance, min(max(limit, 1.0), 1e9)
+        try:
+            self.hit = blow(case)
+        except SimulationError as error:
+            self.hit = None
+            self.readout.text = f"<p>{html.escape(str(error))}</p>"
+        else:
+            self._draw(self.hit)
+            self.readout.text = _told(self.hit, resonance, limit, known)
+        self._remap()
+
+    def _put(self, name: str, **columns: list[float]) -> None:
+        """Replace the data of a source, but only if they differ: each change makes the browser redraw."""
+        if self.sources[name].data != columns:
+            self.sources[name].data = columns
+
+    def _limit(self, case: Case) -> float:
+        """The threshold [Hz], interpolated from the map if that belongs to the same stick and strike point."""
+        picture, settings = self.picture, self.settings
+        if picture is not None and (self.drawn.at, self.drawn.bending) == (settings.at, settings.bending):
+            with np.errstate(all="ignore"):
+                found = np.exp(np.interp(np.log(settings.mass), np.log(picture.mass), np.log(picture.threshold)))
+            if np.isfinite(found) and found > 0.0:
+                return float(found)
+        return limit_of(case)
+
+    def _draw(self, hit: Response) -> None:
+        end = 1.15 * hit.impacts[-1].end if hit.impacts else float(hit.time[-1])
+        shown = hit.time <= end
+        self.sources["force-data"].data = {"x": hit.time[shown], "y": hit.force[shown]}
+        frequencies = np.geomspace(*BAND, SPECTRUM_POINTS)
+        size = spectrum(hit, frequencies)
+        top = float(size.max()) or 1.0
+        self.sources["spectrum-data"].data = {"x": frequencies, "y": np.maximum(size, 0.1 * DEPTH * top)}
+        self.document.get_model_by_name("spectrum").y_range.update(start=DEPTH * top, end=2.0 * top)
+
+    def _label(self, settings: Settings, law: Contact) -> None:
+        raised = "" if settings.exponent == 1.0 else f"{settings.exponent:.3g}".translate(RAISED)
+        said = {
+            "mass": si(settings.mass, "kg", 3),
+            "stiffness": si(law.stiffness, "N/m", 3) + raised,
+            "exponent": f"{settings.exponent:.3g}",
+            "speed": si(settings.speed, "m/s", 3),
+            "bending": si(settings.bending or 0.0, "Hz", 3),
+        }
+        said |= {letter: si(value, "m", 3) for letter, value in zip("xy", settings.at)}
+        shown = [name for name in said if name in self.sliders]
+        self.sources["said"].data = {
+            "name": shown,
+            "title": [self.sliders[name].title for name in shown],
+            "text": [said[name] for name in shown],
+        }
+
+    def _remap(self) -> None:
+        """If the map no longer fits the settings, recompute it in the background once the sliders rest."""
+        if not self.mapping and self._background() != self.drawn:
+            self.mapping = True
+            self._entitle_map()
+            self.document.add_timeout_callback(self._begin_map, REST)
+
+    def _background(self) -> Settings:
+        """The settings with mass and stiffness reset, because the map covers both."""
+        return replace(self.settings, mass=self.bench.start.mass, stiffness=1.0)
+
+    def _begin_map(self) -> None:
+        wanted = self._background()
+
+        def work() -> None:
+            rest = self.bench.residual(wanted)
+            self.document.add_next_tick_callback(lambda: self._refine(wanted.at, rest))
+            try:
+                picture = self.bench.picture(wanted)
+            except (SimulationError, ValueError):
+                picture = None
+            self.document.add_next_tick_callback(lambda: self._mapped(wanted, picture))
+
+        self.pool.submit(work)
+
+    def _refine(self, at: tuple[float, ...], rest: float) -> None:
+        """Store the residual compliance of a new strike point and strike again: its blows are exact from now on."""
+        if self.refined != at:
+            self.refined, self.rest = at, rest
+            self.update()
+
+    def _entitle_map(self) -> None:
+        self.document.get_model_by_name("map").title.text = "Number of impacts" + ", computing …" * self.mapping
+
+    def _mapped(self, wanted: Settings, picture: Picture | None) -> None:
+        self.mapping, self.drawn, self.picture = False, wanted, picture
+        if picture is not None:
+            self.sources["cells"].data = _quads(picture)
+            self.sources["limit"].data = {"x": picture.mass, "y": picture.limit}
+        self._entitle_map()
+        self.update()  # recomputes the map if the settings changed meanwhile
+
+    def _listen(self) -> None:
+        if self.hit is None:
+            return
+        heard = sound.synthesise(self.hit, self.bench.scene.points[0], duration=PLAYED)
+        level = heard.peak_level
+        raised = max(0.0, report.QUIET - level) if math.isfinite(level) else 0.0
+        note = f"Full scale is {heard.full_scale:g} {heard.unit}; peak {level:.1f} dB"
+        note += f", raised here by {raised:.1f} dB." if raised else "."
+        uri = report.audio(heard.samples * 10.0 ** (raised / 20.0), heard.rate)
+        self.sources["sound"].data = {"uri": [uri], "note": [note.replace("-", "−")]}
+
+
+def _told(hit: Response, resonance: float, limit: float, exact: bool) -> str:
+    """The blow in numbers, as HTML; without an error until the compliance of a new strike point is known."""
+    error = "refining …" if not exact else power(hit.error.total) if hit.error.resolvable else "not resolvable"
+    ratio = (
+        "body always stops it"
+        if not limit
+        else "body never stops it"
+        if math.isinf(limit)
+        else f"{resonance / limit:.2g} × threshold"
+    )
+    cells = [
+        ("impacts", str(hit.n_impacts)),
+        ("peak force", si(hit.peak_force, "N", 3)),
+        ("time in contact", si(hit.contact_time, "s", 3)),
+        ("restitution", f"{hit.restitution:.3f}".replace("-", "−")),
+        ("contact resonance", f"{si(resonance, 'Hz', 3)}, {ratio}"),
+        ("estimated error", error),
+    ]
+    items = "".join(
+        f'<div style="min-width:4.5em"><div style="font-size:12px;opacity:.75">{name}</div>'
+        f'<div style="font-size:17px;font-weight:600">{html.escape(value)}</div></div>'
+        for name, value in cells
+    )
+    return f'<div style="display:flex;flex-wrap:wrap;gap:4px 22px">{items}</div>'
+
+
+def _quads(picture: Picture) -> dict[str, Any]:
+    """Every cell of the map as a coloured rectangle."""
+    edges = []
+    for values in (picture.mass, picture.stiffness):
+        step = (values[1] / values[0]) ** 0.5
+        edges.append(np.append(values / step, values[-1] * step))
+    n = len(picture.mass)
+    colour = np.array(COLOURS)[np.clip(np.where(picture.n_impacts > 0, picture.n_impacts, 0), 0, len(COLOURS) - 1)]
+    return {
+        "left": np.tile(edges[0][:-1], n),
+        "right": np.tile(edges[0][1:], n),
+        "bottom": np.repeat(edges[1][:-1], n),
+        "top": np.repeat(edges[1][1:], n),
+        "colour": colour.reshape(-1).tolist(),
+    }

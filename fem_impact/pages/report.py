@@ -1,0 +1,365 @@
+"""Writes one self-contained HTML page about a strike: the scene, the errors, the results and the sound."""
+
+import base64
+import csv
+import io
+import json
+import math
+import os
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.io import wavfile
+
+from .._base import check, markup
+from .._base.files import replacing
+from ..impact.response import Response
+from ..scenes.scene import Run, Scene, load_scene, scene_of
+from ..scenes.schema import PATHS, fault, read_bytes
+from ..scenes.sentences import place, power, si, tidy, words
+from ..show import export, sampling, sound
+
+BAND = (10.0, 20e3)  # [Hz] of the spectrum shown: roughly the audible range; more if LOBES asks for it
+LOBES = 3.0  # [-] the spectrum reaches at least LOBES / duration of the shortest impact
+SPECTRUM_POINTS = 1000  # [-] about one per pixel
+ENERGY_TIMES = 400  # [-] times at which the energies are drawn
+FRAMES = 72  # [-] frames of the wave: three seconds at 24 per second
+SHAPES = 12  # [-] mode shapes shown
+DIGITS = 6  # [-] of the numbers in the plots; the downloads have full precision
+QUIET = -20.0  # [dB] re full scale: a quieter sound is offered again, amplified
+DISTANCE = 1.0  # [m] from the plate to the default listener
+PLAYED = 3.0  # [s] longest sound, to keep the page small
+MOST_POINTS = 4  # [-] largest number of observation points with a sound player
+WEB = Path(__file__).parent / "web"
+
+
+@check.typed
+def read(path: str | Path) -> Scene:
+    """Read the scene from a TOML file or from a result of `fem-impact strike` (response.json or its folder).
+
+    File names in the scene are relative to the file that contains them. Raises ValueError if the extra ``web`` is
+    missing, so that the user learns it before the work and not after it.
+    """
+    _tools()
+    path = check.path("path", path)
+    if path.is_dir():
+        path = path / "response.json"
+    if path.suffix.lower() != ".json":
+        return load_scene(path)
+    try:
+        data = json.loads(read_bytes(path).decode("utf-8", "replace"))
+        if isinstance(data, dict) and isinstance(data.get("scene"), dict):
+            return _whole(scene_of(data["scene"], path, folder=path.parent))
+    except (json.JSONDecodeError, RecursionError):  # RecursionError: lists nested too deeply
+        pass
+    raise fault(path, "not a result of `fem-impact strike`; give its response.json, or the scene's TOML file")
+
+
+def _whole(scene: Scene) -> Scene:
+    """The scene of a result, if the mesh or drawing of its body still exists."""
+    for source in (scene.mesh.values[key] for key in PATHS if key in scene.mesh.values):
+        if not os.path.isfile(source):  # unlike Path.is_file, returns False for invalid file names too
+            raise fault(
+                scene.path, f"the file of the struck body is missing: restore {source}, or give the scene's TOML file"
+            )
+    return scene
+
+
+def _tools() -> list[Any]:
+    return [check.extra(module, "web", "a report") for module in ("jinja2", "plotly.offline")]
+
+
+@check.typed
+def write(path: str | Path, scene: Scene, run: Run) -> None:
+    """Write the page of a strike.
+
+    Parameters
+    ----------
+    path : str or Path
+        The HTML file to write.
+    scene : Scene
+    run : Run
+        From `Scene.run` with ``target="modal"``: the page shows the motion of the body.
+
+    Raises
+    ------
+    ValueError
+        If the extra ``web`` is not installed, or ``run`` has no modes.
+    """
+    jinja2, plotly = _tools()
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(WEB), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
+    )
+    response = run.response
+    if run.plan.target != "modal":
+        raise ValueError(f"run must have target 'modal' because a report shows motion, got {run.plan.target!r}")
+    page = environment.get_template("report.html").render(
+        title=scene.title or scene.path.stem,
+        words=words(scene, response),
+        picture=scene.picture(),
+        observed=bool(scene.watched),
+        verdict=response.outcome,
+        tiles=_tiles(response),
+        error=_errors(response),
+        modelled=_modelled(response, run),
+        reasons=map(tidy, (*run.plan.reasons, *run.notes)),
+        impacts=response.impacts,
+        energies=_shares(response),
+        sounds=_sounds(scene, response),
+        files=_downloads(scene, run),
+        versions=export.versions(),
+        command=_command(scene, response),
+        force_picture=_force_picture(response),
+        data=_script_text(_plots(response)),
+        plotly=plotly.get_plotlyjs(),
+        style=(WEB / "report.css").read_text(encoding="utf-8"),
+        script=(WEB / "report.js").read_text(encoding="utf-8"),
+        si=si,
+        power=power,
+    )
+    with replacing(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def _command(scene: Scene, response: Response) -> str:
+    """The command that reproduces the blow; for a result, the report command."""
+    path = shlex.quote(str(scene.path))
+    if scene.path.suffix.lower() == ".json":
+        return f"fem-impact report {path}"
+    return f"fem-impact strike {path} --target modal --tolerance {response.tolerance:g}"
+
+
+def _tiles(response: Response) -> list[tuple[str, str]]:
+    met = response.error.total <= response.tolerance
+    total = power(response.error.total) if response.error.resolvable else "not resolvable"
+    return [
+        ("impacts", str(response.n_impacts)),
+        ("peak force", si(response.peak_force, "N")),
+        ("time in contact", si(response.contact_time, "s")),
+        ("impulse", si(response.impulse, "N s")),
+        ("restitution", f"{response.restitution:.4f}"),
+        ("estimated error" if met else "estimated error, above tolerance", total),
+    ]
+
+
+def _errors(response: Response) -> dict[str, Any]:
+    error = response.error
+    shares = [
+        ("time step", error.step, "from a second run of the same blow"),
+        ("modes left out", error.truncation, "from a run with fewer modes"),
+        ("finite elements", error.mesh, "from the frequency errors, weighted by energy"),
+    ]
+    scale = max(response.tolerance, *(value for _, value, _ in shares))
+    return {
+        "rows": [
+            {"name": name, "value": value, "how": how, "part": max(0.0, min(1.0, value / scale))}
+            for name, value, how in shares
+        ],
+        "total": error.total,
+        "tolerance": response.tolerance,
+        "met": error.total <= response.tolerance,
+        "resolvable": error.resolvable,
+        "energy": response.energy_error,
+    }
+
+
+def _modelled(response: Response, run: Run) -> list[tuple[str, str]]:
+    modes, took = response.target, sum(run.seconds.values())
+    return [
+        ("modes of the struck body", f"{modes.n_modes}, up to {si(modes.frequencies[-1], 'Hz')}"),
+        ("time steps", f"{len(response.history.steps)}, scheme {response.scheme}"),
+        ("computing time", f"{si(took, 's', 3)}: " + ", ".join(f"{k} {si(x, 's', 3)}" for k, x in run.seconds.items())),
+    ]
+
+
+def _shares(response: Response) -> list[dict[str, Any]]:
+    energies = response.energies
+    total = sum(max(value, 0.0) for value in energies.values()) or 1.0
+    return [
+        {
+            "name": "struck body" if name == "target" else name,
+            "key": name,
+            "joule": value,
+            "part": max(value, 0.0) / total,
+        }
+        for name, value in energies.items()
+    ]
+
+
+def _force_picture(response: Response) -> str:
+    said = f"Contact force over time: {response.n_impacts} impacts, peak {si(response.peak_force, 'N')}"
+    shown = response.time <= sampling.end_of(response)
+    return markup.curve(response.time[shown], response.force[shown], label="force", unit="N", title=said)
+
+
+@dataclass(frozen=True)
+class Player:
+    """One sound on the page."""
+
+    name: str
+    note: str
+    uri: str
+
+
+def _sounds(scene: Scene, response: Response) -> list[Player]:
+    """The sound at each observation point and, for a plate, at the listener (default: `DISTANCE` from the plate)."""
+    heard = [
+        (f"Motion at {place(point)}", sound.synthesise(response, point, duration=_duration(response)))
+        for point in scene.points[:MOST_POINTS]
+    ]
+    if response.target.dimension == 2:
+        listener = scene.listener or [*np.asarray(response.at).tolist(), DISTANCE]
+        where = f" to {place(listener)}" if scene.listener else f", {DISTANCE:g} m in front of the strike point"
+        pressure = sound.radiate(response, listener, duration=_duration(response))
+        heard.append((f"Sound radiated{where}", pressure))
+    players = []
+    for name, samples in heard:
+        level = samples.peak_level
+        stated = f"peak {samples.said}; full scale is {samples.full_scale:g} {samples.unit} in every report"
+        players.append(Player(name, stated, audio(samples.samples, samples.rate)))
+        if -math.inf < level < QUIET:
+            raised = samples.samples * 10.0 ** (-level / 20.0)
+            players.append(
+                Player(name, f"the same sound amplified by {-level:.1f} dB to full scale", audio(raised, samples.rate))
+            )
+    return players
+
+
+def _duration(response: Response) -> float:
+    decay = response.target.damping_ratio * response.target.omega
+    slowest = float(decay[response.target.omega > 0.0].min(initial=np.inf))
+    return float(np.clip(sound.DECAY / slowest, sound.SHORTEST, PLAYED)) if slowest > 0.0 else PLAYED
+
+
+def audio(samples: np.ndarray, rate: int) -> str:
+    """A data URI with the samples as a 16-bit WAV file, for the page's player."""
+    file = io.BytesIO()
+    wavfile.write(file, rate, np.round(32767.0 * np.clip(samples, -1.0, 1.0)).astype(np.int16))
+    return _uri("audio/wav", file.getvalue())
+
+
+def _downloads(scene: Scene, run: Run) -> list[dict[str, str]]:
+    response = run.response
+    frequencies = _frequencies(response)
+    spectrum = response.spectrum(frequencies)
+    changes = {"tolerance": response.tolerance}
+    data = {**export.numbers(response), "scene": scene.data(**changes), "seconds": dict(run.seconds)}
+    data |= {"plan": run.plan.data(), "notes": list(run.notes), "versions": export.versions()}
+    texts = {
+        "response.json": ("application/json", json.dumps(export.plain(data), indent=2, allow_nan=False)),
+        "force.csv": ("text/csv", _csv(("time [s]", response.time), ("force [N]", response.force))),
+        "spectrum.csv": (
+            "text/csv",
+            _csv(("frequency [Hz]", frequencies), ("real [N s]", spectrum.real), ("imaginary [N s]", spectrum.imag)),
+        ),
+        "modes.csv": (
+            "text/csv",
+            _csv(("frequency [Hz]", response.target.frequencies), ("damping ratio [-]", response.target.damping_ratio)),
+        ),
+    }
+    return [
+        {"name": name, "size": si(len(text.encode()), "B", 3), "uri": _uri(kind, text.encode())}
+        for name, (kind, text) in texts.items()
+    ]
+
+
+def _csv(*columns: tuple[str, np.ndarray]) -> str:
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow([name for name, _ in columns])
+    writer.writerows(zip(*(values.tolist() for _, values in columns)))
+    return file.getvalue()
+
+
+def _uri(kind: str, raw: bytes) -> str:
+    return f"data:{kind};base64,{base64.b64encode(raw).decode('ascii')}"
+
+
+def _script_text(data: Mapping[str, Any]) -> str:
+    """JSON with ``<`` escaped, so that it cannot close the script element around it."""
+    return json.dumps(export.plain(data), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _plots(response: Response) -> dict[str, Any]:
+    """The data that the page's script draws: histories, spectrum, energies, and shapes as packed integers."""
+    modes = response.target
+    end = sampling.end_of(response)
+    shown = response.time <= end
+    frequencies = _frequencies(response)
+    times = np.linspace(0.0, end, ENERGY_TIMES)
+    energy = [_energy(response, times, body) for body in (0, -1)]
+    moving = (modes.omega > 0.0) & (modes.frequencies < 2.0 * frequencies[-1])
+    last = response.impacts[-1].end if response.impacts else 0.0
+    return {
+        "force": {"x": _short(response.time[shown]), "y": _short(response.force[shown])},
+        "impacts": [[impact.start, impact.end] for impact in response.impacts],
+        "spectrum": {"x": _short(frequencies), "y": _short(np.abs(response.spectrum(frequencies)))},
+        "natural": _short(modes.frequencies[(modes.omega > 0.0) & (modes.frequencies < frequencies[-1])]),
+        "energy": {
+            "x": _short(times),
+            "striker": _short(energy[0].sum(axis=1)),
+            "body": _short(energy[1].sum(axis=1)),
+            "rest": _short(energy[0][0].sum() - energy[0].sum(axis=1) - energy[1].sum(axis=1)),
+        },
+        "modal": {
+            "x": _short(modes.frequencies[moving]),
+            "y": _short(_energy(response, np.array([last]), -1)[0, moving]),
+        },
+        "view": _view(response, end),
+    }
+
+
+def _frequencies(response: Response) -> np.ndarray:
+    shortest = min((impact.duration for impact in response.impacts), default=1.0)
+    return np.geomspace(BAND[0], max(BAND[1], LOBES / shortest), SPECTRUM_POINTS)
+
+
+def _energy(response: Response, times: np.ndarray, body: int) -> np.ndarray:
+    """Energy [J] of each mode of a body, (n_times, n_modes)."""
+    q, p = response.modal_state(times, body=body)
+    return 0.5 * (p**2 + (response.bodies[body].omega * q) ** 2)
+
+
+def _view(response: Response, end: float) -> dict[str, Any]:
+    """The body as a surface, its motion over time and its first mode shapes, for the 3-D views."""
+    modes = response.target
+    points, cells, surface = sampling.surface(modes)
+    rows = modes.shapes.at(points)  # (n_points, n_modes), evaluated once: finding the elements is the slow part
+    times = np.linspace(0.0, end, FRAMES)
+    wave = response.modal_state(times)[0] @ rows.T  # (n_times, n_points)
+    assert response.at is not None
+    struck = response.displacement(response.at[None], times)
+    count = min(SHAPES, modes.n_modes)
+    shapes = rows[:, :count].T / np.maximum(np.abs(rows[:, :count]).max(axis=0), 1e-300)[:, None]
+    edge = surface[markup.rim(cells)]  # (n_sides, 2, 2)
+    return {
+        "x": _short(surface[:, 0]),
+        "y": _short(surface[:, 1]),
+        "cells": cells.T.tolist(),
+        "rim": [[x for a, b in edge[:, :, i].tolist() for x in (a, b, None)] for i in (0, 1)],
+        "at": [float(response.at[0]), float(response.at[1]) if modes.dimension == 2 else 0.0],
+        "times": _short(times),
+        "first": sampling.telling(response, times),
+        "surface": _short(struck[:, 0]),
+        "gap": _short(sampling.gap(response, times)),
+        "wave": _packed(wave),
+        "shapes": _packed(shapes),
+        "frequencies": _short(modes.frequencies[:count]),
+        "damping": _short(modes.damping_ratio[:count]),
+    }
+
+
+def _packed(rows: np.ndarray) -> dict[str, Any]:
+    """Rows as little-endian 16-bit integers and their unit: a tenth of the size of text."""
+    step = float(np.abs(rows).max(initial=0.0)) / 32767.0 or 1.0
+    raw = np.ascontiguousarray(np.round(rows / step).astype("<i2")).tobytes()
+    return {"step": step, "rows": len(rows), "data": base64.b64encode(raw).decode("ascii")}
+
+
+def _short(values: np.ndarray) -> list[float]:
+    """Numbers rounded to `DIGITS` digits, more than a screen can show."""
+    return [float(f"{value:.{DIGITS}g}") for value in np.asarray(values, float).tolist()]

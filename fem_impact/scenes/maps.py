@@ -1,0 +1,357 @@
+"""Maps of scenes: finds the modes they need, adds contact resonance and threshold, and writes pictures and files."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray
+
+from .._base import check
+from ..impact import accuracy, threshold
+from ..impact.contact import Contact
+from ..model import planner
+from ..show import figures, plots
+from ..sweeps import grid, hammers
+from .scene import Scene
+from .schema import MAKERS, Part
+
+FIRST_LOOK = 40  # [-] modes found first, to estimate how many a map needs
+MOST_MODES = 300  # [-] most modes used to choose a hammer; residual compliance replaces the others
+FORMATS = ("nc", "zarr")
+FILES = (".nc", ".zarr", ".csv", ".png")  # a folder name must not end like this
+MOST_ROWS = 10**6  # [-] a larger map gets no CSV file
+PICTURED = {  # layers drawn for a map with two axes: name in the picture
+    "n_impacts": "number of impacts",
+    "contact_time": "time in contact",
+    "restitution": "restitution",
+    "peak_force": "peak force",
+    "centroid": "spectral centroid",
+}
+RESONANCES = tuple(m * 10.0**e for e in range(6) for m in (1, 2, 5))  # [Hz] levels of the contours
+
+
+@check.typed
+def map_scene(
+    scene: Scene,
+    *,
+    over: Mapping[str, Any] | None = None,
+    max_frequency: float | None = None,
+    tolerance: float | None = None,
+    **wanted: Any,
+) -> xarray.Dataset:
+    """Strike a scene for every combination of parameters.
+
+    Parameters
+    ----------
+    scene : Scene
+    over : mapping of key to values, optional
+        Axes as in `sweep`, or any other number of the scene, written ``section.thickness``; the body is rebuilt for
+        each of its values. By default the axes of the scene's table [map].
+    max_frequency : float [Hz], optional
+        Upper end of the band of the spectral centroid.
+    tolerance : float [-], optional
+        Replaces the tolerance of the scene.
+    **wanted
+        ``workers``, ``client``, ``store``, ``watch``, ``max_cells`` and ``tell`` of `sweep`.
+
+    Returns
+    -------
+    xarray.Dataset
+        As from `sweep`, with two more layers: ``contact_resonance`` [Hz], one over twice the contact time of a rigid
+        striker on a rigid wall; and ``threshold`` [Hz], the contact resonance above which the body stops the striker
+        by the kinetic-energy criterion (NaN if the striker never rebounds or is never stopped).
+    """
+    table = {} if scene.map is None else scene._make("map", scene.map)
+    over = table.get("over", {}) if over is None else over
+    if not isinstance(over, Mapping) or not all(isinstance(name, str) for name in over):
+        raise ValueError(f"over must map the names of axes to their values, got {check.shown(over)}")
+    band = table.get("max_frequency") if max_frequency is None else max_frequency
+    limit = scene.blow.values.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance
+    limit = check.between("tolerance", limit, 1e-12, 1.0)
+    if not over:
+        raise ValueError(
+            f'{scene.path}: [map] is missing; add it and name the axes, as in over = {{ "striker.mass" = [0.01, 0.1] }}'
+        )
+    quick = {name: values for name, values in over.items() if grid.ALIASES.get(name, name) in grid.AXES}
+    slow = {name: list(values) for name, values in over.items() if name not in quick}
+    for name in slow:
+        _check_key(scene, name)
+    if not quick:
+        quick = {"strike.speed": [scene.blow.values["speed"]]}
+    law = scene.make_contact()
+    grid.admit(
+        math.prod(len(values) for values in over.values()), len(grid.LAYERS), wanted.pop("max_cells", grid.MOST_CELLS),
+        quick=law.loss == 0.0 and law.exponent >= 1.0 and not {"loss", "contact.loss"} & set(over),
+        tell=wanted.pop("tell", None),
+    )  # fmt: skip
+    pieces = []
+    store = wanted.pop("store", None)
+    for number, chosen in enumerate(product(*slow.values())):
+        changed = scene
+        for name, value in zip(slow, chosen):
+            changed = changed_scene(changed, name, value)
+        own = store if store is None or not slow else Path(store).with_name(f"{Path(store).name}-{number}")
+        pieces.append(_quick_map(changed, quick, band, limit, {**wanted, "store": own, "max_cells": check.REACH}))
+    result = _joined(pieces, slow)
+    result.attrs["scene"] = json.dumps(
+        {**scene.data(), "map": {name: list(map(_plain, v)) for name, v in over.items()}}
+    )
+    result.attrs["title"] = scene.title or str(scene.path.name)
+    return result
+
+
+def changed_scene(scene: Scene, key: str, value: Any) -> Scene:
+    """The scene with one number replaced; ``key`` is table.key."""
+    table, name = key.split(".", 1)
+    field = "blow" if table == "strike" else table
+    part = getattr(scene, field) or Part()
+    change: dict[str, Any] = {field: Part(part.kind, {**part.values, name: _plain(value)})}
+    return replace(scene, **change)
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+
+
+def _check_key(scene: Scene, key: str) -> None:
+    known = [f"{t}.{k}" for t in MAKERS for k in getattr(getattr(scene, t, None), "values", {})]
+    if key not in known:
+        names = [*grid.AXES, *grid.ALIASES, *known]
+        raise ValueError(f"{scene.path}: [map] over: {key} is not an axis{check.nearest(key, names)}")
+
+
+def _quick_map(
+    scene: Scene, over: Mapping[str, Any], band: float | None, tolerance: float, wanted: Mapping[str, Any]
+) -> xarray.Dataset:
+    """A map whose axes do not need a new body."""
+    law, striker, blow = scene.make_contact(), scene.make_striker(), scene.blow.values
+    case = grid.Case(scene.modes(FIRST_LOOK), striker, law, np.atleast_1d(np.asarray(blow["at"], float)), blow["speed"])
+    axes = grid.checked_axes(case, over)
+    needed = max(
+        needed_frequency(corner, tolerance) * case.modes.frequencies[-1] / corner.modes.frequencies[-1]
+        for corner in _corners(case, axes)
+    )
+    modes = case.modes
+    if needed > modes.frequencies[-1]:
+        number, most = number_of_modes(modes, needed), planner.MOST_MODES[scene.source]
+        if number > most:
+            raise check.SimulationError(
+                f"{scene.path}: the shortest blow of the map needs about {number} modes, at most {most} are allowed; "
+                "allow a larger tolerance, or leave out the stiffest contacts and the lightest strikers"
+            )
+        modes = scene.modes(number)
+    case = replace(case, modes=modes)
+    table = grid.sweep(
+        modes, striker, law, at=blow["at"], speed=blow["speed"], over=over, tolerance=tolerance, max_frequency=band,
+        residual=blow.get("residual", True), **wanted,
+    )  # fmt: skip
+    return with_theory(table, case, axes)
+
+
+def _corners(case: grid.Case, axes: Mapping[str, np.ndarray]) -> Iterator[grid.Case]:
+    """The blows at every combination of the ends of the axes."""
+    ends = [values if name == "at" else np.unique([values.min(), values.max()]) for name, values in axes.items()]
+    for chosen in product(*ends):
+        corner = case
+        for name, value in zip(axes, chosen):
+            corner = corner.changed(name, value)
+        yield corner
+
+
+def needed_frequency(case: grid.Case, tolerance: float) -> float:
+    """Frequency [Hz] up to which a blow needs modes to meet the tolerance."""
+    return accuracy.cutoff_frequency(
+        case.modes, case.at, contact=case.contact, mass=case.striker.felt_mass, speed=case.speed,
+        tolerance=planner.SHARE * tolerance,
+    )  # fmt: skip
+
+
+def number_of_modes(first: Any, frequency: float) -> int:
+    """Approximate number of modes up to a frequency [Hz], from the first modes by Weyl's law."""
+    growth = (frequency / first.frequencies[-1]) ** (0.5 * first.dimension)
+    return math.ceil(1.1 * first.n_modes * growth)
+
+
+def with_theory(table: xarray.Dataset, case: grid.Case, axes: Mapping[str, np.ndarray]) -> xarray.Dataset:
+    """Add ``contact_resonance`` and ``threshold`` [Hz] to a map, each along the axes it depends on."""
+    for name, needs, find, meaning in (
+        (
+            "contact_resonance",
+            ("mass", "striker_frequency", "stiffness", "exponent", "speed"),
+            _resonance,
+            "one over twice the contact time on a rigid wall",
+        ),
+        (
+            "threshold",
+            ("mass", "striker_frequency", "at", "target_mass", "target_frequency"),
+            _threshold,
+            "contact resonance above which the struck body stops the striker",
+        ),
+    ):
+        mine = {axis: values for axis, values in axes.items() if axis in needs}
+        found = np.empty([len(values) for values in mine.values()])
+        for place in np.ndindex(*found.shape):
+            cell = case
+            for (axis, values), i in zip(mine.items(), place):
+                cell = cell.changed(axis, values[i])
+            found[place] = find(cell)
+        table[name] = (tuple(mine), found, {"units": "Hz", "long_name": meaning})
+    return table
+
+
+def _resonance(case: grid.Case) -> float:
+    law = Contact(case.contact.stiffness, case.contact.exponent)
+    return 0.5 / accuracy.contact_duration(law, case.striker.felt_mass, case.speed)
+
+
+def _threshold(case: grid.Case) -> float:
+    found = threshold.threshold_frequency(case.modes, case.at, case.striker.felt_mass)
+    return math.nan if found is None or math.isinf(found) else found
+
+
+def _joined(pieces: Sequence[xarray.Dataset], slow: Mapping[str, Sequence[Any]]) -> xarray.Dataset:
+    """Join the pieces along the axes that rebuild the body; the last of these axes varies fastest."""
+    rows = list(pieces)
+    for name, values in reversed(list(slow.items())):
+        numeric = all(isinstance(value, (int, float, np.number)) for value in values)
+        index = xarray.IndexVariable(name, np.asarray(values, float) if numeric else np.arange(len(values)))
+        count = len(values)
+        rows = [
+            xarray.concat(
+                rows[i : i + count], index, data_vars="all", coords="minimal", join="override", combine_attrs="override"
+            )
+            for i in range(0, len(rows), count)
+        ]
+    return rows[0]
+
+
+def draw(
+    table: xarray.Dataset,
+    layer: str,
+    marks: Sequence[plots.Mark] = (),
+    *,
+    limits: tuple[float | None, float | None] = (None, None),
+    **wanted: Any,
+) -> Any:
+    """Draw one layer of a map with two axes in colour, with contours of contact resonance and threshold.
+
+    Parameters
+    ----------
+    table : xarray.Dataset
+        From `map_scene` or `with_theory`; its title becomes that of the picture.
+    layer : str
+    marks : sequence of Mark
+    limits : (low, high), optional
+        Values at the ends of the colour scale; by default the extremes of the layer.
+    **wanted
+        Arguments of `plots.colour_map` that replace those chosen here.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    values = table[layer]
+    if values.ndim != 2:
+        raise ValueError(f"layer must have two axes to be drawn, got {', '.join(map(str, values.dims))}; select two")
+    size = np.asarray(values, float)
+    size = size[np.isfinite(size) & (size > 0.0)]
+    log = layer != "n_impacts" and size.size == values.size and size.max() > 5.0 * size.min()
+    label = PICTURED.get(layer, layer)
+    if "max_frequency" in values.attrs:
+        label += f" up to {values.max_frequency:g} Hz"
+    chosen: dict[str, Any] = {
+        "x": _axis(table, values.dims[1]),
+        "y": _axis(table, values.dims[0]),
+        "colour": plots.Axis(label, _unit(values), log=bool(log), limits=limits),
+        "contours": _contours(table, values),
+        "marks": marks,
+        "title": str(table.attrs.get("title", "")),
+    }
+    return plots.colour_map(_in_grams(values.where(table.n_impacts >= 0)), **{**chosen, **wanted})
+
+
+def _contours(table: xarray.Dataset, values: xarray.DataArray) -> list[Any]:
+    """Contours of contact resonance, and of where it equals the threshold, as far as they cross the map."""
+    resonance = table.contact_resonance.broadcast_like(values).transpose(*values.dims)
+    if np.ptp(resonance.values) == 0.0:
+        return []
+    shown = [f for f in RESONANCES if resonance.min() < f < resonance.max()]
+    found: list[Any] = [(resonance, shown, "Hz", "contact resonance")]
+    limit = (resonance / table.threshold).transpose(*values.dims)
+    if float(limit.min()) < 1.0 < float(limit.max()):
+        found.append((limit, [1.0], "", "threshold: the body stops the striker"))
+    return found
+
+
+def _axis(table: xarray.Dataset, name: Any) -> plots.Axis:
+    """How to draw an axis: logarithmic if its values are evenly spaced in the logarithm."""
+    if name not in table.coords:  # points of a plate have two coordinates each
+        parts = [table[f"{name}_{letter}"].values for letter in "xyz" if f"{name}_{letter}" in table.coords]
+        names = [f"({', '.join(f'{x:.3g}' for x in point)})" for point in zip(*parts)]
+        return plots.Axis("strike point [m]", names=tuple(names or map(str, range(table.sizes[name]))))
+    place = table[name]
+    values = np.asarray(place, float)
+    steps = np.diff(np.log(values)) if (values > 0.0).all() else np.zeros(0)
+    log = len(steps) > 1 and np.allclose(steps, steps[0], rtol=1e-3)
+    return plots.Axis(str(place.attrs.get("long_name", name)), _unit(place), log=bool(log))
+
+
+def _in_grams(values: xarray.DataArray) -> xarray.DataArray:
+    """Convert masses along axes to grams, because SI prefixes do not go with kg."""
+    heavy = {name: 1e3 * values[name] for name in values.dims if name in values.coords and _unit(values[name]) == "g"}
+    return values.assign_coords(heavy)
+
+
+def _unit(values: xarray.DataArray) -> str:
+    unit = str(values.attrs.get("units", ""))
+    power = unit.partition("**")[2]
+    return {"1": "", "kg": "g"}.get(unit, unit.replace(f"**{power}", f"$^{{{power}}}$") if power else unit)
+
+
+def can_write(form: str, folder: Path | None = None) -> str:
+    """Check that a map can be written, before any work is done; return the format."""
+    if folder is not None and folder.suffix.lower() in FILES:
+        raise ValueError(
+            f"--out must name a folder for map.nc, map.csv and pictures, got {folder}; "
+            f"give {folder.with_suffix('')}, and --format zarr for map.zarr"
+        )
+    if check.one_of("format", form, FORMATS) == "zarr":
+        check.extra("zarr", "cluster", "format zarr")
+    return form
+
+
+def write(folder: Path, table: xarray.Dataset, form: str = "nc") -> list[str]:
+    """Write map.nc or map.zarr, map.csv and, for a map with two axes, a picture of each layer; return the names.
+
+    A map of more than MOST_ROWS cells gets no CSV file: it would be slow to write and useless.
+    """
+    form = can_write(form)
+    names = [f"map.{form}"]
+    if form == "nc":
+        table.to_netcdf(folder / names[0], engine="scipy")
+    else:
+        table.to_zarr(folder / names[0], zarr_format=2)  # version 3 has no standard for text yet
+    if table.n_impacts.size <= MOST_ROWS:
+        names.append("map.csv")
+        table.to_dataframe().to_csv(folder / "map.csv")
+    if len(table.n_impacts.dims) == 2:
+        for layer in PICTURED:
+            if layer in table and bool((table.n_impacts >= 0).any()):
+                figures.save(folder / f"{layer}.png", draw(table, layer))
+                names.append(f"{layer}.png")
+    return names
+
+
+@check.typed
+def hammers_for(scene: Scene, bandwidth: float, masses: Any, *, drop: float = 10.0) -> tuple[hammers.Hammer, ...]:
+    """What each hammer can do at the strike point of a scene; the scene's own striker is ignored."""
+    at, first = scene.blow.values["at"], scene.modes(FIRST_LOOK)
+    needed = hammers.highest_frequency(first, at, bandwidth, masses, drop=drop)
+    number = min(number_of_modes(first, needed), MOST_MODES)
+    modes = scene.modes(number) if number > first.n_modes else first
+    return hammers.choose(modes, at, bandwidth, masses, drop=drop)

@@ -1,0 +1,220 @@
+"""The format of a scene file: its tables, their keys, and the public functions they call."""
+
+import inspect
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from .. import mesh
+from .._base import check
+from ..fe.section import Beam, Material, Plate
+from ..impact import collision
+from ..impact.contact import Contact
+from ..impact.striker import Striker
+from ..show import sound
+
+LARGEST_FILE = 1_000_000  # [byte] a scene is written by hand, so a larger file is a mistake
+
+
+@dataclass(frozen=True)
+class Part:
+    """One table of a scene: the kind of function it calls, and the arguments."""
+
+    kind: str = ""
+    values: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+
+
+def _beam(material: Material, *, width: Any = None, height: Any = None, diameter: Any = None) -> Beam:
+    if diameter is not None and width is None and height is None:
+        return Beam.circular(material, diameter=diameter)
+    if diameter is not None or width is None or height is None:
+        raise ValueError("width and height must both be given, or diameter alone")
+    return Beam.rectangular(material, width=width, height=height)
+
+
+def _sphere(*, radius: float, E: float, nu: float, rho: float) -> Striker:
+    return Striker.sphere(Material(E=E, nu=nu, rho=rho), radius)
+
+
+def target_values(*, mass=None, first_frequency=None, nu=0.3, damping_ratio=0.0, source="auto") -> dict[str, Any]:
+    """Check the table [target]: mass and first frequency to scale to, nu without a material, damping and source."""
+    check.between("nu", nu, -1.0, 0.5)
+    check.non_negative("damping_ratio", damping_ratio)
+    scale = {"mass": (mass, "kg"), "first_frequency": (first_frequency, "Hz")}
+    given = {name: check.positive(name, value, unit) for name, (value, unit) in scale.items() if value is not None}
+    return {
+        "scale": given,
+        "nu": nu,
+        "damping_ratio": damping_ratio,
+        "source": check.one_of("source", source, SOURCES),
+    }
+
+
+def _observe(*, points: Any = None, listener: Any = None) -> None:
+    if points is None and listener is None:
+        raise ValueError("points or listener must be given; add one or leave out the table")
+    if points is not None and (not isinstance(points, list) or not points):
+        raise ValueError(f"points must be a list of points such as [[0.1, 0.2]], got {check.shown(points)}")
+    if listener is not None:
+        sound.beside(listener)
+
+
+def map_values(*, over: Any, max_frequency: Any = None) -> dict[str, Any]:
+    """Check the table [map]: the values along each axis, and the upper end of the centroid's band [Hz]."""
+    if not isinstance(over, dict) or not over:
+        raise ValueError(f'over must be a table of axes such as "striker.mass" = [0.05, 0.1], got {check.shown(over)}')
+    band = None if max_frequency is None else check.positive("max_frequency", max_frequency, "Hz")
+    return {"over": {name: _along(name, values) for name, values in over.items()}, "max_frequency": band}
+
+
+def _along(name: str, values: Any) -> np.ndarray:
+    """Values along an axis: a list, or a range {from, to, count, scale}."""
+    if isinstance(values, list):
+        return np.array(values)
+    if not isinstance(values, dict) or not {"from", "to", "count"} <= set(values) <= {"from", "to", "count", "scale"}:
+        raise ValueError(
+            f"{name} must be a list or {{ from, to, count, scale = 'linear' or 'log' }}, got {check.shown(values)}"
+        )
+    low, high = check.number(f"{name}.from", values["from"]), check.number(f"{name}.to", values["to"])
+    count = check.count(f"{name}.count", values["count"], high=MOST_VALUES)
+    if check.one_of(f"{name}.scale", values.get("scale", "linear"), ("linear", "log")) == "linear":
+        return np.linspace(low, high, count)
+    return np.geomspace(check.positive(f"{name}.from", low), check.positive(f"{name}.to", high), count)
+
+
+MOST_VALUES = 10**6  # [-] most values along one axis of a map
+SOURCES = ("auto", "fe", "analytic")
+# Functions that build each part of a scene; their arguments are the keys of its table.
+# The first entry is the key that selects the function, '' if there is only one.
+MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
+    "mesh": (
+        "shape",
+        {
+            "rectangle": mesh.rectangle,
+            "disk": mesh.disk,
+            "polygon": mesh.polygon,
+            "outline": mesh.outline,
+            "line": mesh.line,
+            "file": mesh.load,
+        },
+    ),
+    "material": ("", {"": Material}),
+    "section": ("kind", {"plate": Plate, "beam": _beam}),
+    "target": ("", {"": target_values}),
+    "striker": ("kind", {"rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick}),
+    "contact": (
+        "kind",
+        {
+            "linear": Contact.linear,
+            "hertz": Contact.hertz,
+            "power": Contact.power,
+            "restituting": Contact.restituting,
+            "between": Contact.between,
+        },
+    ),
+    "strike": ("", {"": collision.strike}),
+    "observe": ("", {"": _observe}),
+    "map": ("", {"": map_values}),
+}
+TABLES = [*MAKERS, "supports"]
+REQUIRED = ("mesh", "striker", "contact", "strike")
+SUPPLIED = {"material", "modes", "striker", "contact", "sphere", "plate"}  # arguments that come from other tables
+SUPPORTS = ("clamped", "hinged", "free")
+PATHS = ("source", "path")  # keys that name a file, relative to the scene file
+
+
+def fault(path: Path, text: str) -> ValueError:
+    """A ValueError of one line that names the file; cleans the text, as a scene may come from an untrusted source."""
+    return ValueError(f"{check.line(str(path))}: {check.line(text)}")
+
+
+def read_tables(path: Path) -> dict[str, Any]:
+    """Tables of a TOML file as plain dicts; ValueError of one line if it is not valid TOML."""
+    raw = read_bytes(path)
+    try:
+        return tomllib.loads(raw.decode("utf-8"))
+    except UnicodeDecodeError:
+        raise fault(path, "a scene must be UTF-8 text; save it in that encoding") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise fault(path, f"not valid TOML: {error}") from None
+
+
+def read_bytes(path: Path) -> bytes:
+    """Contents of a scene or result file; if it does not exist, the ValueError suggests the nearest name."""
+    if not path.is_file():  # refuses folders, and pipes that may never end
+        folder = path.parent
+        near = [name.name for name in islice(folder.iterdir(), 1000)] if folder.is_dir() else []
+        raise fault(path, f"there is no such file{check.nearest(path.name, near)}")
+    with open(path, "rb") as file:
+        raw = file.read(LARGEST_FILE + 1)
+    if len(raw) > LARGEST_FILE:
+        raise fault(path, f"the file must be smaller than {LARGEST_FILE} bytes; check that it is a scene")
+    return raw
+
+
+def read_part(path: Path, table: str, values: dict[str, Any], folder: Path) -> Part:
+    """Read one table and check its keys against the arguments of its function; ValueError names file, table and key.
+
+    File names in the table are relative to ``folder``.
+    """
+
+    def wrong(text: str) -> ValueError:
+        return fault(path, f"[{table}] {text}")
+
+    try:
+        bad = _not_finite(values)
+    except RecursionError:
+        raise wrong("is nested too deeply") from None
+    if bad:
+        raise wrong(f"{bad[0]} must be finite, got {bad[1]}")
+    if table == "supports":
+        for edge, support in values.items():
+            if support not in SUPPORTS:
+                raise wrong(f"{edge} must be one of {', '.join(SUPPORTS)}, got {check.shown(support)}")
+        return Part("", MappingProxyType(values))
+    selector, makers = MAKERS[table]
+    values = dict(values)
+    if selector and selector not in values:
+        raise wrong(f"{selector} is missing; it is one of {', '.join(makers)}")
+    kind = values.pop(selector) if selector else ""
+    try:
+        check.one_of(selector, kind, makers)
+        _check_keys(selector, kind, values, makers[kind])
+    except ValueError as error:
+        raise wrong(str(error)) from None
+    if table == "mesh":
+        values.update({key: str(folder / values[key]) for key in PATHS if key in values})
+    return Part(kind, MappingProxyType(values))
+
+
+def _check_keys(selector: str, kind: str, values: dict[str, Any], maker: Callable[..., Any]) -> None:
+    arguments = {n: p for n, p in inspect.signature(maker).parameters.items() if n not in SUPPLIED}
+    known = [selector, *arguments] if selector else list(arguments)
+    for key in values:
+        if key not in arguments:
+            hint = check.nearest(key, known) or f"; it has {', '.join(known)}"
+            raise ValueError(f"{key} is not a key of this table{hint}")
+    for key, argument in arguments.items():
+        if argument.default is inspect.Parameter.empty and key not in values:
+            raise ValueError(f"{key} is missing" + (f" for {selector} = {kind!r}" if selector else ""))
+    for key in PATHS:
+        if key in values and selector == "shape" and not isinstance(values[key], str):
+            raise ValueError(f"{key} must be the name of a file, got {check.shown(values[key])}")
+
+
+def _not_finite(value: Any, name: str = "") -> tuple[str, float] | None:
+    """Name and value of the first number in nested data that is not finite; None if all are."""
+    if isinstance(value, dict):
+        found = (_not_finite(item, f"{name}.{key}" if name else str(key)) for key, item in value.items())
+    elif isinstance(value, list):
+        found = (_not_finite(item, f"{name}[{i}]") for i, item in enumerate(value))
+    else:
+        return (name, value) if isinstance(value, float) and not math.isfinite(value) else None
+    return next((hit for hit in found if hit), None)

@@ -1,0 +1,114 @@
+"""Describes a scene in sentences, and writes numbers as a person would."""
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+
+from ..impact import accuracy, threshold
+from ..impact.contact import Contact
+from ..impact.response import Response
+from .scene import Scene
+
+PREFIX = "fpnµm kMGT"
+NBSP = "\N{NO-BREAK SPACE}"  # keeps a number and its unit on one line
+NUMBER = re.compile(  # numbers with a unit or an exponent; counts and names stay as they are
+    r"(?<![\w.])(\d+(?:\.\d+)?(?:e[+-]?\d+)?) (Hz|s|m|kg|m/\(N s\))(?![\w/])"
+    r"|(?<![\w.])(\d+(?:\.\d+)?e[+-]?\d+)(?![\w.])"
+)
+RAISED = str.maketrans("-.0123456789", "⁻·⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def si(value: float, unit: str, digits: int = 4) -> str:
+    """A number with an SI prefix: 0.0041273 s becomes 4.127 ms."""
+    if unit == "kg" and abs(value) < 1.0:
+        value, unit = 1e3 * value, "g"
+    elif unit == "kg" and abs(value) >= 1e3:
+        value, unit = 1e-3 * value, "t"
+    if not value or not math.isfinite(value):
+        return f"{value:g}{NBSP}{unit}".replace("inf", "∞")
+    rounded = abs(float(f"{value:.{digits}g}"))  # rounded first: 0.99996 m must become 1 m, not 1000 mm
+    power = 0 if unit == "kg" else int(np.clip(math.floor(math.log10(rounded) / 3.0 + 1e-12), -5, 4))
+    return f"{value * 10.0 ** (-3 * power):.{digits}g}{NBSP}{PREFIX[power + 5].strip()}{unit}".replace("-", "−")
+
+
+def power(value: float) -> str:
+    """A number as a power of ten: 4.5 · 10⁻⁶."""
+    if not value or not math.isfinite(value):
+        return f"{value:g}".replace("inf", "∞")
+    digits, exponent = f"{value:.1e}".split("e")
+    size = f"10{str(int(exponent)).translate(RAISED)}"
+    return size if digits == "1.0" else f"{digits.removesuffix('.0')} · {size}"
+
+
+def tidy(text: str) -> str:
+    """A sentence with readable numbers: 1.34e+04 Hz becomes 13.4 kHz, 4.5e-03 becomes 4.5 · 10⁻³."""
+
+    def written(found: re.Match) -> str:
+        number, unit, bare = found.groups()
+        return power(float(bare)) if bare else si(float(number), unit)
+
+    return NUMBER.sub(written, text)
+
+
+def place(point: Any) -> str:
+    """Coordinates of a point with their unit."""
+    numbers = [f"{x:.4g}".replace("-", "−") for x in np.atleast_1d(point)]
+    return (f"({', '.join(numbers)})" if len(numbers) > 1 else numbers[0]) + f"{NBSP}m"
+
+
+def words(scene: Scene, response: Response) -> list[str]:
+    """Describe the scene in a few sentences."""
+    modes, striker, law = response.target, response.striker, response.contacts[0]
+    low, high = (f(modes.shapes.grid()[0], axis=0) for f in (np.min, np.max))
+    extent = " × ".join(si(x, "m") for x in high - low)
+    kind = {1: "beam", 2: "plate"}[modes.dimension]
+    if scene.mesh.kind == "disk":
+        kind, extent = "disk", f"{si(2.0 * scene.mesh.values['radius'], 'm')} diameter"
+    flexible = modes.frequencies[modes.omega > 0.0]
+    held = dict(scene.supports.values) or {"boundary": "free"}
+    if len(set(held.values())) == 1 and ("boundary" in held or len(held) == len(scene.body().edges) - 1):
+        edges = next(iter(held.values())) + (" all round" if modes.dimension == 2 else " at both ends")
+    else:
+        edges = ", ".join(f"{how} at the edge “{name}”" for name, how in held.items())
+    ratio = modes.damping_ratio[modes.omega > 0.0]
+    damping = "without damping" if not ratio.any() else f"damped by {100 * ratio[0]:.3g} % of critical"
+    body = (
+        f"A {kind} of {extent}, {si(modes.mass, 'kg')}, {edges}; its first flexible mode is at "
+        f"{si(flexible[0], 'Hz')}, {damping}."
+    )
+    assert striker is not None
+    arrives = {
+        "stick": f"a stick of {si(striker.mass, 'kg')}, hinged at its far end",
+        "sphere": f"a ball of {si(striker.mass, 'kg')}",
+        "rigid": f"a rigid mass of {si(striker.mass, 'kg')}",
+    }[scene.striker.kind]
+    if scene.striker.kind == "stick":
+        bending = striker.modes.frequencies[striker.modes.omega > 0.0][0]
+        arrives += f" (effective mass {si(striker.felt_mass, 'kg')} at the tip; first bending mode {si(bending, 'Hz')})"
+    blow = f"It is struck at {place(response.at)} by {arrives}, moving at {si(response.speed, 'm/s')}."
+    raised = "" if law.exponent == 1.0 else f"{law.exponent:g}".translate(RAISED)
+    stiffness = si(law.stiffness, "N/m") + raised
+    contact = f"The contact is a spring that only pushes, with a force of {stiffness} × indentation{raised}"
+    contact += f", with loss {law.loss:.3g} s/m." if law.loss else "."
+    return [body, blow, contact, _single_or_multiple(response, law)]
+
+
+def _single_or_multiple(response: Response, law: Contact) -> str:
+    """What the kinetic-energy criterion predicts for the blow."""
+    assert response.striker is not None
+    mass = response.striker.felt_mass
+    resonance = 0.5 / accuracy.contact_duration(Contact(law.stiffness, law.exponent), mass, response.speed)
+    limit = threshold.threshold_frequency(response.target, response.at, mass)
+    said = f"On a rigid wall the contact would resonate at {si(resonance, 'Hz', 3)}. "
+    if limit is None:
+        return said + "Here not even the softest contact rebounds: the body is no heavier than the striker."
+    if math.isinf(limit):
+        return said + "By the kinetic-energy criterion the striker rebounds however hard the contact."
+    side = "below" if resonance < limit else "above"
+    times = f"{resonance / limit:.2g}" if resonance > 0.01 * limit else power(resonance / limit)
+    return said + (
+        f"By the kinetic-energy criterion the body stops the striker above {si(limit, 'Hz', 3)}; this blow is {side} "
+        f"that, at {times} times the threshold."
+    )

@@ -1,0 +1,338 @@
+"""Writes files: mode shapes and motion for ParaView, sound, tables, and numbers as JSON."""
+
+import base64
+import csv
+import json
+import math
+import platform
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from scipy.io import wavfile
+
+from .._base import check
+from .._base.files import replacing, staged
+from ..impact.response import Response
+from ..modes import universal_files
+from ..modes.modal import Modes
+from . import sampling, sound
+
+__all__ = [
+    "numbers",
+    "plain",
+    "staged",
+    "versions",
+    "vtk_ending",
+    "write_animation",
+    "write_force",
+    "write_json",
+    "write_uff",
+    "write_vtk",
+    "write_wav",
+]
+
+CENTROID_BAND = 20e3  # [Hz] upper end of the spectral centroid's band: about the limit of hearing
+PACKAGES = ("fem-impact", "numpy", "scipy", "scikit-fem", "netgen-mesher", "numba")
+WARP = 0.1  # [-] largest deflection of the warp vector over the body's extent
+CELL_TYPE = {1: 1, 2: 3, 3: 5}  # number of points: VTK's code for a vertex, line or triangle
+KIND = {"f": "Float64", "i": "Int64", "u": "UInt8"}
+MOST_FRAMES = 1000  # [-] most frames of an animation: 0.2 GB
+DISTINCT = 1e-9  # [-] relative spacing given to equal frequencies, because a collection drops equal times
+
+
+@check.typed
+def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, times: Any = None) -> None:
+    """Write mode shapes, or the motion after a strike, for ParaView and pyvista.
+
+    Parameters
+    ----------
+    path : path ending in .vtu (one file) or .pvd (a collection, its parts in a folder of the same name)
+        Modes in a .vtu: one point array ``mode_001`` ... per mode, with all frequencies as field data. Modes in a
+        .pvd: one part per mode, with its frequency as time value and field data, ``shape`` [kg**-0.5] and a ``warp``
+        vector for display. Motion: one part per time (a .vtu takes only one time), with ``displacement`` [m] and
+        ``velocity`` [m/s] of the kept modes; the contact ``force`` [N] and, for a strike, the position of the
+        ``striker`` [m] as field data.
+    modes : Modes
+    response : Response, optional
+        Write its motion instead of the mode shapes; ``modes`` must then be those of the struck body.
+    times : array_like, shape (n_times,) [s], optional
+        Times of the motion; required with response.
+
+    Raises
+    ------
+    ValueError
+        If the path has another ending, or times are missing.
+    """
+    path = check.path("path", path)
+    suffix = vtk_ending(path)
+    points, cells = sampling.grid(modes)
+    if response is None:
+        parts = _mode_parts(modes, points)
+        stamps = _distinct(modes.frequencies)
+    else:
+        if times is None:
+            raise ValueError("times must be given with response, as an array in s")
+        stamps = check.array("times", times, (None,), "s", lift=True)
+        parts = _motion_parts(response, points, stamps)
+    if suffix == ".pvd":
+        _write_collection(path, points, cells, parts, stamps)
+    elif response is None:
+        arrays = {f"mode_{i + 1:03d}": part[0]["shape"] for i, part in enumerate(parts)}
+        _write_vtu(path, points, cells, arrays, {"frequency": modes.frequencies, "damping_ratio": modes.damping_ratio})
+    elif len(parts) == 1:
+        _write_vtu(path, points, cells, *parts[0])
+    else:
+        raise ValueError(f"times must be one time for a .vtu, got {len(parts)}; write a .pvd")
+
+
+@check.typed
+def write_animation(path: str | Path, modes: Modes, mode: int, *, frames: int = 24) -> None:
+    """Write one period of a mode's vibration for ParaView and pyvista to play.
+
+    Parameters
+    ----------
+    path : path ending in .pvd; its parts go to a folder of the same name
+        One part per frame, with its time [s] as time value and the vector ``warp``, at most a tenth of the body's
+        extent.
+    modes : Modes
+    mode : int, number of the mode, from 1
+    frames : int, number of frames, evenly spaced over the period
+
+    Raises
+    ------
+    ValueError
+        If the path has another ending, or the mode does not exist or is a rigid motion.
+    """
+    path = check.path("path", path)
+    if vtk_ending(path) != ".pvd":
+        raise ValueError(f"path must end in .pvd to hold several times, got {str(path)!r}")
+    if check.count("mode", mode) > modes.n_modes:
+        raise ValueError(f"mode must be at most {modes.n_modes}, got {mode}")
+    frequency = float(modes.frequencies[mode - 1])
+    if frequency == 0.0:
+        raise ValueError(f"mode must be a flexible mode, but mode {mode} is a rigid motion; take a higher one")
+    turns = np.arange(check.count("frames", frames, low=2, high=MOST_FRAMES)) / frames
+    points, cells = sampling.grid(modes)
+    arrays, fields = _mode_parts(modes, points)[mode - 1]
+    parts = [({"warp": np.cos(2.0 * np.pi * turn) * arrays["warp"]}, fields) for turn in turns]
+    _write_collection(path, points, cells, parts, turns / frequency)
+
+
+def vtk_ending(path: str | Path) -> str:
+    """Ending of a path, if `write_vtk` can write it; ValueError otherwise."""
+    return check.one_of("path ending", check.path("path", path).suffix, (".vtu", ".pvd"))
+
+
+@check.typed
+def write_uff(path: str | Path, modes: Modes) -> None:
+    """Write mode shapes as a universal file for modal-test programs: nodes (15, 2411), cells (2412), shapes (55).
+
+    The deflection is in z, normalised to modal mass 1; numbers have six digits. Needs pyuff:
+    ``pip install 'fem-impact[uff]'``. `Modes.from_uff` reads the file back.
+    """
+    if modes.dimension == 0:
+        raise ValueError("modes must be those of a plate or beam, got a rigid mass, which has no shape to write")
+    points, cells = modes.shapes.grid()
+    with replacing(path) as temporary:
+        universal_files.write(temporary, modes.frequencies, modes.damping_ratio, modes.shape_at(points), points, cells)
+
+
+@check.typed
+def write_wav(
+    path: str | Path, response: Response, at: Any = None, *, listener: Any = None, **options: Any
+) -> sound.Sound:
+    """Write the sound of a blow as 32-bit float WAV and return it.
+
+    The sound is the velocity of the point ``at`` (see `sound.synthesise`) or, with a ``listener``, the pressure near a
+    plate (see `sound.radiate`); ``options`` go to that function.
+    """
+    if listener is None:
+        heard = sound.synthesise(response, at, **options)
+    else:
+        heard = sound.radiate(response, listener, **options)
+    with replacing(path) as temporary:
+        wavfile.write(temporary, heard.rate, heard.samples.astype(np.float32))
+    return heard
+
+
+@check.typed
+def write_force(path: str | Path, response: Response) -> None:
+    """Write the force history as CSV in full precision: a header with units, then one row per instant."""
+    with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["time [s]", "force [N]"])
+        writer.writerows(zip(response.time.tolist(), response.force.tolist()))
+
+
+@check.typed
+def write_json(path: str | Path, data: dict[str, Any]) -> None:
+    """Write plain data as JSON that every reader accepts, without NaN or infinity (see `plain`)."""
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(plain(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "sensitivity", "total", "resolvable")
+
+
+@check.typed
+def numbers(response: Response) -> dict[str, Any]:
+    """All scalars of a response by name, in SI units, and its impacts."""
+    error = response.error
+    return {
+        "response": {
+            "n_impacts": response.n_impacts,
+            "contact_time": response.contact_time,
+            "peak_force": response.peak_force,
+            "impulse": response.impulse,
+            "restitution": response.restitution,
+            "speed": response.speed,
+            "spectral_centroid": {
+                "value": _centroid(response),
+                "max_frequency": CENTROID_BAND,
+            },
+            "energies": response.energies,
+            "dissipated": response.dissipated,
+            "energy_error": response.energy_error,
+            "momentum_error": response.momentum_error,
+            "error": {name: getattr(error, name) for name in ERROR_PARTS},
+            "tolerance": response.tolerance,
+            "finished": response.finished,
+            "scheme": response.scheme,
+            "n_modes": response.target.n_modes,
+            "max_frequency": response.target.frequencies[-1],
+        },
+        "impacts": [
+            {"start": hit.start, "end": hit.end, "peak_force": hit.peak_force, "impulse": hit.impulse}
+            for hit in response.impacts
+        ],
+    }
+
+
+def _centroid(response: Response) -> float | None:
+    """Spectral centroid; None without contact, or if the blow is too long for a band up to CENTROID_BAND."""
+    try:
+        return response.spectral_centroid(CENTROID_BAND)
+    except ValueError:
+        return None
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that compute the numbers."""
+    return {"python": platform.python_version(), **{name: metadata.version(name) for name in PACKAGES}}
+
+
+def plain(value: Any) -> Any:
+    """The same data as dicts, lists, strings and finite numbers; NaN and infinity become None."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    return str(value)
+
+
+def _mode_parts(modes: Modes, points: np.ndarray) -> list[tuple[dict, dict]]:
+    shapes = modes.shapes.at(points)  # (n_points, n_modes)
+    extent = float(np.ptp(points, axis=0).max(initial=0.0)) or 1.0
+    largest = np.abs(shapes).max(axis=0, initial=0.0)
+    warp = np.zeros((modes.n_modes, len(points), 3))
+    warp[:, :, 2] = (shapes * (WARP * extent / np.where(largest > 0.0, largest, 1.0))).T
+    return [
+        (
+            {"shape": shapes[:, i].copy(), "warp": warp[i]},
+            {"mode": i + 1, "frequency": modes.frequencies[i], "damping_ratio": modes.damping_ratio[i]},
+        )
+        for i in range(modes.n_modes)
+    ]
+
+
+def _motion_parts(response: Response, points: np.ndarray, times: np.ndarray) -> list[tuple[dict, dict]]:
+    moves = []
+    # Kept modes only: the residual dip would need a static solution for every grid point. `shapes.at` also accepts the
+    # midpoints of chords along a hole, which lie just off the body.
+    rows = response.target.shapes.at(points)  # (n_points, n_modes)
+    for state in response.modal_state(times):
+        vector = np.zeros((len(times), len(points), 3))
+        vector[:, :, 2] = state @ rows.T  # (n_times, n_points)
+        moves.append(vector)
+    fields: list[dict[str, Any]] = [{"time": t} for t in times]
+    for i in range(response.history.n_contacts):
+        name = "force" if response.history.n_contacts == 1 else f"force_{i + 1}"
+        for field, force in zip(fields, response.history.force_at(times, i)[0]):
+            field[name] = force
+    if response.striker is not None and response.at is not None:
+        striker = response.striker
+        tip = response.displacement(striker.at[None] if striker.modes.dimension else None, times, body=0)[:, 0]
+        for field, way in zip(fields, tip):
+            place = np.zeros((1, 3))
+            place[0, : len(response.at)], place[0, 2] = response.at, way
+            field["striker"] = place
+    return [({"displacement": d, "velocity": v}, field) for d, v, field in zip(*moves, fields)]
+
+
+def _distinct(stamps: np.ndarray) -> np.ndarray:
+    result = np.array(stamps, float)
+    for i in range(1, len(result)):
+        result[i] = max(result[i], result[i - 1] + DISTINCT * max(result[i - 1], 1.0))
+    return result
+
+
+def _write_collection(path: Path, points, cells, parts: list[tuple[dict, dict]], stamps: np.ndarray) -> None:
+    """Write the parts first and the collection last, so that it never names a missing file."""
+    folder = path.with_suffix("")
+    folder.mkdir(exist_ok=True)
+    lines = []
+    for i, ((arrays, fields), stamp) in enumerate(zip(parts, stamps)):
+        name = f"{path.stem}_{i + 1:03d}.vtu"
+        _write_vtu(folder / name, points, cells, arrays, {**fields, "TimeValue": stamp})
+        file = quoteattr(f"{folder.name}/{name}")
+        lines.append(f'<DataSet timestep="{float(stamp)!r}" group="" part="0" file={file}/>')
+    with replacing(path) as temporary:
+        body = "\n".join(lines)
+        text = f'<VTKFile type="Collection" version="0.1">\n<Collection>\n{body}\n</Collection>\n</VTKFile>\n'
+        temporary.write_text('<?xml version="1.0"?>\n' + text, encoding="utf-8")
+
+
+def _write_vtu(path: Path, points: np.ndarray, cells: np.ndarray, arrays: dict, fields: dict) -> None:
+    """Write a binary VTK XML unstructured grid; meshio would drop the field data, and pyvista would load all of VTK."""
+    spatial = np.zeros((len(points), 3))
+    spatial[:, : points.shape[1]] = points
+    offsets = np.arange(1, len(cells) + 1) * cells.shape[1]
+    types = np.full(len(cells), CELL_TYPE[cells.shape[1]], np.uint8)
+    field_data = "".join(_data_array(k, np.atleast_1d(v), tuples=True) for k, v in fields.items())
+    point_data = "".join(_data_array(k, v) for k, v in arrays.items())
+    geometry = _data_array("Points", spatial)
+    cell_data = "".join(
+        _data_array(name, array)
+        for name, array in (("connectivity", cells.reshape(-1)), ("offsets", offsets), ("types", types))
+    )
+    text = (
+        '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
+        'header_type="UInt64">\n<UnstructuredGrid>\n'
+        f"<FieldData>\n{field_data}</FieldData>\n"
+        f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(cells)}">\n'
+        f"<PointData>\n{point_data}</PointData>\n<Points>\n{geometry}</Points>\n<Cells>\n{cell_data}</Cells>\n"
+        "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
+    )
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _data_array(name: str, values: Any, tuples: bool = False) -> str:
+    array = np.asarray(values)
+    kind = KIND[array.dtype.kind]
+    raw = np.ascontiguousarray(array, dtype=np.dtype(kind.lower()).newbyteorder("<")).tobytes()
+    text = base64.b64encode(len(raw).to_bytes(8, "little") + raw).decode("ascii")
+    shape = f' NumberOfTuples="{len(array)}"' if tuples else ""
+    width = f' NumberOfComponents="{array.shape[1]}"' if array.ndim == 2 else ""
+    return f'<DataArray type="{kind}" Name={quoteattr(name)}{shape}{width} format="binary">{text}</DataArray>\n'

@@ -1,0 +1,277 @@
+"""Plots of a blow in one style: safe for colour-blind readers, SI units on every axis, no screen needed."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from cycler import cycler
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter
+
+from .._base import check, markup
+from .._base.files import replacing
+from ..impact import spectra
+from ..impact.response import Response
+from ..modes.modal import Modes
+from . import sampling
+
+# Okabe and Ito's palette: distinct for all common kinds of colour vision, and in print.
+BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
+STYLE: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.titlesize": 10.0,
+    "axes.titlelocation": "left",
+    "axes.prop_cycle": cycler(color=[BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY]),
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.5,
+    "legend.frameon": False,
+    "savefig.dpi": 150.0,
+}
+SPECTRUM_BAND = (10.0, 20e3)  # [Hz] default band: about what people hear
+SPECTRUM_POINTS = 1200  # [-] frequencies in a spectrum: about one per pixel
+SPECTRUM_DEPTH = 1e-4  # [-] bottom of the spectrum axis: 80 dB below the largest value
+MOST_NUMBERS = 20  # [-] with more contacts than this, the numbers would overlap and are left out
+HEADROOM = 1.15  # [-] top of the force axis over the peak force: leaves room for the numbers
+TIMES = 800  # [-] instants in the plot of energies
+MODE_DEPTH = 1e-8  # [-] bottom of the energy axis: 80 dB below the most energetic mode
+FLAT = 1e-9  # [-] a shape below this share of its largest deflection is zero up to rounding
+MARGIN = 0.1  # [-] time shown before and after the blow, over its duration
+
+
+@contextmanager
+def _styled(width: float, height: float) -> Iterator[Figure]:
+    with matplotlib.rc_context(STYLE):
+        yield Figure(figsize=(width, height), layout="constrained")
+
+
+@check.typed
+def save(path: str | Path, figure: Figure) -> None:
+    """Write a figure; the ending of the path sets the format (.png, .pdf, .svg)."""
+    endings = [f".{name}" for name in figure.canvas.get_supported_filetypes()]
+    check.one_of("path ending", check.path("path", path).suffix.lower(), endings)
+    with matplotlib.rc_context(STYLE), replacing(path) as temporary:
+        figure.savefig(temporary)
+
+
+@check.typed
+def force(response: Response, *, band: tuple[float, float] = SPECTRUM_BAND) -> Figure:
+    """Plot the contact force over time, and the magnitude of its spectrum over frequency.
+
+    Parameters
+    ----------
+    response : Response
+    band : (low, high) [Hz] of the spectrum shown
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Contacts are shaded and numbered; ticks at the bottom of the spectrum mark the modes of the struck body.
+    """
+    low, high = check.band("band", band, "Hz")
+    with _styled(7.0, 6.0) as figure:
+        above, below = figure.subplots(2, 1)
+        _draw_force(above, response)
+        frequencies = np.geomspace(low, high, SPECTRUM_POINTS)
+        size = np.abs(response.spectrum(frequencies))
+        top = float(size.max(initial=0.0)) or 1.0
+        below.loglog(frequencies, np.maximum(size, 0.1 * SPECTRUM_DEPTH * top))
+        below.set(xlim=(low, high), ylim=(SPECTRUM_DEPTH * top, 2.0 * top))
+        below.set(xlabel="frequency", ylabel="force spectrum [N s]", title="Spectrum of the force")
+        below.xaxis.set_major_formatter(EngFormatter(unit="Hz", sep=" "))
+        below.plot(
+            response.target.frequencies,
+            np.zeros(response.target.n_modes),
+            "|",
+            color=GREEN,
+            ms=9.0,
+            transform=below.get_xaxis_transform(),
+            label="modes of the struck body",
+            clip_on=True,
+        )
+        below.legend(loc="lower left")
+    return figure
+
+
+def _draw_force(axes: Any, response: Response) -> None:
+    start, end = response.time[0], response.time[-1]
+    if response.impacts:
+        start, end = response.impacts[0].start, response.impacts[-1].end
+    room = MARGIN * (end - start)
+    axes.plot(response.time, response.force)
+    for number, impact in enumerate(response.impacts, 1):
+        axes.axvspan(impact.start, impact.end, color=SKY, alpha=0.2, lw=0)
+        if response.n_impacts <= MOST_NUMBERS:
+            place = (0.5 * (impact.start + impact.end), 0.97)
+            axes.annotate(
+                str(number), place, xycoords=axes.get_xaxis_transform(), ha="center", va="top", color="#555555"
+            )
+    axes.set(xlim=(start - room, end + room), xlabel="time", ylabel="contact force", title="Contact force")
+    axes.set_ylim(0.0, HEADROOM * (response.peak_force or 1.0))
+    axes.xaxis.set_major_formatter(EngFormatter(unit="s", sep=" "))
+    axes.yaxis.set_major_formatter(EngFormatter(unit="N", sep=" "))
+
+
+@check.typed
+def energies(response: Response) -> Figure:
+    """Plot the energy of striker and struck body during the blow, and the rest: in the contact or lost."""
+    end = (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
+    times = np.linspace(0.0, (1.0 + MARGIN) * end, TIMES)
+    parts = []
+    for body in (0, -1):
+        q, p = response.modal_state(times, body=body)
+        parts.append(0.5 * (p**2 + (response.bodies[body].omega * q) ** 2).sum(axis=1))
+    with _styled(7.0, 3.6) as figure:
+        axes = figure.subplots()
+        axes.plot(times, parts[0], label="striker")
+        axes.plot(times, parts[1], label="struck body")
+        axes.plot(times, parts[0][0] - parts[0] - parts[1], label="contact and losses")
+        axes.set(xlim=(0.0, times[-1]), xlabel="time", ylabel="energy", title="Energy during the blow")
+        axes.xaxis.set_major_formatter(EngFormatter(unit="s", sep=" "))
+        axes.yaxis.set_major_formatter(EngFormatter(unit="J", sep=" "))
+        axes.legend(loc="best")
+    return figure
+
+
+@check.typed
+def mode_energies(response: Response) -> Figure:
+    """Plot the energy of each mode of the struck body when the striker leaves, over its frequency."""
+    end = response.impacts[-1].end if response.impacts else 0.0
+    q, p = response.modal_state([end])
+    energy = 0.5 * (p**2 + (response.target.omega * q) ** 2)[0]
+    shown = (response.target.omega > 0.0) & (energy > 0.0)
+    top = float(energy[shown].max(initial=0.0)) or 1.0
+    with _styled(7.0, 3.6) as figure:
+        axes = figure.subplots()
+        axes.vlines(response.target.frequencies[shown], MODE_DEPTH * top, energy[shown], lw=2.0, color=BLUE)
+        axes.set(xscale="log", yscale="log", ylim=(MODE_DEPTH * top, 3.0 * top))
+        axes.set(xlabel="natural frequency", ylabel="energy", title="Energy of each mode after the blow")
+        axes.xaxis.set_major_formatter(EngFormatter(unit="Hz", sep=" "))
+        axes.yaxis.set_major_formatter(EngFormatter(unit="J", sep=" "))
+    return figure
+
+
+@check.typed
+def mobility(modes: Modes, at: Any, to: Any = None, *, band: tuple[float, float] | None = None) -> Figure:
+    """Plot magnitude and phase of the velocity at ``to`` per force at ``at``, over frequency.
+
+    Parameters
+    ----------
+    modes : Modes
+    at, to : point of the force and of the velocity, (dimension,) [m]; the same point by default
+    band : (low, high) [Hz], optional
+        By default from half the first flexible frequency to the highest kept one.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    flexible = modes.frequencies[modes.omega > 0.0]
+    if band is None:
+        if not flexible.size:
+            raise ValueError("band must be given for a body without flexible modes, in Hz")
+        band = (0.5 * float(flexible[0]), float(flexible[-1]))
+    low, high = check.band("band", band, "Hz")
+    grid = np.geomspace(low, high, SPECTRUM_POINTS)
+    frequencies = np.union1d(grid, flexible[(flexible > low) & (flexible < high)] * (1.0 + 1e-6))  # misses no peak
+    value = spectra.mobility(modes, at, at if to is None else to, frequencies)
+    with _styled(7.0, 5.0) as figure:
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+        above.loglog(frequencies, np.abs(value))
+        above.set(ylabel="mobility [m/(N s)]", title="Mobility", xlim=(low, high))
+        below.semilogx(frequencies, np.angle(value, deg=True))
+        below.set(ylabel="phase [degrees]", xlabel="frequency", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
+        below.xaxis.set_major_formatter(EngFormatter(unit="Hz", sep=" "))
+    return figure
+
+
+@check.typed
+def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
+    """Draw the first mode shapes as small pictures with nodal lines, each under its frequency.
+
+    Parameters
+    ----------
+    modes : Modes of a plate or a beam
+    count : int
+        Largest number of modes.
+    columns : int
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    count = min(check.count("count", count), modes.n_modes)
+    columns = min(check.count("columns", columns), count)
+    rows = -(-count // columns)
+    check.between("dimension of modes", modes.dimension, 1, 2)
+    points, cells = sampling.grid(modes)
+    shapes = modes.shapes.at(points)[:, :count]
+    shapes = shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300)
+    rim = markup.rim(cells) if modes.dimension == 2 else None
+    with _styled(2.2 * columns, 1.9 * rows) as figure:
+        grid = figure.subplots(rows, columns, squeeze=False)
+        for i, axes in enumerate(grid.flat):
+            if i >= count:
+                axes.set_axis_off()
+                continue
+            if modes.dimension == 1:
+                order = np.argsort(points[:, 0])
+                axes.plot(points[order, 0], shapes[order, i])
+                axes.axhline(0.0, color="#888888", lw=0.6)
+                axes.set(ylim=(-1.1, 1.1), yticks=[], xlabel="x [m]" if i >= count - columns else "")
+            else:
+                axes.tripcolor(*points.T, cells, shapes[:, i], cmap="PuOr", vmin=-1, vmax=1, shading="gouraud")
+                nodal = _unflattened(shapes[:, i], cells)
+                axes.tricontour(*points.T, cells, nodal, levels=[0.0], colors="black", linewidths=0.8)
+                axes.add_collection(LineCollection(list(points[rim]), colors="#888888", linewidths=0.8))
+                axes.set_aspect("equal")
+                axes.set_axis_off()
+            axes.set_title(f"{i + 1}   {in_hertz(modes.frequencies[i])}")
+    return figure
+
+
+def snapshot(plane: np.ndarray, cells: np.ndarray, deflection: np.ndarray, at: np.ndarray, title: str) -> Figure:
+    """Draw the deflection of a surface at one instant in colour, from -1 to 1, and mark the strike point.
+
+    Parameters
+    ----------
+    plane : ndarray, shape (n_points, 2) [m]
+    cells : ndarray, shape (n_cells, 3)
+    deflection : ndarray, shape (n_points,) [-]
+    at : ndarray, shape (dimension,) [m]
+    title : str
+    """
+    with _styled(7.2, 4.8) as figure:
+        axes: Any = figure.subplots()
+        axes.tripcolor(*plane.T, cells, deflection, cmap="PuOr", vmin=-1, vmax=1, shading="gouraud")
+        axes.add_collection(LineCollection(list(plane[markup.rim(cells)]), colors="#888888", linewidths=0.8))
+        axes.plot(at[0], at[1] if len(at) > 1 else 0.0, "o", mfc="none", mec=VERMILION, mew=2.0, ms=9.0)
+        axes.set(aspect="equal", title=title)
+        axes.set_axis_off()
+    return figure
+
+
+def in_hertz(value: float) -> str:
+    """A frequency with its unit, to four digits."""
+    return f"{value:.4g} Hz" if value < 1e4 else f"{value * 1e-3:.4g} kHz"
+
+
+def _unflattened(shape: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """The shape (n_points,), with zeros replaced by a tiny share of the neighbouring values.
+
+    A supported edge is zero up to rounding; without this, parts of it would be drawn as nodal lines.
+    """
+    total, count = np.zeros(len(shape)), np.zeros(len(shape))
+    for i in range(3):
+        np.add.at(total, cells[:, i], shape[cells].sum(axis=1))
+        np.add.at(count, cells[:, i], 3.0)
+    return np.where(np.abs(shape) < FLAT, FLAT * total / np.maximum(count, 1.0), shape)

@@ -1,0 +1,324 @@
+"""Curves, maps and sketches for studies and sweeps, in the style of `figures`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
+from scipy.interpolate import RegularGridInterpolator
+
+from ..sweeps.hammers import Hammer, half_sine_reach
+from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, _styled
+
+BLACK, GREY = "#222222", "#777777"
+PALETTE = "cividis"  # perceptually uniform, also for colour-blind readers
+FINER = 8  # [-] each pixel is split into this many parts to draw contours
+MOST_NAMES = 5  # [-] most names along an axis
+FEW = 10  # [-] a range of fewer whole numbers gets one colour per number
+HALO = withStroke(linewidth=2.2, foreground=BLACK)  # keeps white lines visible on bright colours
+RIM = withStroke(linewidth=4.0, foreground="white")  # keeps circles visible on dark colours
+TILT = np.array([[1.0, 0.42], [0.0, 0.5]])  # oblique view of a plate's plane: rows give screen x and y
+__all__ = ["BLACK", "BLUE", "GREEN", "GREY", "ORANGE", "PURPLE", "SKY", "VERMILION", "Axis", "Curve", "Mark"]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Label, unit (shown with SI prefixes), scale and limits of an axis."""
+
+    label: str
+    unit: str = ""
+    log: bool = False
+    limits: tuple[float | None, float | None] = (None, None)
+    names: tuple[str, ...] = ()  # labels for the values 0, 1, 2 ... instead of numbers
+
+    def apply(self, axes: Any, which: str) -> None:
+        """Set label, scale, limits and ticks of matplotlib axes along 'x' or 'y'."""
+        setter = {"label": f"set_{which}label", "scale": f"set_{which}scale", "limits": f"set_{which}lim"}
+        getattr(axes, setter["label"])(f"{self.label} [dB]" if self.unit == "dB" else self.label)
+        axis = getattr(axes, f"{which}axis")
+        if self.log:
+            getattr(axes, setter["scale"])("log")
+            axis.set_minor_formatter(NullFormatter())
+        if self.unit not in ("", "dB"):
+            axis.set_major_formatter(EngFormatter(unit=self.unit, sep=" "))
+        elif self.log:
+            axis.set_major_formatter("{x:g}")
+        if self.names:
+            axis.set_major_locator(MaxNLocator(MOST_NAMES, integer=True))
+            axis.set_major_formatter(lambda x, _: self.names[int(x)] if x in range(len(self.names)) else "")
+        getattr(axes, setter["limits"])(*self.limits)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One curve, its name in the legend ('' for none) and its style."""
+
+    x: np.ndarray  # (n_points,)
+    y: np.ndarray  # (n_points,)
+    label: str = ""
+    color: str = BLUE
+    style: str = "-"
+    width: float = 1.5  # [pt]
+    panel: str = ""  # name of the panel it belongs to; panels are stacked
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A case to mark on a map."""
+
+    x: float
+    y: float
+    label: str
+    color: str = GREEN
+
+
+def curves(
+    drawn: Sequence[Curve], *, x: Axis, y: Axis, title: str = "", filled: Curve | None = None, between: Any = None
+) -> Figure:
+    """Draw curves in one or more panels; shade ``filled`` down to zero, and ``between`` = (x, low, high).
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    panels = list(dict.fromkeys(curve.panel for curve in drawn))
+    with _styled(6.4, 3.8 if len(panels) == 1 else 2.2 * len(panels)) as figure:
+        all_axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
+        for axes, panel in zip(all_axes, panels):
+            if filled is not None:
+                axes.fill_between(filled.x, filled.y, color=filled.color, alpha=0.3, lw=0)
+            if between is not None:
+                axes.fill_between(*between, color=GREEN, alpha=0.25, lw=0)
+            mine = [curve for curve in drawn if curve.panel == panel]
+            for curve in mine:
+                axes.plot(curve.x, curve.y, curve.style, color=curve.color, lw=curve.width, label=curve.label or None)
+            x.apply(axes, "x")
+            y.apply(axes, "y")
+            axes.label_outer()
+            if any(curve.label for curve in mine):
+                axes.legend(loc="best", title=panel or None, alignment="left")
+        all_axes[0].set_title(title)
+    return figure
+
+
+def colour_map(
+    values: Any,
+    *,
+    x: Axis,
+    y: Axis,
+    colour: Axis,
+    title: str = "",
+    contours: Sequence[tuple[Any, Sequence[float], str, str]] = (),
+    marks: Sequence[Mark] = (),
+    shades: Sequence[tuple[Any, str, str]] = (),
+) -> Figure:
+    """Draw a scalar over a grid of two parameters, one pixel per case.
+
+    Parameters
+    ----------
+    values : xarray.DataArray with two dimensions, the first along y
+    x, y, colour : Axis
+    contours : sequence of (values on the same grid, levels, unit, name); unit '' draws lines without numbers
+    marks : sequence of Mark
+    shades : sequence of (mask on the same grid, colour, name), painted over the colours
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    along_y, along_x = (np.asarray(values[dim], float) for dim in values.dims)
+    field = np.ma.masked_invalid(np.asarray(values, float))
+    low, high = colour.limits
+    low = float(field.min()) if low is None and field.count() else low
+    high = float(field.max()) if high is None and field.count() else high
+    norm: Any = LogNorm(low, high) if colour.log else Normalize(low, high)
+    whole = field.count() and bool((field == field.round()).all()) and not colour.unit and not colour.log
+    few = whole and low is not None and high is not None and high - low < FEW
+    numbers = [float(n) for n in range(int(low or 0), int(high or 0) + 1)] if few else []
+    if few:  # one colour per number
+        norm = BoundaryNorm([number - 0.5 for number in [*numbers, numbers[-1] + 1.0]], colormaps[PALETTE].N)
+    with _styled(6.4, 4.6) as figure:
+        axes = figure.subplots()
+        axes.grid(False)
+        edges = _edges(along_x, x.log), _edges(along_y, y.log)
+        x.apply(axes, "x")  # scales first: contour labels follow the drawn lines
+        y.apply(axes, "y")
+        axes.set(xlim=(edges[0][0], edges[0][-1]), ylim=(edges[1][0], edges[1][-1]))
+        image = axes.pcolormesh(*edges, field, norm=norm, cmap=PALETTE, rasterized=True)
+        handles: list[Any] = []
+        for mask, paint, name in shades:
+            shown = np.ma.masked_equal(np.asarray(mask, float), 0.0)
+            axes.pcolormesh(*edges, shown, cmap=ListedColormap([paint]), vmin=0.0, vmax=1.0, rasterized=True)
+            handles.append(Patch(facecolor=paint, edgecolor=GREY, label=name))
+        for (data, levels, unit, name), (paint, style) in zip(contours, _LINES):
+            finer = _finer(along_x, along_y, np.asarray(data, float))
+            lines = axes.contour(*finer, levels=levels, colors=paint, linewidths=1.0, linestyles=style)
+            if unit:
+                axes.clabel(lines, fmt={level: EngFormatter(unit=unit, sep=" ")(level) for level in levels}, fontsize=8)
+            for part in (lines, *lines.labelTexts):
+                part.set_path_effects([HALO])
+            handles.append(Line2D([], [], color=paint, ls=style, lw=1.0, label=name, path_effects=[HALO]))
+        for mark in marks:
+            ring: dict[str, Any] = {"ls": "", "marker": "o", "ms": 10, "mfc": "none", "mec": mark.color, "mew": 2.2}
+            ring["path_effects"] = [RIM]
+            axes.plot([mark.x], [mark.y], clip_on=False, **ring)
+            handles.append(Line2D([], [], label=mark.label, **ring))
+        axes.set_title(title)
+        bar = figure.colorbar(image, ax=axes, label=colour.label, pad=0.02)
+        if colour.log:
+            bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        bar.ax.yaxis.set_minor_formatter(NullFormatter())
+        bar.ax.yaxis.set_major_formatter(EngFormatter(unit=colour.unit, sep=" ") if colour.unit else "{x:g}")
+        if few:
+            bar.set_ticks(numbers)
+            bar.ax.tick_params(which="both", length=0)
+        elif whole:
+            bar.ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+        if handles:
+            legend = figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=9)
+            legend.set_frame_on(True)
+            legend.get_frame().set(facecolor="#DDDDDD" if contours else "white", edgecolor="none")
+    return figure
+
+
+_LINES = (
+    ("white", "solid"),
+    ("white", "dashed"),
+    ("white", "dotted"),
+)  # colour and style of each set of contours, in order
+
+
+def _finer(x: np.ndarray, y: np.ndarray, data: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Interpolate positive data (n_y, n_x) linearly in the logarithms, which is exact for power laws."""
+    if min(x.min(), y.min(), np.nanmin(data)) <= 0.0 or min(data.shape) < 2:
+        return x, y, data
+    read = RegularGridInterpolator((np.log(y), np.log(x)), np.log(data))
+    x, y = (np.interp(np.arange(0, len(v) - 1 + 1e-9, 1 / FINER), np.arange(len(v)), np.log(v)) for v in (x, y))
+    return np.exp(x), np.exp(y), np.exp(read(tuple(np.meshgrid(y, x, indexing="ij"))))
+
+
+def _edges(centres: np.ndarray, log: bool) -> np.ndarray:
+    """Edges of the pixels around ascending values, (n + 1,)."""
+    place = np.log(centres) if log else centres
+    if len(place) == 1:
+        place = place[0] + np.array([-0.5, 0.5]) * (0.1 if log else 0.1 * abs(place[0]) or 1.0)
+    else:
+        middle = 0.5 * (place[1:] + place[:-1])
+        place = np.concatenate([[2 * place[0] - middle[0]], middle, [2 * place[-1] - middle[-1]]])
+    return np.exp(place) if log else place
+
+
+def plan(corners: Any, points: Any, labels: Sequence[str], *, title: str = "", colors: Sequence[str] = ()) -> Figure:
+    """Draw a plate from above, or a beam from the side, with its strike points.
+
+    Parameters
+    ----------
+    corners : array_like, shape (n_corners, 2) [m] of a plate; (2, 1) of a beam
+    points : array_like, shape (n_points, 2 or 1) [m]
+    labels : sequence of str, one for each point
+    colors : sequence of str, one for each point
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    outline, places = np.asarray(corners, float), np.atleast_2d(np.asarray(points, float))
+    beam = outline.shape[1] == 1
+    with _styled(6.4, 1.9 if beam else 4.2) as figure:
+        axes = figure.subplots()
+        axes.grid(False)
+        if beam:
+            thick = 0.02 * float(np.ptp(outline))
+            outline = np.array([[x, y] for x, y in zip(outline[[0, 1, 1, 0], 0], [-thick, -thick, thick, thick])])
+            places = np.column_stack([places[:, 0], np.full(len(places), thick)])
+        axes.add_patch(Polygon(outline, closed=True, facecolor=SKY, edgecolor=BLUE, alpha=0.5))
+        size = float(np.ptp(outline, axis=0).max())
+        for i, (place, label) in enumerate(zip(places, labels)):
+            paint = colors[i] if colors else VERMILION
+            if beam:
+                arrow = {"arrowstyle": "-|>", "color": paint, "lw": 2.0}
+                high = place + np.array([0.0, 0.1 * size])
+                axes.annotate("", place, high, arrowprops=arrow)
+                axes.text(high[0], high[1] + (0.012 + 0.04 * (i % 2)) * size, label, ha="center", color=paint)
+            else:
+                axes.plot(*place, "*", color=paint, ms=14)
+                axes.annotate(label, place, (0, 11), textcoords="offset points", ha="center", color=paint)
+        axes.set_title(title)
+        axes.set_aspect("equal")
+        axes.set(xlabel="position [m]", ylabel="" if beam else "position [m]")
+        if beam:
+            axes.set(ylim=(-0.06 * size, 0.2 * size), yticks=[])
+            axes.spines["left"].set_visible(False)
+        axes.margins(0.05)
+    return figure
+
+
+def blow(corners: Any, at: Any, *, title: str = "") -> Figure:
+    """Draw a plate in oblique view, struck through a spring by the free end of a stick hinged at its far end.
+
+    Parameters
+    ----------
+    corners : array_like, shape (n_corners, 2) [m]
+    at : strike point, (2,) [m]
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    outline = np.asarray(corners, float) @ TILT.T
+    foot = np.asarray(at, float) @ TILT.T
+    size = float(np.ptp(outline, axis=0).max())
+    tip, hinge = (foot + size * np.array(shift) for shift in ((0.0, 0.16), (0.8, 0.33)))
+    with _styled(6.4, 3.4) as figure:
+        axes = figure.subplots()
+        axes.axis("off")
+        axes.add_patch(Polygon(outline, closed=True, facecolor=SKY, edgecolor=BLUE, alpha=0.5, lw=1.5))
+        turns = np.linspace(0.0, 1.0, 17)
+        width = 0.018 * size * np.where((turns > 0.1) & (turns < 0.9), (-1.0) ** np.arange(17), 0.0)
+        axes.plot(foot[0] + width, foot[1] + turns * (tip - foot)[1], color=VERMILION, lw=1.8)
+        axes.plot(*foot, "*", color=VERMILION, ms=12)
+        axes.plot(*np.transpose([tip, hinge]), color="#7A1F1F", lw=7, solid_capstyle="round")
+        axes.plot(*hinge, "o", mfc="white", mec=BLACK, ms=9, mew=1.8)
+        for text, place, align in (
+            ("plate, hinged all round", outline.min(axis=0) + size * np.array([0.02, -0.05]), "left"),
+            ("contact spring", 0.5 * (foot + tip) - size * np.array([0.04, 0.0]), "right"),
+            ("stick", 0.5 * (tip + hinge) + size * np.array([0.0, 0.05]), "center"),
+            ("hinge", hinge + size * np.array([0.03, 0.0]), "left"),
+        ):
+            axes.text(place[0], place[1], text, ha=align, va="center")
+        axes.set_title(title)
+        axes.set_aspect("equal")
+        axes.margins(0.08)
+    return figure
+
+
+def hammers(found: Sequence[Hammer], bandwidth: float, drop: float = 10.0) -> Any:
+    """Draw the range of tips that work, over the mass of the hammer.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    mass = 1e3 * np.array([hammer.mass for hammer in found])
+    hardest = np.array([hammer.hardest or np.nan for hammer in found])
+    softest = np.array([hammer.softest or np.nan for hammer in found])
+    wanted = mass / 1e3 * (2.0 * np.pi * bandwidth / half_sine_reach(drop)) ** 2
+    drawn = [
+        Curve(mass, hardest, "hardest tip that hits once", VERMILION),
+        Curve(mass, softest, "softest tip that reaches the bandwidth", BLUE),
+        Curve(mass, wanted, "softest tip on a rigid wall", GREY, "--"),
+    ]
+    return curves(
+        drawn,
+        x=Axis("mass of the hammer", "g", log=True),
+        y=Axis("stiffness of the tip", "N/m", log=True),
+        title=f"Hammers for {bandwidth:g} Hz at -{drop:g} dB without a double hit",
+        between=(mass, softest, hardest),
+    )

@@ -1,0 +1,76 @@
+"""Points and cells fine enough to draw mode shapes smoothly, whatever the finite elements."""
+
+import numpy as np
+
+from ..impact.response import Response
+from ..modes.modal import Modes
+
+ENOUGH = 2500  # [-] points on a plate: several per half wave in the first hundred modes
+RIBBON = 0.06  # [-] a beam is drawn as a ribbon: width over length
+AFTER = 1.35  # [-] end of the animation over the end of the last contact
+HALVINGS = 5  # [-] most refinements; each splits a triangle into four
+
+
+def grid(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n_points, dimension) [m] and cells (n_cells, dimension + 1) of a body, refined until smooth to the eye.
+
+    New points lie on the straight sides of the elements, so a curved edge stays as coarse as the mesh.
+    """
+    points, cells = modes.shapes.grid()
+    for _ in range(HALVINGS):
+        if modes.dimension != 2 or cells.shape[1] != 3 or len(points) >= ENOUGH:
+            break
+        points, cells = _halved(points, cells)
+    return points, cells
+
+
+def surface(modes: Modes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The body as triangles in the plane; a beam becomes a ribbon.
+
+    Returns
+    -------
+    points : ndarray, shape (n_points, dimension) [m], where to evaluate the shapes
+    cells : ndarray, shape (n_cells, 3)
+    plane : ndarray, shape (n_points, 2) [m], where to draw each point
+    """
+    points, cells = grid(modes)
+    if modes.dimension == 2:
+        return points, cells, points
+    x = np.sort(points[:, 0])
+    n, half = len(x), 0.5 * RIBBON * float(np.ptp(x))
+    here = np.arange(n - 1)
+    corners = ((here, here + 1, here + n), (here + 1, here + n + 1, here + n))
+    cells = np.vstack([np.column_stack(corner) for corner in corners])
+    plane = np.column_stack([np.tile(x, 2), np.repeat([-half, half], n)])
+    return plane[:, :1], cells, plane
+
+
+def gap(response: Response, times: np.ndarray) -> np.ndarray:
+    """Distance between striker and struck surface [m], (n_times,); zero during contact."""
+    striker = response.striker
+    if striker is None or response.at is None:
+        raise ValueError("response must have a striker, got one of collide; use the response of strike")
+    tip = response.displacement(striker.at[None] if striker.modes.dimension else None, times, body=0)
+    return np.maximum(response.displacement(response.at[None], times) - tip, 0.0)[:, 0]
+
+
+def end_of(response: Response) -> float:
+    """End of the animation of a blow [s]."""
+    return AFTER * (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
+
+
+def telling(response: Response, times: np.ndarray) -> int:
+    """Index of the time [s] that shows the wave best: the first with half the largest deflection under the striker."""
+    assert response.at is not None
+    deflection = np.abs(response.displacement(response.at[None], times)[:, 0])
+    return int(np.argmax(deflection >= 0.5 * deflection.max()))
+
+
+def _halved(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    sides = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)  # (3 n_cells, 2)
+    unique, number = np.unique(sides, axis=0, return_inverse=True)
+    middle = len(points) + number.reshape(-1, 3)  # (n_cells, 3) opposite vertices 2, 0, 1
+    a, b, c = cells.T
+    ab, bc, ca = middle.T
+    quarters = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    return np.vstack([points, points[unique].mean(axis=1)]), np.vstack([np.column_stack(q) for q in quarters])

@@ -1,0 +1,221 @@
+"""The sound of a blow, as samples: the velocity of a point on the struck body, or the pressure a plate radiates."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from ..impact.response import Response
+from . import sampling
+
+RATE = 48_000  # [Hz] sample rate: all audible modes are below half of it
+FULL_SCALE = 10.0  # [m/s] velocity of sample value 1.0: above that of any plate struck at a few m/s
+LOUDEST = 200.0  # [Pa] pressure of sample value 1.0: 140 dB, far louder than any struck plate at a distance
+REFERENCE = {"m/s": (1e-9, "1 nm/s"), "Pa": (20e-6, "20 µPa")}  # unit: value of 0 dB (ISO 1683) and its name
+AIR = (1.204, 343.2)  # [kg/m^3], [m/s] density and speed of sound at 20 degrees C
+OVERSAMPLING = 8  # [-] instants per sample as the first waves arrive: the finite differences err by 0.5 % at 10 kHz
+HIGHEST_RATE = 1_000_000  # [Hz] highest sample rate: far above what any device plays
+MOST_SAMPLES = 10_000_000  # [-] most samples: three minutes at 48 kHz take about ten seconds to compute
+SHORTEST, LONGEST = 0.5, 5.0  # [s] limits of the default duration
+DECAY = np.log(1e3)  # [-] by default the sound ends when its slowest mode has lost 60 dB
+BLOCK = 4096  # [-] samples computed from one modal state: limits the memory, does not change the result
+CRITICAL = 1e-6  # [-] damping ratios closer to 1 become 1 plus this: at 1 the two roots coincide; test_sound.py
+
+
+@dataclass(frozen=True, eq=False)
+class Sound:
+    """Samples, ready to write or play."""
+
+    samples: np.ndarray  # (n_times,) [-] velocity or pressure, divided by full_scale
+    rate: int  # [Hz]
+    full_scale: float  # [m/s] or [Pa], value of a sample of 1.0
+    unit: str = "m/s"
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+
+    @property
+    def peak_level(self) -> float:
+        """Largest sample in dB relative to full scale; minus infinity for silence."""
+        peak = float(np.abs(self.samples).max(initial=0.0))
+        return 20.0 * float(np.log10(peak)) if peak else -np.inf
+
+    @property
+    def level(self) -> float:
+        """Largest sample in dB relative to ``REFERENCE``: 20 micropascals or 1 nm/s."""
+        return self.peak_level + 20.0 * float(np.log10(self.full_scale / REFERENCE[self.unit][0]))
+
+    @property
+    def said(self) -> str:
+        """The level in words, with its reference."""
+        return f"{self.level:.1f} dB re {REFERENCE[self.unit][1]}".replace("-", "−")
+
+
+@check.typed
+def synthesise(
+    response: Response, at: Any = None, *, duration: float | None = None, rate: int = RATE, normalise: bool = False
+) -> Sound:
+    """Turn the velocity of a point of the struck body into sound, from the first touch on.
+
+    Parameters
+    ----------
+    response : Response
+    at : array_like, shape (dimension,) [m], optional
+        Point to listen to; the strike point by default.
+    duration : float [s], optional
+        By default until the slowest mode has lost 60 dB, but at least 0.5 s and at most 5 s.
+    rate : int [Hz]
+    normalise : bool
+        Scale the largest sample to 1. Otherwise 1 means ``FULL_SCALE`` for every blow, so that two strikes can be
+        compared by ear.
+
+    Returns
+    -------
+    Sound
+
+    Notes
+    -----
+    The motion of each mode is exact at every sample, during and after the blow. Leaves out rigid modes (inaudible) and
+    modes at or above ``rate / 2`` (they would alias). This is the motion of the surface, not the radiated pressure.
+    """
+    modes = response.target
+    point: Any = modes.point("at", response.at if at is None else at)
+    rate, heard = _audible(response, rate)
+    times = response.time[0] + np.arange(_length(response, heard, duration, rate)) / rate
+    shape = modes.shape_at(point)[0]  # (n_modes,)
+    n_blow = int(np.searchsorted(times, response.time[-1], side="right"))
+    blow = response.modal_state(times[:n_blow])[1][:, heard] @ shape[heard]
+    free = _ring(response, times[n_blow:], heard, shape[None, heard] + 0j, 1) if n_blow < len(times) else np.zeros(0)
+    return _scaled(np.concatenate([blow, free]), rate, FULL_SCALE, "m/s", normalise)
+
+
+@check.typed
+def radiate(
+    response: Response,
+    listener: Any,
+    *,
+    duration: float | None = None,
+    rate: int = RATE,
+    normalise: bool = False,
+    air: tuple[float, float] = AIR,
+) -> Sound:
+    """Sound pressure near a plate mounted in an infinite rigid wall.
+
+    Parameters
+    ----------
+    response : Response of a struck plate
+    listener : array_like, shape (3,) [m]
+        Position; the third coordinate is the distance from the plate's plane, positive on the side it moves to.
+    duration, rate, normalise
+        As in `synthesise`; unless normalised, a sample of 1 means ``LOUDEST``.
+    air : density [kg/m^3] and speed of sound [m/s]
+
+    Returns
+    -------
+    Sound
+        Time zero is the first touch; the sound arrives after its travel time through the air.
+
+    Notes
+    -----
+    Rayleigh's integral ``p = rho/(2 pi) int a(x, t - R/c) / R dS`` over the whole plate. After the blow each mode is
+    exact in time; while the first waves arrive, acceleration is a finite difference of velocity. The air does not
+    act back on the plate, and rigid motions are left out.
+
+    References
+    ----------
+    Rayleigh, The Theory of Sound, section 278.
+    """
+    modes = response.target
+    if modes.dimension != 2:
+        raise ValueError(f"response must be that of a plate, got a body of dimension {modes.dimension}; use synthesise")
+    place = beside(listener)
+    density, speed = (check.positive("air", x) for x in check.array("air", air, (2,)))
+    rate, heard = _audible(response, rate)
+    points, cells = sampling.grid(modes)
+    weights = density / (2.0 * np.pi) * np.sign(place[2]) * _areas(points, cells)
+    way = np.sqrt(((points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)  # (n_points,) [m]
+    shapes = modes.shapes.at(points)[:, heard] * (weights / way)[:, None]  # (n_points, n_heard)
+    times = response.time[0] + np.arange(_length(response, heard, duration, rate)) / rate
+    n_first = int(np.searchsorted(times, response.time[-1] + way.max() / speed, side="right"))
+    first = _arrival(response, times[:n_first], heard, shapes, way / speed)
+    delayed = np.stack(
+        [np.einsum("km,km->m", shapes, np.exp(-np.outer(way / speed, r))) for r in _roots(response, heard)]
+    )
+    ring = _ring(response, times[n_first:], heard, delayed, 2) if n_first < len(times) else np.zeros(0)
+    return _scaled(np.concatenate([first, ring]), rate, LOUDEST, "Pa", normalise)
+
+
+def beside(listener: Any) -> np.ndarray:
+    """Check the coordinates (3,) [m] of a listener, which must lie off the plate's plane."""
+    place = check.array("listener", listener, (3,), "m")
+    if not abs(place[2]) > 0.0:
+        raise ValueError("listener must lie off the plate's plane, got a third coordinate of 0 m; give a distance")
+    return place
+
+
+def _audible(response: Response, rate: int) -> tuple[int, np.ndarray]:
+    rate = check.count("rate", rate, high=HIGHEST_RATE)
+    return rate, (response.target.omega > 0.0) & (response.target.omega < np.pi * rate)
+
+
+def _length(response: Response, heard: np.ndarray, duration: float | None, rate: int) -> int:
+    """Number of samples in a duration [s]; without one, chosen from the decay."""
+    if duration is None:
+        slowest = float((response.target.damping_ratio * response.target.omega)[heard].min(initial=np.inf))
+        duration = float(np.clip(DECAY / slowest, SHORTEST, LONGEST)) if slowest > 0.0 else LONGEST
+    duration = check.between("duration", check.positive("duration", duration, "s"), 0.0, MOST_SAMPLES / rate, "s")
+    return max(1, round(duration * rate))
+
+
+def _scaled(signal: np.ndarray, rate: int, full_scale: float, unit: str, normalise: bool) -> Sound:
+    scale = float(np.abs(signal).max(initial=0.0)) if normalise else full_scale
+    return Sound(signal / (scale or 1.0), rate, scale or full_scale, unit)
+
+
+def _roots(response: Response, heard: np.ndarray) -> np.ndarray:
+    """Both roots [1/s] of ``s**2 + 2 zeta omega s + omega**2`` for each audible mode, (2, n_heard)."""
+    omega, zeta = response.target.omega[heard], response.target.damping_ratio[heard]
+    zeta = np.where(np.abs(zeta - 1.0) < CRITICAL, 1.0 + CRITICAL, zeta)
+    split = omega * np.sqrt(zeta**2 - 1.0 + 0j)
+    return np.stack([-zeta * omega + split, -zeta * omega - split])
+
+
+def _ring(response: Response, times: np.ndarray, heard: np.ndarray, weights: np.ndarray, order: int) -> np.ndarray:
+    """Weighted sum of the modes' time derivatives at equally spaced times after the last contact, (n_times,).
+
+    Without contact ``q = a exp(r t) + b exp(s t)``; all blocks of samples share one table of exponentials. Weights are
+    (1, n_heard), or (2, n_heard) with one for each root; ``order`` is that of the derivative.
+    """
+    roots = _roots(response, heard)
+    step = times[1] - times[0] if len(times) > 1 else 0.0
+    table = np.exp(roots[:, None, :] * (step * np.arange(min(BLOCK, len(times))))[None, :, None])
+    q, p = (state[:, heard] for state in response.modal_state(times[::BLOCK]))  # (n_blocks, n_heard)
+    first = (p - roots[1] * q) / (roots[0] - roots[1])
+    parts = np.stack([first, q - first]) * (weights * roots**order)[:, None, :]  # (2, n_blocks, n_heard)
+    blocks = np.einsum("rbm,rtm->bt", parts, table, optimize=True).real  # (n_blocks, BLOCK)
+    return blocks.reshape(-1)[: len(times)]
+
+
+def _areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Area [m^2] of each point, (n_points,): a third of every triangle around it."""
+    a, b, c = (points[cells[:, i]] for i in range(3))
+    area = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    return np.bincount(cells.reshape(-1), np.repeat(area / 3.0, 3), minlength=len(points))
+
+
+def _arrival(response, times: np.ndarray, heard: np.ndarray, shapes: np.ndarray, delay: np.ndarray) -> np.ndarray:
+    """Pressure (n_times,) [Pa] while sound from the blow still arrives: sums the delayed acceleration of each point."""
+    pressure, began = np.zeros(len(times)), response.time[0]
+    silent = int(np.searchsorted(times, began + delay.min(), side="right"))
+    step = (times[-1] - times[0]) / max(1, len(times) - 1) / OVERSAMPLING
+    for start in range(max(1, silent), len(times), BLOCK):
+        part = slice(start, start + BLOCK)
+        # instants whose sound arrives in this block, with one more on each side for the finite differences
+        first, last = max(began, times[start] - delay.max() - step), times[part][-1] - delay.min() + step
+        fine = np.linspace(first, last, int(np.ceil((last - first) / step)) + 1)
+        momentum = response.modal_state(fine)[1][:, heard]  # (n_fine, n_heard)
+        acceleration = np.gradient(momentum, fine[1] - fine[0], axis=0)
+        for shape, late in zip(shapes, delay):
+            pressure[part] += np.interp(times[part] - late, fine, acceleration @ shape, left=0.0)
+    return pressure

@@ -1,0 +1,385 @@
+"""Many blows at once: each body becomes one kernel, and every blow refines its step until it meets the tolerance."""
+
+import math
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
+from functools import partial
+
+import numpy as np
+from scipy import special
+
+from ..impact.collision import RESOLVED, rest_mode
+from ..impact.compiled import many_blows, propagation
+from ..impact.striker import Striker
+from ..modes.modal import Modes
+
+STEPS = 12.0  # [-] steps per contact at tolerance 1e-3, rounded up by at most sqrt(2); the first run takes half as many
+STEP_ORDER = 3.5  # [-] order of the error in the step: between 3 (linear contact) and 4 (Hertz)
+REFINEMENTS = 6  # [-] runs after the first one; a blow that then still misses the tolerance goes to the modal engine
+ORDER = 2.0  # [-] order assumed when two runs are compared; cautious, as 3 and more was measured
+ALLOWED = 0.5  # [-] largest estimated error accepted, as a share of the tolerance
+PER_PERIOD = 2.0  # [-] steps per period of the highest frequency in the centroid's band
+MILD = 8.0  # [-] an error below this many times the accepted one cuts the step by sqrt(2) instead of 2
+MENDED = 3.0  # [-] error of the peak force over the correction applied to it: the largest measured
+HEARD = 3.0  # [-] ringing left unresolved, over tolerance times force: only part of it becomes an error
+YIELD = 0.02  # [-] relative error of the peak per share of badly sampled top modes in the indentation: measured
+ALIAS = (4.0, 8.0)  # [rad] omega times step of badly sampled modes; faster ones follow the force statically
+LENGTHS = (48, 192, 768, 3072)  # [-] kernel lengths in steps, tried in turn until the blow fits
+SLACK = 2.0  # [-] a touch or gap counts only above this many times tolerance times deepest approach
+MODES = 4096  # [-] modes summed into a kernel at once: limits the memory to about 20 MB
+PIECE = 2**14  # [-] blows a thread follows at once at most, so that their data stay in the cache
+FEW = 1024  # [-] blows that are too few to split between threads
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Blows between the same two bodies at the same points; their masses, the law and the speed may differ."""
+
+    omega: tuple[np.ndarray, np.ndarray]  # of target and striker, (n_modes,) [rad/s]
+    zeta: tuple[np.ndarray, np.ndarray]  # (n_modes,) [-]
+    squared: tuple[np.ndarray, np.ndarray]  # (n_modes,) [-] squared shapes at the contact point times the body's mass
+    rest: tuple[float, float]  # [kg m/N] residual compliance times the body's mass
+
+    @classmethod
+    def of(cls, modes: Modes, at: np.ndarray, striker: Striker, residual: bool, lossy: bool = False) -> "Family":
+        """The family of a blow; if ``lossy``, the residual compliance becomes an extra mode, as in `strike`."""
+        parts = []
+        for body, point in ((modes, at), (striker.modes, striker.at)):
+            place = point[None] if body.dimension else None
+            rest = float(body.residual_compliance(place)[0, 0]) if residual and body.dimension else 0.0
+            rest = max(0.0, rest) * body.mass
+            omega, zeta = np.array(body.omega), np.array(body.damping_ratio)
+            squared = body.shape_at(place)[0] ** 2 * body.mass
+            if lossy and rest > 0.0:
+                above, damping = rest_mode(body.dimension, omega[-1], zeta[-1], lossy)
+                omega, zeta = np.append(omega, above), np.append(zeta, damping)
+                squared, rest = np.append(squared, rest * above**2), 0.0
+            parts.append((omega, zeta, squared, rest))
+        return cls(*zip(*parts))
+
+    def rigid(self, body: int) -> float:
+        """Sum of the squared shapes of rigid motions, times the mass [-]."""
+        return float(self.squared[body][self.omega[body] == 0.0].sum())
+
+    def static(self, body: int) -> float:
+        """Static compliance of the kept flexible modes, times the mass [kg m/N]."""
+        flexible = self.omega[body] > 0.0
+        return float((self.squared[body][flexible] / self.omega[body][flexible] ** 2).sum())
+
+    def edge(self, body: int) -> float:
+        """Highest natural frequency of a body [rad/s]."""
+        return float(self.omega[body].max())
+
+    def top(self, body: int) -> float:
+        """Static compliance of the modes in the upper half of the band, times the mass [kg m/N]."""
+        high = (self.omega[body] > 0.0) & (self.omega[body] > 0.5 * self.edge(body))
+        return float((self.squared[body][high] / self.omega[body][high] ** 2).sum())
+
+    def heard(self, body: int, compliance: np.ndarray) -> np.ndarray:
+        """Frequency [rad/s] above which all modes together stay below each compliance; 0 if the whole body does."""
+        fastest = np.argsort(-self.omega[body])[: np.count_nonzero(self.omega[body])]
+        omega = self.omega[body][fastest]
+        above = np.cumsum(self.squared[body][fastest] / omega**2)
+        return np.append(omega, 0.0)[np.searchsorted(above, compliance)]
+
+    def kernels(self, h: float, n_steps: int) -> tuple[np.ndarray, ...]:
+        """Kernels of both bodies at unit mass, (6, n_steps) each, and bounds of their motion in flight."""
+        found = []
+        for omega, zeta, squared in zip(self.omega, self.zeta, self.squared):
+            bounds = np.empty((many_blows.SPLITS + many_blows.LEVELS, 2, 2))
+            many_blows.flight_bounds(omega, zeta, squared, h, bounds)
+            found.append((kernel_rows(omega, zeta, squared, h, n_steps)[0], bounds))
+        return found[0][0], found[1][0], found[0][1], found[1][1]
+
+    def later(self, h: float, n_steps: int) -> tuple[np.ndarray, np.ndarray]:
+        """The same kernels without the means, 1/4, 2/4, ... of a step later, (2**SPLITS - 1, 4, n_steps) each."""
+        parts = np.arange(1, 2**many_blows.SPLITS) / 2**many_blows.SPLITS
+        first, second = (kernel_rows(*body, h, n_steps, parts) for body in zip(self.omega, self.zeta, self.squared))
+        return first, second
+
+
+def kernel_rows(
+    omega: np.ndarray, zeta: np.ndarray, squared: np.ndarray, h: float, n_steps: int, parts: np.ndarray | None = None
+) -> np.ndarray:
+    """Approach of a body of unit mass when a unit force acts on it for one step: in that step and all later ones.
+
+    Parameters
+    ----------
+    omega, zeta, squared : ndarray, shape (n_modes,)
+        Frequencies [rad/s], damping ratios and squared shapes of the modes.
+    h : float [s]
+    n_steps : int
+    parts : ndarray, shape (n_parts,) [-], optional
+        Also at these fractions of a step after the end of each step.
+
+    Returns
+    -------
+    ndarray, shape (1, 6, n_steps) or (n_parts, 4, n_steps)
+        Approach at the ends of the steps, its rate there and its mean over each step, each for a constant force and for
+        the ramp t/h - 1/2. With ``parts`` there are no means.
+
+    Notes
+    -----
+    The output after ``i stride + j`` steps is the output row advanced by j steps times the state after ``i stride``
+    steps: one matrix product replaces the loop over all steps.
+    """
+    stride = 2 ** math.ceil(0.5 * math.log2(n_steps))
+    n_strides = -(-n_steps // stride)
+    looks = 3 if parts is None else 2
+    rows: np.ndarray = np.zeros((1 if parts is None else len(parts), looks, 2, n_strides * stride))
+    for start in range(0, len(omega), MODES):
+        some = slice(start, start + MODES)
+        w, z, u = omega[some], zeta[some], squared[some]
+        one, many, part = np.empty((3, propagation.N_TABLE, len(w)))
+        propagation.step_table(w, z, h, one)
+        propagation.step_table(w, z, stride * h, many)
+        seen = np.empty((looks, stride, 2, len(w)))
+        for look, (q, p) in zip(seen, ((u, 0.0 * u), (0.0 * u, u), (u * one[8], u * one[9]))):
+            many_blows.orbit(one[[0, 2, 1, 3]], q, p, look)
+        states = np.empty((len(rows), 2, n_strides, 2, len(w)))
+        for i, places in enumerate(states):
+            for place, q, p in zip(places, one[4:8:2], one[5:8:2]):
+                if parts is not None:
+                    propagation.step_table(w, z, parts[i] * h, part)
+                    q, p = part[0] * q + part[1] * p, part[2] * q + part[3] * p
+                many_blows.orbit(many, q, p, place)
+        product = seen.reshape(looks * stride, -1) @ states.reshape(-1, 2 * len(w)).T
+        product = product.reshape(looks, stride, len(rows), 2, n_strides).transpose(2, 0, 3, 4, 1)
+        if parts is None:
+            rows[0, 2, :, 0] += one[10:12] @ u
+        ends, means = product[:, :2], product[:, 2:]
+        rows[:, :2] += ends.reshape(rows[:, :2].shape)
+        rows[:, 2:, :, 1:] += means.reshape(rows[:, 2:].shape)[..., :-1]
+    return np.ascontiguousarray(rows.reshape(len(rows), 2 * looks, -1)[..., :n_steps])
+
+
+@dataclass(frozen=True, eq=False)
+class Blows:
+    """Parameters of many blows, all arrays (n_cases,)."""
+
+    families: Mapping[int, Family]
+    family: np.ndarray  # key of each blow in families
+    target_mass: np.ndarray  # [kg]
+    striker_mass: np.ndarray  # [kg]
+    stiffness: np.ndarray  # [N/m**exponent]
+    exponent: np.ndarray  # [-]
+    speed: np.ndarray  # [m/s]
+    loss: np.ndarray  # [s/m]
+
+    @property
+    def n_cases(self) -> int:
+        return len(self.family)
+
+    def pieces(self, size: int) -> "list[Blows]":
+        """The same blows in pieces of at most ``size``."""
+        columns = [getattr(self, field.name) for field in fields(self)[1:]]
+        starts = range(0, self.n_cases, size)
+        return [Blows(self.families, *(column[start : start + size] for column in columns)) for start in starts]
+
+
+@dataclass(frozen=True, eq=False)
+class Bounces:
+    """Results of many blows, all arrays (n_cases,); NaN for blows that the modal engine must compute."""
+
+    n_impacts: np.ndarray  # [-]
+    contact_time: np.ndarray  # [s]
+    restitution: np.ndarray  # [-]
+    impulse: np.ndarray  # [N s]
+    peak_force: np.ndarray  # [N]
+    error: np.ndarray  # [-] estimated
+    centroid: np.ndarray  # [Hz]
+    done: np.ndarray  # bool: met the tolerance, and no touch in flight was missed
+
+
+Kernels = dict[tuple[int, int, int, bool], tuple[np.ndarray, ...]]  # keys: family, step, length, later
+KEPT = 128e6  # [byte] kernels are dropped after a call if they take more
+NO_KERNELS = (np.empty((0, 4, 0)),) * 2
+
+
+def bounce(
+    blows: Blows, *, tolerance: float, band: float = 0.0, workers: int | None = None, kernels: Kernels | None = None
+) -> Bounces:
+    """Compute blows in kernel form at unit speed, with shorter steps until each meets the tolerance.
+
+    Parameters
+    ----------
+    blows : Blows
+    tolerance : float [-]
+        Largest error accepted, as in `strike`.
+    band : float [Hz]
+        Upper end of the centroid's band; 0 for no centroid.
+    workers : int, optional
+        Number of threads; one per core by default.
+    kernels : dict, optional
+        Kernels computed so far for the same families; this call adds new ones.
+
+    Returns
+    -------
+    Bounces
+
+    Notes
+    -----
+    With ``d = v x`` the blow depends on stiffness and speed only through ``k v**(exponent - 1)``; times do not change,
+    and forces scale with v.
+    """
+    workers = workers or os.cpu_count() or 1
+    kernels = {} if kernels is None else kernels
+    follow = partial(_follow, tolerance=tolerance, band=band, kernels=kernels)
+    size = min(PIECE, max(FEW, -(-blows.n_cases // (4 * workers))))
+    if workers == 1 or blows.n_cases <= size:
+        found = [follow(part) for part in blows.pieces(PIECE)]
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            found = list(pool.map(follow, blows.pieces(size)))
+    if sum(part.nbytes for parts in kernels.values() for part in parts) > KEPT:
+        kernels.clear()
+    return Bounces(*(np.concatenate(columns) for columns in zip(*found)))
+
+
+def _follow(blows: Blows, tolerance: float, band: float, kernels: Kernels) -> tuple[np.ndarray, ...]:
+    """The columns of `Bounces` for some blows."""
+    engine = _Engine(blows, band, kernels)
+    final, error = _refined(engine, tolerance)
+    v = blows.speed
+    return (
+        final[0], final[1], final[2] * engine.own_rigid - 1.0, final[2] * v, final[3] * v, error, final[4],
+        ~np.isnan(error),
+    )  # fmt: skip
+
+
+def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Result of `_Engine.run` once the steps are short enough, and its error; NaN if they never are."""
+    n = engine.blows.n_cases
+    first = step = engine.first_step(tolerance)
+    finer = np.full(n, 2)  # [half-octaves]
+    todo = np.arange(n)
+    coarse = engine.run(todo, step - finer)
+    error = np.full(n, np.nan)
+    final = np.full_like(coarse, np.nan)
+    for _ in range(REFINEMENTS):
+        ratio = 2.0 ** (0.5 * finer)
+        slack = SLACK * tolerance * 2.0 ** (0.5 * STEP_ORDER * (first[todo] - step))
+        fine = engine.run(todo, step, slack, ratio * coarse[7])
+        found = engine.error(coarse, fine, todo, ratio)
+        met = found <= ALLOWED * tolerance
+        final[:, todo[met]] = fine[:, met]
+        error[todo[met]] = found[met]
+        coarse, todo = fine[:, ~met], todo[~met]
+        if not todo.size:
+            break
+        finer = np.where(found[~met] < MILD * ALLOWED * tolerance, 1, 2)
+        step = step[~met] + finer
+    return final, error
+
+
+class _Engine:
+    """Kernels by family and step, and the numbers that all runs share."""
+
+    def __init__(self, blows: Blows, band: float, kernels: Kernels) -> None:
+        self.blows, self.band, self.kernels = blows, band, kernels
+        self.keys, self.which = np.unique(blows.family, return_inverse=True)
+        self.shares = np.array([1.0 / blows.target_mass, 1.0 / blows.striker_mass])
+        rigid, static, rest = (
+            np.array([self.of_family(number, body) for body in (0, 1)]) * self.shares
+            for number in (Family.rigid, Family.static, lambda family, body: family.rest[body])
+        )
+        self.own_rigid, self.rigid, self.static = rigid[1], rigid.sum(axis=0), static.sum(axis=0)
+        stiffness = blows.stiffness * blows.speed ** (blows.exponent - 1.0)
+        self.law = np.array([stiffness, blows.exponent, rest.sum(axis=0), blows.loss * blows.speed])
+
+    def of_family(self, number: Callable[[Family, int], float], body: int) -> np.ndarray:
+        """One number of one body for every blow, (n_cases,)."""
+        return np.array([number(self.blows.families[int(key)], body) for key in self.keys])[self.which]
+
+    def first_step(self, tolerance: float) -> np.ndarray:
+        """Step of each blow in half-octaves, h = 2**(-step / 2): at least STEPS per contact with a rigid wall.
+
+        If the step is close to the period of a body's highest modes, two runs can agree on a wrong peak; the step is
+        then shorter if these modes contribute enough to matter. A contact with loss also needs shorter steps: its
+        force depends on the rate of approach, so that more modes ring in it.
+        """
+        stiffness, exponent, rest, loss = self.law
+        q = 1.0 / (exponent + 1.0)
+        deepest = np.exp(q * np.log(0.5 / (q * stiffness * self.rigid)))
+        duration = 2.0 * np.sqrt(np.pi) * special.gamma(1.0 + q) / special.gamma(0.5 + q) * deepest
+        duration *= np.where(exponent == 1.0, np.sqrt(1.0 + stiffness * rest), 1.0)
+        count = STEPS * (1e-3 / tolerance) ** (1.0 / STEP_ORDER)
+        step = np.ceil(2.0 * np.log2(np.maximum(count / duration, PER_PERIOD * self.band))).astype(int)
+        for body in (0, 1):
+            edge, yields = self.of_family(Family.edge, body), self.of_family(Family.top, body)
+            angle = edge * 2.0 ** (-0.5 * step)
+            blind = (
+                (YIELD * yields * self.shares[body] * stiffness > tolerance) & (angle > ALIAS[0]) & (angle < ALIAS[1])
+            )
+            step[blind] += np.ceil(2.0 * np.log2(angle[blind] / ALIAS[0])).astype(int)
+            if loss.any():
+                rung = loss * (np.pi / duration) ** 2 / self.rigid * self.shares[body]  # [N/m] ringing per compliance
+                heard = np.zeros(len(step))
+                for i, key in enumerate(self.keys):
+                    cells = (self.which == i) & (loss > 0.0)
+                    heard[cells] = self.blows.families[int(key)].heard(body, HEARD * tolerance / rung[cells])
+                ringing = heard > 0.0
+                step[ringing] = np.maximum(
+                    step[ringing], np.ceil(2.0 * np.log2(2.0 * heard[ringing] / RESOLVED)).astype(int)
+                )
+        return step
+
+    def run(
+        self, cells: np.ndarray, step: np.ndarray, slack: np.ndarray | None = None, length: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Compute blows with the given steps; return what `many_blows.run` writes, (9, n_cells).
+
+        Without ``slack``, flights are only sampled and a short touch can be missed: good enough for the coarse run of a
+        comparison. ``length`` is the expected number of steps of each blow.
+        """
+        out = np.full((9, self.blows.n_cases), np.nan)
+        slacks = np.zeros(self.blows.n_cases)
+        if slack is not None:
+            slacks[cells] = slack
+        todo = np.ones(len(cells), bool)
+        for limit in LENGTHS:
+            now = todo if length is None or limit == LENGTHS[-1] else todo & (length < limit)
+            self._run(cells[now], step[now], slacks, slack is not None, limit, out)
+            todo &= ~(now & (out[5, cells] != many_blows.LONG))
+            if not todo.any():
+                break
+        return out[:, cells]
+
+    def kernel(self, family: int, step: int, length: int, later: bool) -> tuple[np.ndarray, ...]:
+        """Kernels of a family, one per length, so that no blow depends on the others in its batch."""
+        key = family, step, length, later
+        if key not in self.kernels:
+            find = Family.later if later else Family.kernels
+            self.kernels[key] = find(self.blows.families[family], 2.0 ** (-0.5 * step), length)
+        return self.kernels[key]
+
+    def _run(
+        self, cells: np.ndarray, step: np.ndarray, slack: np.ndarray, sure: bool, length: int, out: np.ndarray
+    ) -> None:
+        group = np.stack([self.blows.family[cells], step])
+        order = np.lexsort(group)
+        edges = np.flatnonzero(np.any(np.diff(group[:, order], axis=1) != 0, axis=0)) + 1
+        for part in np.split(order, edges) if cells.size else ():
+            family, exponent = int(group[0, part[0]]), int(step[part[0]])
+            kernels = self.kernel(family, exponent, length, False)
+            later = self.kernel(family, exponent, length, True) if sure and length > LENGTHS[0] else NO_KERNELS
+            about = self.shares, self.law, self.rigid, self.static, slack, self.band
+            many_blows.run(*(cells[part], 2.0 ** (-0.5 * exponent), *kernels, *later, sure, *about, out))
+
+    def error(self, coarse: np.ndarray, fine: np.ndarray, cells: np.ndarray, ratio: np.ndarray) -> np.ndarray:
+        """Largest error of the finer run in the quantities under tolerance; infinite if the two runs ended differently.
+
+        The error in the time of contact is that of the approach divided by its rate there.
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            relative = np.abs(coarse[1:4] / fine[1:4] - 1.0)
+            change = relative.max(axis=0)
+            change = np.maximum(change, fine[8] * relative[1:].max(axis=0))
+            if self.band:
+                change = np.maximum(change, np.abs(coarse[4] / fine[4] - 1.0))
+        absolute = np.abs(coarse[2] - fine[2]) * self.own_rigid[cells]
+        same = (coarse[0] == fine[0]) & (coarse[5] <= many_blows.DOUBTFUL) & (fine[5] == many_blows.DONE)
+        found = np.maximum(np.fmax(change, absolute) / (ratio**ORDER - 1.0), MENDED * fine[6])
+        return np.where(same, found, np.inf)

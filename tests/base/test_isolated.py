@@ -1,0 +1,158 @@
+"""A mesh file is read apart: what never ends, fills the memory, dies or looks elsewhere becomes one sentence."""
+
+import os
+import subprocess
+import sys
+import time
+
+import meshio
+import numpy as np
+import pytest
+
+from fem_impact import mesh
+from fem_impact._base import isolated
+
+PLATE = mesh.rectangle(1.0, 1.0, size=0.5)
+
+
+def written(path, **options):
+    points = np.column_stack([PLATE.points, np.zeros(len(PLATE.points))])
+    meshio.Mesh(points, [("triangle", PLATE.cells)]).write(path, **options)
+    return path
+
+
+def test_reader_that_never_ends_is_stopped(tmp_path, monkeypatch):
+    monkeypatch.setattr(isolated, "PATIENCE", 1.0)
+    path = tmp_path / "plate.mdpa"  # meshio looks for the end of a block beyond the end of the file
+    path.write_text("Begin Nodes\n 1 0 0 0\n")
+    began = time.monotonic()
+    with pytest.raises(ValueError, match=r"plate\.mdpa cannot be read as a mesh \(reading took longer than 1 s"):
+        mesh.load(path)
+    assert time.monotonic() - began < 8.0  # the patience, and the start of a process on a busy machine
+
+
+def test_header_that_claims_more_than_the_memory_is_refused(tmp_path):
+    path = tmp_path / "plate.ply"
+    path.write_text(
+        "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000\n"
+        "property double x\nproperty double y\nproperty double z\nelement face 0\n"
+        "property list uchar int vertex_indices\nend_header\n"
+    )
+    with pytest.raises(ValueError, match=r"plate\.ply cannot be read as a mesh"):
+        mesh.load(path)
+
+
+@pytest.mark.parametrize("status", [2, -6, -11])
+def test_reader_that_dies_or_fills_the_memory_is_a_sentence(tmp_path, monkeypatch, status):
+    monkeypatch.setattr(isolated, "run", lambda path, reader, arguments, patience: (status, b"", b""))
+    (tmp_path / "plate.msh").write_text("any")
+    with pytest.raises(ValueError, match=r"plate\.msh cannot be read as a mesh \(.* crashed or exceeded 2 GB\)"):
+        mesh.load(tmp_path / "plate.msh")
+
+
+@pytest.mark.parametrize("name", ["plate.msh", "plate.vtu", "plate.svg", "plate.unv"])
+@pytest.mark.parametrize("size", [0, 2**31])
+def test_holes_are_not_parsed(tmp_path, name, size):
+    with (tmp_path / name).open("wb") as file:
+        file.truncate(size)
+    with pytest.raises(ValueError, match=rf"{name.replace('.', '[.]')} .*(begins with zeros only|empty)"):
+        isolated.read(tmp_path / name, "a mesh", "mesh.meshio_reader:read")
+
+
+def test_memory_of_the_reader_is_limited():
+    script = "from fem_impact._base import isolated; isolated.limit_memory(); bytearray(3 << 30)"
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert run.returncode == 1 and "MemoryError" in run.stderr
+
+
+def test_file_that_unpacks_to_more_than_the_memory_is_refused(tmp_path):
+    h5py = pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
+    path = written(tmp_path / "plate.med")
+    with h5py.File(path, "r+") as file:
+        nodes = next(group for name, group in file["ENS_MAA/mesh"].items())["NOE"]
+        del nodes["COO"]
+        coordinates = nodes.create_dataset("COO", (3 * 10**9,), "f8", chunks=(2**20,), compression="gzip")
+        coordinates.attrs["NBR"] = 10**9
+    assert path.stat().st_size < 100_000
+    with pytest.raises(ValueError, match=r"plate\.med cannot be read as a mesh \(.* crashed or exceeded 2 GB\)"):
+        mesh.load(path)
+
+
+@pytest.mark.parametrize("place", ["{folder}/secret.inp", "../secret.inp", "/etc/passwd"])
+def test_files_that_a_mesh_includes_must_lie_beside_it(tmp_path, place):
+    (tmp_path / "in").mkdir()
+    (tmp_path / "secret.inp").write_text("*NODE\n1, 7.25, 7.5, 0.\n")
+    path = tmp_path / "in" / "plate.inp"
+    path.write_text("*INCLUDE, INPUT=" + place.format(folder=tmp_path) + "\n*NODE\n1, 0., 0., 0.\n")
+    with pytest.raises(ValueError, match="it refers to a file outside its folder") as caught:
+        mesh.load(path)
+    assert "7.25" not in str(caught.value) and "root" not in str(caught.value)
+
+
+def test_a_mesh_may_include_what_lies_beside_it(tmp_path):
+    written(tmp_path / "part.inp")
+    (tmp_path / "whole.inp").write_text("*INCLUDE, INPUT=part.inp\n")
+    assert mesh.load(tmp_path / "whole.inp").area == pytest.approx(1.0)
+
+
+def test_a_link_to_a_mesh_elsewhere_is_followed(tmp_path):
+    (tmp_path / "in").mkdir()
+    written(tmp_path / "plate.vtu")
+    os.symlink(tmp_path / "plate.vtu", tmp_path / "in" / "link.vtu")
+    assert mesh.load(tmp_path / "in" / "link.vtu").area == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("how", ["link", "raw", "xdmf"])
+def test_hdf5_that_looks_into_other_files_is_refused(tmp_path, how):
+    h5py = pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
+    (tmp_path / "in").mkdir()
+    path = tmp_path / "in" / "plate.med"
+    written(path)
+    (tmp_path / "secret.bin").write_bytes(np.arange(27.0).tobytes())
+    if how == "xdmf":
+        path = written(tmp_path / "in" / "plate.xdmf")
+        os.rename(tmp_path / "in" / "plate.h5", tmp_path / "plate.h5")
+        path.write_text(path.read_text().replace("plate.h5:", "../plate.h5:"))
+    else:
+        with h5py.File(path, "r+") as file:
+            if how == "link":
+                file["stray"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "/x")
+            else:
+                file.create_dataset("stray", (27,), "f8", external=[(str(tmp_path / "secret.bin"), 0, 216)])
+    with pytest.raises(ValueError, match=r"refers to a file outside its folder|links to another|stores its data in"):
+        mesh.load(path)
+
+
+def test_every_format_that_hdf5_holds_is_read(tmp_path):
+    pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
+    for name in ("plate.med", "plate.h5m", "plate.xdmf"):
+        assert mesh.load(written(tmp_path / name)).area == pytest.approx(1.0)
+
+
+def test_missing_hdf5_is_named(tmp_path, monkeypatch):
+    (tmp_path / "plate.med").write_bytes(b"\x89HDF\r\n\x1a\n")
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    monkeypatch.setattr(isolated, "confine", lambda path: None)  # it would bind this process for good
+    assert isolated.main(tmp_path / "plate.med", "mesh.meshio_reader:arrays", []) == (
+        1,
+        b"this needs h5py: pip install 'fem-impact[hdf5]'",
+    )
+
+
+def test_unknown_ending_is_told_with_those_that_are_known(tmp_path):
+    (tmp_path / "plate.xyz").write_text("1")
+    with pytest.raises(ValueError, match=r"its ending is '\.xyz', but meshio reads .*\.vtu"):
+        mesh.load(tmp_path / "plate.xyz")
+
+
+@pytest.mark.parametrize("kind", ["folder", "pipe", "loop", "empty"])
+def test_what_is_no_file_is_told_at_once(tmp_path, kind):
+    path = tmp_path / "plate.msh"
+    {
+        "folder": path.mkdir,
+        "pipe": lambda: os.mkfifo(path),
+        "loop": lambda: os.symlink(path, path),
+        "empty": path.touch,
+    }[kind]()
+    with pytest.raises(ValueError, match=r"plate\.msh"):
+        mesh.load(path)

@@ -1,0 +1,83 @@
+"""What a notebook shows of things: pictures and tables that are well-formed, true and escaped."""
+
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from test_cli import TEXT
+
+import fem_impact as fi
+from fem_impact._base import markup
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def parsed(html):
+    """HTML that is XML as well: whatever is not closed or escaped fails here."""
+    return ElementTree.fromstring(f"<div>{html}</div>")
+
+
+@pytest.fixture
+def scene(tmp_path):
+    (tmp_path / "small.toml").write_text(TEXT.replace("A small test", "<b>&") + "[observe]\npoints = [[0.3, 0.2]]\n")
+    return fi.load_scene(tmp_path / "small.toml")
+
+
+def test_scene_shows_where_it_is_struck(scene):
+    tree = parsed(scene._repr_html_())
+    (picture,) = tree.iter(f"{SVG}svg")
+    circles = [(float(c.get("cx")), float(c.get("cy"))) for c in picture.iter(f"{SVG}circle")]
+    corners = markup.MARGIN, markup.WIDTH - markup.MARGIN
+    across = [(x - corners[0]) / (corners[1] - corners[0]) for x, _ in circles]
+    assert across == pytest.approx([0.3 / 0.465, 0.3, 0.3], abs=1e-3)  # drawn to a tenth of a pixel
+    assert "<b>&" in "".join(tree.itertext())
+    assert any(path.get("stroke-dasharray") == "7 4" for path in picture.iter(f"{SVG}path"))  # hinged all round
+
+
+def test_response_shows_its_force(scene):
+    hit = scene.strike()
+    tree = parsed(hit._repr_html_())
+    text = "".join(tree.itertext())
+    assert f"{hit.peak_force:.5g} N" in text and f"{hit.restitution:.5f}" in text
+    (line,) = tree.iter(f"{SVG}polyline")
+    heights = [float(pair.split(",")[1]) for pair in line.get("points").split()]
+    assert min(heights) == pytest.approx(2.0 * markup.MARGIN, abs=0.1) and len(heights) <= markup.SAMPLES + 1
+
+
+def test_modes_and_meshes_show_themselves():
+    modes = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=30)
+    text = "".join(parsed(modes._repr_html_()).itertext())
+    assert "30 modes" in text and "100 Hz" in text and "0.2 kg" in text
+    assert "3 x 2 m" in "".join(parsed(fi.mesh.rectangle(3.0, 2.0)._repr_html_()).itertext()).replace(" m x", " x")
+
+
+@pytest.mark.parametrize("mesh", [fi.mesh.disk(0.1, hole=0.02), fi.mesh.line(1.0), fi.mesh.rectangle(1.0, 2.0)])
+def test_every_edge_can_be_drawn_in_every_way(mesh):
+    for kind in ("clamped", "hinged", "free"):
+        picture = markup.body(mesh, supports={"boundary": kind}, title="a < b")
+        tree = parsed(picture)
+        assert tree[0].get("aria-label") == "a < b"
+        box = [float(x) for x in tree[0].get("viewBox").split()]
+        assert 0 < box[3] < 2.0 * markup.WIDTH
+
+
+def test_curved_outline_is_drawn_as_round_as_it_is():
+    disk = fi.mesh.disk(0.1)
+    path = next(parsed(markup.body(disk, title="disk")).iter(f"{SVG}path")).get("d")
+    assert path.count("Z") == 1
+    ring = fi.mesh.disk(0.1, hole=0.03)
+    assert next(parsed(markup.body(ring, title="ring")).iter(f"{SVG}path")).get("d").count("Z") == 2
+
+
+def test_named_edge_overrules_the_whole():
+    mesh = fi.mesh.rectangle(1.0, 1.0)
+    held = markup.held_edges(mesh, {"left": "clamped", "boundary": "hinged"})
+    assert {held[int(i)] for i in mesh.edges["left"]} == {"clamped"}
+    assert {held[int(i)] for i in mesh.edges["top"]} == {"hinged"}
+
+
+def test_flat_and_single_histories_are_drawn():
+    for x, y in ((np.zeros(1), np.zeros(1)), (np.arange(3.0), np.zeros(3))):
+        assert "NaN" not in markup.curve(x, y, label="force", unit="N", title="none") and "nan" not in markup.curve(
+            x, y, label="force", unit="N", title="none"
+        )

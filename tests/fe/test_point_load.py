@@ -1,0 +1,200 @@
+"""Static compliance of FE plates under a point against closed forms, inside, beside edges and on them."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.fe import point_load
+from fem_impact.modes import analytic
+
+PLATE = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), thickness=2e-3)
+
+
+def finite_elements(mesh, supports, points, section=PLATE):
+    modes = fi.find_modes(fi.assemble(mesh, section, supports=supports), n_modes=6)
+    return modes.shapes.compliance(np.array(points))
+
+
+# At every kind of edge, from the middle to the edge itself, at a vertex of the rim, in mid-facet and between.
+@pytest.mark.parametrize("edge", analytic.ENDS)
+@pytest.mark.parametrize("place", [0.0, 0.5, 0.97, 0.99, 0.999, 0.9999, 1.0])
+def test_disk(edge, place):
+    exact = analytic.disk(0.2, edge=edge, section=PLATE, n_modes=6)
+    mesh = fi.mesh.disk(0.2)
+    modes = fi.find_modes(fi.assemble(mesh, PLATE, supports={"boundary": edge}), n_modes=6)
+    system = modes.shapes.system
+    ends = system.mesh.points[system.mesh.facets[0]]
+    angle = np.arctan2(ends[:, 1], ends[:, 0])
+    turn = (angle[1] - angle[0] + np.pi) % (2.0 * np.pi) - np.pi
+    for share in (0.0, 0.5, 0.3):
+        direction = angle[0] + share * turn
+        point = place * 0.2 * np.array([[np.cos(direction), np.sin(direction)]])
+        found, expected = (one.shapes.compliance(point)[0, 0] for one in (modes, exact))
+        if place == 1.0 and edge != "free":
+            assert abs(found) < 1e-12 * exact.shapes.compliance(np.zeros((1, 2)))[0, 0]  # it rests there
+            continue
+        error = abs(found / expected - 1.0)
+        assert error < 2e-5  # 1e-6 at and inside a free edge, 5e-6 beside a held one
+        assert error < 3.0 * modes.shapes.compliance_error(point)[0]
+
+
+def test_deflection_elsewhere():
+    points = np.array([[0.3, 0.2], [0.62, 0.45], [-0.1, -0.4], [0.0, 1.0]])
+    for edge in analytic.ENDS:
+        exact = analytic.disk(1.0, edge=edge, section=PLATE, n_modes=6).shapes
+        modes = fi.find_modes(fi.assemble(fi.mesh.disk(1.0), PLATE, supports={"boundary": edge}), n_modes=6)
+        expected = exact.deflection(points[:1], points)
+        scale = np.abs(expected).max()
+        assert_allclose(modes.shapes.deflection(points[:1], points), expected, atol=2e-5 * scale)
+        assert_allclose(modes.shapes.compliance(points), exact.compliance(points), atol=2e-5 * scale)
+
+
+def levy(edges, length, width, points, section=PLATE, n_terms=40_000):
+    """Static compliance (n,) of a plate hinged at x = 0 and length, its edges y = 0, width as told, by Levy's series.
+
+    Timoshenko and Woinowsky-Krieger, Theory of plates and shells, art. 35 and 47 to 49; per sine across the length an
+    infinite strip's deflection and four functions that decay from the edges.
+    """
+    C = section.stiffness(np.zeros((1, 2)))[0]
+    D, nu = C[0, 0], C[0, 1] / C[0, 0]
+    m = np.arange(1, n_terms + 1)
+    beta = m * np.pi / length
+
+    def strip(s):
+        """(1 + z) exp(-z) / 4 of z = beta abs(s), and its derivatives over beta**k by s."""
+        z, sign = beta * np.abs(s), 1.0 if s >= 0.0 else -1.0
+        e = np.exp(-z)
+        return [0.25 * (1 + z) * e, -0.25 * sign * z * e, 0.25 * (z - 1) * e, 0.25 * sign * (2 - z) * e]
+
+    def decaying(z, sign):
+        """Derivatives over beta**k of exp(-z) and z exp(-z), z growing with the sign along y."""
+        e = np.exp(-z)
+        return [[(-sign) ** k * e, (-sign) ** k * (z - k) * e] for k in range(4)]
+
+    def conditions(kind, jets):
+        w, dw, d2w, d3w = jets
+        return {"clamped": [w, dw], "hinged": [w, d2w], "free": [d2w - nu * w, d3w - (2 - nu) * dw]}[kind]
+
+    values = []
+    for x, y0 in points:
+        rows, right = [], []
+        for kind, y in zip(edges, (0.0, width)):
+            near, far = decaying(beta * y, 1.0), decaying(beta * (width - y), -1.0)
+            columns = [[jet[i] for jet in side] for side in (near, far) for i in range(2)]
+            rows += np.array([conditions(kind, column) for column in columns]).transpose(1, 0, 2).tolist()
+            right += [-value for value in conditions(kind, strip(y - y0))]
+        matrix, vector = np.array(rows).transpose(2, 0, 1), np.array(right).T
+        weights = np.linalg.solve(matrix, vector[..., None])[..., 0]
+        e, f = np.exp(-beta * y0), np.exp(-beta * (width - y0))
+        shapes = np.column_stack([e, beta * y0 * e, f, beta * (width - y0) * f])
+        each = (0.25 + (weights * shapes).sum(axis=1)) * 2.0 / length / (beta**3 * D)
+        total = (each * np.sin(beta * x) ** 2).sum()
+        tail = each[-1] * n_terms**3 / (2.0 * n_terms * (n_terms + 1.0)) * 0.5  # the mean square of the sines
+        values.append(total + tail)
+    return np.array(values)
+
+
+# Straight edges of every kind, on them, beside them and in the corners.
+@pytest.mark.parametrize("edges", [("free", "free"), ("clamped", "free"), ("hinged", "free"), ("clamped", "clamped")])
+def test_plates_hinged_at_two_sides(edges):
+    length, width = 0.3, 0.2
+    inside = [(0.15, 0.1), (0.11, 0.07), (0.02, 0.16)]
+    beside = [(0.15, 0.2 - d) for d in (2e-5, 2e-4, 2e-3, 6e-3)] + [(0.15, 2e-3), (3e-4, 0.2 - 2e-4), (0.003, 0.197)]
+    on = [(0.15, 0.2), (0.07, 0.2), (0.0123, 0.2)] if edges[1] == "free" else []
+    points = np.array(inside + beside + on)
+    supports = {"left": "hinged", "right": "hinged", "bottom": edges[0], "top": edges[1]}
+    modes = fi.find_modes(fi.assemble(fi.mesh.rectangle(length, width), PLATE, supports=supports), n_modes=20)
+    expected = levy(edges, length, width, points)
+    found = np.array([modes.shapes.compliance(point[None])[0, 0] for point in points])
+    claim = np.array([modes.shapes.compliance_error(point[None])[0] for point in points])
+    assert_allclose(
+        found, expected, rtol=5e-6
+    )  # 1e-7 and, beside held edges, 2e-6 measured; the series is good to 1e-8
+    assert (np.abs(found / expected - 1.0) < 3.0 * claim).all()
+    for point in points:  # and what twenty modes leave of it is positive, as it must be
+        assert modes.residual_compliance(point[None])[0, 0] > 0.0
+
+
+def test_hinged_rectangle():
+    points = [[0.465, 0.3], [0.8, 0.5], [0.2, 0.15], [0.05, 0.5], [1e-4, 2e-4]]
+    exact = analytic.rectangle(1.55, 1.0, section=PLATE, n_modes=6).shapes
+    for size in (0.25, 0.06):
+        for point in points:
+            found = finite_elements(fi.mesh.rectangle(1.55, 1.0, size=size), {"boundary": "hinged"}, [point])
+            assert_allclose(found, exact.compliance(np.array([point])), rtol=1e-5)  # 1e-6 measured, 4e-6 at the corner
+
+
+def test_a_body_hinged_at_one_edge_balances_its_load_by_turning():
+    found = finite_elements(fi.mesh.rectangle(1.0, 0.8, size=0.1), {"left": "hinged"}, [[0.5, 0.4]])
+    finer = finite_elements(fi.mesh.rectangle(1.0, 0.8, size=0.05), {"left": "hinged"}, [[0.5, 0.4]])
+    assert_allclose(found, finer, rtol=2e-6)  # the coarser mesh's smooth part; 2e-7 measured
+
+
+def navier(section, length, width, point, n_waves):
+    """Static compliance of a hinged orthotropic rectangle, grain along x, by Navier's double series."""
+    C = section.stiffness(np.zeros((1, 2)))[0]
+    m, n = np.pi * np.arange(1, n_waves + 1)[:, None] / length, np.pi * np.arange(1, n_waves + 1) / width
+    stiffness = C[0, 0] * m**4 + 2.0 * (C[0, 1] + 2.0 * C[2, 2]) * m**2 * n**2 + C[1, 1] * n**4
+    return 4.0 / (length * width) * ((np.sin(m * point[0]) * np.sin(n * point[1])) ** 2 / stiffness).sum()
+
+
+def test_tonewood():
+    wood = fi.Material.orthotropic(E_along=10e9, E_across=0.7e9, nu=0.37, G=0.7e9, rho=420.0)
+    section, point = fi.Plate(wood, thickness=3e-3), (0.2, 0.15)
+    rough, fine = (navier(section, 0.5, 0.4, point, n) for n in (800, 1600))
+    exact = fine + (fine - rough) / 3.0  # the tail falls with the square of the number of waves
+    found = finite_elements(fi.mesh.rectangle(0.5, 0.4, size=0.05), {"boundary": "hinged"}, [point], section)
+    assert_allclose(found, exact, rtol=2e-6)  # 2e-7 measured; the elements alone err by 1e-3
+
+
+def test_the_grain_may_run_askew():
+    wood = fi.Material.orthotropic(E_along=10e9, E_across=0.7e9, nu=0.37, G=0.7e9, rho=420.0, angle=0.5)
+    section = fi.Plate(wood, thickness=3e-3)
+    values = [
+        finite_elements(fi.mesh.rectangle(0.5, 0.4, size=size), {"left": "clamped"}, [[0.2, 0.15]], section)
+        for size in (0.08, 0.03)
+    ]
+    assert_allclose(*values, rtol=1e-4)  # 1.5e-5 measured
+
+
+def test_varying_thickness_needs_no_twin():
+    mesh, held, points = fi.mesh.rectangle(1.0, 0.8), {"boundary": "clamped"}, [[0.3, 0.3], [0.71, 0.52]]
+    taper = fi.Plate(PLATE.material, thickness=lambda x: 2e-3 * (1.0 + x[:, 0]))
+    tapered = [finite_elements(fi.mesh.rectangle(1.0, 0.8, size=size), held, points, taper) for size in (0.1, 0.03)]
+    assert_allclose(tapered[0], tapered[1], rtol=1e-5)
+    uniform = [
+        finite_elements(mesh, held, points, fi.Plate(PLATE.material, thickness=thickness))
+        for thickness in (2e-3, lambda x: 2e-3 * (1.0 + 1e-9 * x[:, 0]))
+    ]
+    assert_allclose(*uniform, rtol=1e-7)
+
+
+def test_wood_as_stiff_across_as_along_is_isotropic():
+    wood = fi.Material.orthotropic(E_along=10e9, E_across=10e9, nu=0.3, G=10e9 / 2.6, rho=2700.0)
+    isotropic = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=2700.0), thickness=2e-3)
+    mesh, held = fi.mesh.rectangle(1.0, 0.8, size=0.08), {"boundary": "clamped"}
+    plain = finite_elements(mesh, held, [[0.3, 0.3]], section=fi.Plate(wood, thickness=2e-3))
+    assert_allclose(plain, finite_elements(mesh, held, [[0.3, 0.3]], section=isotropic), rtol=1e-9)
+
+
+def test_springs_tension_and_masses_are_part_of_it():
+    mesh = fi.mesh.rectangle(0.3, 0.2)
+    held = finite_elements(mesh, {"boundary": "hinged"}, [[0.1, 0.07]])
+    sprung = finite_elements(mesh, {"boundary": fi.Elastic(1e12)}, [[0.1, 0.07]])
+    assert_allclose(sprung, held, rtol=1e-4)  # what the springs give: 1e-5
+    skin = fi.Plate(fi.Material(E=3.5e9, nu=0.38, rho=1380.0), thickness=2e-4, tension=300.0)
+    values = [
+        point_load.static_deflection(
+            fi.assemble(fi.mesh.disk(0.2, size=size), skin, {"boundary": "clamped"}), np.array([[0.05, 0.1]])
+        ).compliance[0, 0]
+        for size in (0.03, 0.015)
+    ]
+    assert_allclose(values[0], values[1], rtol=1e-4)  # its edge bends within three millimetres
+
+
+def test_modes_softer_than_the_body_are_an_error():
+    modes = fi.find_modes(fi.assemble(fi.mesh.rectangle(0.3, 0.2), PLATE, supports={"boundary": "hinged"}), n_modes=20)
+    wrong = fi.Modes(0.5 * modes.omega, modes.damping_ratio, modes.shapes, modes.mass)
+    with pytest.raises(fi.SimulationError, match=r"softer at \(0.1, 0.07\) m than the whole body"):
+        fi.strike(wrong, fi.Striker.rigid(0.02), fi.Contact.linear(1e5), at=(0.1, 0.07), speed=1.0)

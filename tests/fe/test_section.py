@@ -1,0 +1,61 @@
+"""Sections: stiffness and mass per length or area, and what is refused."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from fem_impact.fe.section import Beam, Material, Plate
+
+STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
+POINT = np.zeros((1, 2))
+
+
+def test_isotropic_plate_has_the_textbook_stiffness():
+    D = 210e9 * 2e-3**3 / (12 * (1 - 0.3**2))
+    wanted = D * np.array([[1, 0.3, 0], [0.3, 1, 0], [0, 0, 0.35]])
+    assert_allclose(Plate(STEEL, 2e-3).stiffness(POINT)[0], wanted, rtol=1e-14)  # the same products, rounded
+
+
+def test_orthotropic_with_equal_moduli_is_isotropic_at_any_angle():
+    same = Material.orthotropic(E_along=210e9, E_across=210e9, nu=0.3, G=210e9 / 2.6, rho=7850.0, angle=0.7)
+    assert_allclose(same.plane_stress, STEEL.plane_stress, rtol=1e-13, atol=1e-3)  # rounding of 1e11 Pa
+
+
+def test_grain_turned_by_a_right_angle_swaps_the_axes():
+    wood = {"E_along": 11e9, "E_across": 0.8e9, "nu": 0.3, "G": 0.7e9, "rho": 450.0}
+    along = Material.orthotropic(**wood).plane_stress
+    turned = Material.orthotropic(**wood, angle=np.pi / 2).plane_stress
+    assert_allclose(turned[[1, 0, 2]][:, [1, 0, 2]], along, rtol=1e-12, atol=1e-5)  # cos(pi/2) is 6e-17, not 0
+    assert_allclose(along[0, 0], 11e9 / (1 - 0.3**2 * 0.8 / 11), rtol=1e-14)
+
+
+def test_sections_of_beams():
+    assert_allclose(Beam.rectangular(STEEL, width=0.02, height=0.01).stiffness(POINT[:, :1]), 210e9 * 0.02e-6 / 12)
+    assert_allclose(Beam.circular(STEEL, diameter=0.01).stiffness(POINT[:, :1]), 210e9 * np.pi * 0.01**4 / 64)
+    assert_allclose(Beam.circular(STEEL, diameter=0.01).inertia(POINT[:, :1]), 7850 * np.pi * 0.01**2 / 4)
+
+
+def test_thickness_may_vary():
+    plate = Plate(STEEL, lambda x: 1e-3 * (1 + x[:, 0]))
+    assert_allclose(plate.inertia(np.array([[0.0, 0.0], [1.0, 0.0]])), [7.85, 15.7])
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: Material(E=-1.0, nu=0.3, rho=1.0), "E must be positive, got -1 Pa"),
+        (lambda: Material(E=1.0, nu=0.6, rho=1.0), "nu must be above -1 and at most 0.5, got 0.6"),
+        (lambda: Material(E=1.0, nu=-1.0, rho=1.0), "nu must be above -1"),
+        (lambda: Material.orthotropic(E_along=1.0, E_across=4.0, nu=0.5, G=1.0, rho=1.0), "release energy"),
+        (lambda: Plate(STEEL, 0.0), "thickness must be positive, got 0 m"),
+        (lambda: Plate(STEEL, lambda x: x[:, 0]).inertia(POINT), r"thickness must be positive everywhere, got 0 m at"),
+        (
+            lambda: Plate(STEEL, lambda x: np.ones(7)).inertia(POINT),
+            "thickness must be a function that returns numbers",
+        ),
+        (lambda: Beam.rectangular(STEEL, width=0.1, height=-0.1), "height must be positive, got -0.1 m"),
+    ],
+)
+def test_refuses_what_no_material_does(make, text):
+    with pytest.raises(ValueError, match=text):
+        make()

@@ -1,0 +1,189 @@
+"""Springs, point masses, tension, grain and varying sections against closed forms."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import brentq
+
+from fem_impact import mesh
+from fem_impact.fe.assembly import assemble
+from fem_impact.fe.section import Beam, Elastic, Material, Plate
+from fem_impact.modes.modal import find_modes
+
+STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
+PLATE = Plate(STEEL, 2e-3)
+D = 210e9 * 2e-3**3 / (12 * (1 - 0.3**2))
+PER_AREA = 7850 * 2e-3
+BAR = Beam.rectangular(STEEL, width=0.02, height=0.01)
+EI, PER_LENGTH = 210e9 * 0.02 * 0.01**3 / 12, 7850 * 0.02 * 0.01
+
+
+def test_tension_stiffens_a_hinged_plate_as_the_closed_form_says():
+    tension = 5e3
+    pulled = Plate(STEEL, 2e-3, tension=tension)
+    modes = find_modes(assemble(mesh.rectangle(1.55, 1.0), pulled, {"boundary": "hinged"}), n_modes=4)
+    wave2 = np.pi**2 * np.array([1 + 1 / 1.55**2, 1 + 4 / 1.55**2, 1 + 9 / 1.55**2, 4 + 1 / 1.55**2])
+    exact = np.sqrt((D * wave2**2 + tension * wave2) / PER_AREA)
+    assert_allclose(modes.omega, np.sort(exact), rtol=1e-5)  # WAVE_PER_ELEMENT's promise
+
+
+def test_a_drumhead_is_a_membrane():
+    thin = Plate(Material(E=4e9, nu=0.35, rho=1400.0), 2e-4, tension=4e3)
+    modes = find_modes(assemble(mesh.disk(0.18), thin, {"boundary": "hinged"}), n_modes=1)
+    assert_allclose(modes.omega[0], 1596.92625, rtol=3e-5)  # root of the hinged disk under tension, J0 and I0
+    wave = 2.404825557695773 / 0.18
+    assert_allclose(modes.omega[0], wave * np.sqrt(4e3 / (1400 * 2e-4)), rtol=1e-4)  # bending adds D k^2 / 2 T = 7e-5
+
+
+def test_orthotropic_hinged_plate_meets_its_closed_form():
+    wood = Material.orthotropic(E_along=11e9, E_across=0.8e9, nu=0.35, G=0.75e9, rho=430.0)
+    h, a, b = 3e-3, 0.5, 0.36
+    inner = 1 - 0.35**2 * 0.8 / 11
+    D1, D2, D12, D66 = 11e9 / inner, 0.8e9 / inner, 0.35 * 0.8e9 / inner, 0.75e9
+    m, n = np.meshgrid(np.arange(1, 9), np.arange(1, 9))
+    kx, ky = m * np.pi / a, n * np.pi / b
+    stiff = h**3 / 12 * (D1 * kx**4 + 2 * (D12 + 2 * D66) * kx**2 * ky**2 + D2 * ky**4)
+    exact = np.sort(np.sqrt(stiff / (430 * h)).ravel())[:10]
+    modes = find_modes(
+        assemble(mesh.rectangle(a, b), Plate(wood, h), {"boundary": "hinged"}), n_modes=10, tolerance=1e-6
+    )
+    assert_allclose(modes.omega, exact, rtol=1e-6)
+    turned = Material.orthotropic(E_along=11e9, E_across=0.8e9, nu=0.35, G=0.75e9, rho=430.0, angle=np.pi / 2)
+    other = find_modes(
+        assemble(mesh.rectangle(b, a), Plate(turned, h), {"boundary": "hinged"}), n_modes=10, tolerance=1e-6
+    )
+    assert_allclose(other.omega, exact, rtol=1e-6)
+
+
+def test_a_strip_without_contraction_is_a_beam_of_the_same_varying_height():
+    loose = Material(E=210e9, nu=0.0, rho=7850.0)
+
+    def height(points):
+        return 0.01 * (1.0 - 0.5 * points[:, 0])
+
+    beam = find_modes(
+        assemble(mesh.line(1.0, size=0.01), Beam.rectangular(loose, width=0.05, height=height), {"left": "clamped"}),
+        n_modes=2,
+    )
+    plate = find_modes(assemble(mesh.rectangle(1.0, 0.05), Plate(loose, height), {"left": "clamped"}), n_modes=2)
+    assert_allclose(plate.omega, beam.omega, rtol=1e-5)  # the beam errs by 7e-4 (kh)**4 = 1e-8, the strip by 1e-6
+
+
+def test_cantilever_with_a_tip_mass():
+    share = 0.7
+
+    def condition(x):
+        c, s, C, S = np.cos(x), np.sin(x), np.cosh(x), np.sinh(x)
+        return 1 + c * C + share * x * (c * S - s * C)
+
+    exact = np.array([brentq(condition, 0.5, 1.8), brentq(condition, 3.5, 4.6)])
+    mass = share * PER_LENGTH
+    modes = find_modes(assemble(mesh.line(1.0), BAR, {"left": "clamped"}, point_masses=[(1.0, mass)]), n_modes=2)
+    assert_allclose(modes.omega, exact**2 * np.sqrt(EI / PER_LENGTH), rtol=1e-6)
+    assert_allclose(modes.mass, PER_LENGTH + mass, rtol=1e-12)
+
+
+def test_a_stepped_cantilever_meets_its_transfer_matrices():
+    step = 0.37
+
+    def field(beta, x):
+        """Deflection, slope, moment and shear over E I of the thin part, carried over a length x."""
+        b = beta * x
+        c, s, C, S = np.cos(b), np.sin(b), np.cosh(b), np.sinh(b)
+        A, B, F, G = (C + c) / 2, (S + s) / 2 / beta, (C - c) / 2 / beta**2, (S - s) / 2 / beta**3
+        return np.array(
+            [
+                [A, B, F, G],
+                [beta**4 * G, A, B, F],
+                [beta**4 * F, beta**4 * G, A, B],
+                [beta**4 * B, beta**4 * F, beta**4 * G, A],
+            ]
+        )
+
+    def condition(omega):
+        thin = np.sqrt(omega * np.sqrt(7850 * 12 / (210e9 * 0.01**2)))
+        thick = np.sqrt(omega * np.sqrt(7850 * 12 / (210e9 * 0.02**2)))
+        total = field(thick, 1 - step) @ np.diag([1, 1, 1 / 8, 1 / 8]) @ field(thin, step)
+        return np.linalg.det(total[2:, 2:])
+
+    grid = np.linspace(20, 2500, 4000)
+    values = np.array([condition(w) for w in grid])
+    exact = [brentq(condition, grid[i], grid[i + 1]) for i in np.flatnonzero(values[1:] * values[:-1] < 0)][:3]
+    stepped = Beam.rectangular(STEEL, width=0.01, height=lambda x: np.where(x[:, 0] < step, 0.01, 0.02))
+    modes = find_modes(assemble(mesh.line(1.0), stepped, {"left": "clamped"}), n_modes=3)
+    assert_allclose(modes.omega, exact, rtol=1e-5)  # a node stands at the step; else 1e-2 is lost
+
+
+def test_a_heavy_mass_swings_on_the_static_compliance_of_the_plate():
+    at, mass = (0.5, 0.4), 1e4
+    bare = find_modes(assemble(mesh.rectangle(1.0, 0.8), PLATE, {"boundary": "hinged"}), n_modes=1)
+    laden = find_modes(
+        assemble(mesh.rectangle(1.0, 0.8), PLATE, {"boundary": "hinged"}, point_masses=[(at, mass)]), n_modes=1
+    )
+    compliance = bare.shapes.compliance(np.array([at]))[0, 0]
+    # Dunkerley: the plate's own mass adds about m_plate / mass, 1e-3; the mesh about 3e-3 under a point
+    assert_allclose(laden.omega[0], (mass * compliance) ** -0.5, rtol=5e-3)
+
+
+def test_a_free_plate_turns_about_its_common_centre_of_mass():
+    system = assemble(mesh.rectangle(1.0, 1.0), PLATE, point_masses=[((0.9, 0.5), 5.0)])
+    modes = find_modes(system, n_modes=4)
+    plate = PER_AREA
+    x0 = (plate * 0.5 + 5.0 * 0.9) / (plate + 5.0)
+    inertia_y = plate * (1 / 12 + (x0 - 0.5) ** 2) + 5.0 * (0.9 - x0) ** 2
+    at = (0.2, 0.5)
+    effective = 1.0 / (1.0 / (plate + 5.0) + (0.2 - x0) ** 2 / inertia_y)
+    assert modes.n_rigid == 3
+    assert_allclose((modes.shape_at([at])[0, :3] ** 2).sum(), 1.0 / effective, rtol=1e-9)
+
+
+def test_soft_springs_carry_a_plate_as_a_rigid_body():
+    spring = Elastic(stiffness=1.0)
+    modes = find_modes(assemble(mesh.rectangle(1.0, 0.5), PLATE, {"boundary": spring}), n_modes=3)
+    assert modes.n_rigid == 0
+    heave = np.sqrt(1.0 * 3.0 / (PER_AREA * 0.5))  # stiffness times perimeter over mass
+    line = 2 * (1.0**3 / 12) + 2 * 0.5 * 0.5**2  # sum of x^2 ds along the rim
+    pitch = np.sqrt(line / (PER_AREA * 0.5 * 1.0**2 / 12))
+    assert_allclose(np.sort(modes.omega)[0], heave, rtol=1e-3)  # the plate bends by 3e-4 of the springs
+    assert np.isclose(modes.omega, pitch, rtol=1e-3).any()
+
+
+def test_stiff_springs_are_hinges_and_stiff_turning_springs_clamps():
+    shape = mesh.rectangle(1.0, 1.0)
+    hinged = find_modes(assemble(shape, PLATE, {"boundary": Elastic(1e12)}), n_modes=3)
+    assert_allclose(hinged.omega * np.sqrt(PER_AREA / D), np.pi**2 * np.array([2, 5, 5]), rtol=1e-4)
+    clamped = find_modes(assemble(shape, PLATE, {"boundary": Elastic(1e12, 1e9)}), n_modes=1)
+    assert_allclose(clamped.omega * np.sqrt(PER_AREA / D), [35.9851911], rtol=1e-4)
+
+
+def test_a_beam_on_an_end_spring():
+    # hinged at the left, a spring k at the right: rigid turning while the spring is soft, omega^2 = 3 k / m
+    modes = find_modes(assemble(mesh.line(1.0), BAR, {"left": "hinged", "right": Elastic(1.0)}), n_modes=1)
+    assert_allclose(modes.omega[0], np.sqrt(3.0 / PER_LENGTH), rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("act", "text"),
+    [
+        (
+            lambda: assemble(mesh.rectangle(1, 1), Plate(STEEL, 1e-3, tension=1.0), {"left": "hinged"}),
+            "every edge supported",
+        ),
+        (
+            lambda: assemble(mesh.rectangle(1, 1), PLATE, point_masses=[((2.0, 0.5), 1.0)]),
+            r"must lie on the body, got \(2, 0.5\) m",
+        ),
+        (
+            lambda: assemble(mesh.rectangle(1, 1), PLATE, point_masses=[((0.2, 0.5), -1.0)]),
+            "mass of .* must be positive, got -1 kg",
+        ),
+        (
+            lambda: assemble(mesh.rectangle(1, 1), PLATE, point_masses=[0.2]),
+            r"must be a pair \(point in m, mass in kg\)",
+        ),
+        (lambda: Elastic(-1.0), "stiffness must not be negative"),
+    ],
+)
+def test_refuses_what_cannot_be_attached(act, text):
+    with pytest.raises(ValueError, match=text):
+        act()

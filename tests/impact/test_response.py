@@ -1,0 +1,88 @@
+"""What is read from a blow: histories, spectrum, motion, words."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.impact import response
+
+
+@pytest.fixture(scope="module")
+def half_sine():
+    """A mass of 0.1 kg on a plate of 1000 t: pi ms half sine of 100 N."""
+    return fi.strike(fi.Modes.rigid(1e6), fi.Striker.rigid(0.1), fi.Contact.linear(1e5), at=None, speed=1.0)
+
+
+def test_spectrum_is_that_of_a_half_sine(half_sine):
+    fc = np.sqrt(1e5 / 0.1) / (2.0 * np.pi)
+    frequencies = fc * np.array([0.0, 0.5, 1.0, 1.187, 2.0, 3.0])
+    size = np.abs(half_sine.spectrum(frequencies)) / half_sine.impulse
+    # |F| = cos(pi x / 2) / (1 - x**2), pi / 4 at x = 1: Euphonics 2.2.6; the samples follow it to the tolerance
+    wanted = [1.0, np.cos(np.pi / 4) / 0.75, np.pi / 4, 10.0 ** (-3.0 / 20.0), 1.0 / 3.0, 0.0]
+    assert_allclose(size, wanted, atol=5e-4)
+
+
+@pytest.mark.parametrize("highest", [1.0, 2e3, 2e4])
+def test_spectrum_of_many_pieces_is_the_same_by_transform(half_sine, monkeypatch, highest):
+    frequencies = np.append(np.linspace(-highest, highest, 501), 0.123 * highest)
+    summed = half_sine.spectrum(frequencies)
+    monkeypatch.setattr(response, "MOST_TERMS", 0)
+    # impulses in cells fold the kinks at both ends into the band: 2e-6 was measured at most, on blows with more of them
+    assert_allclose(half_sine.spectrum(frequencies), summed, rtol=0, atol=1e-5 * np.abs(summed).max())
+    assert_allclose(half_sine.spectrum([0.0]), [half_sine.impulse], rtol=1e-5)  # by the sum: a transform has no band
+
+
+def test_centroid_of_a_blow_of_too_many_periods_is_refused(half_sine):
+    with pytest.raises(ValueError, match=r"max_frequency must be at most .* Hz for a blow of 0\.003142 s"):
+        half_sine.spectral_centroid(1e12)
+
+
+def test_spectral_centroid_states_its_band(half_sine):
+    low, high = half_sine.spectral_centroid(100.0), half_sine.spectral_centroid(1000.0)
+    assert 40.0 < low < 50.0 < high < 1000.0  # a spectrum flat at first has its centroid near half the band
+    with pytest.raises(ValueError, match="max_frequency must be positive"):
+        half_sine.spectral_centroid(0.0)
+
+
+def test_states_come_in_any_order_and_before_the_blow_is_refused(half_sine):
+    times = np.array([2e-3, 0.0, 5e-3, 1e-3])
+    q, p = half_sine.modal_state(times, body=0)
+    for i, t in enumerate(times):
+        one_q, one_p = half_sine.modal_state([t], body=0)
+        assert_allclose(q[i], one_q[0], rtol=1e-13, atol=1e-18)
+        assert_allclose(p[i], one_p[0], rtol=1e-13)
+    assert_allclose(q[1], 0.0, atol=0.0)
+    with pytest.raises(ValueError, match="times must not be before the blow at 0 s"):
+        half_sine.modal_state([-1e-3])
+
+
+def test_velocity_is_the_rate_of_displacement():
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20, damping_ratio=0.01)
+    hit = fi.strike(plate, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), at=(0.465, 0.3), speed=1.0)
+    t, h = np.linspace(2e-4, 6e-3, 40), 1e-7
+    slope = (hit.displacement([(0.5, 0.5)], t + h) - hit.displacement([(0.5, 0.5)], t - h)) / (2.0 * h)
+    rate = hit.velocity([(0.5, 0.5)], t)
+    assert_allclose(slope, rate, atol=1e-6 * np.abs(rate).max())  # second difference and rounding
+
+
+def test_summary_speaks_of_what_counts(half_sine):
+    text = half_sine.summary()
+    for word in ("1 impact", "final separation (proved)", "peak 100", "restitution", "estimated error", "energy"):
+        assert word in text
+
+
+def test_centroid_is_that_of_the_spectrum():
+    """The compiled transform of equal steps in frequency against the one at any frequencies."""
+    hit = fi.strike(
+        fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=60),
+        fi.Striker.stick(0.1, 10e3),
+        fi.Contact.linear(1e6),
+        at=(0.465, 0.3),
+        speed=1.0,
+    )
+    limit, span = 3e3, hit.impacts[-1].end
+    frequencies = np.linspace(0.0, limit, max(512, int(32.0 * limit * span)))
+    size = np.abs(hit.spectrum(frequencies))
+    wanted = np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies)
+    assert_allclose(hit.spectral_centroid(limit), wanted, rtol=1e-9)  # rounding of 256 turns at most

@@ -1,0 +1,45 @@
+"""Mobility against exact formulas, and the half sine against its printed properties."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from fem_impact.impact import spectra
+from fem_impact.modes import analytic
+
+
+def test_half_sine_levels():
+    # -3, -6, -10, -20 dB points and the first null, over the contact frequency (half-sine table of Euphonics 2.2.6).
+    level = 20.0 * np.log10(spectra.half_sine_spectrum([1.187, 1.637, 2.039, 2.607], 1.0))
+    assert_allclose(level, [-3.0, -6.0, -10.0, -20.0], atol=0.02)  # abscissae printed to four digits
+    assert spectra.half_sine_spectrum(3.0, 1.0) < 1e-15
+    assert_allclose(spectra.half_sine_spectrum([1.0, 1.0 + 1.01e-4, 1.0 - 1.01e-4], 1.0), np.pi / 4, rtol=1e-4)
+
+
+def test_mobility_is_reciprocal_and_static_at_low_frequency():
+    modes = analytic.rectangle(1.0, 0.7, mass=0.5, first_frequency=80.0, n_modes=30, damping_ratio=0.01)
+    a, b, low = (0.2, 0.3), (0.6, 0.5), [1e-3]
+    there, back = spectra.mobility(modes, a, b, [50.0, 200.0]), spectra.mobility(modes, b, a, [50.0, 200.0])
+    assert_allclose(there, back, rtol=1e-12)  # same sum in another order
+    static = modes.shapes.compliance(np.array([a, b]))[0, 1]
+    assert_allclose(spectra.mobility(modes, a, b, low) / (2j * np.pi * low[0]), static, rtol=1e-6)  # damping: 1e-7
+
+
+def test_mobility_of_a_large_plate_averages_to_the_infinite_plate():
+    modes = analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=10.0, n_modes=2000, damping_ratio=0.02)
+    density, first = 0.2 / 1.55, np.pi**2 * (1 + 1 / 1.55**2)
+    infinite = 1.0 / (8.0 * density * 2 * np.pi * 10.0 / first)
+    drive = spectra.mobility(modes, (0.7, 0.4), (0.7, 0.4), np.linspace(2000.0, 4000.0, 400))
+    assert_allclose(drive.real.mean(), infinite, rtol=0.05)  # Skudrzyk's mean value; 1 % measured
+    assert abs(drive.imag.mean()) < 0.1 * infinite
+
+
+def test_mobility_of_a_rigid_mass_is_that_of_a_mass():
+    modes = analytic.Modes.rigid(2.0)
+    assert_allclose(spectra.mobility(modes, None, None, [5.0]), 1.0 / (2j * np.pi * 5.0 * 2.0), rtol=1e-14)
+
+
+def test_frequencies_must_be_positive():
+    modes = analytic.Modes.rigid(2.0)
+    with pytest.raises(ValueError, match="frequencies must be positive, got 0 Hz"):
+        spectra.mobility(modes, None, None, [0.0])

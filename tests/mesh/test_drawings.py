@@ -1,0 +1,163 @@
+"""Outlines from SVG, DXF, shapely and points: curves stay curves, units are honoured, what is no body is refused."""
+
+import numpy as np
+import pytest
+import shapely
+from numpy.testing import assert_allclose
+
+from fem_impact import mesh
+from fem_impact._base import isolated
+from fem_impact.fe.assembly import assemble
+from fem_impact.fe.section import Material, Plate
+from fem_impact.modes.modal import find_modes
+
+PLATE = Plate(Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
+PER_RATE = np.sqrt(7850 * 2e-3 / (210e9 * 2e-3**3 / (12 * (1 - 0.3**2))))
+ANGLE = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" {head}>{body}</svg>'
+
+
+def first(shape, support):
+    """Dimensionless first frequency with the rim held."""
+    return find_modes(assemble(shape, PLATE, {"boundary": support}), n_modes=1).omega[0] * PER_RATE
+
+
+def svg(tmp_path, body, head='width="2000mm" height="2000mm" viewBox="0 0 2 2"'):
+    pytest.importorskip("svgelements", reason="the cad extra is not installed")
+    path = tmp_path / "plate.svg"
+    path.write_text(SVG.format(head=head, body=body))
+    return path
+
+
+def dxf(tmp_path, draw, units=6):
+    ezdxf = pytest.importorskip("ezdxf", reason="the cad extra is not installed")
+    document = ezdxf.new()
+    document.units = units
+    draw(document.modelspace())
+    document.saveas(tmp_path / "plate.dxf")
+    return tmp_path / "plate.dxf"
+
+
+@pytest.mark.parametrize(
+    "source", [np.column_stack([np.cos(ANGLE), np.sin(ANGLE)]), shapely.Point(3, 4).buffer(1.0), None]
+)
+def test_points_on_a_circle_make_a_disk(source, tmp_path):
+    source = svg(tmp_path, '<circle cx="1" cy="1" r="1"/>') if source is None else source
+    disk = mesh.outline(source)
+    assert_allclose(disk.curvatures, 1.0, rtol=1e-9)
+    assert_allclose(first(disk, "hinged"), 4.935149043, rtol=1e-5)  # Bessel root; the polygon's limit is 40 % higher
+
+
+def test_points_on_an_ellipse_make_an_ellipse():
+    shape = mesh.outline(np.column_stack([2 * np.cos(ANGLE), np.sin(ANGLE)]))
+    assert "smooth curves" in shape.notes[0]
+    # a^2 omega sqrt(rho h / D) = 27.377 for a clamped ellipse of 2 : 1 (Leissa, Vibration of Plates, table 3.1)
+    assert_allclose(4.0 * first(shape, "clamped"), 27.377, rtol=1e-4)
+
+
+def test_ellipse_in_an_svg_turned_by_a_transform(tmp_path):
+    body = '<ellipse cx="1" cy="1" rx="1" ry=".5" transform="rotate(30 1 1)"/>'
+    shape = mesh.outline(svg(tmp_path, body, 'viewBox="0 0 2 2"'), unit="m")
+    assert_allclose(first(shape, "clamped"), 27.377, rtol=1e-4)
+
+
+def test_svg_keeps_size_names_and_holes_and_turns_y_upward(tmp_path):
+    body = '<path id="rim" d="M0 0 H300 V200 H0 Z"/><circle id="hole" cx="80" cy="50" r="20"/>'
+    shape = mesh.outline(svg(tmp_path, body, 'width="300mm" height="200mm" viewBox="0 0 300 200"'))
+    assert set(shape.edges) == {"rim", "hole", "outer", "boundary"}
+    assert_allclose(np.ptp(shape.points, axis=0), [0.3, 0.2], rtol=1e-9)
+    hole = shape.points[shape.facets[shape.edges["hole"]][:, 0]]
+    assert_allclose(hole.mean(axis=0), [0.08, -0.05], atol=1e-4)  # y upward
+    assert not shape.notes
+
+
+def test_svg_without_a_unit_says_what_was_taken(tmp_path):
+    shape = mesh.outline(svg(tmp_path, '<rect width="96" height="96"/>', 'viewBox="0 0 96 96"'))
+    assert "states no unit" in shape.notes[0]
+
+
+def test_dxf_lines_and_arcs_in_any_order_make_a_stadium(tmp_path):
+    def draw(space):
+        space.add_line((0, 0), (1000, 0))
+        space.add_line((0, 1000), (1000, 1000))
+        space.add_arc((1000, 500), 500, -90, 90)
+        space.add_arc((0, 500), 500, 90, 270)
+        space.add_circle((500, 500), 100)
+
+    shape = mesh.outline(dxf(tmp_path, draw, units=4))
+    exact = 1.0 + 0.25 * np.pi - 0.01 * np.pi
+    assert_allclose(mesh.outline(dxf(tmp_path, draw, units=4), size=0.02).area, exact, rtol=1e-3)  # chords
+    assert set(shape.edges) == {"edge0", "hole0", "outer", "boundary"}  # smooth all round: one edge
+
+
+def test_dxf_polyline_with_a_bulge_is_an_arc(tmp_path):
+    corners = [(0, 0, 0, 0, 0), (1, 0, 0, 0, 1), (1, 1, 0, 0, 0), (0, 1, 0, 0, 0)]
+    shape = mesh.outline(dxf(tmp_path, lambda space: space.add_lwpolyline(corners, close=True)))
+    curved = shape.curvatures[np.abs(shape.curvatures[:, 0]) > 0]
+    assert_allclose(curved, 2.0, rtol=1e-6)
+
+
+def test_dxf_ellipse_and_spline(tmp_path):
+    shape = mesh.outline(dxf(tmp_path, lambda space: space.add_ellipse((0, 0), (2, 0), 0.5)))
+    assert_allclose(4.0 * first(shape, "clamped"), 27.377, rtol=1e-4)
+    points = [(0.0, 0.0), (1.0, 0.0), (1.2, 0.8), (0.0, 1.0), (0.0, 0.0)]
+    curve = mesh.outline(dxf(tmp_path, lambda space: space.add_spline(points)))
+    assert curve.curved.all()
+
+
+@pytest.mark.parametrize(
+    ("act", "text"),
+    [
+        (
+            lambda t: mesh.outline(svg(t, '<path d="M0 0 H1 V1"/>')),
+            r"open outline: it ends at \(1, -1\).*close the path",
+        ),
+        (lambda t: mesh.outline(svg(t, "")), "has no outline"),
+        (lambda t: mesh.outline(t / "none.svg"), "there is no such file"),
+        (lambda t: mesh.outline([(0, 0), (1, 0)]), "must have 3 to 2000 points, got 2"),
+        (lambda t: mesh.outline([(0, 0), (1, 1), (1, 0), (0, 1)]), "must not cross or touch itself"),
+        (lambda t: mesh.outline(shapely.Point(0, 0)), "one shapely Polygon, got a Point"),
+        (lambda t: mesh.outline(dxf(t, lambda s: s.add_circle((0, 0), 150.0))), "looks like millimetres"),
+    ],
+)
+def test_what_is_no_outline_is_refused(tmp_path, act, text):
+    with pytest.raises(ValueError, match=text):
+        act(tmp_path)
+
+
+def test_broken_files_are_refused(tmp_path):
+    pytest.importorskip("svgelements", reason="the cad extra is not installed")
+    pytest.importorskip("ezdxf", reason="the cad extra is not installed")
+    for name in ("plate.svg", "plate.dxf"):
+        (tmp_path / name).write_text("neither")
+        with pytest.raises(ValueError, match=f"{name} cannot be read as"):
+            mesh.outline(tmp_path / name)
+
+
+LAUGHS = '<!DOCTYPE svg [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]>'
+OUTSIDE = '<!DOCTYPE svg [<!ENTITY a SYSTEM "file:///etc/passwd">]>'
+
+
+@pytest.mark.parametrize("head", [LAUGHS, OUTSIDE])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_entities_are_refused_not_expanded(tmp_path, head, encoding):
+    text = f'<?xml version="1.0" encoding="{encoding}"?>{head}' + SVG.format(head="", body="<text>&a;</text>")
+    (tmp_path / "plate.svg").write_bytes(text.encode(encoding))
+    with pytest.raises(ValueError, match="declares XML entities; save it as plain SVG"):
+        mesh.outline(tmp_path / "plate.svg")
+
+
+def test_what_refers_to_itself_or_multiplies_is_a_sentence(tmp_path, monkeypatch):
+    monkeypatch.setattr(isolated, "PATIENCE", 2.0)
+    with pytest.raises(ValueError, match=r"plate\.svg cannot be read as SVG \(maximum recursion"):
+        mesh.outline(svg(tmp_path, '<g id="a"><use href="#a"/></g>'))
+    uses = "".join(f'<g id="a{i}">' + f'<use href="#a{i - 1}"/>' * 10 + "</g>" for i in range(1, 9))
+    with pytest.raises(ValueError, match=r"plate\.svg cannot be read as SVG \(reading took longer|its reader crashed"):
+        mesh.outline(svg(tmp_path, f'<g id="a0"><rect width="1" height="1"/></g>{uses}'))
+
+
+def test_links_to_other_files_are_not_followed(tmp_path):
+    (tmp_path / "other.svg").write_text(SVG.format(head="", body='<circle id="x" r="1"/>'))
+    for href in ("other.svg#x", f"file://{tmp_path}/other.svg#x", "http://localhost:1/other.svg#x"):
+        with pytest.raises(ValueError, match="has no outline"):
+            mesh.outline(svg(tmp_path, f'<use href="{href}"/><image href="{href}" width="1" height="1"/>'))

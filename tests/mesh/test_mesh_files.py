@@ -1,0 +1,263 @@
+"""Mesh files: what is read, what is mended and said, what is refused and why; and the meshes shipped."""
+
+import sys
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from fem_impact import mesh
+from fem_impact._base.check import SimulationError
+from fem_impact.fe.assembly import assemble
+from fem_impact.fe.section import Material, Plate
+from fem_impact.modes.modal import find_modes
+
+MESHES = Path(__file__).parents[2] / "meshes"
+PLATE = Plate(Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
+PER_RATE = np.sqrt(7850 * 2e-3 / (210e9 * 2e-3**3 / (12 * (1 - 0.3**2))))
+GOOD = mesh.rectangle(1.55, 1.0, size=0.25)
+HINGED = np.pi**2 * np.array([1 + 1 / 1.55**2, 1 + 4 / 1.55**2])
+
+
+def parameters(shape, supports, n_modes=2):
+    return find_modes(assemble(shape, PLATE, supports), n_modes=n_modes).omega * PER_RATE
+
+
+def written(tmp_path, points, cells, kind="triangle", name="plate.vtu"):
+    """A file with these points (n, 2 or 3) and cells."""
+    points = np.asarray(points, float)
+    points = np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
+    meshio.Mesh(points, [(kind, np.asarray(cells))]).write(tmp_path / name)
+    return tmp_path / name
+
+
+@pytest.mark.parametrize("name", ["plate.vtu", "plate.vtk", "plate.xdmf", "plate.stl", "plate.inp"])
+def test_formats_without_names_give_the_same_plate(tmp_path, name):
+    if name.endswith("xdmf"):
+        pytest.importorskip("h5py", reason="meshio writes XDMF with h5py")
+    plate = mesh.load(written(tmp_path, GOOD.points, GOOD.cells, name=name))
+    assert_allclose(parameters(plate, {"boundary": "hinged"}), HINGED, rtol=1e-5)  # refined by find_modes: 1e-6
+
+
+def test_saved_mesh_comes_back_with_its_edges(tmp_path):
+    mesh.save(tmp_path / "plate.msh", GOOD)
+    plate = mesh.load(tmp_path / "plate.msh")
+    assert set(plate.edges) == {"left", "right", "bottom", "top", "outer", "boundary"}
+    assert_allclose(plate.points[plate.facets[plate.edges["right"]]][..., 0], 1.55)
+    supports = {"left": "clamped", "right": "clamped"}
+    assert_allclose(parameters(plate, supports), parameters(GOOD, supports), rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["plate.msh", "plate.vtu"])
+def test_a_disk_from_a_file_is_a_disk_and_no_polygon(tmp_path, name):
+    disk = mesh.disk(1.0, size=0.2)
+    if name.endswith("msh"):
+        mesh.save(tmp_path / name, disk)
+    else:
+        written(tmp_path, disk.points, disk.cells, name=name)
+    plate = mesh.load(tmp_path / name)
+    assert_allclose(plate.curvatures, 1.0, rtol=1e-6)  # the circle is found in its points
+    assert_allclose(parameters(plate, {"boundary": "hinged"}), [4.935149043, 13.89816507], rtol=1e-5)  # Bessel roots
+
+
+def test_a_smooth_rim_that_is_no_circle_is_followed(tmp_path):
+    angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    rim = np.column_stack([1.5 * np.cos(angle), np.sin(angle)])
+    shape = mesh.polygon(rim, size=0.2)
+    plate = mesh.load(written(tmp_path, shape.points, shape.cells))
+    a, b = 1.5, 1.0
+    x, y = plate.points[plate.facets[:, 0]].T
+    exact = 1.0 / (a**2 * b**2 * (x**2 / a**4 + y**2 / b**4) ** 1.5)
+    assert_allclose(plate.curvatures[:, 0], exact, rtol=0.01)  # quartics through five points 0.13 apart
+    assert any("smooth curves" in note for note in plate.notes)
+
+
+def test_a_mesh_far_finer_than_the_modes_need_is_filled_anew_within_its_rim(tmp_path):
+    mesh.save(tmp_path / "fine.msh", mesh.disk(1.0, 0.2, size=0.07))
+    plate = mesh.load(tmp_path / "fine.msh")
+    supports = {"outer": "clamped", "inner": "free"}
+    modes = find_modes(assemble(plate, PLATE, supports), n_modes=6, tolerance=1e-3)
+    used = modes.shapes.system.mesh
+    assert len(used.cells) < 0.7 * len(plate.cells)
+    assert set(used.edges) == set(plate.edges)
+    for name in plate.edges:
+        one, two = (m.facets[m.edges[name]] for m in (used, plate))
+        assert_allclose(sorted(used.points[one].tolist()), sorted(plate.points[two].tolist()), rtol=0, atol=1e-12)
+    order = [np.lexsort(np.round(m.middles, 9).T) for m in (used, plate)]
+    for field in ("middles", "curvatures"):  # 1e-6: curvatures come from second differences of the curve
+        one, two = (getattr(m, field)[rows] for m, rows in zip((used, plate), order))
+        assert_allclose(one, two, rtol=0, atol=1e-6)
+    in_full = find_modes(assemble(plate, PLATE, supports), n_modes=6)
+    assert_allclose(modes.omega, in_full.omega, rtol=1e-3)  # the tolerance
+
+
+def test_triangles_under_a_varying_thickness_are_kept():
+    plate = mesh.load(MESHES / "guitar.msh")
+    stepped = Plate(PLATE.material, lambda points: np.where(points[:, 0] < 0.2, 2e-3, 3e-3))
+    used = assemble(plate, stepped, {"body": "clamped"}).mesh
+    assert_allclose(used.refined(0.5).cells, plate.cells)
+    fine = used.refined(2.0)
+    assert len(fine.cells) == 4 * len(plate.cells)
+    assert_allclose(fine.points[: len(plate.points)], plate.points, rtol=0, atol=0)
+    assert len(plate.refined(0.5).cells) < len(plate.cells)
+
+
+def test_where_the_mesher_fails_the_mesh_is_used_as_it_is(monkeypatch):
+    def fail(*_):
+        raise SimulationError("the mesher could not fill the outline")
+
+    plate = mesh.load(MESHES / "guitar.msh")
+    monkeypatch.setattr("fem_impact.mesh.meshes.triangulate", fail)
+    assert_allclose(plate.refined(0.5).cells, plate.cells)
+    assert len(plate.refined(1.3).cells) == 4 * len(plate.cells)
+
+
+@pytest.mark.parametrize("factor", [1.3, 2.0, 2.6])
+def test_smaller_triangles_fill_the_same_rim(factor):
+    plate = mesh.load(MESHES / "guitar.msh")
+    fine = plate.refined(factor)
+    assert fine.size <= plate.size / factor * (1.0 + 1e-9)
+    assert set(fine.edges) == set(plate.edges)
+    # a divided facet is off the curve it was cut from by the sixth power of its length: 1e-6 of 20 mm
+    around, inside = (fine.points[fine.facets[fine.edges[name]][:, 0]] for name in ("body", "hole0"))
+    assert_allclose(np.hypot(*(inside - [0.335, 0.0]).T), 0.045, rtol=1e-6)
+    gap = np.linalg.norm(plate.points[plate.facets[plate.edges["body"]][:, 0]][:, None] - around[None], axis=2)
+    assert gap.min(axis=1).max() < 1e-12
+    corners = fine.points[fine.cells]
+    assert (np.linalg.det(corners[:, 1:] - corners[:, :1]) > 0.0).all()
+    assert_allclose(fine.area, plate.area, rtol=5e-3)  # within the chords, which come nearer to the curve
+
+
+def spoil_inverted():
+    cells = GOOD.cells.copy()
+    cells[::3] = cells[::3][:, [0, 2, 1]]
+    return GOOD.points, cells
+
+
+def spoil_doubled_nodes():
+    cells = GOOD.cells.copy()
+    cells[len(cells) // 2 :] += len(GOOD.points)
+    return np.concatenate([GOOD.points, GOOD.points + 1e-13]), cells
+
+
+def spoil_collapsed():
+    return GOOD.points, np.concatenate([GOOD.cells, [[0, 0, 1], [5, 6, 6]]])
+
+
+def spoil_twice():
+    return GOOD.points, np.concatenate([GOOD.cells, GOOD.cells[:4]])
+
+
+def spoil_order():
+    order = np.random.default_rng(3).permutation(len(GOOD.points))
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    return GOOD.points[order], place[GOOD.cells][::-1]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "note"),
+    [
+        (spoil_inverted, "inverted triangles were flipped"),
+        (spoil_doubled_nodes, "duplicate nodes were merged"),
+        (spoil_collapsed, "2 triangles with two corners at one point were removed"),
+        (spoil_twice, "4 duplicate triangles were removed"),
+        (spoil_order, None),
+    ],
+)
+def test_what_is_safe_to_mend_is_mended_and_said(tmp_path, spoil, note):
+    plate = mesh.load(written(tmp_path, *spoil()))
+    if note is None:
+        assert not plate.notes
+    else:
+        assert any(note in said for said in plate.notes)
+    assert_allclose(plate.area, 1.55, rtol=1e-12)
+    assert_allclose(parameters(plate, {"boundary": "hinged"}), HINGED, rtol=1e-5)
+
+
+def test_hanging_nodes_are_tied_in(tmp_path):
+    points = [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1), (1, 0.5)]
+    plate = mesh.load(written(tmp_path, points, [[0, 1, 4], [0, 4, 5], [1, 2, 6], [2, 3, 6], [3, 4, 6]]))
+    assert "hanging nodes" in plate.notes[0]
+    assert_allclose(parameters(plate, {"boundary": "hinged"}), np.pi**2 * np.array([1.25, 2.0]), rtol=1e-5)
+
+
+def test_quadrilaterals_are_divided(tmp_path):
+    x, y = np.meshgrid(np.linspace(0, 1.55, 7), np.linspace(0, 1, 5), indexing="ij")
+    n = np.arange(35).reshape(7, 5)
+    cells = np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 4)
+    plate = mesh.load(written(tmp_path, np.column_stack([x.ravel(), y.ravel()]), cells, kind="quad"))
+    assert_allclose(parameters(plate, {"boundary": "hinged"}), HINGED, rtol=1e-5)
+
+
+def test_units_are_converted(tmp_path):
+    path = written(tmp_path, GOOD.points * 1e3, GOOD.cells)
+    assert_allclose(mesh.load(path, unit="mm").area, 1.55)
+    with pytest.raises(ValueError, match=r"1550 x 1000 m, which looks like millimetres.*pass unit='mm'"):
+        mesh.load(path)
+    with pytest.raises(ValueError, match="unit must be one of"):
+        mesh.load(path, unit="parsec")
+
+
+def bad_nan():
+    points = GOOD.points.copy()
+    points[7, 0] = np.nan
+    return points, GOOD.cells
+
+
+REFUSED = [
+    (bad_nan, "not a number at node 7.*correct that node"),
+    (lambda: (np.column_stack([GOOD.points, 0.3 * GOOD.points[:, 0]]), GOOD.cells), "is not flat"),
+    (
+        lambda: (
+            np.concatenate([GOOD.points, GOOD.points + np.array([3, 0])]),
+            np.concatenate([GOOD.cells, GOOD.cells + 35]),
+        ),
+        "2 pieces",
+    ),
+    (lambda: (GOOD.points, np.concatenate([GOOD.cells, [[0, 1, 2]]])), "triangles with zero area.*between nodes"),
+    (lambda: ([(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)], [[0, 1, 2], [0, 3, 4]]), "2 pieces that share no side"),
+    (lambda: ([(0, 0), (1, 0), (0, 1), (0.5, 0.9)], [[0, 1, 2], [0, 1, 3]]), "overlap"),
+]
+
+
+@pytest.mark.parametrize(("spoil", "text"), REFUSED)
+def test_what_cannot_be_mended_is_refused_with_the_place(tmp_path, spoil, text):
+    with pytest.raises(ValueError, match=text):
+        mesh.load(written(tmp_path, *spoil()))
+
+
+def test_lines_only_junk_and_missing_files_are_refused(tmp_path, capsys):
+    with pytest.raises(ValueError, match=r"contains line but no triangles.*fi\.mesh\.line"):
+        mesh.load(written(tmp_path, GOOD.points, GOOD.facets, kind="line"))
+    (tmp_path / "junk.msh").write_text("hello")
+    with pytest.raises(ValueError, match=r"junk\.msh cannot be read as a mesh"):
+        mesh.load(tmp_path / "junk.msh")
+    with pytest.raises(ValueError, match="there is no such file"):
+        mesh.load(tmp_path / "nothing.msh")
+    assert capsys.readouterr() == ("", "")  # errors are raised, not printed
+
+
+@pytest.mark.parametrize("name", ["rectangle", "disk", "cymbal", "guitar", "l_shape"])
+def test_shipped_meshes_load_without_repairs(name):
+    plate = mesh.load(MESHES / f"{name}.msh")
+    assert not plate.notes
+    modes = find_modes(assemble(plate, PLATE), n_modes=5)
+    assert modes.n_rigid == 3
+    assert np.isfinite(modes.residual_compliance([plate.points[plate.facets[0, 0]]])).all()
+
+
+def test_shipped_cymbal_rings_as_an_annulus():
+    shipped = parameters(mesh.load(MESHES / "cymbal.msh"), {}, 6)
+    made = parameters(mesh.disk(0.2032, 0.006), {}, 6)
+    assert_allclose(shipped[3:], made[3:], rtol=1e-5)  # two meshes of one body
+
+
+def test_marimba_bar_is_tuned_to_two_octaves(monkeypatch):
+    monkeypatch.setattr(sys, "path", [str(MESHES), *sys.path])
+    import marimba_bar
+
+    modes = find_modes(assemble(*marimba_bar.bar()), n_modes=4)
+    assert_allclose(modes.frequencies[3] / modes.frequencies[2], 4.0, rtol=0.02)  # what its script promises

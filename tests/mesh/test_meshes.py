@@ -1,0 +1,95 @@
+"""Meshes: areas, outlines, named edges, refinement."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from fem_impact import mesh
+
+
+def test_rectangle_is_covered_once_and_its_edges_lie_where_their_names_say():
+    plate = mesh.rectangle(1.55, 1.0, size=0.13)
+    assert_allclose(plate.area, 1.55, rtol=1e-13)  # a sum of rounded areas
+    assert_allclose(plate.perimeter, 5.1, rtol=1e-13)
+    for name, axis, value in (("left", 0, 0.0), ("right", 0, 1.55), ("bottom", 1, 0.0), ("top", 1, 1.0)):
+        on = plate.points[plate.facets[plate.edges[name]]]
+        assert_allclose(on[..., axis], value, atol=1e-15)
+    assert len(plate.edges["boundary"]) == len(plate.facets)
+
+
+def test_boundary_runs_with_the_body_on_its_left():
+    plate = mesh.rectangle(1.0, 2.0, size=0.5)
+    start, end = plate.points[plate.facets].transpose(1, 0, 2)
+    assert_allclose(0.5 * np.sum(start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]), 2.0)  # signed area
+
+
+def test_refined_mesh_keeps_shape_and_edge_names():
+    coarse = mesh.rectangle(1.0, 0.5, size=0.25)
+    fine = coarse.refined(2.0)
+    assert len(fine.cells) == 4 * len(coarse.cells)
+    assert set(fine.edges) == set(coarse.edges)
+
+
+def test_points_of_a_disk_lie_on_the_circle_with_its_curvature():
+    plate = mesh.disk(2.0, 0.5, size=0.4)
+    for name, radius, bend in (("outer", 2.0, 0.5), ("inner", 0.5, -2.0)):
+        mine = plate.edges[name]
+        assert_allclose(np.hypot(*plate.points[plate.facets[mine]].transpose(2, 0, 1)), radius, rtol=1e-12)
+        assert_allclose(np.hypot(*plate.middles[mine].T), radius, rtol=1e-12)
+        assert_allclose(plate.curvatures[mine], bend, rtol=1e-9)  # an edge of the hole is concave
+    assert plate.curved.all()
+
+
+def test_polygon_names_its_sides_and_holes():
+    plate = mesh.polygon([(0, 0), (0, 1), (2, 1), (2, 0)], [[(0.5, 0.4), (0.8, 0.4), (0.8, 0.7)]], size=0.3)
+    assert_allclose(plate.area, 2.0 - 0.045, rtol=1e-12)
+    assert_allclose(plate.points[plate.facets[plate.edges["edge0"]]][..., 0], 0.0, atol=1e-15)
+    assert_allclose(plate.points[plate.facets[plate.edges["edge1"]]][..., 1], 1.0)
+    assert len(plate.edges["outer"]) + len(plate.edges["hole0"]) == len(plate.edges["boundary"])
+
+
+def test_mesh_far_from_the_origin_is_the_same_one_moved():
+    here = mesh.polygon([(0, 0), (1, 0), (0, 1)], size=0.2)
+    there = mesh.polygon([(1e4, 0), (1e4 + 1, 0), (1e4, 1)], size=0.2)
+    assert_allclose(there.points - [1e4, 0], here.points, atol=1e-10)  # 1e4 in floats leaves 2e-12
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: mesh.rectangle(-1.0, 1.0), "length must be positive, got -1 m"),
+        (lambda: mesh.rectangle(1.0, 1.0, size=0.0), "size must be positive, got 0 m"),
+        (lambda: mesh.disk(1.0, 1.0), "hole must be smaller than radius = 1 m, got 1 m"),
+        (lambda: mesh.polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), "must not cross or touch itself.*Self-intersection"),
+        (lambda: mesh.polygon([(0, 0), (1, 1)]), "corners must have 3 to 2000 corners, got 2"),
+        (lambda: mesh.polygon([(0, 0), (1, 0), (1, 0), (0, 1)]), "corners 1 and 2 at the same place"),
+        (lambda: mesh.polygon([(0, 0), (1, 0), (0, 1)], [[(2, 2), (3, 2), (3, 3)]]), "must lie inside the outline"),
+        (lambda: mesh.line(float("nan")), "length must be finite"),
+    ],
+)
+def test_refuses_lengths_that_are_none(make, text):
+    with pytest.raises(ValueError, match=text):
+        make()
+
+
+ROUND = np.linspace(0.0, 2.0 * np.pi, 10**6, endpoint=False)
+
+
+@pytest.mark.parametrize(
+    ("act", "text"),
+    [
+        (lambda: mesh.rectangle(1.0, 1.0, size=1e-9), r"size must be larger: 1e-09 m gives about 2e\+18 elements"),
+        (lambda: mesh.disk(1.0, size=1e-9), "size must be larger"),
+        (lambda: mesh.line(1.0, size=1e-12), "size must be larger"),
+        (lambda: mesh.rectangle(1.0, 1.0).refined(1e9), "size must be larger"),
+        (lambda: mesh.polygon(np.column_stack([np.cos(ROUND), np.sin(ROUND)])), "corners must have 3 to 2000 corners"),
+        (
+            lambda: mesh.polygon([(0, 0), (1, -1e-6), (2, 0), (1, 1e-6)]),
+            "must not be a thousand times longer than wide",
+        ),
+        (lambda: mesh.polygon([(0, 0), (1, 0), (1, 1), (0.51, 1), (0.5, 1e4), (0.49, 1), (0, 1)]), "longer than wide"),
+    ],
+)
+def test_what_would_take_for_ever_is_refused_at_once(act, text):
+    with pytest.raises(ValueError, match=text):
+        act()

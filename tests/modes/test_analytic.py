@@ -1,0 +1,209 @@
+"""Closed-form modes against published roots, orthonormality and independent static sums."""
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from fem_impact.fe import section
+from fem_impact.modes import analytic
+
+ENDS = list(itertools.product(analytic.ENDS, repeat=2))
+
+
+def disk_quadrature(radius, n_radial=80, n_angle=128):
+    """Points (n, 2) and weights (n,) that integrate polynomials over a disk exactly to degree 127."""
+    node, weight = np.polynomial.legendre.leggauss(n_radial)
+    r = 0.5 * radius * (node + 1.0)
+    angle = 2.0 * np.pi * np.arange(n_angle) / n_angle
+    points = np.column_stack([np.outer(r, np.cos(angle)).ravel(), np.outer(r, np.sin(angle)).ravel()])
+    return points, np.repeat(0.5 * radius * weight * r * 2.0 * np.pi / n_angle, n_angle)
+
+
+# Leissa (1969) corrected to converged digits; free beams: Bishop and Johnson (1960), table 7.1.
+@pytest.mark.parametrize(
+    "edge, squared",
+    [
+        ("clamped", [10.2158262, 21.2603977, 21.2603977, 34.8770354, 34.8770354, 39.7711482]),
+        ("hinged", [4.93514904, 13.8981651, 13.8981651, 25.6132967, 25.6132967, 29.7200047]),
+        ("free", [0.0, 0.0, 0.0, 5.3583298, 5.3583298, 9.0031374, 12.4389882, 12.4389882, 20.4745501, 20.4745501]),
+    ],
+)
+def test_disk_frequencies(edge, squared):
+    modes = analytic.disk(0.3, edge=edge, mass=1.0, first_frequency=1.0, n_modes=len(squared))
+    flexible = np.array(squared)[np.array(squared) > 0.0]
+    assert_allclose(modes.frequencies, np.array(squared) / flexible[0], rtol=1e-7)  # the digits printed
+
+
+@pytest.mark.parametrize(
+    "ends, roots",
+    [
+        (("clamped", "free"), [1.875104068712, 4.694091132974]),
+        (("free", "free"), [4.730040744863, 7.853204624096]),
+        (("hinged", "free"), [3.926602312048, 7.068582745629]),
+        (("hinged", "hinged"), [np.pi, 2 * np.pi]),
+    ],
+)
+def test_beam_frequencies(ends, roots):
+    modes = analytic.beam(2.0, ends=ends, mass=1.0, first_frequency=roots[0] ** 2, n_modes=4)
+    assert_allclose(np.sqrt(modes.frequencies[modes.n_rigid :][:2]), roots, rtol=1e-12)  # the digits printed
+
+
+def test_rectangle_frequencies_and_order():
+    modes = analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    m, n = np.meshgrid(np.arange(1, 60), np.arange(1, 60))
+    exact = np.sort(((m / 1.55) ** 2 + n**2).ravel())[:300] / (1 / 1.55**2 + 1) * 100.0
+    assert_allclose(modes.frequencies, exact, rtol=1e-14)  # closed form, rounding only
+
+
+@pytest.mark.parametrize("ends", ENDS)
+def test_beam_modes_are_orthonormal_up_to_high_order(ends):
+    modes = analytic.beam(2.0, ends=ends, mass=0.3, first_frequency=50.0, n_modes=300)
+    node, weight = np.polynomial.legendre.leggauss(1000)
+    shapes = modes.shape_at(1.0 + node)
+    gram = shapes.T @ (shapes * weight[:, None]) * 0.3 / 2.0
+    assert_allclose(gram, np.eye(300), atol=1e-12)  # 1000 points integrate the products to rounding
+
+
+@pytest.mark.parametrize("edge", analytic.ENDS)
+def test_disk_modes_are_orthonormal(edge):
+    modes = analytic.disk(0.7, edge=edge, mass=0.3, first_frequency=50.0, n_modes=120)
+    points, weight = disk_quadrature(0.7)
+    shapes = modes.shape_at(points)
+    gram = shapes.T @ (shapes * weight[:, None]) * 0.3 / (np.pi * 0.7**2)
+    assert_allclose(gram, np.eye(120), atol=1e-11)  # quadrature exact, Bessel functions to some 1e-13
+
+
+@pytest.mark.parametrize("ends", ENDS)
+def test_beam_static_compliance_is_the_limit_of_its_modal_sum(ends):
+    modes = analytic.beam(2.0, ends=ends, mass=0.3, first_frequency=50.0, n_modes=400)
+    points = [[0.001], [0.5], [1.2], [2.0]]
+    rest = modes.residual_compliance(points)
+    first = analytic._beam_roots(ends, 1)[0]
+    unit = first**4 / (0.3 * (2 * np.pi * 50.0) ** 2)  # length**3 / (E I)
+    tail = 4.0 / (3.0 * np.pi**4 * 397.0**3) * unit  # squared shapes are at most 4 / mass, roots (n +- 1/2) pi
+    assert np.diag(rest)[:3].min() > 0.0 and np.abs(rest).max() < 1.01 * tail
+
+
+PLATES = {
+    "rectangle": lambda n: analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=n),
+    **{
+        edge: lambda n, edge=edge: analytic.disk(0.5, edge=edge, mass=0.2, first_frequency=100.0, n_modes=n)
+        for edge in analytic.ENDS
+    },
+}
+
+
+@pytest.mark.parametrize("name", PLATES)
+def test_plate_static_compliance_is_the_limit_of_its_modal_sum(name):
+    modes = PLATES[name](1200)
+    points = np.array([[0.31, 0.2], [0.1, 0.33], [0.22, 0.05]])
+    rest = modes.residual_compliance(points)
+    scale = modes.shapes.compliance(points).max()
+    off_diagonal = rest - np.diag(np.diag(rest))
+    assert np.abs(off_diagonal).max() < 3e-5 * scale  # oscillating tail: 1e-6 ... 2e-5 measured
+    # The diagonal tail is that of an infinite plate, (2 / pi) Y / omega_c with Y = 1 / (8 sqrt(D rho h)).
+    area = 1.55 if name == "rectangle" else np.pi * 0.25
+    density = 0.2 / area
+    first = {"rectangle": np.pi**2 * (1 + 1 / 1.55**2), "clamped": 10.2158262 / 0.25}
+    first |= {"hinged": 4.93514904 / 0.25, "free": 5.3583298 / 0.25}
+    rigidity = density * (2 * np.pi * 100.0 / first[name]) ** 2
+    admittance = 1.0 / (8.0 * np.sqrt(rigidity * density))
+    assert_allclose(np.diag(rest), 2.0 / np.pi * admittance / modes.omega[-1], rtol=0.1)  # 5 % measured, wavy
+
+
+STEEL = section.Material(E=210e9, nu=0.3, rho=7850.0)
+
+
+def test_sections_give_absolute_frequencies():
+    plate = analytic.rectangle(0.4, 0.3, section=section.Plate(STEEL, thickness=2e-3), n_modes=1)
+    rigidity = 210e9 * 2e-3**3 / (12 * (1 - 0.3**2))
+    exact = np.pi / 2 * (1 / 0.4**2 + 1 / 0.3**2) * np.sqrt(rigidity / (7850 * 2e-3))
+    assert_allclose(plate.frequencies, [exact], rtol=1e-14)  # closed form, rounding only
+    assert_allclose(plate.mass, 7850 * 2e-3 * 0.4 * 0.3, rtol=1e-15)
+    rod = analytic.beam(0.5, ends=("clamped", "free"), section=section.Beam.circular(STEEL, diameter=0.01), n_modes=1)
+    exact = 1.875104068712**2 / (2 * np.pi * 0.5**2) * np.sqrt(210e9 * 0.01**2 / (16 * 7850))
+    assert_allclose(rod.frequencies, [exact], rtol=1e-12)  # the root's printed digits
+
+
+DISK_FIRST = {"clamped": 10.2158262, "hinged": 4.93514904, "free": 5.3583298}  # omega R**2 sqrt(rho h / D), nu = 0.3
+
+
+@pytest.mark.parametrize("edge", analytic.ENDS)
+@pytest.mark.parametrize("radius", [0.01, 0.2, 3.0, 100.0])
+def test_a_disk_of_a_section_has_absolute_frequencies_and_compliance_at_every_size(edge, radius):
+    plate = section.Plate(STEEL, thickness=1e-3 * radius)
+    rigidity, per_area = 210e9 * plate.thickness**3 / (12 * (1 - 0.3**2)), 7850 * plate.thickness
+    n_rigid = 3 if edge == "free" else 0
+    modes = analytic.disk(radius, edge=edge, section=plate, n_modes=n_rigid + 1)
+    exact = DISK_FIRST[edge] / radius**2 * np.sqrt(rigidity / per_area) / (2 * np.pi)
+    assert_allclose(modes.frequencies[-1], exact, rtol=1e-8)  # digits printed
+    within = analytic.disk(radius, edge=edge, section=plate, max_frequency=1.0001 * exact)
+    assert within.n_modes == (5 if edge == "free" else 1)  # three rigid motions and a pair
+    assert_allclose(modes.mass, per_area * np.pi * radius**2, rtol=1e-14)
+    if edge != "free":  # Timoshenko and Woinowsky-Krieger, Theory of plates and shells, eq. (89) and (92)
+        centre = {"clamped": 1.0, "hinged": 3.3 / 1.3}[edge] * radius**2 / (16.0 * np.pi * rigidity)
+        assert_allclose(modes.shapes.compliance(np.zeros((1, 2))), [[centre]], rtol=1e-12)
+
+
+def test_sections_a_formula_does_not_cover_are_refused():
+    wood = section.Material.orthotropic(E_along=10e9, E_across=1e9, nu=0.3, G=0.8e9, rho=450.0)
+    with pytest.raises(ValueError, match="section must be isotropic"):
+        analytic.disk(0.1, section=section.Plate(wood, thickness=3e-3), n_modes=5)
+    tapered = section.Beam.rectangular(STEEL, width=0.02, height=lambda x: 0.01 + 0 * x[:, 0])
+    with pytest.raises(ValueError, match="constant along the beam"):
+        analytic.beam(0.1, section=tapered, n_modes=5)
+
+
+def test_inertia_relief_leaves_no_rigid_motion():
+    modes = analytic.disk(1.0, edge="free", mass=1.0, first_frequency=1.0, n_modes=4)
+    points, weight = disk_quadrature(1.0, 30, 32)
+    load = np.array([[0.3, 0.55]])
+    response = np.array([modes.shapes.compliance(np.vstack([load, p[None]]))[0, 1] for p in points[::1]])
+    rigid = modes.shape_at(points)[:, :3]
+    assert (
+        np.abs(rigid.T @ (weight * response)).max() < 1e-4 * np.abs(response).max()
+    )  # 1e-5: the quadrature's error at the kink
+
+
+def test_scaled_modes_keep_form_and_follow_mass_and_frequency():
+    modes = analytic.disk(1.0, edge="free", mass=1.0, first_frequency=50.0, n_modes=30)
+    other = modes.scaled(mass=4.0, first_frequency=100.0)
+    assert_allclose(other.frequencies, 2.0 * modes.frequencies, rtol=1e-14)
+    assert_allclose(other.shape_at([[0.2, 0.1]]), 0.5 * modes.shape_at([[0.2, 0.1]]), rtol=1e-14)
+    assert_allclose(
+        other.residual_compliance([[0.2, 0.1]]), modes.residual_compliance([[0.2, 0.1]]) / 16.0, rtol=1e-9
+    )  # (1/2)**2 from mass, (1/2)**2 from frequency; the difference of sums loses some digits
+
+
+def test_truncated_modes_hand_the_rest_to_the_residual():
+    modes = analytic.rectangle(1.0, 1.0, mass=1.0, first_frequency=50.0, n_modes=60)
+    fewer = modes.truncated(max_frequency=500.0)
+    point = [[0.3, 0.4]]
+    assert fewer.frequencies[-1] <= 500.0 < modes.frequencies[fewer.n_modes]
+    complete = fewer.modal_compliance(point) + fewer.residual_compliance(point)
+    assert_allclose(complete, modes.modal_compliance(point) + modes.residual_compliance(point), rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    "call, text",
+    [
+        (lambda: analytic.rectangle(-1.0, 1.0, mass=1.0, first_frequency=1.0, n_modes=3), "length must be positive"),
+        (lambda: analytic.rectangle(1.0, 1.0, mass=1.0, n_modes=3), "both mass"),
+        (lambda: analytic.rectangle(1.0, 1.0, mass=1.0, first_frequency=1.0), "n_modes or max_frequency"),
+        (lambda: analytic.beam(1.0, ends=("free", "fre"), mass=1.0, first_frequency=1.0, n_modes=3), "mean 'free'"),
+        (lambda: analytic.beam(1.0, ends="free", mass=1.0, first_frequency=1.0, n_modes=3), "two words"),
+        (lambda: analytic.disk(1.0, edge="open", mass=1.0, first_frequency=1.0, n_modes=3), "edge must be one of"),
+        (lambda: analytic.disk(1.0, mass=float("nan"), first_frequency=1.0, n_modes=3), "mass must be finite"),
+    ],
+)
+def test_bad_input_names_argument_and_rule(call, text):
+    with pytest.raises(ValueError, match=text):
+        call()
+
+
+def test_point_off_the_body_is_refused():
+    modes = analytic.disk(0.2, mass=1.0, first_frequency=1.0, n_modes=3)
+    with pytest.raises(ValueError, match=r"points must lie on the body, got \(0.3, 0\) m"):
+        modes.shape_at([[0.3, 0.0]])

@@ -1,0 +1,94 @@
+"""Universal files: modes written and read back, measured modes struck, what is missing named."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from fem_impact import mesh
+from fem_impact.fe.assembly import assemble
+from fem_impact.fe.section import Beam, Material, Plate
+from fem_impact.modes import universal_files
+from fem_impact.modes.modal import Modes, find_modes
+from fem_impact.show import export
+
+pyuff = pytest.importorskip("pyuff", reason="the uff extra is not installed")
+PLATE = Plate(Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
+
+
+def written(tmp_path):
+    modes = find_modes(assemble(mesh.rectangle(0.4, 0.3), PLATE), n_modes=8, damping_ratio=0.01)
+    points, cells = modes.shapes.grid()
+    path = tmp_path / "plate.uff"
+    export.write_uff(path, modes)
+    return modes, points, cells, path
+
+
+def test_modes_come_back_as_they_were_written(tmp_path):
+    modes, points, _, path = written(tmp_path)
+    again = Modes.from_uff(path, mass=modes.mass)
+    assert_allclose(again.frequencies, modes.frequencies, rtol=1e-5)  # six digits are written
+    assert_allclose(again.damping_ratio, modes.damping_ratio, rtol=1e-5)
+    shapes = modes.shape_at(points)
+    assert_allclose(again.shape_at(points), shapes, atol=1e-5 * np.abs(shapes).max())
+    assert again.n_rigid == 3
+
+
+def test_nodes_and_triangles_are_in_the_file(tmp_path):
+    _, points, cells, path = written(tmp_path)
+    sets = pyuff.UFF(str(path)).read_sets()
+    assert [s["type"] for s in sets[:4]] == [15, 2411, 2412, 55]
+    assert_allclose(sets[0]["x"], points[:, 0], atol=1e-6)
+    assert_allclose([element["nodes_nums"] for element in sets[2][91]], cells + 1)  # 91: thin shell triangle
+
+
+def test_a_beam_comes_back_as_a_line_of_points(tmp_path):
+    beam = Beam.rectangular(Material(E=210e9, nu=0.3, rho=7850.0), width=0.02, height=0.01)
+    modes = find_modes(assemble(mesh.line(1.0, size=0.1), beam, {"left": "clamped"}), n_modes=3)
+    points, cells = modes.shapes.grid()
+    universal_files.write(
+        tmp_path / "bar.unv", modes.frequencies, modes.damping_ratio, modes.shape_at(points), points, cells
+    )
+    again = Modes.from_uff(tmp_path / "bar.unv", mass=modes.mass)
+    assert again.dimension == 1
+    assert_allclose(again.shape_at([1.0]), modes.shape_at([1.0]), rtol=1e-5)
+
+
+def test_shapes_are_scaled_by_their_modal_mass(tmp_path):
+    _, points, _, path = written(tmp_path)
+    sets = pyuff.UFF(str(path)).read_sets()
+    for entry in sets[3:]:
+        entry["modal_m"], entry["r3"] = 4.0, 2.0 * entry["r3"]
+    other = tmp_path / "scaled.uff"
+    pyuff.UFF(str(other)).write_sets(sets, mode="add")
+    assert_allclose(
+        Modes.from_uff(other, mass=1.0).shape_at(points),
+        Modes.from_uff(path, mass=1.0).shape_at(points),
+        rtol=2e-5,
+        atol=1e-6,
+    )
+
+
+def test_what_a_file_lacks_is_said(tmp_path):
+    _, _, _, path = written(tmp_path)
+    sets = pyuff.UFF(str(path)).read_sets()
+    alone = tmp_path / "nodes.uff"
+    pyuff.UFF(str(alone)).write_sets(sets[:1], mode="add")
+    with pytest.raises(
+        ValueError, match=r"must hold nodes \(15 or 2411\) and mode shapes \(55\); its data sets are 15"
+    ):
+        Modes.from_uff(alone, mass=1.0)
+    for entry in sets[3:]:
+        entry["modal_m"] = 0.0
+    bare = tmp_path / "bare.uff"
+    pyuff.UFF(str(bare)).write_sets(sets, mode="add")
+    with pytest.raises(ValueError, match=r"states no modal mass for mode 1"):
+        Modes.from_uff(bare, mass=1.0)
+    with pytest.raises(ValueError, match="there is no such file"):
+        Modes.from_uff(tmp_path / "none.uff", mass=1.0)
+    with pytest.raises(ValueError, match="direction must be one of x, y, z"):
+        Modes.from_uff(path, mass=1.0, direction="up")
+
+
+def test_a_rigid_mass_has_no_shape_to_write(tmp_path):
+    with pytest.raises(ValueError, match="no shape to write"):
+        export.write_uff(tmp_path / "mass.uff", Modes.rigid(1.0))

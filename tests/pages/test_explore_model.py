@@ -1,0 +1,73 @@
+"""Blows that follow a hand are the blows of `strike`, and the map under them is true."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_cli import TEXT
+
+import fem_impact as fi
+from fem_impact.impact import accuracy
+from fem_impact.pages import explore_model
+
+
+@pytest.fixture(scope="module")
+def stand(tmp_path_factory):
+    path = tmp_path_factory.mktemp("bench") / "small.toml"
+    path.write_text(TEXT)
+    return explore_model.Bench.of(fi.load_scene(path))
+
+
+def test_start_is_the_scene(stand):
+    hit, scene = explore_model.blow(stand.case(stand.start)), stand.scene.strike(target="modal")
+    # both promise 1e-2 or better
+    assert hit.n_impacts == scene.n_impacts and hit.impulse == pytest.approx(scene.impulse, rel=1e-2)
+
+
+def test_exponent_leaves_the_contact_time_on_a_wall(stand):
+    durations = [
+        accuracy.contact_duration(stand.law(replace(stand.start, exponent=p)), stand.start.mass, stand.start.speed)
+        for p in (1.0, 1.5, 2.7)
+    ]
+    np.testing.assert_allclose(durations, durations[0], rtol=1e-12)  # a closed form, met to rounding
+
+
+def test_map_counts_as_single_blows_do(stand):
+    picture = stand.picture(stand.start)
+    rng = np.random.default_rng(3)
+    cells = [(int(i), int(j)) for i, j in rng.integers(0, len(picture.mass), (12, 2))]
+    counts = [
+        explore_model.blow(
+            stand.case(replace(stand.start, mass=picture.mass[j], stiffness=picture.stiffness[i]))
+        ).n_impacts
+        for i, j in cells
+    ]
+    assert sum(counts[k] == picture.n_impacts[cell] for k, cell in enumerate(cells)) >= 11  # one may graze: 1e-2 here
+    assert (picture.n_impacts == 1).any() and (picture.n_impacts > 1).any()
+
+
+def test_limit_is_where_the_contact_resonates_at_the_threshold(stand):
+    picture = stand.picture(replace(stand.start, exponent=2.0))
+    there = replace(stand.start, exponent=2.0, mass=picture.mass[5], stiffness=picture.limit[5])
+    assert explore_model.resonance_of(stand.case(there)) == pytest.approx(picture.threshold[5], rel=1e-9)
+
+
+def test_guessed_compliance_gives_the_same_blow_where_it_is_right(stand):
+    exact = explore_model.blow(stand.case(stand.start))
+    guessed = explore_model.blow(stand.case(stand.start, stand.residual(stand.start)))
+    assert guessed.impulse == pytest.approx(exact.impulse, rel=1e-9)  # the same numbers by another way
+    assert explore_model.blow(stand.case(stand.start, 0.0)).impulse != exact.impulse
+
+
+def test_quick_spectrum_is_the_exact_one_to_the_eye(stand):
+    hit = explore_model.blow(stand.case(stand.start))
+    frequencies = np.geomspace(20.0, 5e3, 50)
+    exact = np.abs(hit.spectrum(frequencies))
+    np.testing.assert_allclose(
+        explore_model.spectrum(hit, frequencies), exact, atol=2e-3 * exact.max()
+    )  # a pixel of 300
+
+
+def test_click_beside_the_body_is_none(stand):
+    assert stand.place(0.1, 0.1) == (0.1, 0.1)
+    assert stand.place(-0.1, 0.1) is None and stand.place(float("nan"), 0.1) is None

@@ -1,0 +1,271 @@
+"""The page about a blow: everything on it, nothing from elsewhere, usable by anyone."""
+
+import base64
+import json
+import re
+import sys
+
+import numpy as np
+import pytest
+from conftest import Page
+from test_cli import TEXT
+
+import fem_impact as fi
+from fem_impact import cli
+from fem_impact.pages import report
+from fem_impact.scenes import sentences
+
+SCRIPT = "<script>document.title = 'taken'</script>"
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    """The page of a small scene whose title tries to be a script."""
+    folder = tmp_path_factory.mktemp("report")
+    scene = folder / "small.toml"
+    scene.write_text(TEXT.replace("A small test", SCRIPT))
+    assert cli.main(["report", str(scene), "--out", str(folder / "out" / "report.html")]) == 0
+    return folder / "out" / "report.html"
+
+
+@pytest.fixture
+def opened(page, visit):
+    def opened(**options):
+        shown = visit(page.as_uri(), **options)
+        shown.tab.wait_for_selector("html[data-ready]")
+        return shown
+
+    return opened
+
+
+@pytest.fixture(scope="module")
+def desktop(page, chromium):
+    """The page on a desk, shared by tests that only look at it."""
+    shown = Page(chromium)
+    shown.tab.goto(page.as_uri())
+    shown.tab.wait_for_selector("html[data-ready]")
+    yield shown
+    shown.context.close()
+
+
+def download(text, name):
+    raw = re.search(rf'download="{re.escape(name)}" href="data:[a-z/]+;base64,([^"]*)"', text).group(1)
+    return base64.b64decode(raw).decode()
+
+
+def test_page_is_one_file_with_no_way_out(page):
+    text = page.read_text(encoding="utf-8")
+    assert [path.name for path in page.parent.iterdir()] == ["report.html"]
+    assert page.stat().st_size < 12e6
+    own = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)  # plotly's own code names addresses it never asks
+    assert not re.findall(r'(?:src|href)="(?!data:|#)', own)
+    assert "default-src 'none'" in own and "connect-src" not in own
+
+
+def test_texts_of_the_scene_are_escaped(page):
+    text = page.read_text(encoding="utf-8")
+    assert SCRIPT not in text and "&lt;script&gt;document.title" in text
+
+
+def test_downloads_hold_every_number(page):
+    text = page.read_text(encoding="utf-8")
+    data = json.loads(download(text, "response.json"))
+    hit = report.read(page.parent.parent / "small.toml").strike(target="modal")
+    assert data["response"]["peak_force"] == hit.peak_force and len(data["impacts"]) == hit.n_impacts
+    time, force = np.loadtxt(download(text, "force.csv").splitlines(), delimiter=",", skiprows=1).T
+    assert (time == hit.time).all() and (force == hit.force).all()
+
+
+def test_result_of_a_strike_gives_the_same_blow(page, tmp_path):
+    scene = page.parent.parent / "small.toml"
+    assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out")]) == 0
+    for name in (tmp_path / "out", tmp_path / "out" / "response.json"):
+        again = report.read(name)
+        assert again.strike().impulse == report.read(scene).strike().impulse
+
+
+def test_result_carries_its_mesh_wherever_it_goes(tmp_path, capsys, monkeypatch):
+    text = TEXT.replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', 'shape = "file"\npath = "plate.msh"')
+    (tmp_path / "scene.toml").write_text(text.replace('"analytic"', '"fe"').replace("1e-2", "1e-1"))
+    fi.mesh.save(tmp_path / "plate.msh", fi.mesh.rectangle(0.465, 0.3, size=0.1))
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["strike", "scene.toml", "--out", "out"]) == 0
+    assert "plate.msh" in json.loads((tmp_path / "out" / "response.json").read_text())["files"]
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "out").rename(tmp_path / "elsewhere" / "moved")
+    (tmp_path / "plate.msh").unlink()
+    monkeypatch.chdir("/")
+    moved = tmp_path / "elsewhere" / "moved"
+    assert report.read(moved).body().points.max() == 0.465
+    (moved / "plate.msh").unlink()
+    assert cli.main(["report", str(moved), "--out", str(tmp_path / "report.html")]) == 2
+    assert f"the file of the struck body is missing: restore {moved / 'plate.msh'}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        '{"scene": 3}',
+        "[" * 100_000,
+        '{"scene": {"mesh": {"x": ' + "[" * 900 + "]" * 900 + "}}}",
+        '{"scene": {"mesh": {}}}',
+    ],
+)
+def test_file_that_is_no_result_is_a_sentence(tmp_path, capsys, text):
+    path = tmp_path / "response.json"
+    path.write_text(text)
+    assert cli.main(["report", str(path), "--out", str(tmp_path / "report.html")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"fem-impact: {path}") and said.count("\n") == 1
+    assert [file.name for file in tmp_path.iterdir()] == ["response.json"]
+
+
+def test_missing_extra_is_named(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "plotly.offline", None)
+    (tmp_path / "small.toml").write_text(TEXT)
+    assert cli.main(["report", str(tmp_path / "small.toml"), "--out", str(tmp_path / "r.html")]) == 2
+    assert "a report needs plotly: pip install 'fem-impact[web]'" in capsys.readouterr().err
+
+
+def test_beams_and_balls_have_a_page_too(tmp_path):
+    text = (
+        '[mesh]\nshape = "line"\nlength = 0.35\n[target]\nmass = 0.35\nfirst_frequency = 750.0\n'
+        '[striker]\nkind = "sphere"\nradius = 0.01\nE = 210e9\nnu = 0.3\nrho = 7850.0\n'
+        '[contact]\nkind = "linear"\nstiffness = 1e5\n[strike]\nat = [0.1]\nspeed = 1.0\ntolerance = 1e-2\n'
+    )
+    (tmp_path / "bar.toml").write_text(text)
+    scene = fi.load_scene(tmp_path / "bar.toml")
+    report.write(tmp_path / "bar.html", scene, scene.run(target="modal"))
+    page = (tmp_path / "bar.html").read_text(encoding="utf-8")
+    assert "A beam of 350" in page and "by a ball of 32.88" in page
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.0041273, "s", "4.127 ms"),
+        (0.1, "kg", "100 g"),
+        (5e5, "kg", "500 t"),
+        (2.5, "kg", "2.5 kg"),
+        (0.0, "N", "0 N"),
+        (-2e-7, "m", "−200 nm"),
+        (1000.0, "Hz", "1 kHz"),
+        (0.00099998, "N s", "1 mN s"),
+        (float("inf"), "Hz", "∞ Hz"),
+    ],
+)
+def test_numbers_have_prefixes(value, unit, text):
+    assert sentences.si(value, unit).replace(sentences.NBSP, " ") == text
+
+
+@pytest.mark.parametrize(("value", "text"), [(4.5e-6, "4.5 · 10⁻⁶"), (1e-4, "10⁻⁴"), (0.0, "0")])
+def test_small_numbers_have_powers(value, text):
+    assert sentences.power(value) == text
+
+
+def test_nothing_fails_and_nothing_is_asked_for(desktop):
+    shown = desktop
+    shown.tab.wait_for_timeout(300)
+    assert shown.errors == []
+    assert [url for url in shown.requests if not url.startswith(("data:", "blob:"))] == shown.requests[:1]
+    assert shown.requests[0].startswith("file:") and shown.tab.title() == SCRIPT
+
+
+def test_slider_and_list_change_the_picture(opened):
+    tab = opened().tab
+    depth = "Math.min(...document.getElementById('plot-wave').data[0].z)"
+    before, picture = tab.evaluate(depth), tab.locator("#plot-wave").screenshot()
+    tab.locator("#wave-time").focus()
+    for _ in range(10):
+        tab.keyboard.press("ArrowRight")
+    assert tab.evaluate(depth) != before and "s" in tab.locator("#wave-out").inner_text()
+    assert tab.locator("#plot-wave").screenshot() != picture
+    shape = "Array.from(document.getElementById('plot-mode').data[0].z).slice(0, 400).join()"
+    before = tab.evaluate(shape)
+    tab.select_option("#mode-pick", index=3)
+    assert tab.evaluate(shape) != before
+
+
+def test_view_turns_with_the_keyboard_and_plays_when_asked(opened):
+    shown = opened()
+    tab = shown.tab
+    eye = "JSON.stringify(document.getElementById('plot-wave').layout.scene.camera.eye)"
+    before = tab.evaluate(eye)
+    tab.locator("#plot-wave").focus()
+    tab.keyboard.press("ArrowLeft")
+    assert tab.evaluate(eye) != before
+    still = tab.locator("#wave-time").input_value()
+    tab.wait_for_timeout(200)
+    assert tab.locator("#wave-time").input_value() == still  # nothing moves by itself
+    tab.locator("#wave-play").press("Enter")
+    shown.until(f"document.getElementById('wave-time').value !== '{still}'")
+    assert tab.locator("#wave-play").inner_text() == "Pause"
+
+
+def test_paper_is_light_and_shows_the_views(opened):
+    shown = opened(color_scheme="dark")
+    if shown.tab.evaluate("!document.createElement('canvas').getContext('webgl')"):
+        pytest.skip("this browser has no WebGL, so there are no views to print")
+    shown.tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    shown.tab.emulate_media(media="print", color_scheme="dark")
+    shown.until("[...document.querySelectorAll('.view .printed')].filter(i => i.naturalWidth > 100).length === 2")
+    # a view that had been wiped would be of one colour
+    colours = """() => [...document.querySelectorAll('.view .printed')].map(image => {
+        const canvas = document.createElement('canvas');
+        [canvas.width, canvas.height] = [image.naturalWidth, image.naturalHeight];
+        const pen = canvas.getContext('2d');
+        pen.drawImage(image, 0, 0);
+        return new Set(new Uint32Array(pen.getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size;
+    })"""
+    assert min(shown.tab.evaluate(colours)) > 50
+    paper = shown.tab.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert min(map(int, re.findall(r"\d+", paper)[:3])) > 230
+    assert shown.tab.evaluate("getComputedStyle(document.querySelector('nav')).display") == "none"
+    assert shown.errors == []
+
+
+def test_sounds_load(desktop):
+    shown = desktop
+    shown.until("[...document.querySelectorAll('audio')].every(a => a.readyState >= 1)")
+    lengths = shown.tab.evaluate("[...document.querySelectorAll('audio')].map(a => a.duration)")
+    assert len(lengths) >= 2 and all(0.4 < length < 4.0 for length in lengths)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_page_fits_a_phone(opened, scheme):
+    shown = opened(width=375, height=700, color_scheme=scheme, reduced_motion="reduce")
+    assert shown.tab.evaluate("document.documentElement.scrollWidth") == 375
+    small = "[...document.querySelectorAll('button, select')].filter(e => e.getBoundingClientRect().height < 40).length"
+    assert shown.tab.evaluate(small) == 0  # 40 px: a finger's width
+    ink, paper = shown.tab.evaluate(
+        "[getComputedStyle(document.body).color, getComputedStyle(document.body).backgroundColor]"
+    )
+    lightness = [sum(map(int, re.findall(r"\d+", colour)[:3])) / 765 for colour in (ink, paper)]
+    assert (
+        (lightness[0] < 0.2 and lightness[1] > 0.9)
+        if scheme == "light"
+        else (lightness[0] > 0.8 and lightness[1] < 0.2)
+    )
+
+
+def test_keyboard_reaches_everything_and_shows_where_it_is(desktop):
+    stops = desktop.tabbed_to()
+    tags = [tag for tag, _, _ in stops]
+    names = [name for _, name, _ in stops]
+    for tag in ("A", "BUTTON", "INPUT", "SELECT", "AUDIO"):
+        assert tag in tags
+    for name in ("plot-wave", "wave-play", "wave-time", "plot-mode", "mode-pick"):
+        assert name in names
+    assert names[0] == "Skip to the report"
+    assert [stop for stop in stops if not stop[2]] == []
+
+
+def test_pictures_have_a_text_for_those_who_cannot_see_them(desktop):
+    tab = desktop.tab
+    pictures = "[...document.querySelectorAll('[role=img], audio, [role=application]')]"
+    bare = "e => !e.getAttribute('aria-label') && !e.getAttribute('aria-labelledby')"
+    assert tab.evaluate(f"{pictures}.length") > 5 and tab.evaluate(f"{pictures}.filter({bare}).length") == 0
+    unnamed = "[...document.querySelectorAll('input, select')].filter(e => !e.labels.length).length"
+    assert tab.evaluate(unnamed) == 0

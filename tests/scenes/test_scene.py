@@ -1,0 +1,373 @@
+"""A scene file builds what the public functions build, and says in one line what is wrong with it."""
+
+from dataclasses import FrozenInstanceError
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from fem_impact import mesh
+from fem_impact._base import check
+from fem_impact.fe import assembly
+from fem_impact.fe.section import Material, Plate
+from fem_impact.impact import collision
+from fem_impact.impact.contact import Contact
+from fem_impact.impact.striker import Striker
+from fem_impact.model import planner
+from fem_impact.modes import analytic, modal
+from fem_impact.scenes import scene
+
+SCENES = Path(__file__).parents[2] / "studies" / "scenes"
+TEXT = """
+title = "test"
+
+[mesh]
+shape = "rectangle"
+length = 0.465
+width = 0.3
+
+[target]
+mass = 0.2
+first_frequency = 100.0
+damping_ratio = 0.005
+source = "analytic"
+
+[supports]
+boundary = "hinged"
+
+[striker]
+kind = "rigid"
+mass = 0.03
+
+[contact]
+kind = "hertz"
+stiffness = 695e3
+
+[strike]
+at = [0.1395, 0.09]
+tolerance = 1e-2
+speed = 2.0
+"""
+
+
+def write(folder, text=TEXT, **replacements):
+    for old, new in replacements.items():
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def edited(folder, old, new):
+    assert old in TEXT
+    return write(folder, TEXT.replace(old, new))
+
+
+def test_title_cannot_command_a_terminal(tmp_path):
+    path = edited(tmp_path, 'title = "test"', r'title = "a\u001b[31m\u202e\nb"')
+    assert scene.load_scene(path).title == "a [31m  b"
+
+
+def test_scene_strikes_what_the_public_functions_strike(tmp_path):
+    hit = scene.load_scene(write(tmp_path)).strike()
+    body = analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=hit.target.n_modes)
+    again = collision.strike(
+        body.damped(0.005),
+        Striker.rigid(0.03),
+        Contact.hertz(695e3),
+        at=[0.1395, 0.09],
+        speed=2.0,
+        tolerance=planner.SHARE * 1e-2,
+    )
+    # the same calls with the same numbers, up to rounding of the scale: 1e-9 of the peak after some 1e3 rad
+    assert_allclose(hit.force, again.force, rtol=0, atol=1e-9 * again.peak_force)
+    assert hit.n_impacts == again.n_impacts
+
+
+def test_finite_elements_and_formulas_agree_to_the_tolerance(tmp_path):
+    exact = scene.load_scene(write(tmp_path)).strike()
+    found = scene.load_scene(edited(tmp_path, '"analytic"', '"fe"')).strike()
+    # both are promised to 1e-2 of the exact plate, so they differ by 2e-2 at most
+    assert abs(found.restitution - exact.restitution) < 2e-2
+    for name in ("impulse", "contact_time", "peak_force"):
+        assert_allclose(getattr(found, name), getattr(exact, name), rtol=2e-2)
+    assert found.n_impacts == exact.n_impacts
+
+
+def test_tolerance_decides_how_many_modes_are_used(tmp_path):
+    loose = scene.load_scene(write(tmp_path)).modes()
+    tight = scene.load_scene(edited(tmp_path, "1e-2", "1e-5")).modes()
+    assert tight.n_modes > 2 * loose.n_modes
+
+
+def test_material_and_section_give_the_plate_its_own_mass(tmp_path):
+    text = TEXT.replace(
+        "[target]\nmass = 0.2\nfirst_frequency = 100.0",
+        '[material]\nE = 10e9\nnu = 0.3\nrho = 450.0\n[section]\nkind = "plate"\nthickness = 3e-3\n[target]',
+    ).replace('"analytic"', '"fe"')
+    modes = scene.load_scene(write(tmp_path, text)).modes(4)
+    system = assembly.assemble(
+        mesh.rectangle(0.465, 0.3), Plate(Material(E=10e9, nu=0.3, rho=450.0), 3e-3), supports={"boundary": "hinged"}
+    )
+    assert_allclose(modes.mass, 0.465 * 0.3 * 450.0 * 3e-3, rtol=1e-12)
+    # the scene refines to 1e-2, the default mesh is at least that good on the first four
+    assert_allclose(modes.frequencies, modal.find_modes(system, n_modes=4).frequencies, rtol=2e-2)
+
+
+def test_mass_and_frequency_rescale_a_material(tmp_path):
+    text = TEXT.replace(
+        "[target]", '[material]\nE = 10e9\nnu = 0.3\nrho = 450.0\n[section]\nkind = "plate"\nthickness = 3e-3\n[target]'
+    )
+    modes = scene.load_scene(write(tmp_path, text)).modes(4)
+    assert_allclose([modes.mass, modes.frequencies[0]], [0.2, 100.0], rtol=1e-12)
+
+
+def test_count_of_modes_is_what_was_asked(tmp_path):
+    assert scene.load_scene(write(tmp_path)).modes(7).n_modes == 7
+
+
+def test_stages_are_timed_and_watched(tmp_path):
+    seen = []
+
+    class Watch:
+        def __init__(self, name):
+            seen.append(name)
+
+        def __enter__(self):
+            pass
+
+        def __exit__(self, *_):
+            pass
+
+    run = scene.load_scene(edited(tmp_path, '"analytic"', '"fe"')).run(Watch)
+    assert list(dict.fromkeys(seen)) == list(run.seconds) == ["modes", "mesh", "assembly", "strike"]
+    assert all(value > 0.0 for value in run.seconds.values())
+
+
+def test_arguments_of_the_strike_can_be_replaced(tmp_path):
+    loaded = scene.load_scene(write(tmp_path))
+    assert loaded.run(speed=1.0).response.speed == 1.0
+    assert loaded.data(speed=1.0)["strike"] == {"at": [0.1395, 0.09], "speed": 1.0, "tolerance": 1e-2}
+
+
+def test_scene_is_frozen_and_tells_its_data(tmp_path):
+    loaded = scene.load_scene(write(tmp_path))
+    with pytest.raises(FrozenInstanceError):
+        loaded.title = "other"
+    with pytest.raises(TypeError):
+        loaded.mesh.values["length"] = 1.0
+    data = loaded.data()
+    assert data["mesh"] == {"shape": "rectangle", "length": 0.465, "width": 0.3}
+    assert data["supports"] == {"boundary": "hinged"} and data["title"] == "test"
+
+
+def test_mesh_file_is_found_beside_the_scene(tmp_path, monkeypatch):
+    monkeypatch.chdir("/")
+    text = TEXT.replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', 'shape = "file"\npath = "none.msh"')
+    loaded = scene.load_scene(write(tmp_path, text.replace('"analytic"', '"fe"')))
+    assert loaded.mesh.values["path"] == str(tmp_path / "none.msh")
+    with pytest.raises((ValueError, OSError), match=str(tmp_path / "none.msh")):
+        loaded.modes(1)
+
+
+@pytest.mark.parametrize("path", sorted(SCENES.glob("*.toml")), ids=lambda path: path.stem)
+def test_every_scene_of_the_studies_loads_with_a_title(path):
+    assert scene.load_scene(path).title
+
+
+BAD = [
+    ("length = 0.465", "lenght = 0.465", r"\[mesh\] lenght is not a key of this table; did you mean 'length'\?"),
+    ("length = 0.465", "", r"\[mesh\] length is missing for shape = 'rectangle'"),
+    ("length = 0.465", 'length = "long"', r"\[mesh\] length must be a number in m, got 'long'"),
+    ("length = 0.465", "length = true", r"\[mesh\] length must be a number in m, got True"),
+    ("length = 0.465", "length = nan", r"\[mesh\] length must be finite, got nan"),
+    ("length = 0.465", "length = -0.465", r"\[mesh\] length must be positive, got -0.465 m"),
+    ('"rectangle"', '"rectangel"', r"\[mesh\] shape must be one of .*; did you mean 'rectangle'\?"),
+    ('shape = "rectangle"', "", r"\[mesh\] shape is missing; it is one of rectangle, disk"),
+    ("[strike]", "[strik]", r"\[strik\] is not a table of a scene; did you mean 'strike'\?"),
+    ("[contact]", "[[contact]]", r"contact must be a table"),
+    ("mass = 0.03", "mass = -1", r"\[striker\] mass must be positive, got -1 kg"),
+    ("mass = 0.03", "mass = [0.03]", r"\[striker\] mass must be a number in kg"),
+    ("mass = 0.2", "mass = inf", r"\[target\] mass must be finite, got inf"),
+    ("mass = 0.2", "", r"\[target\] needs mass and first_frequency if there is no \[material\]"),
+    ("damping_ratio = 0.005", "damping_ratio = -1", r"\[target\] damping_ratio must not be negative"),
+    ('"analytic"', '"formula"', r"\[target\] source must be one of auto, fe, analytic"),
+    ("stiffness = 695e3", "stiffness = 0", r"\[contact\] stiffness must be positive"),
+    ("stiffness = 695e3", "stifness = 1.0", r"\[contact\] stifness is not a key .*did you mean 'stiffness'"),
+    (
+        'kind = "hertz"\nstiffness = 695e3',
+        'kind = "between"',
+        r"\[contact\] kind 'between' needs a striker of kind 'sphere'",
+    ),
+    ("at = [0.1395, 0.09]", "", r"\[strike\] at is missing"),
+    ("at = [0.1395, 0.09]", "at = [0.5, 0.09]", r"\[strike\] at must lie on the body, got \(0.5, 0.09\) m"),
+    ("at = [0.1395, 0.09]", "at = [0.1, nan]", r"\[strike\] at\[1\] must be finite, got nan"),
+    ("at = [0.1395, 0.09]", "at = [0.1]", r"\[strike\] at must have shape"),
+    ("at = [0.1395, 0.09]", 'at = "middle"', r"\[strike\] at must be numbers in m, got 'middle'"),
+    ("speed = 2.0", "speed = -2.0", r"\[strike\] speed must .*-2 m/s"),
+    ("tolerance = 1e-2", "tolerance = 0", r"\[strike\] tolerance must lie between"),
+    ('boundary = "hinged"', 'boundary = "hinge"', r"\[supports\] boundary must be one of clamped, hinged, free"),
+    ('boundary = "hinged"', 'lef = "hinged"', r"\[supports\] .*lef.*did you mean 'left'"),
+    ('title = "test"', "title = 3", r"title must be text, got 3"),
+    ("mass = 0.2", "mass = 0.2\nmass = 0.3", r"not valid TOML: .*line"),
+    ("speed = 2.0", "speed = 2.0\n[observe]\npoints = [[9.0, 9.0]]", r"\[observe\] points must lie on the body"),
+    (
+        "speed = 2.0",
+        "speed = 2.0\n[observe]",
+        r"\[observe\] points or listener must be given; add one or leave out the table",
+    ),
+    ("speed = 2.0", "speed = 2.0\n[observe]\nlistener = [0.1]", r"\[observe\] listener must have shape \(3\)"),
+    ("speed = 2.0", "speed = 2.0\n[observe]\nlistener = [0.1, 0.1, 0]", r"\[observe\] listener must lie off the plate"),
+    ("speed = 2.0", "speed = 2.0\n[observe]\npoints = 3", r"\[observe\] points must be a list of points"),
+    (
+        "[target]",
+        "[material]\nE = 1e9\nnu = 0.3\nrho = 1e3\n[target]",
+        r"\[section\] is missing; \[material\] needs it",
+    ),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "text"), BAD, ids=[f"{i}" for i in range(len(BAD))])
+@pytest.mark.parametrize("source", ["analytic", "fe"])
+def test_bad_scene_is_told_in_one_line_with_file_table_and_key(tmp_path, old, new, text, source):
+    path = edited(tmp_path, old, new)
+    if old != '"analytic"':
+        path.write_text(path.read_text().replace('"analytic"', f'"{source}"'))
+    with pytest.raises(ValueError, match=text) as caught:
+        scene.load_scene(path).strike()
+    assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("raw", "text"),
+    [
+        (b"\xff\xfe", "must be UTF-8 text"),
+        (b"", r"\[mesh\] is missing"),
+        (b"mesh = 3", r"mesh must be a table, written \[mesh\]"),
+        (b"a = " + b"[" * 50_000, "not valid TOML"),
+        (b"#" * 2_000_000, "must be smaller than"),
+    ],
+)
+def test_file_that_is_no_scene_is_told_so(tmp_path, raw, text):
+    (tmp_path / "scene.toml").write_bytes(raw)
+    with pytest.raises(ValueError, match=text):
+        scene.load_scene(tmp_path / "scene.toml")
+
+
+def test_formulas_decline_what_they_do_not_know(tmp_path):
+    with pytest.raises(ValueError, match="source = 'analytic' covers rectangles hinged all round"):
+        scene.load_scene(edited(tmp_path, 'boundary = "hinged"', 'left = "clamped"')).modes(3)
+
+
+@pytest.mark.parametrize("source", ["analytic", "fe"])
+def test_blow_that_needs_too_many_modes_is_refused_before_they_are_sought(tmp_path, source):
+    text = TEXT.replace("695e3", "1e14").replace('"analytic"', f'"{source}"')
+    with pytest.raises(check.SimulationError, match=r"needs about .* modes, up to .* Hz, more than") as caught:
+        scene.load_scene(write(tmp_path, text)).strike()
+    assert str(caught.value).startswith(f"{tmp_path / 'scene.toml'}: ")
+
+
+LINES = TEXT.strip().splitlines()
+VALUES = st.one_of(
+    st.floats(), st.integers(-(10**30), 10**30), st.booleans(), st.text(max_size=8), st.lists(st.floats(), max_size=3)
+)
+
+
+def toml(value):
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return '"' + "".join(f"\\U{ord(c):08X}" for c in value if not 0xD800 <= ord(c) < 0xE000) + '"'
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    return repr(value)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(line=st.integers(0, len(LINES) - 1), value=VALUES, how=st.sampled_from(["value", "key", "drop", "twice"]))
+def test_mutated_scene_loads_or_says_why(tmp_path, line, value, how):
+    lines = list(LINES)
+    key = lines[line].split(" = ")[0]
+    lines[line] = {
+        "value": f"{key} = {toml(value)}",
+        "key": f"{toml(str(value))} = 1",
+        "drop": "",
+        "twice": f"{lines[line]}\n{lines[line]}",
+    }[how]
+    path = write(tmp_path, "\n".join(lines))
+    try:
+        loaded = scene.load_scene(path)
+        loaded.modes(2)
+    except (ValueError, check.SimulationError) as error:
+        assert "\n" not in str(error) and str(path) in str(error)
+    else:
+        assert np.isfinite(loaded.modes(2).frequencies).all()
+
+
+def test_sphere_beyond_the_range_of_floats_is_an_error(tmp_path):
+    text = (SCENES / "disk.toml").read_text(encoding="utf-8").replace("radius = 5e-3", "radius = 1e308")
+    with pytest.raises(ValueError, match=r"\[striker\] radius must lie between 1e-09 and"):
+        scene.load_scene(write(tmp_path, text))
+
+
+def test_section_beyond_the_range_of_floats_is_an_error_without_warnings(tmp_path):
+    text = (SCENES / "marimba_bar.toml").read_text(encoding="utf-8").replace("width = 0.05", "width = 1e308")
+    with pytest.raises(ValueError, match=r"scene\.toml: \["):  # warnings are errors here, and would come first
+        scene.load_scene(write(tmp_path, text)).strike()
+
+
+WORDS = ["nan", "-inf", "-1", "0", "1e308", "1e-308", "true", '"x"', "[]", "[[]]", "[1]", "[1, 2, 3]", "{}", "{a = 1}"]
+WORDS += ["9" * 400, '""', "1979-05-27", "'\\u0000'", "[nan]", "[[0.1, 0.1]]", '"hinged"', '"between"', "0x1", "1_0"]
+
+
+def mutated(lines, random):
+    lines = list(lines)
+    for _ in range(random.choice([1, 1, 2, 4])):
+        i = random.randrange(len(lines))
+        other = lines[random.randrange(len(lines))]
+        characters = list(lines[i] or " ")
+        characters[random.randrange(len(characters))] = chr(random.randrange(1, 0x250))
+        key = lines[i].split("=")[0]
+        lines[i] = random.choice(
+            [f"{key}= {random.choice(WORDS)}", "", other, f"{lines[i]}\n{other}", "".join(characters)]
+        )
+    return lines
+
+
+@pytest.mark.slow
+def test_ten_thousand_mutated_scenes_load_or_say_why_in_one_line(tmp_path):
+    random = Random(2026)
+    texts = [TEXT.splitlines(), *(path.read_text(encoding="utf-8").splitlines() for path in SCENES.glob("*.toml"))]
+    loaded = 0
+    for _ in range(10_000):
+        path = write(tmp_path, "\n".join(mutated(random.choice(texts), random)))
+        try:
+            scene.load_scene(path)
+            loaded += 1
+        except ValueError as error:
+            assert str(error).startswith(f"{path}: ") and str(error).isprintable()
+    assert 500 < loaded < 9500  # else the mutations are too wild, or do nothing
+
+
+def test_file_and_table_are_named_once(tmp_path):
+    text = (SCENES / "drumstick.toml").read_text(encoding="utf-8").replace("length = 0.465", "length = true")
+    path = write(tmp_path, text)
+    with pytest.raises(ValueError, match="length must be a number in m, got True") as caught:
+        scene.load_scene(path).modes(2)
+    assert str(caught.value).count("[mesh]") == 1 and str(caught.value).count(str(path)) == 1
+
+
+@pytest.mark.parametrize("shape", ['shape = "file"\npath = "{}"', 'shape = "outline"\nsource = "{}"'])
+@pytest.mark.parametrize("place", ["../../../../../../../../etc/passwd", "/etc/passwd", "secret.svg", "secret.msh"])
+def test_a_file_that_is_no_mesh_is_told_without_its_content(tmp_path, shape, place):
+    for name in ("secret.svg", "secret.msh"):
+        (tmp_path / name).write_text("root:x:0:0:hunter2:/root\n")
+    text = TEXT.replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', shape.format(place))
+    with pytest.raises(ValueError, match=r"scene\.toml: \[mesh\]") as caught:
+        scene.load_scene(write(tmp_path, text.replace('"analytic"', '"fe"'))).modes(1)
+    assert "hunter2" not in str(caught.value) and "root:" not in str(caught.value)

@@ -1,0 +1,279 @@
+"""Maps of scenes, their pictures and files, the choice of a hammer, and both at the prompt."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact import cli
+from fem_impact.scenes import maps
+from fem_impact.scenes.scene import scene_of
+from fem_impact.show import plots
+from fem_impact.sweeps import grid, hammers
+
+SCENES = Path(__file__).parents[2] / "studies" / "scenes"
+OVER = {"contact.stiffness": [2e4, 1e5, 4e5], "striker.mass": [0.02, 0.1]}
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return fi.load_scene(SCENES / "drumstick_map.toml")
+
+
+@pytest.fixture(scope="module")
+def table(scene):
+    return maps.map_scene(scene, over=OVER, max_frequency=3e3)
+
+
+def test_cells_of_a_scene_map_are_struck_scenes(scene, table):
+    changed = maps.changed_scene(maps.changed_scene(scene, "contact.stiffness", 1e5), "striker.mass", 0.02)
+    hit, cell = changed.strike(), table.sel(stiffness=1e5, mass=0.02)
+    assert int(cell.n_impacts) == hit.n_impacts
+    assert_allclose(float(cell.restitution), hit.restitution, atol=2e-3)  # 1e-3 each
+    assert_allclose(float(cell.contact_time), hit.contact_time, rtol=2e-3)
+
+
+def test_theory_stands_beside_the_blows(table):
+    felt = table.mass.values / 3.0
+    expected = np.sqrt(table.stiffness.values[:, None] / felt) / (2.0 * np.pi)
+    assert_allclose(table.contact_resonance, expected, rtol=1e-6)  # the stick's felt mass by finite elements
+    assert table.threshold.dims == ("mass",)
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    wanted = [fi.threshold_frequency(plate, (0.465, 0.3), m) for m in felt]
+    assert_allclose(table.threshold, wanted, rtol=0.01)  # other numbers of modes, the rest by their tail
+    assert json.loads(table.attrs["scene"])["map"]["striker.mass"] == [0.02, 0.1]
+
+
+def test_any_number_of_a_scene_is_an_axis(scene):
+    over = {"target.damping_ratio": [0.0, 0.01], "mesh.width": [1.0, 0.8], "strike.speed": [1.0, 2.0]}
+    table = maps.map_scene(scene, over=over)
+    assert dict(table.sizes) == {"mesh.width": 2, "damping_ratio": 2, "speed": 2}
+    assert float(abs(table.contact_time.diff("mesh.width")).min()) > 0.0
+    with pytest.raises(ValueError, match=r"mesh.widht is not an axis; did you mean 'mesh.width'"):
+        maps.map_scene(scene, over={"mesh.widht": [1.0]})
+
+
+def test_files_say_what_the_map_holds(table, tmp_path):
+    names = maps.write(tmp_path, table)
+    assert {"map.nc", "map.csv", "n_impacts.png", "centroid.png"} <= set(names)
+    with xarray.open_dataset(tmp_path / "map.nc", engine="scipy") as read:
+        assert_allclose(read.contact_time, table.contact_time)
+        assert read.contact_time.attrs["units"] == "s"
+        assert read.attrs["scene"] == table.attrs["scene"]
+    assert len((tmp_path / "map.csv").read_text().splitlines()) == 7
+    assert (tmp_path / "restitution.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_pictures_name_points_and_whole_numbers(scene):
+    table = maps.map_scene(scene, over={"striker.mass": [0.01, 0.02], "strike.at": [[0.4, 0.3], [0.45, 0.31]]})
+    figure = maps.draw(table.assign(n_impacts=0 * table.n_impacts + 1), "n_impacts")
+    figure.canvas.draw()
+    axes, bar = figure.axes
+    assert [text.get_text() for text in axes.get_xticklabels() if text.get_text()] == ["(0.4, 0.3)", "(0.45, 0.31)"]
+    assert bar.get_yticks().tolist() == [1.0]
+
+
+def test_contours_of_a_power_law_are_where_it_says():
+    x, y = np.linspace(0.01, 0.2, 4), np.geomspace(1e4, 1e6, 3)
+    finer_x, finer_y, data = plots._finer(x, y, np.sqrt(y[:, None] / x))
+    assert data.shape == (17, 25)
+    assert_allclose(data, np.sqrt(finer_y[:, None] / finer_x), rtol=1e-12)  # rounding of logarithms
+
+
+def test_zarr_keeps_why_a_cell_failed(table, tmp_path):
+    pytest.importorskip("zarr", reason="the cluster extra is not installed")
+    failed = table.copy(deep=True)
+    failed["failure"] = failed.failure.astype("<U40")
+    failed.failure[1, 0] = "the motion may be chaotic: é"
+    maps.write(tmp_path, failed, "zarr")
+    with xarray.open_zarr(tmp_path / "map.zarr") as read:
+        assert read.failure.values.tolist() == [["", ""], ["the motion may be chaotic: é", ""], ["", ""]]
+        assert_allclose(read.contact_time, table.contact_time)
+
+
+def scene_of_size(folder, count):
+    text = (SCENES / "drumstick_map.toml").read_text().replace("count = 20", f"count = {count}")
+    (folder / "large.toml").write_text(text)
+    return str(folder / "large.toml")
+
+
+def test_too_large_a_map_is_refused_and_a_costly_one_says_so(tmp_path, capsys, scene):
+    assert cli.main(["map", scene_of_size(tmp_path, 10**6), "--out", str(tmp_path / "out")]) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "over asks for 1e+12 cells: about" in told
+    assert (
+        "7.2e+04 GB of memory; give fewer values, or raise max_cells, now 1e+08" in told
+    )  # seven layers and two more numbers of 8 byte
+    assert cli.main(["map", scene_of_size(tmp_path, 10**12), "--out", str(tmp_path / "out")]) == 2
+    assert "stiffness.count must be at most 1000000, got" in " ".join(capsys.readouterr().err.split())
+    with pytest.raises(ValueError, match="over asks for 6 cells"):
+        maps.map_scene(scene, over=OVER, max_cells=5)
+    said = []
+    grid.admit(10**8, 6, 1e9, tell=said.append)
+    grid.admit(10**4, 6, 1e9, tell=said.append)
+    assert len(said) == 1
+    assert "6.4 GB of memory" in said[0]
+
+
+def test_stores_of_an_axis_for_which_the_body_is_built_anew(scene, tmp_path):
+    pytest.importorskip("zarr", reason="the cluster extra is not installed")
+    over = {"mesh.width": [1.0, 0.9, 0.8], "striker.mass": [0.05, 0.1]}
+    maps.map_scene(scene, over=over, store=tmp_path / "map")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["map-0", "map-1", "map-2"]
+
+
+def test_map_at_the_prompt(tmp_path, capsys):
+    text = (SCENES / "drumstick_map.toml").read_text().replace("count = 20", "count = 3")
+    (tmp_path / "few.toml").write_text(text)
+    assert cli.main(["map", str(tmp_path / "few.toml"), "--out", str(tmp_path / "out"), "--workers", "1"]) == 0
+    assert "9 blows over stiffness (3), mass (3)" in capsys.readouterr().out
+    assert (tmp_path / "out" / "map.nc").exists()
+    assert cli.main(["map", str(SCENES / "marked_linear.toml"), "--out", str(tmp_path / "none")]) == 2
+    assert "[map] is missing" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (
+            ["map", "drumstick_map.toml", "--out", "map.png"],
+            "--out must name a folder for map.nc, map.csv and pictures",
+        ),
+        (["map", "marked_linear.toml"], "[map] is missing; add it and name the axes, as in over = {"),
+        (["hammer", "drumstick_map.toml", "--bandwith", "500"], "did you mean --bandwidth?"),
+        (["hammer", "drumstick_map.toml"], "see fem-impact hammer --help"),
+    ],
+)
+def test_slips_at_the_prompt_are_told_before_the_work(given, message, capsys):
+    verb, name, *rest = given
+    try:
+        status = cli.main([verb, str(SCENES / name), *rest])
+    except SystemExit as left:
+        status = left.code
+    assert status == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_map_that_needs_too_many_modes_says_what_to_leave_out():
+    found = scene_of(
+        {**PIECES["plate"], "contact": {"kind": "linear", "stiffness": 1e5}}, Path("plate.toml"), folder=Path()
+    )
+    over = {"striker.mass": [1e-4, 0.1], "contact.stiffness": [1e3, 1e9]}
+    with pytest.raises(fi.SimulationError, match=r"needs about \d+ modes, at most 2000 are allowed; allow a larger"):
+        maps.map_scene(found, over=over, tolerance=1e-3)
+
+
+def test_a_chosen_hammer_does_what_was_asked():
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=200)
+    light, heavy = hammers.choose(plate, (0.465, 0.3), 500.0, [2e-3, 0.2])
+    assert light.works
+    assert not heavy.works
+    for tip in (light.softest, light.hardest):
+        hit = fi.strike(plate, fi.Striker.rigid(2e-3), fi.Contact.linear(tip), at=(0.465, 0.3), speed=1.0)
+        assert hit.n_impacts == 1
+        assert hammers.bandwidth_of(hit, 10.0) > 0.98 * 500.0  # blows behind the choice are good to a percent
+
+
+def test_on_an_unyielding_body_the_softest_tip_is_the_half_sines():
+    heavy = fi.analytic.rectangle(1.55, 1.0, mass=5e5, first_frequency=100.0, n_modes=30)
+    (hammer,) = hammers.choose(heavy, (0.465, 0.3), 500.0, [0.02])
+    centre = 500.0 / 2.039  # Hz; a half sine is 10 dB down at 2.039 times its frequency
+    assert_allclose(hammer.softest, 0.02 * (2.0 * np.pi * centre) ** 2, rtol=0.06)  # the last halving is 4 %
+
+
+def test_hammer_at_the_prompt(capsys):
+    arguments = ["hammer", str(SCENES / "drumstick_map.toml"), "--bandwidth", "400", "--masses", "0.002", "0.2"]
+    assert cli.main([*arguments, "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert [hammer["softest"] is not None for hammer in data["hammers"]] == [True, False]
+    assert cli.main(arguments) == 0
+    assert "200 g: no tip reaches 400 Hz and hits once" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["--bandwidth", "0"], "bandwidth must lie between 0.001 and 1e+09 Hz, got 0 Hz"),
+        (["--bandwidth", "inf"], "bandwidth must be finite, got inf Hz"),
+        (["--bandwidth", "500", "--masses", "0"], "masses must lie between 1e-06 and 10000 kg, got 0 kg"),
+        (["--bandwidth", "500", "--masses", "0.01", "nan"], "masses must be finite"),
+        (["--bandwidth", "500", "--drop", "60"], "drop must lie between 1 and 40 dB, got 60 dB"),
+    ],
+)
+def test_hammers_of_no_sense_are_told(given, message, capsys):
+    assert cli.main(["hammer", str(SCENES / "drumstick_map.toml"), *given]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+
+
+def test_one_grazing_blow_of_a_soft_tip_does_not_rule_out_the_harder_ones():
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    (hammer,) = hammers.choose(plate, (0.465, 0.3), 500.0, [1.0])
+    assert hammer.hardest > 2e6  # N/m; the second tip tried, 78 kN/m, hits twice at any tolerance, the next 38 once
+    hit = fi.strike(plate, fi.Striker.rigid(1.0), fi.Contact.linear(hammer.hardest), at=(0.465, 0.3), speed=1.0)
+    assert hit.n_impacts == 1
+
+
+def test_a_bandwidth_beyond_every_tip_has_no_hammer():
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=60)
+    (hammer,) = hammers.choose(plate, (0.465, 0.3), 1e6, [0.01])
+    assert not hammer.works
+
+
+@pytest.mark.parametrize(
+    ("bandwidth", "masses", "text"),
+    [
+        (800.0, [1e30, 0.2], r"masses must lie between 1e-06 and 10000 kg, got 1e\+30 kg"),
+        (800.0, [5e-324], "masses must lie between"),
+        (1e300, [0.1], r"bandwidth must lie between 0.001 and 1e\+09 Hz"),
+    ],
+)
+def test_hammers_beyond_all_reason_are_refused_at_once(bandwidth, masses, text):
+    with pytest.raises(ValueError, match=text):
+        fi.hammers.choose(fi.Modes.rigid(1.0), None, bandwidth, masses)
+
+
+PIECES = {
+    "plate": {
+        "mesh": {"shape": "rectangle", "length": 0.3, "width": 0.2},
+        "material": {"E": 11e9, "nu": 0.37, "rho": 420.0, "E_across": 0.7e9, "G": 0.7e9},
+        "section": {"kind": "plate", "thickness": 2.8e-3},
+        "supports": {"boundary": "clamped"},
+        "striker": {"kind": "rigid", "mass": 0.005},
+        "strike": {"at": [0.13, 0.08], "speed": 1.0, "tolerance": 1e-2},
+    },
+    "bar": {
+        "mesh": {"shape": "line", "length": 0.35},
+        "material": {"E": 20e9, "nu": 0.3, "rho": 1000.0},
+        "section": {"kind": "beam", "width": 0.05, "height": 0.02},
+        "supports": {"left": "free", "right": "free"},
+        "striker": {"kind": "stick", "mass": 0.06, "first_frequency": 2e3},
+        "strike": {"at": [0.11], "speed": 2.0, "tolerance": 1e-3},
+    },
+}
+
+
+@pytest.mark.parametrize("body", [pytest.param("plate", marks=pytest.mark.slow), "bar"])
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_cells_of_finite_element_scenes_are_struck_scenes(body, exponent):
+    """Masses and stiffnesses over more than a decade, any cell."""
+    contact = {"kind": "power", "stiffness": 1e5, "exponent": exponent}
+    found = scene_of({**PIECES[body], "contact": contact}, Path(f"{body}.toml"), folder=Path())
+    soft = 1e3 if exponent == 1.0 else 1e5
+    over = {"striker.mass": [2e-3, 8e-3, 0.03], "contact.stiffness": soft * np.array([1.0, 6.0, 40.0])}
+    table = maps.map_scene(found, over=over)
+    rng = np.random.default_rng(5)
+    for _ in range(4):
+        mass, stiffness = (float(rng.choice(values)) for values in over.values())
+        changed = maps.changed_scene(found, "contact.stiffness", stiffness)
+        hit, cell = (
+            maps.changed_scene(changed, "striker.mass", mass).strike(),
+            table.sel(mass=mass, stiffness=stiffness),
+        )
+        assert int(cell.n_impacts) == hit.n_impacts
+        assert_allclose(float(cell.restitution), hit.restitution, atol=2.0 * hit.tolerance)  # one each
+        for layer in ("contact_time", "peak_force", "impulse"):
+            assert_allclose(float(cell[layer]), getattr(hit, layer), rtol=2.0 * hit.tolerance)

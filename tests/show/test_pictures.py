@@ -1,0 +1,106 @@
+"""Pictures in space where something can render, in the plane where nothing can; both tell the same."""
+
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+from test_cli import TEXT
+
+import fem_impact as fi
+from fem_impact import cli
+from fem_impact.show import pictures, sampling
+
+
+@pytest.fixture(scope="module")
+def hit(tmp_path_factory):
+    path = tmp_path_factory.mktemp("pictures") / "small.toml"
+    path.write_text(TEXT)
+    return fi.load_scene(path).strike(target="modal")
+
+
+@pytest.fixture(params=["in space", "in the plane"])
+def renders(request, monkeypatch):
+    """Whether pictures are rendered; the plane must do wherever nothing can render."""
+    if request.param == "in the plane":
+        monkeypatch.setattr(pictures, "can_render", lambda: False)
+    elif not pictures.can_render():
+        pytest.skip(f"nothing renders here: {pictures.REMEDY}")
+    return request.param == "in space"
+
+
+def coloured(image):
+    """Share of pixels that are orange (pushed down) and that are purple (up)."""
+    red, _, blue = (np.asarray(image.convert("RGB"), float)[..., i] for i in range(3))
+    return float((red > blue + 40.0).mean()), float((blue > red + 20.0).mean())
+
+
+def test_mode_shapes_show_as_many_hills_as_valleys(hit, tmp_path, renders):
+    said = pictures.mode_shapes(tmp_path / "modes.png", hit.target, count=4, columns=2)
+    assert said == ("" if renders else pictures.REMEDY)
+    image = Image.open(tmp_path / "modes.png")
+    width, height = image.size
+    second = image.crop((width // 2, 0, width, height // 2))  # mode (2, 1): one half goes up, the other down
+    down, up = coloured(second)
+    assert down > 0.04 and up > 0.04
+
+
+def test_wave_begins_below_the_striker_and_spreads(hit, tmp_path, renders):
+    assert pictures.animation(tmp_path / "wave.gif", hit, frames=4) == ("" if renders else pictures.REMEDY)
+    with Image.open(tmp_path / "wave.gif") as movie:
+        shares = [coloured(frame)[0] for frame in ImageSequence.Iterator(movie)]
+    assert len(shares) == 4
+    assert shares[0] < 0.02 < shares[1] < max(shares[2:])  # at the first touch the plate is flat but for the mark
+
+
+def test_film_holds_every_frame(hit, tmp_path):
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="MP4 files are an extra: fem-impact[film]")
+    pictures.animation(tmp_path / "wave.mp4", hit, frames=6)
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "wave.mp4"))
+    assert frames == 6 and abs(seconds - 6 / pictures.RATE) < 0.05
+    assert [path.name for path in tmp_path.iterdir()] == ["wave.mp4"]
+
+
+def test_film_without_its_extra_is_a_sentence(hit, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(ValueError, match=r"an MP4 file needs imageio_ffmpeg: pip install 'fem-impact\[film\]'"):
+        pictures.animation(tmp_path / "wave.mp4", hit)
+
+
+def test_picture_of_one_instant_and_its_time(hit, tmp_path, renders):
+    pictures.wave(tmp_path / "a.png", hit)
+    pictures.wave(tmp_path / "b.png", hit, time=0.0)
+    assert coloured(Image.open(tmp_path / "a.png"))[0] > coloured(Image.open(tmp_path / "b.png"))[0]
+
+
+def test_gap_is_closed_while_the_striker_presses(hit):
+    first = hit.impacts[0]
+    times = np.array([0.0, 0.5 * (first.start + first.end), hit.impacts[-1].end * 3.0])
+    gap = sampling.gap(hit, times)
+    assert gap[0] == gap[1] == 0.0 < gap[2]
+
+
+def test_beam_is_drawn_as_a_ribbon():
+    modes = fi.analytic.beam(1.0, ends=("free", "free"), mass=1.0, first_frequency=100.0, n_modes=4)
+    points, cells, plane = sampling.surface(modes)
+    sides = plane[cells[:, 1:]] - plane[cells[:, :1]]
+    # length 1 m times the width, of triangles that all turn the same way
+    assert 0.5 * np.linalg.det(sides).sum() == pytest.approx(sampling.RIBBON, rel=1e-9)
+    assert points.shape == (len(plane), 1)
+
+
+@pytest.mark.parametrize("name", ["wave.jpg", "wave"])
+def test_other_endings_are_refused(hit, tmp_path, name):
+    with pytest.raises(ValueError, match="path ending must be"):
+        pictures.wave(tmp_path / name, hit)
+
+
+def test_strike_writes_them_when_asked(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(pictures, "can_render", lambda: False)
+    monkeypatch.setitem(pictures.animation.__wrapped__.__kwdefaults__, "frames", 3)
+    (tmp_path / "small.toml").write_text(TEXT)
+    out = tmp_path / "out"
+    assert cli.main(["strike", str(tmp_path / "small.toml"), "--out", str(out), "--pictures", "--vtk"]) == 0
+    for name in ("modes.png", "wave.png", "wave.gif", "motion.pvd"):
+        assert (out / name).stat().st_size > 0
+    assert pictures.REMEDY in " ".join(capsys.readouterr().err.split())

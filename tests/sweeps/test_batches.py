@@ -1,0 +1,272 @@
+"""Many blows in kernel form against closed forms, against single blows, and against themselves."""
+
+import numpy as np
+import pytest
+from numba import njit
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.impact import accuracy
+from fem_impact.impact.compiled import many_blows, propagation
+from fem_impact.sweeps import batches
+
+AT = np.array([0.465, 0.3])
+
+
+@njit
+def cubic(d0, v0, d1, v1, t):
+    return many_blows.cubic(d0, v0, d1, v1, t)
+
+
+@njit
+def parted(d0, v0, d1, v1, error, rate_error):
+    return many_blows.parted(d0, v0, d1, v1, error, rate_error)
+
+
+def plate(mass=0.2, **wanted):
+    return fi.analytic.rectangle(1.55, 1.0, mass=mass, first_frequency=100.0, n_modes=120, **wanted)
+
+
+def many(
+    modes, striker, stiffness, *, at=AT, exponent=1.0, speed=1.0, mass=None, target_mass=None, residual=True, loss=0.0
+):
+    """Blows of one family, one for each stiffness."""
+    stiffness = np.atleast_1d(np.asarray(stiffness, float))
+    column = np.ones(len(stiffness))
+    return batches.Blows(
+        {0: batches.Family.of(modes, at, striker, residual, bool(np.any(loss)))},
+        np.zeros(len(stiffness), int),
+        column * (modes.mass if target_mass is None else target_mass),
+        column * (striker.mass if mass is None else mass),
+        stiffness,
+        column * exponent,
+        column * speed,
+        column * loss,
+    )
+
+
+@pytest.mark.parametrize("damping_ratio", [0.0, 0.02, 1.3])
+def test_kernel_is_the_modal_propagation(damping_ratio):
+    """Rows against the same force pushed through the modes one step at a time."""
+    modes = plate(damping_ratio=damping_ratio)
+    squared, h = modes.shape_at(AT)[0] ** 2, 1e-4
+    table = np.empty((propagation.N_TABLE, modes.n_modes))
+    propagation.step_table(np.array(modes.omega), np.array(modes.damping_ratio), h, table)
+    modal = np.array(modes.omega), np.array(modes.damping_ratio), squared, h
+    rows, parts = batches.kernel_rows(*modal, 12)[0], np.array([0.25, 0.8])
+    later = batches.kernel_rows(*modal, 12, parts)
+    q, p = table[4].copy(), table[5].copy()
+    for m in range(12):
+        size = np.abs(squared * p).sum()  # of what the sums of a rate may cancel
+        assert_allclose(rows[0, m], squared @ q, rtol=1e-12)  # the same sums in another order
+        if m < 11:
+            assert_allclose(rows[4, m + 1], squared @ (table[8] * q + table[9] * p), rtol=1e-11)
+        assert_allclose(rows[2, m], squared @ p, rtol=1e-11, atol=1e-13 * size)
+        for rest, part in zip(later, parts):
+            small = np.empty_like(table)
+            propagation.step_table(*modal[:2], part * h, small)
+            assert_allclose(rest[0, m], squared @ (small[0] * q + small[1] * p), rtol=1e-11)
+            assert_allclose(rest[2, m], squared @ (small[2] * q + small[3] * p), rtol=1e-11, atol=1e-13 * size)
+        q, p = table[0] * q + table[1] * p, table[2] * q + table[3] * p
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.2, 1.5, 2.5])
+def test_two_masses_share_speed_whatever_the_law(exponent):
+    target, striker = fi.Modes.rigid(0.3), fi.Striker.rigid(0.1)
+    blows = many(target, striker, np.logspace(3, 7, 9), at=np.zeros(0), exponent=exponent, speed=2.0)
+    found = batches.bounce(blows, tolerance=1e-3)
+    assert found.done.all()
+    assert (found.n_impacts == 1).all()
+    assert_allclose(found.restitution, (0.3 - 0.1) / (0.3 + 0.1), atol=1e-9)  # energy exact at every step
+    reduced = 0.1 * 0.3 / 0.4
+    expected = [accuracy.contact_duration(fi.Contact.power(k, exponent), reduced, 2.0) for k in blows.stiffness]
+    assert_allclose(found.contact_time, expected, rtol=1e-3)  # the tolerance
+    deepest = (0.5 * (exponent + 1.0) * reduced * 4.0 / blows.stiffness) ** (1.0 / (exponent + 1.0))
+    assert_allclose(found.peak_force, blows.stiffness * deepest**exponent, rtol=1e-3)
+
+
+CASES = {
+    "stick on plate": (plate, lambda: fi.Striker.stick(0.1, 10e3), AT),
+    "flexible stick": (plate, lambda: fi.Striker.stick(0.1, 400.0), AT),
+    "damped plate": (lambda: plate(damping_ratio=0.01), lambda: fi.Striker.rigid(0.02), AT),
+    "free bar": (
+        lambda: fi.analytic.beam(1.0, ends=("free", "free"), mass=0.2, first_frequency=100.0, n_modes=40),
+        lambda: fi.Striker.rigid(0.03),
+        np.array([0.1]),
+    ),
+}
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+@pytest.mark.parametrize("case", CASES)
+def test_every_bounce_is_the_single_blow_within_the_tolerance(case, exponent):
+    make, strike, at = CASES[case]
+    modes, striker = make(), strike()
+    stiffness = np.logspace(4, 6, 7) * 10.0 ** (2.0 * (exponent - 1.0))
+    blows = many(modes, striker, stiffness, at=at, exponent=exponent, speed=3.0)
+    found = batches.bounce(blows, tolerance=1e-3)
+    assert found.done.mean() > 0.7  # the others belong to the modal engine
+    for i in np.flatnonzero(found.done):
+        hit = fi.strike(modes, striker, fi.Contact.power(stiffness[i], exponent), at=at, speed=3.0, tolerance=1e-5)
+        assert hit.n_impacts == found.n_impacts[i]
+        assert_allclose(found.restitution[i], hit.restitution, atol=1e-3)
+        for name in ("contact_time", "impulse", "peak_force"):
+            assert_allclose(getattr(found, name)[i], getattr(hit, name), rtol=1e-3)
+
+
+def test_estimate_covers_the_error():
+    """Effectivity over many random blows: the estimate is no less than a third of the error, and not wildly more."""
+    rng = np.random.default_rng(7)
+    stiffness = 10.0 ** rng.uniform(4, 6, 400)
+    blows = many(plate(2.0), fi.Striker.stick(0.1, 10e3), stiffness)
+    rough, fine = batches.bounce(blows, tolerance=1e-2), batches.bounce(blows, tolerance=1e-6)
+    both = rough.done & fine.done
+    assert both.mean() > 0.95
+    error = np.abs(rough.contact_time / fine.contact_time - 1.0)[both]
+    for name in ("impulse", "peak_force"):
+        error = np.maximum(error, np.abs(getattr(rough, name) / getattr(fine, name) - 1.0)[both])
+    effectivity = rough.error[both] / error
+    assert (effectivity > 0.3).mean() > 0.97  # flukes aside
+    assert np.median(effectivity) < 10.0
+
+
+@pytest.mark.parametrize("n_modes", [30, 300])
+def test_steps_do_not_grow_with_the_modes(n_modes):
+    modes = fi.analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=100.0, n_modes=n_modes)
+    engine = batches._Engine(many(modes, fi.Striker.stick(0.1, 10e3), [1e5]), 0.0, {})
+    assert engine.first_step(1e-3)[0] == 26  # h = 2**-13 s whatever the modes: 15 for 1.8 ms
+
+
+def test_only_stiffness_times_speed_to_the_power_matters():
+    speed = np.array([0.1, 1.0, 10.0])
+    blows = many(plate(), fi.Striker.stick(0.1, 10e3), 1e6 / np.sqrt(speed), exponent=1.5, speed=1.0)
+    found = batches.bounce(batches.Blows(**{**vars(blows), "speed": speed}), tolerance=1e-3)
+    assert_allclose(found.contact_time, found.contact_time[0], rtol=1e-9)  # rounding of k v**0.5
+    assert_allclose(found.impulse / speed, found.impulse[0] / speed[0], rtol=1e-9)
+
+
+def test_threads_change_nothing():
+    blows = many(plate(), fi.Striker.stick(0.1, 10e3), np.logspace(4, 6, 2 * batches.FEW))
+    one, two = (batches.bounce(blows, tolerance=1e-3, workers=n) for n in (1, 2))
+    for name in ("n_impacts", "contact_time", "impulse"):
+        assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True)
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.05, 1.5])
+def test_looks_ahead_miss_no_more_of_a_flight_than_is_claimed(zeta):
+    """The bound behind every proved flight against the exact motion after a force of straight pieces with jumps."""
+    rng = np.random.default_rng(5)
+    omega, squared, h, n = np.sort(10.0 ** rng.uniform(2.0, 5.5, 30)), rng.uniform(0.1, 1.0, 30), 1e-4, 12
+    force, ramp = rng.uniform(0.0, 1.0, n), rng.uniform(-1.0, 1.0, n)
+    starts, ends, slopes = force - 0.5 * ramp, force + 0.5 * ramp, ramp / h
+    jumps = np.abs(np.append(starts, 0.0) - np.append(0.0, ends)).sum()
+    bends = np.abs(np.diff(np.concatenate([[0.0], slopes, [0.0]]))).sum()
+    family = batches.Family((omega, np.zeros(1)), (np.full(30, zeta), np.zeros(1)), (squared, np.ones(1)), (0.0, 0.0))
+    table = np.empty((propagation.N_TABLE, 30))
+    propagation.step_table(omega, np.full(30, zeta), h, table)
+    q = p = np.zeros(30)
+    for f, s in zip(force, ramp):
+        q, p = table[0] * q + table[1] * p, table[2] * q + table[3] * p
+        q, p = q + table[4] * f + table[6] * s, p + table[5] * f + table[7] * s
+    claimed = family.kernels(h, 1)[2] @ [jumps, bends]  # (SPLITS + LEVELS, 2)
+    for (error, rate_error), steps in zip(claimed, (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)):
+        span, parts = steps * h, 200
+        small = np.empty((propagation.N_TABLE, 30))
+        propagation.step_table(omega, np.full(30, zeta), span / parts, small)
+        states = [(q, p)]
+        for _ in range(parts):
+            states.append((small[0] * states[-1][0] + small[1] * states[-1][1],
+                           small[2] * states[-1][0] + small[3] * states[-1][1]))  # fmt: skip
+        place = np.array([squared @ state[0] for state in states])
+        rate = span * np.array([squared @ state[1] for state in states])
+        t = np.linspace(0.0, 1.0, parts + 1)
+        curve = [cubic(place[0], rate[0], place[-1], rate[-1], x) for x in t]
+        missed, missed_rate = (np.abs(np.array(curve) - np.column_stack([place, rate]))).max(axis=0)
+        assert missed <= error
+        assert missed_rate <= rate_error
+        assert zeta > 1.0 or (missed > 1e-4 * error and missed_rate > 1e-4 * rate_error)  # not idle where modes ring
+
+
+@pytest.mark.parametrize(
+    ("approach", "apart"),
+    [
+        (lambda t: -1.0 + 0.0 * t, True),  # far away all along
+        (lambda t: -1e-3 - t, True),  # just parted and falling
+        (lambda t: -0.5 + t, True),  # rising into one contact
+        (lambda t: -1.0 + 4.1 * t * (1.0 - t), False),  # touches half way
+        (lambda t: -1.0 + 3.9 * t * (1.0 - t), False),  # nearly: 0.025 short, less than the doubt
+        (lambda t: -1.0 + 3.0 * t * (1.0 - t), True),
+        (lambda t: -0.01 + 1.2 * t - 3.0 * t * t + 1.95 * t**3, False),  # touches, parts and touches again
+    ],
+)
+def test_a_look_ahead_tells_a_touch_from_none(approach, apart):
+    small = 1e-6
+    start, end = ((approach(t + small) - approach(t - small)) / (2.0 * small) for t in (0.0, 1.0))
+    assert parted(approach(0.0), start, approach(1.0), end, 0.05, 0.1) == apart
+
+
+ADVERSARIAL = [  # mass [kg], stiffness [N/m] of sticks that part for 11 us, or touch for a moment
+    (0.0405238816672741, 304640.530612161),
+    (0.10856803301525185, 747597.6912943505),
+]
+
+
+def test_moments_between_the_steps_are_not_lost():
+    rng = np.random.default_rng(11)
+    cells = ADVERSARIAL + list(zip(rng.uniform(0.05, 0.2, 12), 10.0 ** rng.uniform(5.3, 6.0, 12)))
+    modes = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    blows = many(modes, fi.Striker.stick(0.1, 10e3), [k for _, k in cells], mass=np.array([m for m, _ in cells]))
+    found = batches.bounce(blows, tolerance=1e-3)
+    assert found.done.mean() > 0.9
+    for i in np.flatnonzero(found.done):
+        hit = fi.strike(
+            modes, fi.Striker.stick(cells[i][0], 10e3), fi.Contact.linear(cells[i][1]), at=AT, speed=1.0, tolerance=1e-4
+        )
+        assert hit.n_impacts == found.n_impacts[i]
+        assert_allclose(found.contact_time[i], hit.contact_time, rtol=1.1e-3)  # 1e-3, and 1e-4 of the single blow
+        assert_allclose(found.restitution[i], hit.restitution, atol=1.1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("frequency", [600.0, 2e3, 10e3])
+def test_nearly_all_cells_of_a_light_plate_meet_the_tolerance(frequency):
+    """A stick on a plate of its own mass: touches that barely part, where errors are amplified, are rare and small.
+
+    Of 10 000 cells up to 30 were off by more than 1e-3, the worst by 2.8e-3, and 3 had another number of impacts, all
+    from gaps or touches of some us; nearly twice that is allowed for.
+    """
+    rng = np.random.default_rng(3)
+    modes = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    mass, stiffness = rng.uniform(0.01, 0.2, 4000), 10.0 ** rng.uniform(4.0, 6.0, 4000)
+    blows = many(modes, fi.Striker.stick(0.1, frequency), stiffness, mass=mass)
+    found, fine = batches.bounce(blows, tolerance=1e-3), batches.bounce(blows, tolerance=1e-5)
+    both = found.done & fine.done
+    assert both.mean() > 0.99
+    same = found.n_impacts[both] == fine.n_impacts[both]
+    assert same.mean() > 0.997
+    off = np.abs(found.restitution - fine.restitution)
+    for name in ("contact_time", "peak_force"):
+        off = np.maximum(off, np.abs(getattr(found, name) / getattr(fine, name) - 1.0))
+    off = off[both][same]
+    assert (off > 1e-3).mean() < 0.005
+    assert off.max() < 1e-2
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+@pytest.mark.parametrize("residual", [True, False])
+def test_contacts_with_loss_are_the_single_blow_within_the_tolerance(exponent, residual):
+    """Loss hangs on the rate of approach: the ringing of fast modes shows in the force, residual ones too."""
+    rng = np.random.default_rng(8)
+    modes, n = plate(0.6, damping_ratio=0.003), 12
+    stick, loss = fi.Striker.stick(0.1, 2e3), 10.0 ** rng.uniform(-2.0, -0.1, n)
+    mass, stiffness = rng.uniform(0.02, 0.2, n), 10.0 ** rng.uniform(4.0, 6.0, n) * 10.0 ** (2.0 * (exponent - 1.0))
+    blows = many(modes, stick, stiffness, exponent=exponent, speed=0.8, mass=mass, residual=residual, loss=loss)
+    found = batches.bounce(blows, tolerance=1e-3)
+    assert found.done.mean() > 0.9
+    for i in np.flatnonzero(found.done):
+        law, striker = fi.Contact.power(stiffness[i], exponent, loss=loss[i]), fi.Striker.stick(mass[i], 2e3)
+        hit = fi.strike(modes, striker, law, at=AT, speed=0.8, tolerance=1e-5, residual=residual)
+        assert hit.n_impacts == found.n_impacts[i]
+        assert_allclose(found.restitution[i], hit.restitution, atol=1e-3)
+        assert_allclose(found.contact_time[i], hit.contact_time, rtol=1e-3)
+        assert_allclose(found.peak_force[i], hit.peak_force, rtol=1.5e-3)  # 2 of 2400 blows: 1.1e-3 and 1.4e-3

@@ -1,0 +1,262 @@
+"""Maps in a store and on a cluster: resumed after any end, nothing lost, nothing computed twice."""
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+import fem_impact as fi
+from fem_impact.sweeps import grid, store
+from fem_impact.sweeps.store import Store
+
+pytest.importorskip("zarr", reason="the cluster extra is not installed")
+distributed = pytest.importorskip("distributed", reason="the cluster extra is not installed")
+
+AT = (0.465, 0.3)
+OVER = {"mass": np.linspace(0.01, 0.2, 16), "stiffness": np.geomspace(1e4, 1e6, 20)}
+
+
+def arguments(**wanted):
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=40)
+    return (plate, fi.Striker.stick(0.1, 10e3), fi.Contact.linear(1e5)), {
+        "at": AT,
+        "speed": 1.0,
+        "over": OVER,
+        **wanted,
+    }
+
+
+def sweep(**wanted):
+    bodies, others = arguments(**wanted)
+    return fi.sweep(*bodies, **others)
+
+
+def assert_same(table, expected):
+    """Equal but for the order of sums, which depends on where arrays lie in memory: 1e-15, grown by later impacts."""
+    assert table.attrs == expected.attrs
+    np.testing.assert_array_equal(table.n_impacts, expected.n_impacts)
+    np.testing.assert_array_equal(table.failure, expected.failure)
+    for name in ("contact_time", "restitution", "impulse", "peak_force"):
+        np.testing.assert_allclose(table[name], expected[name], rtol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def undisturbed():
+    return sweep()
+
+
+def test_a_store_gives_the_same_map(tmp_path, undisturbed):
+    assert_same(sweep(store=tmp_path / "map"), undisturbed)
+
+
+def test_a_run_that_stopped_goes_on_where_it_was(tmp_path, undisturbed, monkeypatch):
+    solved = []
+    real = grid.solve
+
+    def count(grid, start, stop, **wanted):
+        if len(solved) == 20:
+            raise KeyboardInterrupt
+        solved.append(start)
+        return real(grid, start, stop, **wanted)
+
+    monkeypatch.setattr(grid, "solve", count)
+    with pytest.raises(KeyboardInterrupt):
+        sweep(store=tmp_path / "map")
+    first = list(solved)
+    solved.append(None)  # so that the second run is not stopped
+    assert_same(sweep(store=tmp_path / "map"), undisturbed)
+    again = solved[len(first) + 1 :]
+    assert len(first) == 20
+    assert not set(first) & set(again)  # nothing twice
+    assert sorted(first + again) == list(range(0, 320, store.block_size(320)))  # nothing lost
+
+
+def test_error_texts_are_kept(tmp_path, monkeypatch):
+    def fail(*_, **wanted):
+        raise fi.SimulationError("the motion may be chaotic: é")
+
+    monkeypatch.setattr(grid, "strike", fail)
+    table = sweep(over={"exponent": [0.8, 0.9]}, store=tmp_path / "map")
+    assert table.failure.values.tolist() == ["the motion may be chaotic: é"] * 2
+
+
+def test_a_store_of_another_map_is_refused(tmp_path):
+    sweep(over={"mass": [0.1]}, store=tmp_path / "map")
+    with pytest.raises(ValueError, match="store holds another map"):
+        sweep(over={"mass": [0.2]}, store=tmp_path / "map")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "letter.txt").write_text("dear")
+    with pytest.raises(ValueError, match="store must be a new folder"):
+        sweep(store=tmp_path / "mine")
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
+def test_a_local_cluster_gives_the_same_map(tmp_path, undisturbed):
+    settings = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "host": "127.0.0.1"}
+    with distributed.LocalCluster(**settings) as cluster, distributed.Client(cluster) as client:
+        assert_same(sweep(client=client), undisturbed)
+        assert_same(sweep(client=client), undisturbed)  # at once again, while the scheduler forgets the first
+        assert_same(sweep(client=client, store=tmp_path / "map"), undisturbed)
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """A scheduler and two workers started as a user would, and their processes."""
+    address = f"tcp://127.0.0.1:{free_port()}"
+    dask = [sys.executable, "-m", "dask"]
+    options = ["--no-dashboard", "--host", "127.0.0.1", "--port", address.rsplit(":", 1)[1]]
+    running = {"scheduler": _start([*dask, "scheduler", *options], tmp_path)}
+    for name in ("one", "two"):
+        worker = [*dask, "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--name", name]
+        running[name] = _start([*worker, "--local-directory", str(tmp_path / name)], tmp_path)
+    try:
+        with distributed.Client(address, timeout=60) as client:
+            client.wait_for_workers(2, timeout=60)
+        yield address, running
+    finally:
+        for process in running.values():
+            process.kill()
+            process.wait()
+
+
+def _start(command, folder):
+    return subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+SCRIPT = """
+import sys
+sys.path[:0] = {path!r}
+import test_store
+test_store.slow_sweep({address!r}, {store!r})
+"""
+
+
+def slowly(hit):
+    """A layer that takes long enough for a run to be killed in the middle."""
+    time.sleep(0.02)
+    return hit.restitution
+
+
+def slow_sweep(address, store):
+    """The map, cell by cell."""
+    return sweep(client=address, store=store, layers={"slow": slowly})
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
+def test_killed_workers_and_killed_runs_lose_nothing(tmp_path, cluster, monkeypatch):
+    address, running = cluster
+    path, store = [str(Path(__file__).parent)], tmp_path / "map"
+    monkeypatch.setenv("PYTHONPATH", path[0])
+    with distributed.Client(address) as client:
+        client.run(lambda: sys.path.insert(0, path[0]))
+    script = SCRIPT.format(path=path, address=address, store=str(store))
+    run = subprocess.Popen([sys.executable, "-c", script])
+    _wait_for_blocks(store, 8)
+    os.kill(running["one"].pid, signal.SIGKILL)  # the other goes on
+    _wait_for_blocks(store, 16)
+    os.kill(run.pid, signal.SIGKILL)
+    run.wait()
+    os.kill(running["scheduler"].pid, signal.SIGKILL)
+    os.kill(running["two"].pid, signal.SIGKILL)
+    time.sleep(0.5)
+    kept = {name: name.stat().st_mtime_ns for name in (store / "numbers").rglob("*") if name.is_file()}
+    flags = np.array(Store(store).group["done"][:])
+    assert 16 <= flags.sum() < 64
+    table = sweep(store=store, layers={"slow": slowly})
+    assert {name: name.stat().st_mtime_ns for name in kept} == kept  # finished blocks were not touched again
+    whole = sweep(layers={"slow": lambda hit: hit.restitution})
+    assert_same(table, whole)
+    np.testing.assert_allclose(table.slow, whole.slow, rtol=1e-9)
+    assert json.loads(table.attrs["scene"])["target"]["mass"] == 0.2
+
+
+def _times(store):
+    """When each block of numbers was written."""
+    return {path: path.stat().st_mtime_ns for path in (store / "numbers").rglob("*") if path.is_file()}
+
+
+def _wait_for_blocks(store, count, patience=60.0):
+    end = time.monotonic() + patience
+    while time.monotonic() < end:
+        if (store / "zarr.json").exists():
+            done = len([name for name in (store / "done" / "c").rglob("*") if name.is_file()])
+            if done >= count:
+                return
+        time.sleep(0.05)
+    pytest.fail(f"the run kept fewer than {count} blocks in {patience:g} s")
+
+
+def test_damaged_store_is_told_not_trusted(tmp_path):
+    def damaged():
+        shutil.rmtree(tmp_path / "map", ignore_errors=True)
+        sweep(over={"mass": [0.1]}, store=tmp_path / "map")
+        return tmp_path / "map"
+
+    chunk = damaged() / "numbers" / "c" / "0" / "0"
+    chunk.write_bytes(bytes([chunk.read_bytes()[0] ^ 1]) + chunk.read_bytes()[1:])  # one bit
+    with pytest.raises(ValueError, match=r"store .*map is damaged \(.*checksum"):
+        sweep(over={"mass": [0.1]}, store=tmp_path / "map")
+    meta = damaged() / "numbers" / "zarr.json"
+    meta.write_text(meta.read_text().replace('"crc32c"', '"zstd"'))  # would unpack to any size
+    with pytest.raises(ValueError, match=r"store .*map is damaged"):
+        sweep(over={"mass": [0.1]}, store=tmp_path / "map")
+    meta = damaged() / "zarr.json"
+    meta.write_text(meta.read_text().replace('"n_cases": 1', '"n_cases": 1000000000000'))
+    with pytest.raises(ValueError, match=r"store .*map is damaged"):
+        sweep(over={"mass": [0.1]}, store=tmp_path / "map")
+
+
+SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "drumstick_map.toml"
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
+def test_a_map_at_the_prompt_survives_its_own_end(tmp_path, cluster):
+    """As a user would: scheduler and workers in their own processes, the run killed in the middle, then once more."""
+    address, running = cluster
+    text = SCENE.read_text().replace(
+        'kind = "linear"', 'kind = "power"'
+    )  # below exponent 1 every cell is a single blow
+    (tmp_path / "map.toml").write_text(
+        text.replace("88.6e3", "88.6e3\nexponent = 0.95").replace("count = 20", "count = 12")
+    )
+    command = [sys.executable, "-m", "fem_impact.cli", "map", "map.toml", "--out", "out", "--store", "kept"]
+    run = _start([*command, "--cluster", address], tmp_path)
+    _wait_for_blocks(tmp_path / "kept", 6)
+    os.kill(running["one"].pid, signal.SIGKILL)
+    _wait_for_blocks(tmp_path / "kept", 12)
+    os.kill(run.pid, signal.SIGKILL)
+    run.wait()
+    kept: dict[Path, int] = {}
+    while not kept or kept != _times(tmp_path / "kept"):  # the other worker finishes what it has begun
+        kept = _times(tmp_path / "kept")
+        time.sleep(3.0)
+    assert 12 <= store.Store(tmp_path / "kept").group["done"][:].sum() < 48
+    again = subprocess.run([*command, "--cluster", address], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert again.returncode == 0, again.stderr
+    assert "144 blows over stiffness (12), mass (12)" in again.stdout
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept  # nothing twice
+    alone = [*command[:6], "whole"]
+    subprocess.run(alone, cwd=tmp_path, capture_output=True, check=True)
+    with (
+        xarray.open_dataset(tmp_path / "out" / "map.nc") as one,
+        xarray.open_dataset(tmp_path / "whole" / "map.nc") as two,
+    ):
+        assert_same(one, two)

@@ -1,0 +1,58 @@
+"""The order of the packages: each imports only from those above it in this list, and knows nothing of those below."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+HOME = Path(__file__).parents[1] / "fem_impact"
+ORDER = [
+    "_base", "mesh", "fe", "modes", "impact/compiled", "impact", "model", "sweeps", "show", "scenes", "pages", "",
+]  # fmt: skip
+OWNERS = {
+    "numba": ("impact/compiled/",),
+    "skfem": ("fe/elements.py", "fe/beam_elements.py"),
+    "matplotlib": ("show/figures.py", "show/plots.py"),
+}
+MODULES = sorted(path for path in HOME.rglob("*.py") if path.name != "__init__.py")
+
+
+def package(path):
+    """The package of a module as a path from `HOME`."""
+    return "" if path.parent == HOME else path.parent.relative_to(HOME).as_posix()
+
+
+def imports(path):
+    """Packages of ours that a module imports from, and libraries, anywhere in the file: two sets of names."""
+    own, outside = set(), set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            base = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            for name in node.names:
+                target = base / name.name
+                found = target if target.is_dir() else base.parent if base.with_suffix(".py").exists() else base
+                own.add(found.relative_to(HOME).as_posix().removeprefix("."))
+        elif isinstance(node, ast.ImportFrom):
+            outside.add(node.module.split(".")[0])
+        elif isinstance(node, ast.Import):
+            outside |= {alias.name.split(".")[0] for alias in node.names}
+    return own, outside
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(HOME).as_posix())
+def test_a_module_imports_from_its_package_and_those_above(path):
+    own, outside = imports(path)
+    mine = ORDER.index(package(path))
+    below = {name for name in own if ORDER.index(name) > mine}
+    assert not below, f"{path.name} imports from {sorted(below)}, which come later"
+    here = path.relative_to(HOME).as_posix()
+    trespass = {library for library in outside if not here.startswith(OWNERS.get(library, ("",)))}
+    assert not trespass, f"{here} imports {sorted(trespass)}, which belongs to other modules"
+
+
+@pytest.mark.parametrize("name", [name for name in ORDER if name])
+def test_a_package_says_what_it_is_for_and_where_to_start(name):
+    text = ast.get_docstring(ast.parse((HOME / name / "__init__.py").read_text()))
+    assert text is not None and text.count(".") >= 2 and len(text) < 600
+    modules = {path.stem for path in (HOME / name).glob("*.py")} - {"__init__"}
+    assert name == "impact/compiled" or any(f"`{module}`" in text for module in modules)
