@@ -57,7 +57,6 @@ REST_ABOVE = {1: 1.53, 2: 1.73}
 LOSSY_ABOVE, LOSSY_DAMPING = 30.0, 1.0
 LOSSY_STRIKER = 30.0  # [-] a lossy contact multiplies the truncation error of a striker by this: its modes are sparse
 STRIKER_SHARE = 0.05  # [-] fraction of the tolerance for the striker's left-out modes: keeping them is cheap
-SILENT = 1e-15  # [-] a mode with less than this fraction of the largest shape at the contact rests there
 NOISE = 1e-16  # [-] an approach below this times duration times speed is rounding: the bodies merely touch
 STILL = 1e-12  # [-] a rigid approach slower than this times the speed is rounding: no contact follows
 ROUNDING = 1e-13  # [-] smaller differences of two runs are rounding

@@ -34,7 +34,7 @@ DIP = 0.2  # [-] of the lesser approach at a step's ends: one that dips lower in
 def orbit(table, q, p, out_states):
     """States after 0, 1, 2, ... steps, (n_steps, 2, n_modes), of modes that start from q and p and move freely.
 
-    Parameters: table (4 or more, n_modes): a11, a12, a21, a22 of one step as in `kernels.step_table`.
+    Parameters: table (4 or more, n_modes): a11, a12, a21, a22 of one step as in `propagation.step_table`.
     """
     out_states[0, 0] = q
     out_states[0, 1] = p
