@@ -41,7 +41,6 @@ SLANTED = ((0.0, 0.0), (1.0, 0.0), (0.3, 0.8))
 BEAMS = list(itertools.product(SIDES, repeat=2))
 MIXED = {
     "clamped L": (ELL, ("clamped",) * 6),
-    "L of mixed edges": (ELL, ("hinged", "free", "free", "clamped", "clamped", "free")),
     "clamped rectangle": (SQUARE, ("clamped",) * 4),
     "cantilever": (SQUARE, ("free", "free", "free", "clamped")),
     "clamped triangle": (SLANTED, ("clamped",) * 3),
