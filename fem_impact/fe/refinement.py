@@ -265,21 +265,10 @@ def _needed(parts: np.ndarray, goal: float) -> float:
 def _start(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> System:
     """The system on the mesh expected to meet a tolerance if its edges and corners need no finer one."""
     mesh, size = system.mesh, size_for(system, n_modes, max_frequency, tolerance)
-    if mesh.size_stated:
-        return system
-    if size < mesh.size:
-        finer = mesh.refined(mesh.size / size)
-        return reassemble(system, finer) if len(finer.cells) > len(mesh.cells) else system
-    if size > STEP * mesh.size and len(mesh.cells) > CHEAP_CELLS:  # a mesh file much finer than needed
-        coarse = mesh.refined(mesh.size / size)
-        if len(coarse.cells) < len(mesh.cells):
-            return reassemble(system, coarse)
-    return system
-
-
-def _step(coarse: Mesh, fine: Mesh) -> float:
-    """Ratio [-] of the element sizes of a coarse and a fine mesh."""
-    return (len(fine.cells) / len(coarse.cells)) ** (1.0 / fine.dimension)
+    if mesh.size_stated or size <= STEP * mesh.size or len(mesh.cells) <= CHEAP_CELLS:
+        return fine_enough(system, n_modes, max_frequency, tolerance)
+    coarse = mesh.refined(mesh.size / size)  # a mesh file much finer than needed
+    return reassemble(system, coarse) if len(coarse.cells) < len(mesh.cells) else system
 
 
 def enclosure(found: Spectrum) -> np.ndarray | None:

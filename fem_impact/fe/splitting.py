@@ -25,24 +25,21 @@ def towards_points(mesh: Mesh, points: np.ndarray, held: np.ndarray) -> Mesh:
     """
     extent = float(np.ptp(mesh.points, axis=0).max())
     breadth = mesh.area / mesh.perimeter
-    supported = frozenset(np.flatnonzero(held).tolist())
-    parent = np.arange(len(mesh.facets))
     for _ in range(ROUNDS):
-        on = np.isin(parent, list(supported))
-        size = np.array([_wanted(mesh, on, point, breadth, extent) for point in points])
+        size = np.array([_wanted(mesh, held, point, breadth, extent) for point in points])
         tall = _too_large(mesh, points, size)
         if not tall.any():
             return mesh
-        mesh, split = _divided_across(mesh, tall)
-        parent = parent[split]
+        mesh, parent = _divided_across(mesh, tall)
+        held = held[parent]
     return mesh
 
 
-def _wanted(mesh: Mesh, on: np.ndarray, point: np.ndarray, breadth: float, extent: float) -> float:
-    """Largest side [m] allowed for the triangles at a point; ``on`` says which facets are held."""
-    if not on.any():
+def _wanted(mesh: Mesh, held: np.ndarray, point: np.ndarray, breadth: float, extent: float) -> float:
+    """Largest side [m] allowed for the triangles at a point; ``held`` (n_facets,) says which facets are supported."""
+    if not held.any():
         return DEPTH * breadth
-    ends = np.stack([mesh.points[mesh.facets[on, 0]], mesh.middles[on], mesh.points[mesh.facets[on, 1]]], axis=1)
+    ends = np.stack([mesh.points[mesh.facets[held, 0]], mesh.middles[held], mesh.points[mesh.facets[held, 1]]], axis=1)
     distance = float(_distance(point, ends[:, :-1], ends[:, 1:]).min())
     return DEPTH * (breadth if distance < AT_EDGE * extent else min(breadth, distance))
 

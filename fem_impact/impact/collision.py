@@ -79,6 +79,9 @@ class Touch:
         check.count("first", self.first, low=0)
         if self.second is not None:
             check.count("second", self.second, low=0)
+        for name in ("first_at", "second_at"):
+            if (point := getattr(self, name)) is not None:
+                check.finite(name, check.numbers(name, point, "m"), "m")
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,6 +44,8 @@ def _finished(
         first = check.positive("first_frequency", first_frequency, "Hz")
         factor = 2.0 * np.pi * first / np.sqrt(values[values > 0.0][0])
     omega = np.sqrt(values)
+    if not omega[-1] <= check.REACH:
+        raise ValueError(f"size gives frequencies beyond all numbers, {omega[-1]:g} rad/s at unit mass and rigidity")
     unit = Modes(omega, np.zeros(len(omega)), shapes, mass=1.0)
     scaled = unit.scaled(mass=mass, first_frequency=factor * unit.frequencies[omega > 0.0][0])
     return scaled.damped(damping_ratios(damping_ratio, scaled.omega))

@@ -92,9 +92,8 @@ def at(d, spring):
     """The spring at a given approach."""
     if d <= 0.0:
         return Point(d, d, 0.0, 0.0)
-    x = compression(d, spring)
-    f = spring.stiffness * power(x, spring.exponent)
-    return Point(d, x, f, f * x / (spring.exponent + 1.0) + 0.5 * spring.compliance * f * f)
+    point = compressed(compression(d, spring), spring)
+    return Point(d, point.compression, point.force, point.energy)
 
 
 @inner()

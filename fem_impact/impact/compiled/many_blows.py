@@ -466,7 +466,6 @@ def run(
         swift = own.end + 12.0 * own.mean_ramp
         stiff = 1.0 / (1.0 + kk * swift)
         swift_rate = own.rate + (12.0 * own.mean - 6.0 * own.end) / h
-        d0 = 0.0
         start = Point(0.0, 0.0, 0.0, 0.0)
         rate = 1.0
         ends[0] = 0.0
@@ -486,6 +485,7 @@ def run(
         ending = DONE
         n = 0
         while n < n_steps:
+            d0 = start.approach
             jump = 1
             if not pressed:
                 if level < 0:  # the longest look that might leave no doubt
@@ -529,7 +529,7 @@ def run(
                 level = -1
                 if e <= 0.0:
                     n += jump
-                    ends[n] = d0 = e
+                    ends[n] = e
                     start = Point(e, e, 0.0, 0.0)
                     rates[n] = rate = vf
                     low = min(low, e)
@@ -641,7 +641,7 @@ def run(
                 jumps += loud * abs(held)
                 bends += loud * abs(sloped)
                 held = sloped = 0.0
-            d0, start, rate = y, point, rate1
+            start, rate = point, rate1
             n += 1
         out[0, cell] = count
         out[1, cell] = touched

@@ -84,7 +84,7 @@ def solve_constant(start, e, b, loss, spring):
         y *= 1.0 + 1e-15
     low = 0.0
     f = 0.0
-    end = at(y, spring)
+    end = start
     for _ in range(300):
         end = at(y, spring)
         g, slope = slopes(start, end, spring)
@@ -134,7 +134,7 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
     old_r = 0.0
     f = 0.0
     s = 0.0
-    end = compressed(x, spring)
+    end = start
     close = False
     last = False
     for iteration in range(SOLVES):
