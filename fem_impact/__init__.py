@@ -21,12 +21,12 @@ _HOME = {
     "Touch": "impact.collision",
     "mobility": "impact.spectra",
     "threshold_frequency": "impact.threshold",
-    "strike": "impact.collision",
+    "strike": "model.planner",
     "collide": "impact.collision",
     "Scene": "scenes.scene",
     "load_scene": "scenes.scene",
     "plan": "scenes.scene",
-    "Plan": "model.plan",
+    "Plan": "model.planner",
     "sweep": "sweeps.grid",
 }
 _MODULES = {

@@ -13,6 +13,7 @@ BAR = 0.03  # [-] drawn thickness of a beam over its length
 EDGES = {  # support -> line width [px] and dash pattern; free edges keep the thin outline
     "clamped": (4.5, ""),
     "hinged": (2.5, "7 4"),
+    "elastic": (2.5, "2 4"),
 }
 # Pages set these CSS variables for light and dark themes; notebooks fall back to the colour after the comma.
 INK, BODY, STROKE, STRIKE = (
@@ -67,7 +68,7 @@ def body(mesh: Any, *, supports: Mapping[str, Any] | None = None, at: Any = None
     Parameters
     ----------
     mesh : Mesh
-    supports : mapping of edge name to "clamped", "hinged" or "free", optional
+    supports : mapping of edge name to "clamped", "hinged", "free" or an elastic support, optional
     at : strike point, (dimension,) [m], optional
     points : observation points, (n_points, dimension) [m]
     title : str, description for screen readers
@@ -105,7 +106,12 @@ def body(mesh: Any, *, supports: Mapping[str, Any] | None = None, at: Any = None
 def held_edges(mesh: Any, supports: Mapping[str, Any]) -> dict[int, str]:
     """Facet number -> support; facets without a named support are left out and count as free."""
     ordered = sorted(supports.items(), key=lambda item: item[0] != "boundary")  # a named edge overrides "boundary"
-    return {int(i): str(kind) for name, kind in ordered if name in mesh.edges for i in mesh.edges[name]}
+    return {
+        int(i): kind if isinstance(kind, str) else "elastic"
+        for name, kind in ordered
+        if name in mesh.edges
+        for i in mesh.edges[name]
+    }
 
 
 def rim(cells: np.ndarray) -> np.ndarray:

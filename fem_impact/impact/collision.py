@@ -159,48 +159,7 @@ def strike(
     striker_force: float = 0.0,
     target_force: float = 0.0,
 ) -> Response:
-    """Strike a body at rest and follow both bodies until their final separation.
-
-    Parameters
-    ----------
-    modes : Modes
-        The struck body. The left-out modes act by their static compliance.
-    striker : Striker
-        Arrives in rigid motion.
-    contact : Contact
-    at : strike point, (dimension,) [m]
-    speed : float [m/s]
-        Speed of the striker's contact point towards the body.
-    tolerance : float [-]
-        Largest accepted error: absolute for the restitution, relative for impulse, contact time and peak force.
-    quantity : str, sequence of str or mapping of str to frequency [Hz], optional
-        The quantities that must meet the tolerance; by default "restitution", "impulse", "contact_time", "force" and
-        "n_impacts". Others: "spectrum=5000", the force spectrum up to 5 kHz relative to its largest value, and
-        "sound=5000".
-    residual : bool
-        Whether the residual compliance acts; False uses the given modes only.
-    duration : float [s], optional
-        Time at which the run stops at the latest.
-    max_impacts : int, optional
-        The run stops after this many impacts.
-    scheme : {"A", "A4", "collocation"}, optional
-        Time integration scheme; by default, the tolerance decides.
-    dt : float [s], optional
-        Time step in contact. If given, the step error is only estimated and may exceed the tolerance.
-    striker_force, target_force : float [N]
-        Constant forces at the contact points, positive along the blow; for example the weight of a falling ball.
-
-    Returns
-    -------
-    Response
-
-    Raises
-    ------
-    ValueError
-        If an argument is invalid.
-    SimulationError
-        If the tolerance cannot be met, or if the bodies do not separate for good and no other end was given.
-    """
+    """Strike a body with known modes; see `fi.strike`."""
     speed = check.non_negative("speed", speed, "m/s")
     forces = [
         check.number(name, x, "N") for name, x in (("striker_force", striker_force), ("target_force", target_force))

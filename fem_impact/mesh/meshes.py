@@ -43,6 +43,7 @@ class Mesh:
     size: float = 0.0  # [m] requested element size
     size_stated: bool = True  # True if the user chose the size; otherwise find_modes may change it
     notes: tuple[str, ...] = ()  # what was repaired or assumed
+    form: tuple = ()  # ("rectangle", length, width), ("disk", radius) or ("line", length) [m]; empty for any other body
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)
@@ -149,8 +150,8 @@ def rectangle(length: float, width: float, *, size: float | None = None) -> Mesh
         edges[name] = np.arange(start, start + len(line) - 1)
         start += len(line) - 1
     edges["boundary"] = np.arange(start)
-    recipe = partial(rectangle, length, width)
-    return straight(points, cells, np.concatenate(facets), edges, recipe=recipe, size=size, size_stated=stated)
+    rest = {"recipe": partial(rectangle, length, width), "size": size, "size_stated": stated}
+    return straight(points, cells, np.concatenate(facets), edges, form=("rectangle", length, width), **rest)
 
 
 def line(length: float, *, size: float | None = None) -> Mesh:
@@ -172,6 +173,7 @@ def line(length: float, *, size: float | None = None) -> Mesh:
         recipe=partial(line, length),
         size=size,
         size_stated=stated,
+        form=("line", length),
     )
 
 
@@ -196,7 +198,8 @@ def disk(radius: float, hole: float = 0.0, *, size: float | None = None) -> Mesh
     if 0.0 < hole < SMALLEST_HOLE * radius:
         raise ValueError(f"hole must be zero or at least {SMALLEST_HOLE:g} of radius = {radius:g} m, got {hole:g} m")
     inner = (circle((0.0, 0.0), hole, "inner"),) if hole else ()
-    return fill(Outline.around(circle((0.0, 0.0), radius, "outer"), inner), size=size)
+    made = fill(Outline.around(circle((0.0, 0.0), radius, "outer"), inner), size=size)
+    return made if hole else replace(made, recipe=partial(disk, radius), form=("disk", radius))
 
 
 def polygon(corners: Any, holes: Sequence[Any] = (), *, size: float | None = None) -> Mesh:

@@ -1,5 +1,5 @@
-"""The smallest model of a scene's blow that meets its tolerance, and the reasons for that model.
+"""The smallest model of a blow that meets its tolerance, and the reasons for that model.
 
-Start with `planner`, which chooses target, modes and time steps. `plan` holds the result in words and numbers, and
-`idealisation` the two cheapest models: a rigid body and an infinite plate.
+Start with `planner`, which chooses target, modes and time steps. `target` is the struck body before its modes are
+known, and `idealisation` has the two cheapest models: a rigid body and an infinite plate.
 """

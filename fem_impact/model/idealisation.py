@@ -1,12 +1,17 @@
 """Two simple targets, a rigid body and an infinite plate, and the errors of using them."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from .._base import check
+from ..fe.assembly import support_of_facets
+from ..fe.section import Plate
 from ..impact import threshold
 from ..mesh.meshes import Mesh
 from ..modes.modal import Modes, SampledShapes
+from .target import Target
 
 PULSE = 1.77  # [-] peak response of an oscillator to a half sine, over its static response
 SOFTEST = 10.2158  # [-] first eigenvalue (k r)**2 of a clamped disk; any body that contains the disk has a lower one
@@ -16,7 +21,20 @@ HEAVIEST = 0.3  # [-] damping ratio of the contact with an infinite plate; below
 NEAREST = 2.0  # [-] least clearance**2 / (rate contact time); below it, the echo returns during the contact
 ECHO = 1.2  # [-] error of one straight edge over ratio / nearness**2; measured 0.1 to 0.4, at a disk's centre 4
 FADED = 1e-12  # [-] fraction of its deflection that the infinite plate's mode loses during a contact
+LOOK = 20.0  # [-] closed-form modes up to this multiple of the contact frequency decide if a body counts as rigid
+MOST_LOOKED_AT = 5000  # [-] upper limit on the number of these modes
+FIRST_LOOK = 20  # [-] closed-form modes found first, which scale the body
 INSTANT = 1e9  # [-] relaxation rate of that mode times the contact time; the error is a third of the inverse
+
+
+@dataclass(frozen=True)
+class Outside:
+    """What is known of a target without finite elements, and the errors of simplifying it."""
+
+    mass: float  # [kg] of the whole body
+    rigid: float  # [-] error of treating it as rigid
+    endless: float  # [-] error of treating it as infinite; inf if that is wrong or unknown
+    mobility: float  # [m/(N s)] of the infinite plate; inf if unknown
 
 
 @dataclass(frozen=True)
@@ -181,3 +199,54 @@ def endless_error(view: Surroundings, mobility: float, rate: float, mass: float,
     if restitution * (echo - contact) < (1.0 + restitution) * mass * lift:
         return float("inf")
     return ECHO * view.mirrors(nearness) * ratio / nearness**2
+
+
+def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outside | None:
+    """What is known of a target without finite elements; None if that is not enough.
+
+    Parameters
+    ----------
+    target : Target
+    at : strike point, (dimension,) [m]
+    mass, duration : as in `rigid_error`
+    """
+    mesh, section, find = target.mesh, target.section, target.closed
+    if mesh is None or section is None:
+        return None
+    stretch, rigid = 1.0, np.inf
+    if find is not None:
+        first = find(n_modes=FIRST_LOOK)
+        modes = target.finished(first)
+        stretch = modes.frequencies[-1] / first.frequencies[-1]
+        with target.blame("strike"):
+            at = modes.point("at", at)[0]
+        most = modes.frequencies[-1] * (MOST_LOOKED_AT / FIRST_LOOK) ** (2.0 / modes.dimension)
+        limit = min(LOOK * 0.5 / duration, most)
+        if limit > modes.frequencies[-1]:
+            modes = target.finished(find(max_frequency=limit / stretch))
+        rigid = rigid_error(modes, at, mass, duration)
+        if modes.dimension == 1:
+            return Outside(modes.mass, rigid, np.inf, np.inf)
+    if not isinstance(section, Plate) or callable(section.thickness) or target.point_masses:
+        return None
+    kinds = support_of_facets(mesh, dict(target.supports))
+    free = any(kind not in ("clamped", "hinged") for kind in kinds)
+    with target.blame("strike"):
+        at = check.array("at", at, (2,), "m", lift=True)
+    view = Surroundings.seen(mesh, at)
+    if view is None:
+        return None
+    material = section.material
+    rate = stretch * section.thickness * float(np.sqrt(material.E / 12.0 / (1.0 - material.nu**2) / material.rho))
+    whole = target.scale.get("mass", section.thickness * material.rho * view.area)
+    if find is None:
+        if "first_frequency" in target.scale:
+            low = slowest_rate(view, target.scale["first_frequency"])
+        else:
+            low = rate * float(np.sqrt(min(material.E, material.E_across or np.inf) / material.E))
+        rigid = rigid_bound(view, whole, low, free, mass, duration)
+        if "first_frequency" in target.scale or material.E_across is not None or section.tension:
+            return Outside(whole, rigid, np.inf, np.inf)
+    mobility = view.area / (8.0 * rate * whole)
+    far = endless_error(view, mobility, rate, mass, duration)
+    return Outside(whole, rigid, far, mobility)

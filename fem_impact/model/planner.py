@@ -1,9 +1,8 @@
-"""Choose the smallest model of a scene that meets its tolerance, and run it."""
+"""Choose the smallest model of a blow that meets its tolerance, and run it."""
 
-import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from inspect import signature
 from types import MappingProxyType
 from typing import Any
 
@@ -11,16 +10,16 @@ import numpy as np
 
 from .._base import check
 from ..fe import refinement
-from ..fe.assembly import System, support_of_facets
+from ..fe.assembly import System
 from ..impact import accuracy, collision
 from ..impact.collision import BAND_POINTS
 from ..impact.contact import Contact
 from ..impact.quantities import asked_for
 from ..impact.response import Response
 from ..impact.striker import Striker
-from ..modes.modal import FieldShapes, Modes
+from ..modes.modal import Damping, FieldShapes, Modes
 from . import idealisation
-from .plan import Plan
+from .target import Stages, Target, Watch
 
 SHARE = 0.45  # [-] of the tolerance for left-out modes, as much for the time steps; the mesh gets the rest
 MARGINS = (1.0, 4.0, 16.0)  # [-] these divide the mode error limit in turn, until the left-out modes no longer matter
@@ -28,17 +27,123 @@ NOTCH = 8.0  # [-] the verifying run divides the tolerance by this
 FINEST = 1e-10  # [-] lowest tolerance of a verifying run
 CAUTION = 2.0  # [-] safety factor on the mode error: costs a quarter more modes, but seldom needs a second run
 FIRST_LOOK = 20  # [-] modes found first: enough to scale the body and to predict the density of the others
-MOST_MODES = {"fe": 2000, "analytic": 50_000}  # [-] limit by source: takes about 2 GB and some minutes
+MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by source: takes about 2 GB and some minutes
 SHORT_WAVES = {"argyris": 1e-5, "hermite": 1e-9}  # [-] frequency error for which `find_modes` chooses the mesh
-LOOK = 20.0  # [-] closed-form modes up to this multiple of the contact frequency decide if a body counts as rigid
-MOST_LOOKED_AT = 5000  # [-] upper limit on the number of these modes
 PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}  # that a user may set
+ARGUMENTS = tuple(signature(collision.strike).parameters)[3:]  # after modes, striker and contact
 TARGETS = ("rigid", "infinite", "modal")
 DOFS_PER_AREA = {"argyris": 10.4, "hermite": 2.0}  # [-] unknowns per square, or length, of the element size
 RATES = {"start": 0.02, "dofs": 6e-5, "pairs": 3.5e-7, "steps": 1e-8}  # [s] each, measured by studies/frontier.py
 BYTES = {"start": 2e8, "dofs": 6e3, "pairs": 40.0}  # [byte] each, measured likewise
 
-Watch = Callable[[str], AbstractContextManager[Any]]
+ELEMENTS = {"analytic": "closed form"}
+COSTLY = 10.0, 2e9  # [s], [byte] a plan that costs more warns the user
+
+
+@dataclass(frozen=True, eq=False)
+class Blow:
+    """A blow to be modelled: who strikes what, and what the answer is needed for."""
+
+    target: Target
+    striker: Striker
+    contact: Contact
+    arguments: Mapping[str, Any]  # of `strike`: at, speed, tolerance, quantity and so on
+    points: tuple = ()  # points (dimension,) [m] of the target whose motion is wanted
+    moving: bool = False  # whether the target's motion is wanted, besides the quantities
+    name: str = ""  # of the scene file, put in front of messages
+
+    @check.typed
+    def plan(self, watch: Watch | None = None, **changes: Any) -> "Plan":
+        """Decide how to model the blow, without striking; ``changes`` as in `fi.plan`."""
+        return make(self, changes, Stages(watch))
+
+    def run(self, watch: Watch | None = None, *, plan: "Plan | None" = None, keep: Any = None, **changes: Any) -> "Run":
+        """Strike, and time every stage; with a plan or by a new one."""
+        stages = Stages(watch)
+        return carry_out(make(self, changes, stages) if plan is None else plan, stages, keep)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The model of a blow, its reasons and its cost; `print` it, `run` it, or override pieces with `but`.
+
+    The plan depends only on the blow, the tolerance and the quantities: the same blow gives the same plan.
+    """
+
+    blow: Blow = field(repr=False, compare=False)
+    changes: Mapping[str, Any]  # overridden arguments of the blow and pieces of the plan
+    tolerance: float  # [-]
+    quantities: Mapping[str, float | None]  # each with its band [Hz]
+    target: str  # "rigid", "infinite" or "modal"
+    element: str | None  # "argyris", "hermite" or "closed form"; None for an idealised target
+    size: float | None  # [m] element size
+    n_dofs: int  # [-] approximate number of unknowns
+    n_modes: int  # [-] approximate number of target modes
+    max_frequency: float | None  # [Hz] highest kept target mode; those above act as a spring
+    n_striker_modes: int  # [-] striker modes, including its rigid motions
+    scheme: str
+    dt: float  # [s] first time step in contact
+    duration: float  # [s] of an undisturbed contact, not of the run
+    errors: Mapping[str, float]  # [-] predicted, by cause
+    reasons: tuple[str, ...]  # sentences: what is kept, what is left out, and why
+    seconds: float  # [s] predicted
+    memory: float  # [byte] predicted
+    mass: float = 0.0  # [kg] mass of the target
+    mobility: float = 0.0  # [m/(N s)] of an infinite plate
+    first: Modes | None = field(
+        default=None, repr=False, compare=False
+    )  # the first modes of the target, if they were needed
+
+    @property
+    def error(self) -> float:
+        """Total predicted error [-]."""
+        return float(sum(self.errors.values()))
+
+    @property
+    def costly(self) -> bool:
+        """Whether the run takes more than COSTLY: ten seconds or two gigabytes."""
+        return self.seconds > COSTLY[0] or self.memory > COSTLY[1]
+
+    def but(self, **changes: Any) -> "Plan":
+        """The plan with some pieces or arguments overridden, and new predictions.
+
+        Parameters
+        ----------
+        **changes
+            As in `fi.plan`; None lets the plan choose this piece again.
+        """
+        return self.blow.plan(**{**self.changes, **changes})
+
+    def run(self, watch: Watch | None = None) -> "Run":
+        """Run the plan."""
+        return self.blow.run(watch, plan=self)
+
+    def strike(self) -> Response:
+        """Run the plan and return the response only."""
+        return self.run().response
+
+    @property
+    def cost(self) -> str:
+        """Predicted time and memory, in words."""
+        time = f"{self.seconds:.1g} s" if self.seconds < 10.0 else f"{self.seconds:.0f} s"
+        memory = float(f"{self.memory / 1e6:.2g}")
+        return f"about {time} and {memory:.0f} MB predicted"
+
+    def data(self) -> dict[str, Any]:
+        """All decisions and predictions by name, in SI units."""
+        hidden = ("blow", "changes", "first")
+        found = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in hidden}
+        return {name: dict(value) if isinstance(value, Mapping) else value for name, value in found.items()}
+
+    def __str__(self) -> str:
+        wanted = ", ".join(name if band is None else f"{name} to {band:g} Hz" for name, band in self.quantities.items())
+        lines = [f"Plan for {wanted} to {self.tolerance:g}:", *(f"  {line}" for line in self.reasons)]
+        lines.append("Predicted errors:")
+        lines += [f"  {name:<22} {error:.1e}" for name, error in [*self.errors.items(), ("total", self.error)]]
+        lines.append(f"Cost: {self.cost}")
+        if self.costly:
+            lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")
+        return "\n".join(lines)
 
 
 @dataclass(frozen=True)
@@ -53,55 +158,83 @@ class Run:
     finer: Plan | None = None  # plan of the finer run
 
 
-class Stages:
-    """Wall time of each stage; ``watch`` may display the stages."""
-
-    def __init__(self, watch: Watch | None = None) -> None:
-        self.watch = watch or (lambda name: nullcontext())
-        self.seconds: dict[str, float] = {}
-
-    @contextmanager
-    def __call__(self, name: str) -> Iterator[None]:
-        start = time.perf_counter()
-        try:
-            with self.watch(name):
-                yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
-
-
 @dataclass(frozen=True)
-class _Blow:
-    """The checked blow of a scene."""
+class _Asked:
+    """A blow with changes, checked."""
 
+    blow: Blow
+    changes: Mapping[str, Any]
     values: Mapping[str, Any]  # arguments of `strike`
     pieces: Mapping[str, Any]  # pieces of the plan set by the user
     tolerance: float  # [-]
     quantities: Mapping[str, float | None]
-    striker: Striker
-    contact: Contact
     duration: float  # [s] contact time on a rigid wall
 
+    @classmethod
+    def checked(cls, blow: Blow, changes: Mapping[str, Any]) -> "_Asked":
+        changes = {name: value for name, value in changes.items() if value is not None}
+        pieces = {name: changes[name] for name in PIECES if name in changes}
+        values = {**blow.arguments, **{name: value for name, value in changes.items() if name not in PIECES}}
+        with blow.target.blame("strike"):
+            for name, value in pieces.items():
+                if name == "target":
+                    check.one_of("target", value, TARGETS)
+                elif PIECES[name]:
+                    check.positive(name, value, PIECES[name])
+                else:
+                    check.count(name, value)
+            for name in values:
+                if name not in ARGUMENTS:
+                    raise ValueError(f"{name} is not an argument of a blow{check.nearest(name, [*ARGUMENTS, *PIECES])}")
+            tolerance = check.between("tolerance", values.get("tolerance", collision.TOLERANCE), 1e-12, 1.0)
+            speed = check.positive("speed", values["speed"], "m/s")
+            quantities = asked_for(values.get("quantity"))
+        duration = accuracy.contact_duration(blow.contact, blow.striker.felt_mass, speed)
+        return cls(blow, changes, values, pieces, tolerance, quantities, duration)
 
-@dataclass(frozen=True)
-class _Outside:
-    """What is known of a target without finite elements, and the errors of simplifying it."""
+    @property
+    def law(self) -> dict[str, Any]:
+        """Contact and speed, as arguments."""
+        return {"contact": self.blow.contact, "speed": self.values["speed"]}
 
-    mass: float  # [kg] mass of the whole body
-    rigid: float  # [-] error of treating it as rigid
-    endless: float  # [-] error of treating it as infinite; inf if that is wrong or unknown
-    mobility: float  # [m/(N s)] of the infinite plate; inf if unknown
+    @property
+    def mass(self) -> float:
+        """Mass [kg] of the striker felt at its contact point."""
+        return self.blow.striker.felt_mass
+
+    def find(self, n_modes: int, max_frequency: float | None = None, **how: Any) -> Modes:
+        """Modes of the target, see `Target.find`."""
+        size = self.pieces.get("size")
+        return self.blow.target.find(n_modes, max_frequency, tolerance=self.tolerance, size=size, **how)
 
 
-def make(scene: Any, changes: Mapping[str, Any], stages: Stages) -> Plan:
-    """Choose the model of a scene; see `Scene.plan`."""
-    changes = {name: value for name, value in changes.items() if value is not None}
-    blow = _checked(scene, changes)
-    target = blow.pieces.get("target")
-    if target is None and {"size", "n_modes", "max_frequency"} & set(blow.pieces):
+def plan_of(
+    body: System | Modes,
+    striker: Any,
+    contact: Any,
+    watch: Watch | None = None,
+    *,
+    at: Any,
+    speed: float,
+    damping_ratio: Damping | None = None,
+    **rest: Any,
+) -> Plan:
+    """The plan of a blow that a user describes with objects; ``rest`` as in `fi.plan`."""
+    check.instance("striker", striker, Striker)
+    check.instance("contact", contact, Contact)
+    pieces = {name: rest.pop(name) for name in PIECES if name in rest}
+    target = Target.of(body, damping_ratio)
+    return Blow(target, striker, contact, {"at": at, "speed": speed, **rest}).plan(watch, **pieces)
+
+
+def make(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
+    """Choose the model of a blow; see `fi.plan`."""
+    asked = _Asked.checked(blow, changes)
+    target = asked.pieces.get("target")
+    if target is None and (blow.target.modes is not None or {"size", "n_modes", "max_frequency"} & set(asked.pieces)):
         target = "modal"
-    plan = None if target == "modal" else _idealised(scene, changes, blow, target, stages)
-    return plan or _modal(scene, changes, blow, stages)
+    plan = None if target == "modal" else _idealised(asked, target, stages)
+    return plan or _modal(asked, stages)
 
 
 def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
@@ -109,35 +242,27 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
 
     ``keep`` is a file that stores the modes of a costly plan.
     """
-    scene = plan.scene
-    blow = _checked(scene, plan.changes)
-    fixed = {"n_modes", "max_frequency"} & set(blow.pieces) or not blow.values.get("residual", True)
-    asked = {**blow.values, "tolerance": SHARE * blow.tolerance}
+    blow, asked = plan.blow, _Asked.checked(plan.blow, plan.changes)
+    fixed = {"n_modes", "max_frequency"} & set(asked.pieces) or not asked.values.get("residual", True)
+    arguments = {**asked.values, "tolerance": SHARE * asked.tolerance}
     for margin in MARGINS:
         if margin > 1.0:
-            plan = _modal(scene, plan.changes, blow, stages, plan.first, margin)
-        modes, striker = target(plan, stages, keep), collision.shortened(blow.striker, plan.n_striker_modes)
+            plan = _modal(asked, stages, plan.first, margin)
+        modes, striker = struck(plan, stages, keep), collision.shortened(blow.striker, plan.n_striker_modes)
         if plan.target == "modal":
-            with scene.blame("observe"):
-                for point in scene.points:
+            with blow.target.blame("observe"):
+                for point in blow.points:
                     modes.points("points", [point])
-        with stages("strike"), scene.blame("strike"):
-            response = collision.strike(modes, striker, blow.contact, **asked)
-        if plan.target != "modal" or fixed or response.error.truncation <= SHARE * blow.tolerance:
+        with stages("strike"), blow.target.blame("strike"):
+            response = collision.strike(modes, striker, blow.contact, **arguments)
+        if plan.target != "modal" or fixed or response.error.truncation <= SHARE * asked.tolerance:
             break
     idealised = plan.errors.get("rigid target", 0.0) + plan.errors.get("infinite plate", 0.0)
     error = replace(response.error, idealisation=idealised)
-    response = replace(response, tolerance=blow.tolerance, error=error)
+    response = replace(response, tolerance=asked.tolerance, error=error)
     plan = replace(plan, n_modes=modes.n_modes if plan.target == "modal" else 0)
-    notes = plan.first.shapes.system.mesh.notes if plan.n_dofs else ()
-    return Run(response, MappingProxyType(stages.seconds), plan, notes)
-
-
-def tolerance_of(scene: Any, values: Mapping[str, Any] | None = None) -> float:
-    """The tolerance [-] of a scene; ``values`` replaces the values of its blow."""
-    with scene.blame("strike"):
-        wanted = (scene.blow.values if values is None else values).get("tolerance", collision.TOLERANCE)
-        return check.between("tolerance", wanted, 1e-12, 1.0)
+    mesh = blow.target.mesh
+    return Run(response, MappingProxyType(stages.seconds), plan, () if mesh is None else mesh.notes)
 
 
 def verify(run: Run, watch: Watch | None = None) -> Run:
@@ -152,11 +277,11 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
         finer["size"] = plan.size / 1.5
     finer.update({name: None for name in ("n_modes", "max_frequency", "n_striker_modes", "dt") if name in plan.changes})
     try:
-        other = plan.scene.run(watch, **{**plan.changes, **finer})
+        other = plan.blow.run(watch, **{**plan.changes, **finer})
     except check.SimulationError:
         if plan.target == "modal":
             raise
-        other = plan.scene.run(watch, **{**plan.changes, **finer, "target": plan.target})
+        other = plan.blow.run(watch, **{**plan.changes, **finer, "target": plan.target})
     one, two = run.response, other.response
     true = {
         "restitution": abs(one.restitution - two.restitution),
@@ -172,37 +297,21 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
     return replace(run, verified=MappingProxyType(true), finer=other.plan)
 
 
-def _checked(scene: Any, changes: Mapping[str, Any]) -> _Blow:
-    pieces = {name: changes[name] for name in PIECES if name in changes}
-    values = {**scene.blow.values, **{name: value for name, value in changes.items() if name not in PIECES}}
-    with scene.blame("strike"):
-        for name, value in pieces.items():
-            if name == "target":
-                check.one_of("target", value, TARGETS)
-            elif PIECES[name]:
-                check.positive(name, value, PIECES[name])
-            else:
-                check.count(name, value)
-        tolerance = tolerance_of(scene, values)
-        speed = check.positive("speed", values["speed"], "m/s")
-        quantities = asked_for(values.get("quantity"))
-    striker, contact = scene.make_striker(), scene.make_contact()
-    duration = accuracy.contact_duration(contact, striker.felt_mass, speed)
-    return _Blow(values, pieces, tolerance, quantities, striker, contact, duration)
-
-
-def _idealised(scene: Any, changes: Mapping[str, Any], blow: _Blow, target: str | None, stages: Stages) -> Plan | None:
+def _idealised(asked: _Asked, target: str | None, stages: Stages) -> Plan | None:
     """The plan with a rigid or infinite target, if that is accurate enough or the user asks for it; else None."""
-    values = blow.values
+    blow, values = asked.blow, asked.values
     pressed = values.get("striker_force") or values.get("target_force") or blow.contact.gap < 0.0
-    moving = "sound" in blow.quantities or scene.observe is not None  # the user asks for the target's motion
+    moving = "sound" in asked.quantities or blow.moving
     if target is None and (pressed or moving or not values.get("residual", True)):
         return None
-    seen = _outside(scene, blow, stages)
-    allowed = SHARE * blow.tolerance
+    with stages("modes"):
+        seen = idealisation.from_outside(blow.target, values["at"], asked.mass, asked.duration)
+    allowed = SHARE * asked.tolerance
     if target is not None:
         if seen is None or (target == "infinite" and not np.isfinite(seen.mobility)):
-            raise scene.fault(f"[strike] target = {target!r} needs a plate of known rigidity; use target = 'modal'")
+            raise ValueError(
+                f"{blow.name}target = {target!r} needs a plate of one known rigidity; use target = 'modal'"
+            )
     elif seen is None:
         return None
     elif seen.rigid <= allowed:
@@ -222,99 +331,46 @@ def _idealised(scene: Any, changes: Mapping[str, Any], blow: _Blow, target: str 
         )
     dropped = "no mesh and no modes are needed; the target's sound is not computed"
     return _plan(
-        scene, changes, blow, target=target, errors=error, reasons=(kept, dropped), mass=seen.mass,
+        asked, target=target, errors=error, reasons=(kept, dropped), mass=seen.mass,
         mobility=seen.mobility if target == "infinite" else 0.0,
     )  # fmt: skip
 
 
-def _outside(scene: Any, blow: _Blow, stages: Stages) -> _Outside | None:
-    """What is known of the target without finite elements; None if that is not enough."""
-    scale, find = scene.scale, scene.closed_form()
-    mass, duration = blow.striker.felt_mass, blow.duration
-    stretch, rigid = 1.0, np.inf
-    if find is not None:
-        with stages("modes"):
-            first = find(FIRST_LOOK)
-        modes = first.scaled(**scale)
-        stretch = modes.frequencies[-1] / first.frequencies[-1]
-        with scene.blame("strike"):
-            at = modes.point("at", blow.values["at"])[0]
-        most = modes.frequencies[-1] * (MOST_LOOKED_AT / FIRST_LOOK) ** (2.0 / modes.dimension)
-        limit = min(LOOK * 0.5 / duration, most)
-        if limit > modes.frequencies[-1]:
-            modes = find(FIRST_LOOK, limit / stretch, first).scaled(**scale)
-        rigid = idealisation.rigid_error(modes, at, mass, duration)
-        if modes.dimension == 1:
-            return _Outside(modes.mass, rigid, np.inf, np.inf)
-    with stages("mesh"):
-        body = scene.body()
-    if body.dimension == 1:
-        return None
-    with scene.blame("supports"):
-        free = "free" in support_of_facets(body, dict(scene.supports.values))
-    with scene.blame("strike"):
-        at = check.array("at", blow.values["at"], (2,), "m", lift=True)
-    view = idealisation.Surroundings.seen(body, at)
-    if view is None:
-        return None
-    section = scene.make_section("plate")
-    material = section.material
-    rate = stretch * section.thickness * float(np.sqrt(material.E / 12.0 / (1.0 - material.nu**2) / material.rho))
-    whole = scale.get("mass", section.thickness * material.rho * view.area)
-    if find is None:
-        if "first_frequency" in scale:
-            low = idealisation.slowest_rate(view, scale["first_frequency"])
-        else:
-            low = rate * float(np.sqrt(min(material.E, material.E_across or np.inf) / material.E))
-        rigid = idealisation.rigid_bound(view, whole, low, free, mass, duration)
-        if "first_frequency" in scale or material.E_across is not None or section.tension:
-            return _Outside(whole, rigid, np.inf, np.inf)
-    mobility = view.area / (8.0 * rate * whole)
-    far = idealisation.endless_error(view, mobility, rate, mass, duration)
-    return _Outside(whole, rigid, far, mobility)
-
-
-def _modal(
-    scene: Any,
-    changes: Mapping[str, Any],
-    blow: _Blow,
-    stages: Stages,
-    first: Modes | None = None,
-    margin: float = 1.0,
-) -> Plan:
+def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: float = 1.0) -> Plan:
     """The plan with a modal target; finds its first modes, because they tell how many are needed."""
-    find, scale = scene.finder(stages, blow.tolerance, blow.pieces.get("size")), scene.scale
+    target, at, mass = asked.blow.target, asked.values["at"], asked.mass
     with stages("modes"):
-        first = find(FIRST_LOOK) if first is None else first
-    modes = first.scaled(**scale)
-    with scene.blame("strike"):
-        modes.point("at", blow.values["at"])
-    allowed = SHARE * blow.tolerance / (CAUTION * margin) / (accuracy.LOSSY if blow.contact.loss else 1.0)
-    law = {"contact": blow.contact, "speed": blow.values["speed"]}
-    needed = accuracy.cutoff_frequency(modes, blow.values["at"], mass=blow.striker.felt_mass, tolerance=allowed, **law)
-    band = max((band for band in blow.quantities.values() if band), default=0.0)
-    limit, number = max(needed, band), blow.pieces.get("n_modes")
+        first = asked.find(FIRST_LOOK, stages=stages) if first is None else first
+    modes = target.finished(first)
+    with target.blame("strike"):
+        modes.point("at", at)
+    allowed = SHARE * asked.tolerance / (CAUTION * margin) / (accuracy.LOSSY if asked.blow.contact.loss else 1.0)
+    needed = accuracy.cutoff_frequency(modes, at, mass=mass, tolerance=allowed, **asked.law)
+    band = max((band for band in asked.quantities.values() if band), default=0.0)
+    limit, number = max(needed, band), asked.pieces.get("n_modes")
     if number is None:
-        limit = blow.pieces.get("max_frequency", limit)
-        # Weyl's law; the first modes are kept even if fewer are enough
-        number = max(modes.n_modes, round(modes.n_modes * (limit / modes.frequencies[-1]) ** (0.5 * modes.dimension)))
+        limit = asked.pieces.get("max_frequency", limit)
+        # the first modes are kept even if fewer are enough
+        number = max(modes.n_modes, round(modes.n_modes * target.growth(modes.frequencies[-1], limit)))
     else:
         limit = modes.frequencies[min(number, modes.n_modes) - 1] * max(1.0, number / modes.n_modes) ** (
             2.0 / modes.dimension
         )
-    if number > MOST_MODES[scene.source]:
+    if target.modes is not None and number > target.modes.n_modes:
+        number, limit = target.modes.n_modes, target.modes.frequencies[-1]
+    if number > MOST_MODES[target.kind]:
         raise check.SimulationError(
-            f"{scene.path}: this blow needs about {number:.2g} modes, up to {limit:.2g} Hz, more than the limit of "
-            f"{MOST_MODES[scene.source]}; use a larger tolerance, a softer contact or a lower speed"
+            f"{asked.blow.name}this blow needs about {number:.2g} modes, up to {limit:.2g} Hz, more than the limit of "
+            f"{MOST_MODES[target.kind]}; use a larger tolerance, a softer contact or a lower speed"
         )
-    left = accuracy.truncation_error(modes, blow.values["at"], limit, mass=blow.striker.felt_mass, **law)
+    left = accuracy.truncation_error(modes, at, limit, mass=mass, **asked.law)
     kept = f"the target keeps its modes up to {limit:.4g} Hz, about {number}; the others act as a spring"
-    why = f"the contact lasts about {blow.duration:.3g} s"
+    why = f"the contact lasts about {asked.duration:.3g} s"
     if band > needed:
         kept += f" ({band:g} Hz requested, {needed:.4g} Hz needed for the blow)"
     plan = _plan(
-        scene, changes, blow, target="modal", errors={"target modes left out": left}, reasons=(why, kept),
-        mass=modes.mass, n_modes=number, max_frequency=limit, first=first, element="closed form", margin=margin,
+        asked, target="modal", errors={"target modes left out": left}, reasons=(why, kept), mass=modes.mass,
+        n_modes=number, max_frequency=limit, first=first, element=ELEMENTS.get(target.kind), margin=margin,
     )  # fmt: skip
     if isinstance(first.shapes, FieldShapes):
         plan = _with_mesh(plan, first, first.shapes.system, limit * first.frequencies[-1] / modes.frequencies[-1])
@@ -325,7 +381,7 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
     """The plan with a mesh that resolves a frequency [Hz] of the body as assembled."""
     assert first.frequency_error is not None
     mesh = system.mesh
-    stated = plan.scene.size_stated or "size" in plan.changes or refinement.resolves(system, limit)
+    stated = plan.blow.target.size_stated or "size" in plan.changes or refinement.resolves(system, limit)
     size = mesh.size if stated else min(mesh.size, refinement.size_for(system, None, limit, None))
     n_dofs = round(DOFS_PER_AREA[system.element] * mesh.area / size**mesh.dimension)
     error = max(float(first.frequency_error.max()), SHORT_WAVES[system.element])
@@ -339,73 +395,138 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
 
 
 def _plan(
-    scene: Any, changes: Mapping[str, Any], blow: _Blow, *, errors, reasons, n_modes=0, margin=1.0, **chosen: Any
+    asked: _Asked, *, errors: Mapping, reasons: tuple, n_modes: int = 0, margin: float = 1.0, **chosen: Any
 ) -> Plan:
     """The plan for any target: adds striker modes and time steps, with their errors and cost."""
-    kept, left = _striker_modes(blow, margin)
-    modes = blow.striker.modes
+    kept, left = _striker_modes(asked, margin)
+    modes = asked.blow.striker.modes
     if modes.dimension:
         errors = {**errors, "striker modes left out": left}
         bending, whole = kept - modes.n_rigid, modes.n_modes - modes.n_rigid
         stiff = "is treated as rigid" if bending == 0 else f"keeps {bending} of its {whole} bending modes"
         reasons = (*reasons, f"the striker {stiff}")
-    fixed = blow.values.get("scheme"), blow.values.get("dt")
-    scheme, dt = collision.steps_for(blow.contact, blow.duration, SHARE * blow.tolerance, blow.quantities, *fixed)
-    until = "fixed by dt" if fixed[1] else f"halved until two runs agree to {SHARE * blow.tolerance:.1e}"
-    lasts = blow.values.get("duration")
+    fixed = asked.values.get("scheme"), asked.values.get("dt")
+    scheme, dt = collision.steps_for(
+        asked.blow.contact, asked.duration, SHARE * asked.tolerance, asked.quantities, *fixed
+    )
+    until = "fixed by dt" if fixed[1] else f"halved until two runs agree to {SHARE * asked.tolerance:.1e}"
+    lasts = asked.values.get("duration")
     end = "until the final separation" if lasts is None else f"for {lasts:g} s"
-    count = blow.duration / dt
+    count = asked.duration / dt
     reasons = (*reasons, f"scheme {scheme}, steps of {dt:.3g} s ({count:.0f} per contact), {until}; run {end}")
     return Plan(
-        scene,
-        MappingProxyType(dict(changes)),
-        blow.tolerance,
-        blow.quantities,
+        asked.blow,
+        MappingProxyType(dict(asked.changes)),
+        asked.tolerance,
+        asked.quantities,
         **{"element": None, "size": None, "n_dofs": 0, "max_frequency": None, **chosen},
         n_modes=n_modes,
         n_striker_modes=kept,
         scheme=scheme,
         dt=dt,
-        duration=blow.duration,
-        errors=MappingProxyType({**errors, "steps": SHARE * blow.tolerance}),
+        duration=asked.duration,
+        errors=MappingProxyType({**errors, "steps": SHARE * asked.tolerance}),
         reasons=reasons,
         seconds=RATES["start"] + RATES["steps"] * 10.0 * count * (n_modes + kept),
         memory=BYTES["start"],
     )
 
 
-def _striker_modes(blow: _Blow, margin: float) -> tuple[int, float]:
+def _striker_modes(asked: _Asked, margin: float) -> tuple[int, float]:
     """Number of kept striker modes, and the error [-] of leaving out the others."""
-    modes, kept = blow.striker.modes, blow.pieces.get("n_striker_modes")
+    modes, kept = asked.blow.striker.modes, asked.pieces.get("n_striker_modes")
     if not modes.dimension:
         return modes.n_modes, 0.0
-    law = {"contact": blow.contact, "speed": blow.values["speed"]}
-    if kept is None and blow.values.get("residual", True):
-        return collision.striker_modes(blow.striker, tolerance=blow.tolerance / margin, **law)
+    if kept is None and asked.values.get("residual", True):
+        return collision.striker_modes(asked.blow.striker, tolerance=asked.tolerance / margin, **asked.law)
     kept = max(modes.n_rigid, min(kept or modes.n_modes, modes.n_modes))
-    return kept, collision.striker_error(blow.striker, kept, **law)
+    return kept, collision.striker_error(asked.blow.striker, kept, **asked.law)
 
 
-def target(plan: Plan, stages: Stages, keep: Any = None) -> Modes:
+def struck(plan: Plan, stages: Stages, keep: Any = None) -> Modes:
     """The modes of the target as planned; ``keep`` as in `carry_out`."""
     keep = keep if plan.costly and plan.n_dofs else None
-    scene = plan.scene
-    blow = _checked(scene, plan.changes)
+    target, asked = plan.blow.target, _Asked.checked(plan.blow, plan.changes)
     if plan.target != "modal":
-        at = np.atleast_1d(np.asarray(blow.values["at"], float))
+        at = np.atleast_1d(np.asarray(asked.values["at"], float))
         if plan.target == "rigid":
             return idealisation.unyielding(at, plan.mass)
-        return idealisation.endless(at, plan.mass, plan.mobility, blow.duration)
-    find = scene.finder(stages, blow.tolerance, blow.pieces.get("size"))
+        return idealisation.endless(at, plan.mass, plan.mobility, asked.duration)
+    assert plan.first is not None and plan.max_frequency is not None
     with stages("modes"):
-        first, modes, number = plan.first, plan.first, blow.pieces.get("n_modes")
-        ratio = first.scaled(**scene.scale).frequencies[-1] / first.frequencies[-1]
+        first, modes, number = plan.first, plan.first, asked.pieces.get("n_modes")
+        ratio = target.finished(first).frequencies[-1] / first.frequencies[-1]
         if number is not None and number > first.n_modes:
-            modes = find(number, None, first, keep)
+            modes = asked.find(number, first=first, stages=stages, keep=keep)
         elif plan.max_frequency > ratio * first.frequencies[-1] * (1.0 + 1e-9):
-            modes = find(FIRST_LOOK, plan.max_frequency / ratio, first, keep)
+            modes = asked.find(FIRST_LOOK, plan.max_frequency / ratio, first=first, stages=stages, keep=keep)
         if number is not None:
             modes = modes.truncated(n_modes=number)
-        elif "max_frequency" in blow.pieces:
+        elif "max_frequency" in asked.pieces:
             modes = modes.truncated(max_frequency=plan.max_frequency / ratio)
-        return modes.scaled(**scene.scale).damped(scene.damping_ratio)
+        return target.finished(modes)
+
+
+@check.typed
+def strike(
+    body: Modes | System,
+    striker: Striker,
+    contact: Contact,
+    *,
+    at: Any,
+    speed: float,
+    damping_ratio: Damping | None = None,
+    **options: Any,
+) -> Response:
+    """Strike a body at rest and follow both bodies until their final separation.
+
+    Parameters
+    ----------
+    body : Modes or System
+        The struck body. Of an assembled system, the blow computes only what it needs: as many modes as the tolerance
+        takes, or none if the body may count as rigid or infinite (see `fi.plan`). Modes are taken as they are; those
+        left out act by their static compliance.
+    striker : Striker
+        Arrives in rigid motion.
+    contact : Contact
+    at : strike point, (dimension,) [m]
+    speed : float [m/s]
+        Speed of the striker's contact point towards the body.
+    tolerance : float [-]
+        Largest accepted error: absolute for the restitution, relative for impulse, contact time and peak force.
+    quantity : str, sequence of str or mapping of str to frequency [Hz], optional
+        The quantities that must meet the tolerance; by default "restitution", "impulse", "contact_time", "force" and
+        "n_impacts". Others: "spectrum=5000", the force spectrum up to 5 kHz relative to its largest value, and
+        "sound=5000".
+    residual : bool
+        Whether the residual compliance acts; False uses the given modes only.
+    duration : float [s], optional
+        Time at which the run stops at the latest.
+    max_impacts : int, optional
+        The run stops after this many impacts.
+    scheme : {"A", "A4", "collocation"}, optional
+        Time integration scheme; by default, the tolerance decides.
+    dt : float [s], optional
+        Time step in contact. If given, the step error is only estimated and may exceed the tolerance.
+    striker_force, target_force : float [N]
+        Constant forces at the contact points, positive along the blow; for example the weight of a falling ball.
+
+    damping_ratio : float or function of frequency [Hz], optional
+        Damping of a system, which has none of its own.
+    target, size, n_modes, max_frequency, n_striker_modes : optional
+        Parts of the model to fix by hand, as in `fi.plan`.
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    ValueError
+        If an argument is invalid.
+    SimulationError
+        If the tolerance cannot be met, or if the bodies do not separate for good and no other end was given.
+    """
+    if isinstance(body, Modes) and damping_ratio is None and not set(options) & set(PIECES):
+        return collision.strike(body, striker, contact, at=at, speed=speed, **options)
+    return plan_of(body, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options).strike()

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,9 @@ from scipy import special
 from scipy.optimize import elementwise
 
 from .._base import check
+from ..fe.assembly import support_of_facets
 from ..fe.section import Beam, Plate
+from ..mesh.meshes import Mesh
 from .modal import Damping, Modes, damping_ratios
 
 IMAGES = 6  # [-] image forces beyond each shorter side of a hinged plate; the n-th contributes exp(-2 pi n)
@@ -26,6 +28,29 @@ MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a roo
 MOST_PAIRS = 4 * MOST_MODES  # [-] half-wave number pairs tried on a rectangle; MOST_MODES never needs half of them
 DISK_SCAN = 0.5  # [-] step in z = k radius when scanning for roots; roots of one order are about pi apart
 ENDS = ("clamped", "hinged", "free")
+
+
+def closed_form(mesh: Mesh, section: Plate | Beam, supports: dict[str, Any]) -> Callable[..., Modes] | None:
+    """Function of ``n_modes`` or ``max_frequency`` [Hz] that finds the modes of this body; None if no formula does.
+
+    There are formulas for beams of constant section, and for isotropic plates of constant thickness without tension
+    that are rectangles hinged all round or disks with the same support all round.
+    """
+    kinds, (form, *sizes) = support_of_facets(mesh, supports), mesh.form or ("",)
+    held = {kind if isinstance(kind, str) else "elastic" for kind in kinds}
+    if "elastic" in held:
+        return None
+    if isinstance(section, Beam):
+        uniform = form == "line" and not callable(section.width) and not callable(section.height)
+        ends = str(kinds[0]), str(kinds[-1])
+        return partial(beam, *sizes, ends=ends, section=section) if uniform else None
+    if callable(section.thickness) or section.material.E_across is not None or section.tension or len(held) > 1:
+        return None
+    if form == "rectangle" and held == {"hinged"}:
+        return partial(rectangle, *sizes, section=section)
+    if form == "disk":
+        return partial(disk, *sizes, edge=held.pop(), section=section)
+    return None
 
 
 def _finished(

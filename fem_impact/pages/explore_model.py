@@ -12,6 +12,7 @@ from ..impact.contact import Contact
 from ..impact.response import Response
 from ..mesh.meshes import Mesh
 from ..model import planner
+from ..model.target import Stages
 from ..modes.modal import Modes, SampledShapes
 from ..scenes import maps
 from ..scenes.scene import Scene
@@ -64,7 +65,7 @@ class Bench:
     def of(cls, scene: Scene) -> "Bench":
         """The bench of a scene, with enough modes for its shortest blow, but at most `MOST_MODES`."""
         plan = scene.plan(target="modal", n_modes=FIRST_LOOK)
-        first = planner.target(plan, planner.Stages())
+        first = planner.struck(plan, Stages())
         at = np.atleast_1d(np.asarray(scene.blow.values["at"], float))
         case = grid.Case(first, scene.make_striker(), scene.make_contact(), at, float(scene.blow.values["speed"]))
         bench = cls(scene, scene.body(), case)
@@ -72,7 +73,7 @@ class Bench:
         needed = maps.number_of_modes(first, maps.needed_frequency(bench.case(hard), TOLERANCE))
         if needed <= first.n_modes:
             return bench
-        more = planner.target(plan.but(n_modes=min(needed, MOST_MODES)), planner.Stages())
+        more = planner.struck(plan.but(n_modes=min(needed, MOST_MODES)), Stages())
         return replace(bench, base=replace(case, modes=more))
 
     @cached_property

@@ -138,7 +138,7 @@ def _quick_map(
     )
     modes = case.modes
     if needed > modes.frequencies[-1]:
-        number, most = number_of_modes(modes, needed), planner.MOST_MODES[scene.source]
+        number, most = number_of_modes(modes, needed), planner.MOST_MODES[scene.built.target.kind]
         if number > most:
             raise check.SimulationError(
                 f"{scene.path}: the shortest blow of the map needs about {number} modes, at most {most} are allowed; "

@@ -11,24 +11,20 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
-from ..fe import assembly, refinement
+from ..fe.assembly import System, support_of_facets
 from ..fe.section import Beam, Material, Plate
+from ..impact import collision
 from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..mesh.meshes import Mesh
 from ..model import planner
-from ..model.plan import Plan
-from ..model.planner import Run, Stages, Watch
-from ..modes import analytic, modal
+from ..model.planner import Blow, Plan, Run
+from ..model.target import Stages, Target, Watch
 from ..modes.modal import Modes
-from .schema import MAKERS, PATHS, REQUIRED, TABLES, Part, fault, read_part, read_tables, target_values
+from .schema import MAKERS, PATHS, REQUIRED, TABLES, Part, fault, read_part, read_tables, supports_of, target_values
 
-WORST_FREQUENCY = 0.1  # [-] largest frequency error that `find_modes` accepts as a tolerance
 NOTHING = Part()  # stands for a missing table
-ANALYTIC = {"rectangle": ("left", "right", "bottom", "top"), "line": ("left", "right"), "disk": ("outer",)}
-
-Finder = Callable[..., Modes]  # takes a number of modes or a frequency [Hz], and the first modes
 
 
 @dataclass(frozen=True)
@@ -55,12 +51,15 @@ class Scene:
     def modes(self, count: int | None = None) -> Modes:
         """Modes of the struck body: the first ``count``, or as many as the blow needs to meet its tolerance."""
         if count is None:
-            return planner.target(self.plan(target="modal"), Stages())
-        most = planner.MOST_MODES[self.source]
+            return planner.struck(self.plan(target="modal"), Stages())
+        target = self.built.target
+        most = planner.MOST_MODES[target.kind]
         if check.count("count", count) > most:
             raise fault(self.path, f"count must be at most {most} modes for this scene, got {count}; ask for fewer")
-        found = self.finder(Stages(), planner.tolerance_of(self))(count)
-        return found.scaled(**self.scale).damped(self.damping_ratio)
+        tolerance = self.blow.values.get("tolerance", collision.TOLERANCE)
+        with self.blame("strike"):
+            check.between("tolerance", tolerance, 1e-12, 1.0)
+        return target.finished(target.find(count, tolerance=tolerance))
 
     @check.typed
     def plan(self, *, watch: Watch | None = None, **changes: Any) -> Plan:
@@ -80,7 +79,8 @@ class Scene:
         Plan
             If the target needs modes, this finds the first twenty to estimate how many.
         """
-        return planner.make(self, changes, Stages(watch))
+        stages = Stages(watch)
+        return planner.make(self._staged(stages), changes, stages)
 
     @check.typed
     def run(
@@ -113,7 +113,7 @@ class Scene:
         Run
         """
         stages = Stages(watch)
-        plan = planner.make(self, changes, stages) if plan is None else plan
+        plan = planner.make(self._staged(stages), changes, stages) if plan is None else plan
         if before is not None:
             before(plan)
         run = planner.carry_out(plan, stages, keep)
@@ -180,116 +180,34 @@ class Scene:
                 names.append(source.name)
         return tables, names
 
+    def _staged(self, stages: Stages) -> Blow:
+        """`built`, with its time."""
+        with stages("mesh"):
+            return self.built
+
     @cached_property
-    def source(self) -> str:
-        """Source of the target's modes, "fe" or "analytic": closed formulas if there are any, unless stated."""
-        told = self._target["source"]
-        if told != "auto":
-            return told
-        return "fe" if self.size_stated or self.closed_form() is None else "analytic"
-
-    @property
-    def scale(self) -> Mapping[str, float]:
-        """Mass [kg] and first frequency [Hz] of the target, if the scene gives them."""
-        return self._target["scale"]
-
-    @property
-    def damping_ratio(self) -> float:
-        """Damping ratio [-] of the target's modes."""
-        return self._target["damping_ratio"]
-
-    @property
-    def _target(self) -> dict[str, Any]:
+    def built(self) -> Blow:
+        """The scene as objects."""
+        mesh = self.body()
+        section = self.make_section("beam" if mesh.dimension == 1 else "plate")
+        supports = supports_of(self.supports.values)
+        with self.blame("supports"):
+            support_of_facets(mesh, supports)
         with self.blame("target"):
-            return target_values(**self.target.values)
+            told = target_values(**self.target.values)
+            told.pop("nu")
+            target = Target(mesh, section, supports, **told, blame=self.blame)
+        points = tuple(self.points)
+        moving = self.observe is not None
+        return Blow(target, self._striker, self.make_contact(), self.blow.values, points, moving, f"{self.path}: ")
 
-    def finder(self, stages: Stages, tolerance: float, size: float | None = None) -> Finder:
-        """Function that finds the target's modes, before mass, first frequency and damping are set (see `Finder`)."""
-        if self.source == "analytic" and (size is None or self._target["source"] == "analytic"):
-            return self._analytic()
-        return self._finite_elements(stages, tolerance, size)
-
-    def closed_form(self) -> Finder | None:
-        """The same from closed formulas, whatever the source; None if there are none for this body."""
-        try:
-            return self._analytic()
-        except ValueError:
-            return None
-
-    def body(self, size: float | None = None) -> Mesh:
-        """Mesh of the target, with elements of the given size [m] or as the scene defines it."""
-        if size is None:
-            return self._body
-        if self.mesh.kind == "file":
-            with self.blame("mesh"):
-                return self._body.refined(self._body.size / check.positive("size", size, "m"))
-        return self._make("mesh", Part(self.mesh.kind, {**self.mesh.values, "size": size}))
+    def body(self) -> Mesh:
+        """Mesh of the target."""
+        return self._body
 
     @cached_property
     def _body(self) -> Mesh:
         return self._make("mesh", self.mesh)
-
-    @property
-    def size_stated(self) -> bool:
-        """Whether the scene fixes the element size."""
-        return "size" in self.mesh.values
-
-    def _finite_elements(self, stages: Stages, tolerance: float, size: float | None) -> Finder:
-        def find(n_modes: int, max_frequency: float | None = None, first: Any = None, keep: Any = None) -> Modes:
-            whole = self._system(stages, size) if first is None else None
-            insisted = size is not None or self.size_stated
-            with self.blame("mesh"), np.errstate(all="ignore"):
-                if whole is not None:
-                    wanted = None if insisted else min(tolerance, WORST_FREQUENCY)
-                    return modal.find_modes(whole, n_modes=n_modes, tolerance=wanted)
-                # Start from the mesh of the first modes and refine it if it cannot resolve the shortest wave.
-                system = first.shapes.system
-                enough = insisted or (max_frequency is not None and refinement.resolves(system, max_frequency))
-                system = replace(system, mesh=replace(system.mesh, size_stated=enough))
-                reach = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}
-                return modal.find_modes(system, **reach, keep=keep)
-
-        return find
-
-    def _system(self, stages: Stages, size: float | None) -> assembly.System:
-        with stages("mesh"):
-            body = self.body(size)
-        with stages("assembly"):
-            section = self.make_section("beam" if body.dimension == 1 else "plate")
-            with self.blame("supports"), np.errstate(all="ignore"):
-                return assembly.assemble(body, section, supports=dict(self.supports.values))
-
-    def _analytic(self) -> Finder:
-        edges = dict(self.supports.values)
-        values = {key: value for key, value in self.mesh.values.items() if key != "size"}
-        with self.blame("supports"):
-            held = {name: edges.pop(name, edges.get("boundary", "free")) for name in ANALYTIC.get(self.mesh.kind, ())}
-            edges.pop("boundary", None)
-            if edges:
-                lost = next(iter(edges))
-                raise ValueError(
-                    f"{lost} is not an edge of a {self.mesh.kind}, which has {', '.join(held)}"
-                    f"{check.nearest(lost, held)}"
-                )
-            if self.mesh.kind == "rectangle" and set(held.values()) == {"hinged"}:
-                make: Callable[..., Modes] = analytic.rectangle
-            elif self.mesh.kind == "line":
-                make, values["ends"] = analytic.beam, (held["left"], held["right"])
-            elif self.mesh.kind == "disk" and not values.pop("hole", 0.0):
-                make, values["edge"] = analytic.disk, held["outer"]
-            else:
-                raise ValueError(
-                    f"source = 'analytic' covers rectangles hinged all round, beams and disks without a hole, "
-                    f"not this {self.mesh.kind}; use source = 'fe'"
-                )
-        section = self.make_section("beam" if self.mesh.kind == "line" else "plate")
-
-        def find(n_modes: int, max_frequency: float | None = None, first: Any = None, keep: Any = None) -> Modes:
-            wanted = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}
-            with self.blame("mesh"), np.errstate(all="ignore"):
-                return make(**values, section=section, **wanted)
-
-        return find
 
     def make_section(self, kind: str) -> Plate | Beam:
         """The section; without a material, any of the right kind, as mass and first frequency set the scale."""
@@ -381,9 +299,39 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
 
 
 @check.typed
-def plan(scene: Scene | str | Path, **changes: Any) -> Plan:
-    """Decide how to model a scene, or a scene file, without striking (see `Scene.plan`)."""
-    return (scene if isinstance(scene, Scene) else load_scene(scene)).plan(**changes)
+def plan(
+    blow: Scene | str | Path | System | Modes,
+    striker: Striker | None = None,
+    contact: Contact | None = None,
+    *,
+    watch: Watch | None = None,
+    **changes: Any,
+) -> Plan:
+    """Decide how to model a blow, without striking: the smallest model that meets the tolerance.
+
+    Parameters
+    ----------
+    blow : Scene, path of a scene file, System or Modes
+        A scene says everything. A body needs the arguments of `strike`, given here in the same way.
+    striker, contact : Striker, Contact
+        For a body only.
+    watch : callable, optional
+        Called with the name of each stage; returns a context manager that is open during the stage.
+    **changes
+        Arguments of `strike`, such as ``at``, ``speed``, ``tolerance`` and ``quantity``, which replace those of a
+        scene; and parts of the plan to fix by hand: ``target`` ("rigid", "infinite" or "modal"), ``size`` [m] of the
+        elements, ``n_modes`` or ``max_frequency`` [Hz] of the target, ``n_striker_modes``.
+
+    Returns
+    -------
+    Plan
+        If the target needs modes, this finds the first twenty to estimate how many.
+    """
+    if isinstance(blow, (System, Modes)):
+        return planner.plan_of(blow, striker, contact, watch, **changes)
+    if striker is not None or contact is not None:
+        raise ValueError("striker and contact must be left out for a scene, which has its own")
+    return (blow if isinstance(blow, Scene) else load_scene(blow)).plan(watch=watch, **changes)
 
 
 def _check_whole(scene: Scene) -> None:

@@ -4,7 +4,8 @@ import inspect
 import math
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
@@ -14,11 +15,15 @@ import numpy as np
 
 from .. import mesh
 from .._base import check
-from ..fe.section import Beam, Material, Plate
+from ..fe.assembly import assemble
+from ..fe.section import Beam, Elastic, Material, Plate
 from ..impact import collision
 from ..impact.contact import Contact
 from ..impact.striker import Striker
+from ..modes.analytic import closed_form
+from ..modes.modal import find_modes
 from ..show import sound
+from .fields import over_frequency, varying
 
 LARGEST_FILE = 1_000_000  # [byte] a scene is written by hand, so a larger file is a mistake
 
@@ -31,7 +36,13 @@ class Part:
     values: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
 
+def _plate(material: Material, *, thickness: Any, tension: float = 0.0) -> Plate:
+    return Plate(material, varying("thickness", thickness, 2), tension)
+
+
 def _beam(material: Material, *, width: Any = None, height: Any = None, diameter: Any = None) -> Beam:
+    width, height = varying("width", width, 1), varying("height", height, 1)
+    diameter = varying("diameter", diameter, 1)
     if diameter is not None and width is None and height is None:
         return Beam.circular(material, diameter=diameter)
     if diameter is not None or width is None or height is None:
@@ -43,18 +54,44 @@ def _sphere(*, radius: float, E: float, nu: float, rho: float) -> Striker:
     return Striker.sphere(Material(E=E, nu=nu, rho=rho), radius)
 
 
-def target_values(*, mass=None, first_frequency=None, nu=0.3, damping_ratio=0.0, source="auto") -> dict[str, Any]:
-    """Check the table [target]: mass and first frequency to scale to, nu without a material, damping and source."""
+def _bar(
+    *, E: float, rho: float, length: float, width: Any = None, height: Any = None, diameter: Any = None,
+    left: str = "free", right: str = "free", at: float, nu: float = 0.3,
+) -> Striker:  # fmt: skip
+    section = _beam(Material(E=E, nu=nu, rho=rho), width=width, height=height, diameter=diameter)
+    body, held = mesh.line(length), {"left": left, "right": right}
+    find = closed_form(body, section, held) or partial(find_modes, assemble(body, section, held))
+    return replace(Striker.flexible(find(n_modes=BAR_MODES), at=at), fixed=False)
+
+
+def target_values(
+    *, mass=None, first_frequency=None, nu=0.3, damping_ratio=0.0, point_masses=(), source="auto"
+) -> dict[str, Any]:
+    """Check the table [target].
+
+    It has mass and first frequency to scale to, nu without a material, damping, point masses and the source of modes.
+    """
     check.between("nu", nu, -1.0, 0.5)
-    check.non_negative("damping_ratio", damping_ratio)
     scale = {"mass": (mass, "kg"), "first_frequency": (first_frequency, "Hz")}
     given = {name: check.positive(name, value, unit) for name, (value, unit) in scale.items() if value is not None}
     return {
         "scale": given,
         "nu": nu,
-        "damping_ratio": damping_ratio,
+        "damping_ratio": over_frequency("damping_ratio", damping_ratio),
+        "point_masses": tuple(_weight(i, entry) for i, entry in enumerate(point_masses)),
         "source": check.one_of("source", source, SOURCES),
     }
+
+
+def _weight(i: int, entry: Any) -> tuple[Any, float]:
+    if not isinstance(entry, dict) or set(entry) != {"at", "mass"}:
+        raise ValueError(f"point_masses[{i}] must have at and mass, got {check.shown(entry)}")
+    return entry["at"], check.positive(f"point_masses[{i}].mass", entry["mass"], "kg")
+
+
+def supports_of(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The supports of a scene: edge -> "clamped", "hinged", "free" or `Elastic`, from {stiffness, rotation}."""
+    return {edge: Elastic(**kind) if isinstance(kind, dict) else kind for edge, kind in values.items()}
 
 
 def _observe(*, points: Any = None, listener: Any = None) -> None:
@@ -89,6 +126,7 @@ def _along(name: str, values: Any) -> np.ndarray:
     return np.geomspace(check.positive(f"{name}.from", low), check.positive(f"{name}.to", high), count)
 
 
+BAR_MODES = 96  # [-] modes of a bar that strikes; each blow keeps as many of them as it needs
 MOST_VALUES = 10**6  # [-] most values along one axis of a map
 SOURCES = ("auto", "fe", "analytic")
 # Functions that build each part of a scene; their arguments are the keys of its table.
@@ -106,9 +144,9 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
         },
     ),
     "material": ("", {"": Material}),
-    "section": ("kind", {"plate": Plate, "beam": _beam}),
+    "section": ("kind", {"plate": _plate, "beam": _beam}),
     "target": ("", {"": target_values}),
-    "striker": ("kind", {"rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick}),
+    "striker": ("kind", {"rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick, "bar": _bar}),
     "contact": (
         "kind",
         {
@@ -176,8 +214,17 @@ def read_part(path: Path, table: str, values: dict[str, Any], folder: Path) -> P
         raise wrong(f"{bad[0]} must be finite, got {bad[1]}")
     if table == "supports":
         for edge, support in values.items():
-            if support not in SUPPORTS:
-                raise wrong(f"{edge} must be one of {', '.join(SUPPORTS)}, got {check.shown(support)}")
+            if isinstance(support, dict):
+                try:
+                    _check_keys("", "", support, Elastic)
+                    Elastic(**support)
+                except ValueError as error:
+                    raise wrong(f"{edge}: {error}") from None
+            elif support not in SUPPORTS:
+                raise wrong(
+                    f"{edge} must be one of {', '.join(SUPPORTS)} or {{ stiffness, rotation }}, got "
+                    f"{check.shown(support)}"
+                )
         return Part("", MappingProxyType(values))
     selector, makers = MAKERS[table]
     values = dict(values)

@@ -67,7 +67,8 @@ def words(scene: Scene, response: Response) -> list[str]:
     if scene.mesh.kind == "disk":
         kind, extent = "disk", f"{si(2.0 * scene.mesh.values['radius'], 'm')} diameter"
     flexible = modes.frequencies[modes.omega > 0.0]
-    held = dict(scene.supports.values) or {"boundary": "free"}
+    told = scene.supports.values or {"boundary": "free"}
+    held = {edge: how if isinstance(how, str) else "held by springs" for edge, how in told.items()}
     if len(set(held.values())) == 1 and ("boundary" in held or len(held) == len(scene.body().edges) - 1):
         edges = next(iter(held.values())) + (" all round" if modes.dimension == 2 else " at both ends")
     else:
@@ -83,6 +84,7 @@ def words(scene: Scene, response: Response) -> list[str]:
         "stick": f"a stick of {si(striker.mass, 'kg')}, hinged at its far end",
         "sphere": f"a ball of {si(striker.mass, 'kg')}",
         "rigid": f"a rigid mass of {si(striker.mass, 'kg')}",
+        "bar": f"a flexible bar of {si(striker.mass, 'kg')}",
     }[scene.striker.kind]
     if scene.striker.kind == "stick":
         bending = striker.modes.frequencies[striker.modes.omega > 0.0][0]

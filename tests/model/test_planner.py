@@ -10,7 +10,7 @@ import fem_impact as fi
 from fem_impact._base import check
 from fem_impact.fe import assembly, refinement
 from fem_impact.impact.quantities import USUAL, asked_for
-from fem_impact.model import plan, planner
+from fem_impact.model import planner
 
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 BALL = """
@@ -229,7 +229,7 @@ def test_costly_plan_says_so():
 
 def test_modes_of_a_costly_plan_are_kept_and_taken_up_again(tmp_path, monkeypatch):
     """Broken off after the modes were found, the next run starts with them; other modes are found anew."""
-    monkeypatch.setattr(plan, "COSTLY", (0.0, 0.0))
+    monkeypatch.setattr(planner, "COSTLY", (0.0, 0.0))
     scene, keep = fi.load_scene(SCENES / "marked_linear.toml"), tmp_path / "modes.npz"
     solved = []
     solve = refinement.solve

@@ -1,0 +1,169 @@
+"""What is struck: a body to assemble, an assembled `System` or finished `Modes`, and how its modes are found."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from ..fe import refinement
+from ..fe.assembly import System, assemble, reassemble
+from ..fe.section import Beam, Plate
+from ..mesh.meshes import Mesh
+from ..modes import analytic, modal
+from ..modes.modal import Damping, FieldShapes, Modes
+
+WORST_FREQUENCY = 0.1  # [-] largest frequency error that `find_modes` accepts as a tolerance
+
+Watch = Callable[[str], AbstractContextManager[Any]]
+Blame = Callable[[str], AbstractContextManager[Any]]  # takes "mesh", "supports", ...; says where an error comes from
+
+
+class Stages:
+    """Wall time of each stage; ``watch`` may display the stages."""
+
+    def __init__(self, watch: Watch | None = None) -> None:
+        self.watch = watch or (lambda name: nullcontext())
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[None]:
+        start = perf_counter()
+        try:
+            with self.watch(name):
+                yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """The struck body. Its modes are found at its own mass and stiffness, then scaled and damped."""
+
+    mesh: Mesh | None = None  # None if only modes are known
+    section: Plate | Beam | None = None
+    supports: Mapping[str, Any] = field(default_factory=dict)
+    point_masses: tuple = ()
+    scale: Mapping[str, float] = field(default_factory=dict)  # mass [kg], first_frequency [Hz] to scale to
+    damping_ratio: Damping | None = None  # None keeps that of the modes
+    source: str = "auto"  # "fe", "analytic" or "auto": closed formulas if there are any and no size is stated
+    system: System | None = None  # assembled by the user
+    modes: Modes | None = None  # found by the user
+    blame: Blame = nullcontext
+
+    def __post_init__(self) -> None:
+        if self.source == "analytic" and self.closed is None:
+            raise ValueError(
+                "source = 'analytic' covers beams of constant section, rectangles hinged all round and disks without "
+                "a hole held alike all round, isotropic and without springs or masses; use source = 'fe'"
+            )
+
+    @classmethod
+    def of(cls, body: "System | Modes", damping_ratio: Damping | None = None) -> "Target":
+        """The target that a user has assembled, or whose modes a user has found."""
+        if isinstance(body, Modes):
+            return cls(modes=body, damping_ratio=damping_ratio)
+        held, masses = body.supports, body.point_masses
+        return cls(body.mesh, body.section, held, masses, {}, damping_ratio, "fe", body)
+
+    @property
+    def closed(self) -> Callable[..., Modes] | None:
+        """Closed formulas for this body, see `analytic.closed_form`; None if there are none."""
+        if self.mesh is None or self.section is None or self.point_masses:
+            return None
+        return analytic.closed_form(self.mesh, self.section, dict(self.supports))
+
+    @property
+    def kind(self) -> str:
+        """Where the modes come from: "modes", "fe" or "analytic"."""
+        if self.modes is not None:
+            return "modes"
+        if self.source != "auto":
+            return self.source
+        return "fe" if self.size_stated or self.closed is None else "analytic"
+
+    @property
+    def size_stated(self) -> bool:
+        """Whether the user chose the element size."""
+        return self.mesh is not None and self.mesh.size_stated
+
+    def finished(self, modes: Modes) -> Modes:
+        """The modes as struck: scaled and damped."""
+        modes = modes.scaled(**self.scale) if self.scale else modes
+        return modes if self.damping_ratio is None else modes.damped(self.damping_ratio)
+
+    def find(
+        self,
+        n_modes: int,
+        max_frequency: float | None = None,
+        *,
+        tolerance: float,
+        size: float | None = None,
+        first: Modes | None = None,
+        stages: Stages | None = None,
+        keep: Any = None,
+    ) -> Modes:
+        """Modes before `finished`: the first ``n_modes``, or those up to a frequency [Hz] if it is given.
+
+        Parameters
+        ----------
+        tolerance : float [-]
+            Largest error of the first modes' frequencies.
+        size : float [m], optional
+            Element size that replaces the mesh's own.
+        first : Modes, optional
+            Modes found before; their mesh is refined if it cannot resolve the frequency.
+        stages : Stages, optional
+            Measures meshing and assembly.
+        keep : path of an .npz file, optional
+            As in `find_modes`.
+        """
+        reach: dict[str, Any] = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}
+        if self.modes is not None:
+            return self.modes.truncated(**reach)
+        insisted, wanted = size is not None or self.size_stated, None
+        if self.kind == "analytic" and (size is None or self.source == "analytic"):
+            body = None
+        elif first is None:
+            body = self._system(size, stages or Stages())
+            wanted = None if insisted else min(tolerance, WORST_FREQUENCY)
+        else:  # start from the mesh of the first modes and refine it if it cannot resolve the shortest wave
+            assert isinstance(first.shapes, FieldShapes)
+            body = first.shapes.system
+            enough = insisted or (max_frequency is not None and refinement.resolves(body, max_frequency))
+            body = replace(body, mesh=replace(body.mesh, size_stated=enough))
+        with self.blame("mesh"), np.errstate(all="ignore"):  # an overflow becomes inf, which the checks refuse
+            if body is not None:
+                return modal.find_modes(body, **reach, tolerance=wanted, keep=keep)
+            assert self.closed is not None
+            return self.closed(**reach)
+
+    def growth(self, low: float, high: float) -> float:
+        """How many times more modes there are below a frequency [Hz] than below a lower one, by Weyl's law."""
+        section = self.section
+        if not isinstance(section, Plate) or not section.tension or self.mesh is None:
+            body = self.modes or self.mesh
+            return (high / low) ** (0.5 * (2 if body is None else body.dimension))
+        # A stretched plate: omega**2 inertia = bending k**4 + tension k**2, and the number goes as k**2.
+        middle = self.mesh.points[self.mesh.cells].mean(axis=1)
+        bending, inertia = float(section.stiffness(middle)[:, 0, 0].mean()), float(section.inertia(middle).mean())
+        far, near = (
+            np.sqrt(section.tension**2 + 4.0 * bending * inertia * (2.0 * np.pi * f) ** 2) - section.tension
+            for f in (high, low)
+        )
+        return float(far / near)
+
+    def _system(self, size: float | None, stages: Stages) -> System:
+        """The assembled body, with elements of the given size [m]."""
+        assert self.mesh is not None and self.section is not None
+        mesh = self.mesh
+        if size is not None:
+            with stages("mesh"), self.blame("mesh"):
+                mesh = mesh.refined(mesh.size / check.positive("size", size, "m"))
+        if self.system is not None:
+            return self.system if size is None else reassemble(self.system, mesh)
+        with stages("assembly"), self.blame("supports"), np.errstate(all="ignore"):
+            return assemble(mesh, self.section, dict(self.supports), point_masses=self.point_masses)

@@ -1,0 +1,97 @@
+"""What varies in space or over frequency, as a scene file can write it: a table of values or a list of cases."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+
+from .._base import check
+
+AXES = ("x", "y")
+SHAPES = ({"value", "centre", "radius"}, {"value", "from", "to"})
+
+
+def varying(name: str, value: Any, dimension: int) -> Any:
+    """A number, or a function of points (n_points, dimension) [m], from what a scene says.
+
+    Parameters
+    ----------
+    name : str
+    value : float or dict
+        A number; a table ``{x = [...], values = [...]}``, on a plate ``{x = [...], y = [...], values = [[...], ...]}``
+        with one row of values for each x, linear in between and constant beyond; or
+        ``{cases = [...], otherwise = 3e-3}``, where each case is ``{value, centre, radius}`` or ``{value, from, to}``
+        (opposite corners) and the first that holds counts.
+    dimension : int
+        2 on a plate, 1 on a beam.
+    """
+    if not isinstance(value, dict):
+        return value
+    if "cases" in value:
+        return _cases(name, value, dimension)
+    axes = AXES[:dimension]
+    if set(value) != {*axes, "values"}:
+        raise ValueError(
+            f"{name} must be a number, a table with {', '.join(axes)} and values, or cases with otherwise; "
+            f"got {check.shown(value)}"
+        )
+    grid = [check.array(f"{name}.{axis}", value[axis], (None,), "m") for axis in axes]
+    for axis, along in zip(axes, grid):
+        if len(along) < 2 or (np.diff(along) <= 0.0).any():
+            raise ValueError(f"{name}.{axis} must be at least two ascending numbers, got {check.shown(value[axis])}")
+    table = check.array(f"{name}.values", value["values"], tuple(map(len, grid)), "m")
+    between = RegularGridInterpolator(grid, table)
+    low, high = ([along[end] for along in grid] for end in (0, -1))
+    return lambda points: between(np.clip(points, low, high))
+
+
+def _cases(name: str, value: dict, dimension: int) -> Callable[[np.ndarray], np.ndarray]:
+    """A function that is constant in parts."""
+    if set(value) != {"cases", "otherwise"} or not isinstance(value["cases"], list):
+        raise ValueError(f"{name} must have cases, a list, and otherwise; got {check.shown(value)}")
+    otherwise = check.positive(f"{name}.otherwise", value["otherwise"], "m")
+    cases = []
+    for i, case in enumerate(value["cases"]):
+        where = f"{name}.cases[{i}]"
+        if not isinstance(case, dict) or set(case) not in SHAPES:
+            raise ValueError(
+                f"{where} must have value, centre and radius, or value, from and to; got {check.shown(case)}"
+            )
+        inside = check.positive(f"{where}.value", case["value"], "m")
+        if "radius" in case:
+            centre = check.array(f"{where}.centre", np.atleast_1d(case["centre"]), (dimension,), "m")
+            cases.append((inside, centre, check.positive(f"{where}.radius", case["radius"], "m")))
+        else:
+            ends = [
+                check.array(f"{where}.{end}", np.atleast_1d(case[end]), (dimension,), "m") for end in ("from", "to")
+            ]
+            cases.append((inside, np.minimum(*ends), np.maximum(*ends)))
+
+    def at(points: np.ndarray) -> np.ndarray:
+        result = np.full(len(points), otherwise)
+        for inside, first, second in reversed(cases):  # the first case that holds counts
+            if isinstance(second, float):
+                here = np.linalg.norm(points - first, axis=1) <= second
+            else:
+                here = ((points >= first) & (points <= second)).all(axis=1)
+            result[here] = inside
+        return result
+
+    return at
+
+
+def over_frequency(name: str, value: Any) -> Any:
+    """A number, or a function of frequency [Hz] from ``{frequency = [...], ratio = [...]}``.
+
+    It is linear in between and constant beyond.
+    """
+    if not isinstance(value, dict):
+        return check.non_negative(name, value)
+    if set(value) != {"frequency", "ratio"}:
+        raise ValueError(f"{name} must be a number or have frequency and ratio, got {check.shown(value)}")
+    frequency = check.ascending(f"{name}.frequency", value["frequency"], "Hz")
+    ratio = check.array(f"{name}.ratio", value["ratio"], frequency.shape)
+    if (ratio < 0.0).any():
+        raise ValueError(f"{name}.ratio must not be negative, got {ratio.min():g}")
+    return lambda hertz: np.interp(hertz, frequency, ratio)
