@@ -301,8 +301,9 @@ def _parser() -> argparse.ArgumentParser:
     doctor = verbs.add_parser("doctor", help="check this installation and suggest a remedy for each failure")
     doctor.set_defaults(run=_doctor)
 
-    completion = verbs.add_parser("completion", help="print a completion script for bash: eval it in ~/.bashrc")
-    completion.set_defaults(run=lambda options: print(_completion(parser)))
+    completion = verbs.add_parser("completion", help="print a script that completes commands; eval it in ~/.bashrc")
+    completion.add_argument("shell", choices=("bash", "zsh", "tcsh"), nargs="?", default="bash", help="default: bash")
+    completion.set_defaults(run=lambda options: print(_completion(parser, options.shell)))
     return parser
 
 
@@ -574,26 +575,16 @@ def _doctor(options: argparse.Namespace) -> None:
         raise fi.SimulationError(f"{', '.join(failed)}: not working; see above")
 
 
-def _completion(parser: argparse.ArgumentParser) -> str:
-    """A bash script that completes the command, then its options and file names."""
+def _completion(parser: argparse.ArgumentParser, shell: str) -> str:
+    """A script that completes commands, options and file names."""
+    from ._base import check  # imports numpy, which --help and --version do not need
+
+    shtab = check.extra("shtab", "completion", "completion")
     (verbs,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
-    cases = [
-        f"        {name}) words='{' '.join(word for action in verb._actions for word in action.option_strings)}' ;;"
-        for name, verb in verbs.choices.items()
-    ]
-    return "\n".join(
-        [
-            "_fem_impact() {",
-            "    local words='--help --version'",
-            '    case "${COMP_WORDS[1]}" in',
-            *cases,
-            "    esac",
-            '    [ "$COMP_CWORD" = 1 ] && words="$words ' + " ".join(verbs.choices) + '"',
-            '    COMPREPLY=($(compgen -W "$words" -- "${COMP_WORDS[COMP_CWORD]}"))',
-            "}",
-            "complete -o default -F _fem_impact fem-impact",
-        ]
-    )
+    for action in (action for verb in verbs.choices.values() for action in verb._actions):
+        if action.type is _place:
+            action.complete = shtab.FILE
+    return shtab.complete(parser, shell)
 
 
 def _wrapped(text: str) -> str:

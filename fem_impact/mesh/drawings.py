@@ -109,7 +109,6 @@ def svg_arrays(path: Path) -> dict[str, np.ndarray]:
     import svgelements
 
     _refuse_entities(path)
-    isolated.confine(path)
     drawing = svgelements.SVG.parse(str(path))
     if not isinstance(drawing, svgelements.SVG):
         raise ValueError("it contains no <svg> element")
@@ -178,7 +177,6 @@ def dxf_arrays(path: Path) -> dict[str, np.ndarray]:
     """Pieces and unit of a DXF file; runs in the reader process (see `isolated`)."""
     import ezdxf
 
-    isolated.confine(path)
     drawing = ezdxf.readfile(path)
     found: list[Piece] = []
     for entity in drawing.modelspace():
