@@ -1,7 +1,7 @@
 """Read a file with another library in a separate process.
 
 Some parsers hang, fill the memory or crash. The separate process has limits on time and memory, and any failure becomes
-a one-line error message. It is not a sandbox: a reader has all rights of the user, so that a file can make it read other
+a one-line error message. It is not a sandbox: the reader has all rights of the user, so a file can make it read other
 files, as the includes of an Abaqus deck do. Read files of unknown origin in a container.
 """
 

@@ -37,6 +37,7 @@ class HermiteSpace:
     def __init__(self, mesh: MeshLine) -> None:
         ends = mesh.p[0, mesh.t]  # (2, n_cells)
         self.start, self.length = ends[0], ends[1] - ends[0]
+        self.origin = self.start[:, None]  # (n_cells, 1)
         self.bubbles = np.broadcast_to(np.eye(DEGREE - 3), (len(self.start), DEGREE - 3, DEGREE - 3))  # Legendre
 
     def decouple(self, K: np.ndarray, M: np.ndarray) -> None:
