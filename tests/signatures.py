@@ -196,6 +196,7 @@ def table() -> dict[str, dict[str, Any]]:
         "Response.displacement": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "body": -1, "residual": True},
         "Response.velocity": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "body": -1, "residual": True},
         "Response.modal_state": {"self": t["hit"], "times": [0.0, 1e-3], "body": -1},
+        "Response.modal_energy": {"self": t["hit"], "times": [0.0, 1e-3], "body": -1},
         "Response.spectral_centroid": {"self": t["hit"], "max_frequency": 5e3},
         "Response.spectrum": {"self": t["hit"], "frequencies": [0.0, 1e3]},
         "mobility": {"modes": t["modes"], "at": at, "to": (0.2, 0.2), "frequencies": [50.0, 60.0]},

@@ -7,16 +7,15 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.special import gamma
 
 from .._base import check
 from .._base.check import SimulationError
 from ..modes.modal import Modes, left_out
-from . import accuracy
+from . import accuracy, force_spectrum
 from .compiled import build, record
 from .compiled.collocation import run_collocation
 from .compiled.energy import run_energy
-from .contact import Contact
+from .contact import Contact, wall_time
 from .quantities import asked_for
 from .response import Dip, Error, History, Response
 from .striker import Striker
@@ -463,22 +462,13 @@ def _pace(system: _System) -> tuple[float, float]:
             speed = max(speed, approach * np.sqrt(k * approach ** (exponent - 1.0) * mobile[-1]))
         if speed == 0.0:
             continue
-        free = _wall_duration(k, exponent, mobile, speed)
-        if exponent == 1.0:
-            free = free * np.sqrt(1.0 + k * compliance)
+        free = wall_time(k, exponent, mobile, speed, compliance)
         shortest = min(shortest, float(free[np.argmax(np.pi / free < above)]))
         fastest = max(fastest, float(speed))
     if not np.isfinite(shortest):
         k, exponent = system.law[0, :2]
         return float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0
     return shortest, fastest
-
-
-def _wall_duration(k: float, exponent: float, mobility: np.ndarray, speed: float) -> np.ndarray:
-    """Contact times [s] of masses 1/mobility on a rigid wall; logarithms avoid overflow."""
-    q = 1.0 / (exponent + 1.0)
-    deepest = np.exp(q * (2.0 * np.log(speed) - np.log(2.0 * q * k) - np.log(mobility)))
-    return 2.0 * np.sqrt(np.pi) * gamma(1.0 + q) / gamma(0.5 + q) * deepest / speed
 
 
 def _scheme_for(tolerance: float, exponent: float) -> str:
@@ -515,7 +505,7 @@ def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance
     modes = striker.modes
     law: dict[str, Any] = {"contact": contact, "mass": striker.felt_mass, "speed": speed}
     allowed = STRIKER_SHARE * tolerance / (LOSSY_STRIKER if contact.loss else 1.0)
-    omega_0 = np.pi / accuracy.contact_duration(**law)
+    omega_0 = 2.0 * np.pi * accuracy.contact_resonance(**law)
     whole = modes.truncated(n_modes=modes.n_rigid).residual_compliance(striker.at[None])[0, 0]
     if striker.felt_mass * omega_0**2 * whole <= allowed:
         return modes.n_rigid, allowed
@@ -680,7 +670,10 @@ def _difference(
     for name, band in quantities.items():
         if band is not None:
             frequencies = np.linspace(0.0, band, BAND_POINTS)
-            first, second = (_force_spectrum(history, frequencies) for history in (coarse, fine))
+            first, second = (
+                force_spectrum.of_pieces(force_spectrum.pieces(*history.samples(1.0)), frequencies)
+                for history in (coarse, fine)
+            )
             found[name] = float(np.abs(first - second).max() / (np.abs(second).max() or 1.0)) / over[0]
     return max(ROUNDING, *(float(found.get(name, 0.0)) for name in quantities))
 
@@ -721,10 +714,6 @@ def _totals(history: History) -> tuple[float, float, float]:
     """Impulse [N s], contact time [s] and peak force [N] of a run with impacts."""
     rows = history.contacts.tolist()
     return sum(row[3] for row in rows), sum(row[1] - row[0] for row in rows), max(row[2] for row in rows)
-
-
-def _force_spectrum(history: History, frequencies: np.ndarray) -> np.ndarray:
-    return Response((), (), history, 1.0, 1.0, "", Error(0.0, 0.0, 0.0)).spectrum(frequencies)
 
 
 def _sensitivity(coarse: History, fine: History) -> float:

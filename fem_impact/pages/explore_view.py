@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from .._base.check import SimulationError
+from ..impact import force_spectrum
 from ..impact.contact import Contact
 from ..impact.response import Response
 from ..scenes.sentences import RAISED, place, power, si
 from ..show import sound
 from ..sweeps.grid import Case
 from . import report
-from .explore_model import Bench, Picture, Settings, blow, limit_of, resonance_of, spectrum
+from .explore_model import Bench, Picture, Settings, blow, limit_of
 
 BAND = (20.0, 20e3)  # [Hz] of the spectrum
 SPECTRUM_POINTS = 240  # [-] more points take time but show no more
@@ -269,7 +270,7 @@ class Page:
         at = settings.at if len(settings.at) > 1 else (*settings.at, 0.0)
         self._put("at", x=[at[0]], y=[at[1]])
         self._put("here", x=[settings.mass], y=[settings.stiffness])
-        resonance, limit = resonance_of(case), self._limit(case)
+        resonance, limit = case.resonance, self._limit(case)
         self.resonance.location, self.threshold.location = resonance, min(max(limit, 1.0), 1e9)
         try:
             self.hit = blow(case)
@@ -301,7 +302,7 @@ class Page:
         shown = hit.time <= end
         self.sources["force-data"].data = {"x": hit.time[shown], "y": hit.force[shown]}
         frequencies = np.geomspace(*BAND, SPECTRUM_POINTS)
-        size = spectrum(hit, frequencies)
+        size = force_spectrum.magnitude(hit.time, hit.force, frequencies)
         top = float(size.max()) or 1.0
         self.sources["spectrum-data"].data = {"x": frequencies, "y": np.maximum(size, 0.1 * DEPTH * top)}
         self.document.get_model_by_name("spectrum").y_range.update(start=DEPTH * top, end=2.0 * top)

@@ -291,7 +291,7 @@ def _plots(response: Response) -> dict[str, Any]:
     shown = response.time <= end
     frequencies = _frequencies(response)
     times = np.linspace(0.0, end, ENERGY_TIMES)
-    energy = [_energy(response, times, body) for body in (0, -1)]
+    energy = [response.modal_energy(times, body=body) for body in (0, -1)]
     moving = (modes.omega > 0.0) & (modes.frequencies < 2.0 * frequencies[-1])
     last = response.impacts[-1].end if response.impacts else 0.0
     return {
@@ -307,7 +307,7 @@ def _plots(response: Response) -> dict[str, Any]:
         },
         "modal": {
             "x": _short(modes.frequencies[moving]),
-            "y": _short(_energy(response, np.array([last]), -1)[0, moving]),
+            "y": _short(response.modal_energy([last])[0, moving]),
         },
         "view": _view(response, end),
     }
@@ -316,12 +316,6 @@ def _plots(response: Response) -> dict[str, Any]:
 def _frequencies(response: Response) -> np.ndarray:
     shortest = min((impact.duration for impact in response.impacts), default=1.0)
     return np.geomspace(BAND[0], max(BAND[1], LOBES / shortest), SPECTRUM_POINTS)
-
-
-def _energy(response: Response, times: np.ndarray, body: int) -> np.ndarray:
-    """Energy [J] of each mode of a body, (n_times, n_modes)."""
-    q, p = response.modal_state(times, body=body)
-    return 0.5 * (p**2 + (response.bodies[body].omega * q) ** 2)
 
 
 def _view(response: Response, end: float) -> dict[str, Any]:

@@ -13,7 +13,6 @@ import xarray
 
 from .._base import check
 from ..impact import accuracy, threshold
-from ..impact.contact import Contact
 from ..model import planner
 from ..show import figures, plots
 from ..sweeps import grid, hammers
@@ -183,7 +182,7 @@ def with_theory(table: xarray.Dataset, case: grid.Case, axes: Mapping[str, np.nd
         (
             "contact_resonance",
             ("mass", "striker_frequency", "stiffness", "exponent", "speed"),
-            _resonance,
+            lambda cell: cell.resonance,
             "one over twice the contact time on a rigid wall",
         ),
         (
@@ -202,11 +201,6 @@ def with_theory(table: xarray.Dataset, case: grid.Case, axes: Mapping[str, np.nd
             found[place] = find(cell)
         table[name] = (tuple(mine), found, {"units": "Hz", "long_name": meaning})
     return table
-
-
-def _resonance(case: grid.Case) -> float:
-    law = Contact(case.contact.stiffness, case.contact.exponent)
-    return 0.5 / accuracy.contact_duration(law, case.striker.felt_mass, case.speed)
 
 
 def _threshold(case: grid.Case) -> float:

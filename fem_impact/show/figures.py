@@ -126,10 +126,7 @@ def energies(response: Response) -> Figure:
     """Plot the energy of striker and struck body during the blow, and the rest: in the contact or lost."""
     end = (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
     times = np.linspace(0.0, (1.0 + MARGIN) * end, TIMES)
-    parts = []
-    for body in (0, -1):
-        q, p = response.modal_state(times, body=body)
-        parts.append(0.5 * (p**2 + (response.bodies[body].omega * q) ** 2).sum(axis=1))
+    parts = [response.modal_energy(times, body=body).sum(axis=1) for body in (0, -1)]
     with _styled(7.0, 3.6) as figure:
         axes = figure.subplots()
         axes.plot(times, parts[0], label="striker")
@@ -146,8 +143,7 @@ def energies(response: Response) -> Figure:
 def mode_energies(response: Response) -> Figure:
     """Plot the energy of each mode of the struck body when the striker leaves, over its frequency."""
     end = response.impacts[-1].end if response.impacts else 0.0
-    q, p = response.modal_state([end])
-    energy = 0.5 * (p**2 + (response.target.omega * q) ** 2)[0]
+    energy = response.modal_energy([end])[0]
     shown = (response.target.omega > 0.0) & (energy > 0.0)
     top = float(energy[shown].max(initial=0.0)) or 1.0
     with _styled(7.0, 3.6) as figure:

@@ -15,6 +15,7 @@ import xarray
 
 from .._base import check
 from .._base.check import SimulationError
+from ..impact import accuracy
 from ..impact.collision import strike
 from ..impact.contact import Contact
 from ..impact.response import Response
@@ -81,6 +82,11 @@ class Case:
     contact: Contact
     at: np.ndarray  # (dimension,) [m]
     speed: float  # [m/s]
+
+    @property
+    def resonance(self) -> float:
+        """Contact resonance [Hz] of the striker on a rigid wall."""
+        return accuracy.contact_resonance(self.contact, self.striker.felt_mass, self.speed)
 
     def changed(self, name: str, value: Any) -> "Case":
         """The same blow with one parameter of `AXES` replaced."""
