@@ -14,7 +14,7 @@ from ..mesh.meshes import Mesh, aligned
 from . import beam_elements
 from .beam_elements import HermiteSpace
 from .corners import around_corners
-from .elements import Argyris, ArgyrisSpace, Bent, BentMapping, Morley, MorleySpace, numbering, quadrature, triangles
+from .elements import ArgyrisSpace, Bent, BentMapping, MorleySpace, numbering, quadrature, triangles
 from .section import Beam, Elastic, Plate
 from .splitting import towards_points
 from .springs import beam_springs, check_masses, edge_springs, plate_springs
@@ -350,7 +350,7 @@ def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, masses: list, mark
     space = HermiteSpace(line)
     K, M, stiffness, inertia, dx = beam_elements.integrals(space, fields)
     frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
-    dofs, n_all = beam_elements.numbering(line, space)
+    dofs, n_all = numbering(line, space)
     fixed = np.zeros(n_all, bool)
     sprung: list[tuple[tuple[int, int], Elastic]] = []
     for vertex, kind in zip(mesh.facets[:, 0], kinds):
@@ -409,8 +409,7 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict, masses: list) ->
     bent = _bent(mesh, centre, length, points, plane)
     mapping = None if bent is None else BentMapping(plane, bent)
     space = ArgyrisSpace(plane, bent)
-    element = Argyris(space)
-    x, dx = quadrature(plane, element, MASS_ORDER, mapping)
+    x, dx = quadrature(plane, space, MASS_ORDER, mapping)
     frame, stiffness, inertia, softness = _plate_fields(section, x, centre, length)
     weighted = stiffness * dx[..., None, None], inertia * dx
     K, M = np.empty((len(x), 21, 21)), np.empty((len(x), 21, 21))
@@ -424,7 +423,7 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict, masses: list) ->
     held = support_of_facets(mesh, supports)
     elastic = edge_springs(held, frame)
     rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, _kinds(held), elastic)
-    expand, project, dofs = constrain(rim, space.vertices, *numbering(plane, element))
+    expand, project, dofs = constrain(rim, space.vertices, *numbering(plane, space))
     n_all = expand.shape[0]
     springs = csc_matrix((n_all, n_all))
     on = np.flatnonzero(elastic.any(axis=1))
@@ -457,10 +456,10 @@ def _assemble_morley(mesh: Mesh, section: Plate, supports: dict, masses: list) -
     centre, length, points = _centred(mesh)
     plane = triangles(points, mesh.cells)
     space = MorleySpace(plane)
-    x, dx = quadrature(plane, Morley(), MORLEY_ORDER)
+    x, dx = quadrature(plane, space, MORLEY_ORDER)
     frame, stiffness, inertia, softness = _plate_fields(section, x, centre, length)
     K, M = _integrated(space, np.arange(len(x)), x, stiffness * dx[..., None, None], inertia * dx)
-    dofs, n_all = numbering(plane, Morley())
+    dofs, n_all = numbering(plane, space)
     cells, sides = cells_of_facets(mesh.facets, space.vertices)
     fixed = np.zeros(n_all, bool)
     for facet, kind in enumerate(held):

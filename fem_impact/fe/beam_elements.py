@@ -9,8 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from skfem import Dofs, ElementLineHermite, MeshLine
-from skfem.element import DiscreteField
+from skfem import ElementLineHermite, MeshLine
 
 from ..mesh.facets import powers
 
@@ -28,11 +27,19 @@ ROUNDING = 1e-14  # [-] a smaller misfit is just rounding
 MOST_BREAKS = 2000  # [-] most places where the section may jump or kink
 
 
+class Hermite(ElementLineHermite):
+    """scikit-fem's Hermite element with bubbles, used only to number the unknowns."""
+
+    interior_dofs = DEGREE - 3
+
+
 class HermiteSpace:
     """Shape functions of the elements of one line: deflection and slope at both ends, and bubbles in between.
 
     The bubbles are the modes of the element clamped at both ends, so they do not couple to each other.
     """
+
+    element = Hermite
 
     def __init__(self, mesh: MeshLine) -> None:
         ends = mesh.p[0, mesh.t]  # (2, n_cells)
@@ -103,21 +110,6 @@ def _legendre(x: np.ndarray) -> np.ndarray:
     return result
 
 
-class Hermite(ElementLineHermite):
-    """scikit-fem's Hermite element with the shape functions of `HermiteSpace`; make a new one for each mesh."""
-
-    interior_dofs = DEGREE - 3
-
-    def __init__(self, space: HermiteSpace) -> None:
-        self.space = space
-
-    def gbasis(self, mapping, X, i, tind=None):
-        cells = np.arange(len(self.space.start)) if tind is None else tind
-        points = mapping.F(X, tind=tind).transpose(1, 2, 0)
-        value, slope, bend = (f[..., i] for f in self.space.functions(cells, points, (0, 1, 2)))
-        return (DiscreteField(value=value, grad=slope[None], hess=bend[None, None]),)
-
-
 def segments(nodes: np.ndarray) -> MeshLine:
     """Make scikit-fem's mesh of line elements between ascending nodes (n,)."""
     return MeshLine(nodes[None], np.stack([np.arange(len(nodes) - 1), np.arange(1, len(nodes))]))
@@ -164,12 +156,6 @@ def quadrature(space: HermiteSpace) -> tuple[np.ndarray, np.ndarray]:
     """Gauss points of every element and their weights, both (n_cells, n_q)."""
     node, weight = np.polynomial.legendre.leggauss(QUADRATURE)
     return space.start[:, None] + 0.5 * (node + 1.0) * space.length[:, None], 0.5 * weight * space.length[:, None]
-
-
-def numbering(line: MeshLine, space: HermiteSpace) -> tuple[np.ndarray, int]:
-    """Numbers of the unknowns of each element, (n_local, n_cells), and how many unknowns there are."""
-    dofs = Dofs(line, Hermite(space))
-    return dofs.element_dofs, dofs.N
 
 
 def divisions(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes: np.ndarray) -> np.ndarray:

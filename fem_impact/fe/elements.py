@@ -5,7 +5,6 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 from skfem import Dofs, ElementTriArgyris, ElementTriMorley, MappingAffine, MeshTri
-from skfem.element import DiscreteField
 from skfem.quadrature import get_quadrature
 
 from ..mesh.facets import Curves, powers
@@ -154,6 +153,8 @@ class ArgyrisSpace:
     and its unknowns to the reference directions.
     """
 
+    element = ElementTriArgyris  # scikit-fem's class: it numbers the unknowns
+
     def __init__(self, mesh: MeshTri, bent: Bent | None = None) -> None:
         self.inner = Triangles(mesh, bent)
         self.origin, self.inverse, self.jacobian = self.inner.origin, self.inner.inverse, self.inner.jacobian
@@ -212,7 +213,7 @@ class ArgyrisSpace:
 
         The integrals of products of monomials are the same for all triangles, so they are computed once.
         """
-        X, weight = get_quadrature(Argyris.refdom, order)
+        X, weight = get_quadrature(self.element.refdom, order)
         local = X.T - 1.0 / 3.0
         values = monomials(local, 0, 0)
         bends = np.stack([monomials(local, 2 - k, k) for k in range(3)])  # (3, n_q, 21)
@@ -243,31 +244,14 @@ class ArgyrisSpace:
         return result
 
 
-class Argyris(ElementTriArgyris):
-    """scikit-fem's Argyris element with the shape functions of `ArgyrisSpace`; make a new one for each mesh."""
-
-    def __init__(self, space: ArgyrisSpace) -> None:
-        self.space = space
-        self.fields: list[np.ndarray] = []
-        self.asked: object = None
-
-    def gbasis(self, mapping, X, i, tind=None):
-        cells = np.arange(len(self.space.origin)) if tind is None else tind
-        if X is not self.asked:
-            points = mapping.F(X, tind=tind).transpose(1, 2, 0)  # (n_cells, n_q, 2)
-            self.fields, self.asked = self.space.functions(cells, points, (0, 1, 2)), X
-        value, gradient, hessian = self.fields
-        xx, xy, yy = hessian[:, 0, :, i], hessian[:, 1, :, i], hessian[:, 2, :, i]
-        grad = gradient[..., i].transpose(1, 0, 2)
-        return (DiscreteField(value=value[..., i], grad=grad, hess=np.array([[xx, xy], [xy, yy]])),)
-
-
 class MorleySpace:
     """Quadratic Morley shape functions of straight triangles: deflection at corners, slope at mid-sides.
 
     They are continuous only at those points and approach the frequencies from below, while Argyris elements approach
     them from above.
     """
+
+    element = ElementTriMorley
 
     def __init__(self, mesh: MeshTri) -> None:
         self.inner = Triangles(mesh)
@@ -312,10 +296,6 @@ class MorleySpace:
         return result
 
 
-class Morley(ElementTriMorley):
-    """scikit-fem's Morley element, used only to number the unknowns; make a new one for each mesh."""
-
-
 def _quadratic(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
     """Derivative of the six monomials of degree 2 at local coordinates (..., 2), shape (..., 6)."""
     x, y = powers(local[..., 0], 2, dx), powers(local[..., 1], 2, dy)
@@ -328,14 +308,14 @@ def triangles(points: np.ndarray, cells: np.ndarray) -> MeshTri:
     return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
 
 
-def quadrature(mesh, element, order: int, mapping=None) -> tuple[np.ndarray, np.ndarray]:
+def quadrature(mesh, space, order: int, mapping=None) -> tuple[np.ndarray, np.ndarray]:
     """Quadrature on every cell: points (n_cells, n_q, dimension) and weights (n_cells, n_q)."""
-    X, weight = get_quadrature(element.refdom, order)
+    X, weight = get_quadrature(space.element.refdom, order)
     mapping = mesh._mapping() if mapping is None else mapping
     return mapping.F(X).transpose(1, 2, 0), np.abs(mapping.detDF(X)) * weight
 
 
-def numbering(mesh, element) -> tuple[np.ndarray, int]:
+def numbering(mesh, space) -> tuple[np.ndarray, int]:
     """Numbers of the unknowns of each cell, (n_local, n_cells), and how many unknowns there are."""
-    dofs = Dofs(mesh, element)
+    dofs = Dofs(mesh, space.element())  # a new object: scikit-fem's elements remember their first mesh
     return dofs.element_dofs, dofs.N
