@@ -48,7 +48,7 @@ INNER = {
     "Plan.data", "Plan.run", "Plan.strike", "Response.body_slice", "Response.summary", "Scene.picture",
     "mesh.Mesh", "mesh.straight", "mesh.fill", "Modes.points",
     "analytic.RectangleShapes", "analytic.BeamShapes", "analytic.DiskShapes",  # behind the checks of Modes
-    "export.plain", "export.versions", "export.vtk_ending", "figures.snapshot",
+    "export.plain", "export.versions", "export.csv_text", "export.run_data", "export.vtk_ending", "figures.snapshot",
     "figures.in_hertz", "sound.Sound",
     "hammers.Hammer", "hammers.bandwidth_of", "hammers.half_sine_reach",
     "report.Player", "report.audio", "explore.serve",  # serve ends at an interruption only, see test_explore

@@ -1,4 +1,4 @@
-"""Small SVG pictures and HTML tables for notebooks and pages, without a drawing library."""
+"""Tables for the terminal and for notebooks, and small SVG pictures without a drawing library."""
 
 import html
 from collections.abc import Iterable, Mapping, Sequence
@@ -33,6 +33,16 @@ def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = ()) -> str:
         for first, *rest in rows
     )
     return f"<table>{f'<thead><tr>{top}</tr></thead>' if top else ''}<tbody>{body}</tbody></table>"
+
+
+def columns(rows: Iterable[Sequence[Any]], head: Sequence[str] = ()) -> list[str]:
+    """Rows of cells as lines of text: the first column to the left, the others to the right."""
+    cells = [[str(cell) for cell in row] for row in (*([head] if head else []), *rows)]
+    widths = [max(map(len, column)) for column in zip(*cells)]
+    return [
+        "  ".join([row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:]))])
+        for row in cells
+    ]
 
 
 def side_by_side(*parts: str) -> str:

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from .._base import markup
+
 COSTLY = 10.0, 2e9  # [s], [byte] a plan that costs more warns the user
 
 
@@ -81,7 +83,8 @@ class Plan:
         wanted = ", ".join(name if band is None else f"{name} to {band:g} Hz" for name, band in self.quantities.items())
         lines = [f"Plan for {wanted} to {self.tolerance:g}:", *(f"  {line}" for line in self.reasons)]
         lines.append("Predicted errors:")
-        lines += [f"  {name:<22} {error:.1e}" for name, error in [*self.errors.items(), ("total", self.error)]]
+        errors = [*self.errors.items(), ("total", self.error)]
+        lines += [f"  {line}" for line in markup.columns([(name, f"{error:.1e}") for name, error in errors])]
         lines.append(f"Cost: {self.cost}")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")

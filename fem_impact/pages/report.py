@@ -1,7 +1,6 @@
 """Writes one self-contained HTML page about a strike: the scene, the errors, the results and the sound."""
 
 import base64
-import csv
 import io
 import json
 import math
@@ -243,36 +242,23 @@ def audio(samples: np.ndarray, rate: int) -> str:
 
 
 def _downloads(scene: Scene, run: Run) -> list[dict[str, str]]:
-    response = run.response
+    response, modes = run.response, run.response.target
     frequencies = _frequencies(response)
     spectrum = response.spectrum(frequencies)
-    changes = {"tolerance": response.tolerance}
-    data = {**export.numbers(response), "scene": scene.data(**changes), "seconds": dict(run.seconds)}
-    data |= {"plan": run.plan.data(), "notes": list(run.notes), "versions": export.versions()}
-    texts = {
-        "response.json": ("application/json", json.dumps(export.plain(data), indent=2, allow_nan=False)),
-        "force.csv": ("text/csv", _csv(("time [s]", response.time), ("force [N]", response.force))),
-        "spectrum.csv": (
-            "text/csv",
-            _csv(("frequency [Hz]", frequencies), ("real [N s]", spectrum.real), ("imaginary [N s]", spectrum.imag)),
-        ),
-        "modes.csv": (
-            "text/csv",
-            _csv(("frequency [Hz]", response.target.frequencies), ("damping ratio [-]", response.target.damping_ratio)),
-        ),
-    }
+    data = export.run_data(run, scene.data(tolerance=response.tolerance))
+    tables = {
+        "force.csv": {"time [s]": response.time, "force [N]": response.force},
+        "spectrum.csv": {
+            "frequency [Hz]": frequencies, "real [N s]": spectrum.real, "imaginary [N s]": spectrum.imag
+        },
+        "modes.csv": {"frequency [Hz]": modes.frequencies, "damping ratio [-]": modes.damping_ratio},
+    }  # fmt: skip
+    texts = {"response.json": ("application/json", json.dumps(data, indent=2, allow_nan=False))}
+    texts |= {name: ("text/csv", export.csv_text(**columns)) for name, columns in tables.items()}
     return [
         {"name": name, "size": si(len(text.encode()), "B", 3), "uri": _uri(kind, text.encode())}
         for name, (kind, text) in texts.items()
     ]
-
-
-def _csv(*columns: tuple[str, np.ndarray]) -> str:
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow([name for name, _ in columns])
-    writer.writerows(zip(*(values.tolist() for _, values in columns)))
-    return file.getvalue()
 
 
 def _uri(kind: str, raw: bytes) -> str:

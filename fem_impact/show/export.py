@@ -2,6 +2,7 @@
 
 import base64
 import csv
+import io
 import json
 import math
 import platform
@@ -16,23 +17,15 @@ from scipy.io import wavfile
 from .._base import check
 from .._base.files import replacing, staged
 from ..impact.response import Response
+from ..model.planner import Run
 from ..modes import universal_files
 from ..modes.modal import Modes
 from . import sampling, sound
 
 __all__ = [
-    "numbers",
-    "plain",
-    "staged",
-    "versions",
-    "vtk_ending",
-    "write_animation",
-    "write_force",
-    "write_json",
-    "write_uff",
-    "write_vtk",
-    "write_wav",
-]
+    "csv_text", "numbers", "plain", "run_data", "staged", "versions", "vtk_ending", "write_animation", "write_force",
+    "write_json", "write_uff", "write_vtk", "write_wav",
+]  # fmt: skip
 
 CENTROID_BAND = 20e3  # [Hz] upper end of the spectral centroid's band: about the limit of hearing
 PACKAGES = ("fem-impact", "numpy", "scipy", "scikit-fem", "netgen-mesher", "numba")
@@ -161,10 +154,9 @@ def write_wav(
 @check.typed
 def write_force(path: str | Path, response: Response) -> None:
     """Write the force history as CSV in full precision: a header with units, then one row per instant."""
-    with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["time [s]", "force [N]"])
-        writer.writerows(zip(response.time.tolist(), response.force.tolist()))
+    with replacing(path) as temporary:
+        text = csv_text(**{"time [s]": response.time, "force [N]": response.force})
+        temporary.write_text(text, encoding="utf-8", newline="")
 
 
 @check.typed
@@ -189,10 +181,7 @@ def numbers(response: Response) -> dict[str, Any]:
             "impulse": response.impulse,
             "restitution": response.restitution,
             "speed": response.speed,
-            "spectral_centroid": {
-                "value": _centroid(response),
-                "max_frequency": CENTROID_BAND,
-            },
+            "spectral_centroid": {"value": _centroid(response), "max_frequency": CENTROID_BAND},
             "energies": response.energies,
             "dissipated": response.dissipated,
             "energy_error": response.energy_error,
@@ -217,6 +206,21 @@ def _centroid(response: Response) -> float | None:
         return response.spectral_centroid(CENTROID_BAND)
     except ValueError:
         return None
+
+
+def run_data(run: Run, scene: dict[str, Any]) -> dict[str, Any]:
+    """Everything a run found, as plain data: its numbers, plan, notes and seconds, and the tables of its scene."""
+    data = {"plan": run.plan.data(), "scene": scene, "seconds": dict(run.seconds), "notes": list(run.notes)}
+    return plain({**numbers(run.response), **data, "versions": versions()})
+
+
+def csv_text(**columns: np.ndarray) -> str:
+    """Columns of numbers as CSV in full precision, under a header with their names and units."""
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(values.tolist() for values in columns.values())))
+    return file.getvalue()
 
 
 def versions() -> dict[str, str]:
