@@ -51,7 +51,8 @@ INNER = {
     "export.plain", "export.versions", "export.csv_text", "export.run_data", "export.vtk_ending", "figures.snapshot",
     "figures.in_hertz", "sound.Sound",
     "hammers.Hammer", "hammers.bandwidth_of", "hammers.half_sine_reach",
-    "report.Player", "report.audio", "explore.serve",  # serve ends at an interruption only, see test_explore
+    "report.Player", "report.audio", "report.template",
+    "explore.serve",  # ends at an interruption only, see test_explore
     "Modes",
 }  # fmt: skip
 

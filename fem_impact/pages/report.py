@@ -89,14 +89,11 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
     ValueError
         If the extra ``web`` is not installed, or ``run`` has no modes.
     """
-    jinja2, plotly = _tools()
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(WEB), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
-    )
+    _, plotly = _tools()
     response = run.response
     if run.plan.target != "modal":
         raise ValueError(f"run must have target 'modal' because a report shows motion, got {run.plan.target!r}")
-    page = environment.get_template("report.html").render(
+    page = template("report.html").render(
         title=scene.title or scene.path.stem,
         words=words(scene, response),
         picture=scene.picture(),
@@ -122,6 +119,15 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
     )
     with replacing(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def template(name: str) -> Any:
+    """A template of the folder ``web``; it escapes all text."""
+    import jinja2
+
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(WEB), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
+    ).get_template(name)
 
 
 def _command(scene: Scene, response: Response) -> str:
