@@ -97,6 +97,11 @@ def between(name: str, value: Any, low: float, high: float, unit: str = "") -> f
     return result
 
 
+def tolerance(value: Any) -> float:
+    """Return the tolerance of a blow as a float; beyond rounding, none can be met."""
+    return between("tolerance", value, 1e-12, 1.0)
+
+
 def count(name: str, value: Any, low: int = 1, high: int = MOST) -> int:
     """Return ``value`` as an int from ``low`` to ``high``."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):

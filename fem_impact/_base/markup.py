@@ -118,12 +118,6 @@ def held_edges(mesh: Any, supports: Mapping[str, Any]) -> dict[int, str]:
     return {int(i): str(kind) for name, kind in ordered if name in mesh.edges for i in mesh.edges[name]}
 
 
-def rim(cells: np.ndarray) -> np.ndarray:
-    """Sides (n_sides, 2) that belong to a single triangle: the edge of the plate."""
-    sides, counts = np.unique(np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0, return_counts=True)
-    return sides[counts == 1]
-
-
 def _outline(mesh: Any, held: Mapping[int, str], place: Any) -> str:
     """The filled outline and its supported edges; each facet is a parabola through its middle."""
     after = {int(a): (int(b), i) for i, (a, b) in enumerate(mesh.facets)}

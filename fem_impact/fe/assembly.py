@@ -15,12 +15,11 @@ from . import beam_elements
 from .beam_elements import HermiteSpace
 from .corners import around_corners
 from .elements import ArgyrisSpace, Bent, BentMapping, MorleySpace, numbering, quadrature, triangles
-from .section import Beam, Elastic, Plate
+from .section import KINDS, Beam, Elastic, Plate
 from .splitting import towards_points
 from .springs import beam_springs, check_masses, edge_springs, plate_springs
 from .supports import Rim, cells_of_facets, constrain
 
-KINDS = ("clamped", "hinged", "free")
 MORLEY_ORDER = 4  # [-] order of the quadrature on Morley elements; exact for products of quadratics
 MASS_ORDER = 10  # [-] order of the quadrature on Argyris elements; exact for products of quintics
 UNEVEN = 20.0  # [-] above this ratio of triangle sizes, eigenvalues are computed from the strain energy

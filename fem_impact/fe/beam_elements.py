@@ -12,16 +12,15 @@ import numpy as np
 from skfem import ElementLineHermite, MeshLine
 
 from ..mesh.facets import powers
+from .elements import ON_BODY
 
 DEGREE = 32  # [-] polynomial degree of the deflection within an element
-QUADRATURE = 48  # [-] Gauss points of an element; exact for products of two shapes and a section of degree 31
-ON_BODY = 1e-9  # [-] distance in the frame by which rounding may put a point outside its element
+QUADRATURE = 3 * DEGREE // 2  # [-] Gauss points of an element; exact for two shapes and a section of degree 31
 APART = 0.01  # [-] nodes closer than this fraction of the beam cause a rounding error of 1e-9 in the stiffness
-SAME_NODE = 1e-9  # [-] the same at a held end, where deflections are so small that rounding does no harm
 ROUNDED = 1e-15  # [-] rounding error of an element as long as the beam; grows as 1 / length**3 for shorter ones
 SMOOTH = 12  # [-] degree of the polynomial that must fit the section within an element
 RESOLVED = 1e-9  # [-] largest error of this fit, relative to the largest value in the element
-NARROW = 1e-9  # [-] accuracy with which a step or kink is located, as a fraction of the beam
+NARROW = 1e-9  # [-] accuracy of the place of a step or kink as a fraction of the beam; nearer to a held end, no node
 NARROWEST = 1e-6  # [-] smallest element made to fit the section, as a fraction of the beam
 ROUNDING = 1e-14  # [-] a smaller misfit is just rounding
 MOST_BREAKS = 2000  # [-] most places where the section may jump or kink
@@ -127,7 +126,7 @@ def nodes(points: np.ndarray, marked: np.ndarray, held: np.ndarray) -> np.ndarra
     apart = min(APART * (points[-1] - points[0]), 0.5 * np.diff(points).min())
     for place in marked:
         off = np.abs(place - np.array(kept))
-        if off.min() > (SAME_NODE if kept[off.argmin()] in held else apart):
+        if off.min() > (NARROW if kept[off.argmin()] in held else apart):
             kept.append(place)
     between = points[np.abs(points[:, None] - kept).min(axis=1) > apart]
     return np.unique(np.append(kept, between))

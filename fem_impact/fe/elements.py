@@ -1,6 +1,7 @@
 """Triangular elements whose shape functions stay accurate for any size, shape and position of the triangle."""
 
 from itertools import product
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -8,9 +9,9 @@ from skfem import Dofs, ElementTriArgyris, ElementTriMorley, MappingAffine, Mesh
 from skfem.quadrature import get_quadrature
 
 from ..mesh.facets import Curves, powers
+from .supports import SIDES
 
 EXPONENTS = np.array([(i, j) for i in range(6) for j in range(6 - i)])  # the 21 monomials of degree 5
-SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in scikit-fem's order
 ON_BODY = 1e-9  # [-] share of a triangle's size by which rounding may put a point outside it
 NEAR_CURVE = 1e-5  # [-] the same at curved edges: the mesh is closer to the curve than this share of a triangle
 CANDIDATES = 8  # [-] nearest triangles searched first; if none holds the point, all are searched
@@ -108,6 +109,21 @@ class Triangles:
             rows = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
         return np.stack([np.stack(row, axis=-1) for row in rows], axis=1)
 
+    def derivatives(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...], terms: Any, weights: Any):
+        """Derivatives of polynomials, one array for each order, as in `ArgyrisSpace.functions`.
+
+        ``terms(local, dx, dy)`` gives derivatives (..., n) of n terms; ``weights`` (n_cells, n, n_local) combine them.
+        """
+        local = self.local(cells, points)
+        result = []
+        for order in orders:
+            raw = [terms(local, order - k, k) @ weights[cells] for k in range(order + 1)]
+            stacked = np.stack(raw, axis=1)  # (n, order + 1, n_q, n_local)
+            if order:
+                stacked = (self.chain(cells, order) @ stacked.reshape(*stacked.shape[:2], -1)).reshape(stacked.shape)
+            result.append(stacked if order else raw[0])
+        return result
+
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cell that holds each point (n, 2), or else the nearest one, and whether the point lies in it."""
         near = self.tree.query(points, k=min(CANDIDATES, len(self.origin)))[1].reshape(len(points), -1)
@@ -195,18 +211,7 @@ class ArgyrisSpace:
 
         The arrays are (n, n_q, 21) for order 0, (n, 2, n_q, 21) for order 1, (n, 3, n_q, 21) for order 2 (xx, xy, yy).
         """
-        local = self.inner.local(cells, points)
-        result = []
-        for order in orders:
-            raw = [monomials(local, order - k, k) @ self.coefficients[cells] for k in range(order + 1)]
-            if order == 0:
-                result.append(raw[0])
-                continue
-            stacked = np.stack(raw, axis=1)  # (n, order + 1, n_q, 21)
-            shape = stacked.shape
-            turned = self.inner.chain(cells, order) @ stacked.reshape(*shape[:2], -1)
-            result.append(turned.reshape(shape))
-        return result
+        return self.inner.derivatives(cells, points, orders, monomials, self.coefficients)
 
     def uniform(self, cells: np.ndarray, stiffness: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
         """Bending and mass matrices (n, 21, 21) of straight cells (n,) with uniform stiffness (3, 3) and unit inertia.
@@ -269,18 +274,7 @@ class MorleySpace:
 
     def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
         """The same as `ArgyrisSpace.functions`, with six shape functions per cell."""
-        offset = points - self.origin[cells][:, None]
-        local = np.einsum("eij,eqj->eqi", self.inverse[cells], offset)
-        result = []
-        for order in orders:
-            raw = [_quadratic(local, order - k, k) @ self.coefficients[cells] for k in range(order + 1)]
-            if order == 0:
-                result.append(raw[0])
-                continue
-            stacked = np.stack(raw, axis=1)
-            shape = stacked.shape
-            result.append((self.inner.chain(cells, order) @ stacked.reshape(*shape[:2], -1)).reshape(shape))
-        return result
+        return self.inner.derivatives(cells, points, orders, _quadratic, self.coefficients)
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cell that holds each point (n, 2), or the nearest one, and whether the point lies in it."""

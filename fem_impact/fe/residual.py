@@ -19,9 +19,8 @@ import numpy as np
 from ..mesh.facets import powers
 from . import beam_elements
 from .assembly import System
-from .elements import SIDES
 from .springs import along_facets
-from .supports import cells_of_facets
+from .supports import SIDES, cells_of_facets
 
 CALIBRATION = 33.0  # [-] weighted squares over the energy error: 20 to 45 for 20 kinds of plates; test_residual.py
 DEGREE = 5  # [-] polynomial degree of the elements

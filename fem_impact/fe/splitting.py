@@ -1,6 +1,7 @@
 """Divide triangles where a solution needs smaller ones, and keep the boundary on its true curve."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -152,15 +153,7 @@ class Rim:
     def finish(self, mesh: Mesh, points: np.ndarray, cells: np.ndarray) -> Mesh:
         parent = np.array(self.parent)
         edges = {name: np.flatnonzero(np.isin(parent, numbers)) for name, numbers in mesh.edges.items()}
-        arrays = (np.array(a) for a in (self.middles, self.tangents, self.curvatures))
-        middles, tangents, curvatures = arrays
-        return replace(
-            mesh,
-            points=points,
-            cells=cells,
-            facets=np.array(self.facets),
-            edges=edges,
-            middles=middles,
-            tangents=tangents,
-            curvatures=curvatures,
-        )
+        rim: dict[str, Any] = {
+            name: np.array(getattr(self, name)) for name in ("facets", "middles", "tangents", "curvatures")
+        }
+        return replace(mesh, points=points, cells=cells, edges=edges, **rim)

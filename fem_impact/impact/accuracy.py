@@ -102,7 +102,14 @@ def _order(exponent: Any) -> tuple[Any, Any]:
 def _density(modes: Modes, at: Any, contact: Contact, mass: float, speed: float) -> tuple[float, float, float, float]:
     """Contact frequency [rad/s], stiffness [N/m], and A and s of the density A omega**-s of the left-out modes."""
     omega_0 = 2.0 * np.pi * contact_resonance(contact, mass, speed)
-    point = modes.point("at", at)
-    rest = max(0.0, float(modes.residual_compliance(point)[0, 0]))
+    return omega_0, mass * omega_0**2, *left_out_density(modes, modes.point("at", at))
+
+
+def left_out_density(modes: Modes, point: np.ndarray) -> tuple[float, float]:
+    """A and s of the density A omega**-s [1/(kg rad/s)] of the squared shapes of the left-out modes at a point.
+
+    The residual compliance gives A; s is 0 on plates and 1/2 on beams.
+    """
     s = 0.5 if modes.dimension == 1 else 0.0
-    return omega_0, mass * omega_0**2, (1.0 + s) * rest * modes.omega[-1] ** (1.0 + s), s
+    rest = max(0.0, float(modes.residual_compliance(point)[0, 0]))
+    return (1.0 + s) * rest * modes.omega[-1] ** (1.0 + s), s

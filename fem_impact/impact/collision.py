@@ -114,7 +114,7 @@ class _Options:
     @classmethod
     def checked(cls, tolerance, duration, max_impacts, scheme, dt, quantity) -> "_Options":
         return cls(
-            check.between("tolerance", tolerance, 1e-12, 1.0),
+            check.tolerance(tolerance),
             np.inf if duration is None else check.positive("duration", duration, "s"),
             0 if max_impacts is None else check.count("max_impacts", max_impacts),
             None if scheme is None else check.one_of("scheme", scheme, SCHEMES),
@@ -211,11 +211,10 @@ def strike(
     struck = _part(modes, ((0, -1.0),), point, rows, rest, forces[1])
 
     def blow(striker: Striker) -> Response:
-        touch = Touch(contact, 0, 1, striker.at[None] if striker.modes.dimension else None, point)
+        touch = Touch(contact, 0, 1, striker.at[None], point)
         rest = striker.left_out if residual and striker.modes.dimension else None
-        end = striker.at[None] if striker.modes.dimension else np.zeros((1, 0))
         motion = speed * striker.motion
-        arriving = _part(striker.modes, ((0, 1.0),), end, striker.shape[None], rest, forces[0], motion)
+        arriving = _part(striker.modes, ((0, 1.0),), striker.at[None], striker.shape[None], rest, forces[0], motion)
         return _follow((striker.modes, modes), [touch], [arriving, struck], speed, options, striker, point[0])
 
     if striker.fixed or not residual or speed == 0.0:
@@ -339,7 +338,7 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Pa
         if speed != 0.0:
             if not ends[body] or not rows[0, modes.omega == 0.0].any():
                 raise ValueError(f"speeds must be zero for a body that cannot move rigidly, got {speed:g} m/s")
-            part = replace(part, p=part.p + speed * modes.rigid_motion(points[:1] if modes.dimension else None))
+            part = replace(part, p=part.p + speed * modes.rigid_motion(points[:1]))
         arriving = arriving or speed
         parts.append(part)
     return parts, arriving

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -329,7 +330,7 @@ def _nested(name: str, loops: list[Loop]) -> Outline:
 
 
 def _renamed(piece: Piece, name: str) -> Piece:
-    return piece if piece.name else piece.named(name)
+    return piece if piece.name else replace(piece, name=name)
 
 
 def _edges(loop: Loop) -> Loop:

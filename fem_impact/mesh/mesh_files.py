@@ -200,6 +200,16 @@ def boundary(cells: np.ndarray) -> np.ndarray:
     return sides[index[counts == 1]]
 
 
+def quartered(cells: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Each triangle split in four, (4 n_cells, 3); the new points, from number n on, halve the sides (n_new, 2)."""
+    sides = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)  # (3 n_cells, 2)
+    unique, number = np.unique(sides, axis=0, return_inverse=True)
+    a, b, c = cells.T
+    ab, bc, ca = n + number.reshape(-1, 3).T
+    quarters = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    return np.concatenate([np.column_stack(part) for part in quarters]), unique
+
+
 def _hanging(points: np.ndarray, cells: np.ndarray, names: dict, notes: list[str]) -> np.ndarray:
     """Split triangles at hanging nodes, the vertices of neighbours that lie on their sides, until none is left."""
     count = 0

@@ -6,7 +6,7 @@ from typing import Any
 
 from .._base import markup
 
-COSTLY = 10.0, 2e9  # [s], [byte] a plan that costs more warns the user
+COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced
 
 
 @dataclass(frozen=True)

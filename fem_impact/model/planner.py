@@ -137,7 +137,7 @@ def tolerance_of(scene: Any, values: Mapping[str, Any] | None = None) -> float:
     """The tolerance [-] of a scene; ``values`` replaces the values of its blow."""
     with scene.blame("strike"):
         wanted = (scene.blow.values if values is None else values).get("tolerance", collision.TOLERANCE)
-        return check.between("tolerance", wanted, 1e-12, 1.0)
+        return check.tolerance(wanted)
 
 
 def verify(run: Run, watch: Watch | None = None) -> Run:

@@ -10,7 +10,7 @@ from scipy import special
 from scipy.optimize import elementwise
 
 from .._base import check
-from ..fe.section import Beam, Plate
+from ..fe.section import KINDS, Beam, Plate
 from .modal import Damping, Modes, Shapes, damping_ratios
 
 IMAGES = 6  # [-] image forces beyond each shorter side of a hinged plate; the n-th contributes exp(-2 pi n)
@@ -25,7 +25,6 @@ MOST_MODES = 1_000_000  # [-] largest number of modes of a rectangle or beam; th
 MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a root search
 MOST_PAIRS = 4 * MOST_MODES  # [-] half-wave number pairs tried on a rectangle; MOST_MODES never needs half of them
 DISK_SCAN = 0.5  # [-] step in z = k radius when scanning for roots; roots of one order are about pi apart
-ENDS = ("clamped", "hinged", "free")
 
 
 def _finished(
@@ -411,7 +410,7 @@ def beam(
     length = check.positive("length", length, "m")
     if not isinstance(ends, (list, tuple)) or len(ends) != 2:
         raise ValueError(f"ends must be two words, one for each end, got {check.shown(ends)}")
-    pair = (check.one_of("ends", ends[0], ENDS), check.one_of("ends", ends[1], ENDS))
+    pair = (check.one_of("ends", ends[0], KINDS), check.one_of("ends", ends[1], KINDS))
     rigid = _beam_rigid(pair)
     physical = _physical(section, Beam, mass, first_frequency, length)
     first = float(_beam_roots(pair, 1)[0] ** 2)
@@ -643,7 +642,7 @@ def disk(
     Leissa (1969), NASA SP-160, ch. 2; Boggio (1905) for the static deflection of the clamped disk.
     """
     radius = check.positive("radius", radius, "m")
-    check.one_of("edge", edge, ENDS)
+    check.one_of("edge", edge, KINDS)
     if section is not None and nu is not None:
         raise ValueError("give nu or section, not both: the section's material has its own nu")
     physical = _physical(section, Plate, mass, first_frequency, np.pi * radius**2)

@@ -14,7 +14,7 @@ from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility
 from . import universal_files
 
-HIGHEST = 1e74  # [Hz] highest frequency that scaling may produce; its powers must stay finite, see `check.REACH`
+HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 2 pi times it must stay in reach
 SHOWN = 10  # [-] modes listed in a notebook
 REMEMBERED = 16  # [-] points whose shapes and static deflections a body keeps, because one blow needs them many times
 ROUNDING = 1e-12  # [-] rounding error of a compliance, relative to itself and to that of the first mode

@@ -38,41 +38,19 @@ def write(path: Any, frequencies, damping_ratio, shapes, points, cells) -> None:
     zero, one = np.zeros(n_points, int), np.ones(n_points, int)
     x, y, z = place.T
     nodes = {"node_nums": node, "def_cs": zero, "disp_cs": zero, "color": one, "x": x, "y": y, "z": z}
-    sets: list[dict[Any, Any]] = [
-        nodes | {"type": 15},
-        nodes | {"type": 2411},
-    ]  # data set 2411 keeps all digits of the coordinates
+    sets: list[dict[Any, Any]] = [nodes | {"type": 15}, nodes | {"type": 2411}]  # 2411 keeps all digits
     code = CELL_CODE.get(cells.shape[1] if len(cells) else 0)
     if code is not None:
         sets.append({"type": 2412, code: [_element(i, code, cell) for i, cell in enumerate(cells.tolist())]})
     for i, (frequency, damping) in enumerate(zip(frequencies, damping_ratio)):
         still = np.zeros(n_points)
-        sets.append(
-            {
-                "type": 55,
-                "id1": f"mode {i + 1}",
-                "id2": "mass-normalised, kg**-0.5",
-                "id3": "NONE",
-                "id4": "NONE",
-                "id5": "NONE",
-                "model_type": STRUCTURAL,
-                "analysis_type": NORMAL_MODE,
-                "data_ch": 2,
-                "spec_data_type": DISPLACEMENT,
-                "data_type": REAL,
-                "n_data_per_node": 3,
-                "r1": still,
-                "r2": still,
-                "r3": shapes[:, i].copy(),
-                "load_case": 1,
-                "mode_n": i + 1,
-                "freq": float(frequency),
-                "modal_m": 1.0,
-                "modal_damp_vis": float(damping),
-                "modal_damp_his": 0.0,
-                "node_nums": node,
-            }
-        )
+        sets.append({
+            "type": 55, "id1": f"mode {i + 1}", "id2": "mass-normalised, kg**-0.5", "id3": "NONE", "id4": "NONE",
+            "id5": "NONE", "model_type": STRUCTURAL, "analysis_type": NORMAL_MODE, "data_ch": 2,
+            "spec_data_type": DISPLACEMENT, "data_type": REAL, "n_data_per_node": 3, "r1": still, "r2": still,
+            "r3": shapes[:, i].copy(), "load_case": 1, "mode_n": i + 1, "freq": float(frequency), "modal_m": 1.0,
+            "modal_damp_vis": float(damping), "modal_damp_his": 0.0, "node_nums": node,
+        })  # fmt: skip
     path.unlink(missing_ok=True)
     pyuff.UFF(str(path)).write_sets(sets, mode="add")
 

@@ -17,6 +17,7 @@ from scipy.io import wavfile
 from .._base import check, markup
 from .._base.files import replacing
 from ..impact.response import Response
+from ..mesh.mesh_files import boundary
 from ..scenes.scene import Run, Scene, load_scene, scene_of
 from ..scenes.schema import PATHS, fault, read_bytes
 from ..scenes.sentences import place, power, si, tidy, words
@@ -321,7 +322,7 @@ def _view(response: Response, end: float) -> dict[str, Any]:
     struck = response.displacement(response.at[None], times)
     count = min(SHAPES, modes.n_modes)
     shapes = rows[:, :count].T / np.maximum(np.abs(rows[:, :count]).max(axis=0), 1e-300)[:, None]
-    edge = surface[markup.rim(cells)]  # (n_sides, 2, 2)
+    edge = surface[boundary(cells)]  # (n_sides, 2, 2)
     return {
         "x": _short(surface[:, 0]),
         "y": _short(surface[:, 1]),

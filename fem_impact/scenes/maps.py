@@ -71,7 +71,7 @@ def map_scene(
         raise ValueError(f"over must map the names of axes to their values, got {check.shown(over)}")
     band = table.get("max_frequency") if max_frequency is None else max_frequency
     limit = scene.blow.values.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance
-    limit = check.between("tolerance", limit, 1e-12, 1.0)
+    limit = check.tolerance(limit)
     if not over:
         raise ValueError(
             f'{scene.path}: [map] is missing; add it and name the axes, as in over = {{ "striker.mass" = [0.01, 0.1] }}'

@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import mesh
 from .._base import check
-from ..fe.section import Beam, Material, Plate
+from ..fe.section import KINDS, Beam, Material, Plate
 from ..impact import collision
 from ..impact.contact import Contact
 from ..impact.striker import Striker
@@ -126,7 +126,6 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
 TABLES = [*MAKERS, "supports"]
 REQUIRED = ("mesh", "striker", "contact", "strike")
 SUPPLIED = {"material", "modes", "striker", "contact", "sphere", "plate"}  # arguments that come from other tables
-SUPPORTS = ("clamped", "hinged", "free")
 PATHS = ("source", "path")  # keys that name a file, relative to the scene file
 
 
@@ -176,8 +175,8 @@ def read_part(path: Path, table: str, values: dict[str, Any], folder: Path) -> P
         raise wrong(f"{bad[0]} must be finite, got {bad[1]}")
     if table == "supports":
         for edge, support in values.items():
-            if support not in SUPPORTS:
-                raise wrong(f"{edge} must be one of {', '.join(SUPPORTS)}, got {check.shown(support)}")
+            if support not in KINDS:
+                raise wrong(f"{edge} must be one of {', '.join(KINDS)}, got {check.shown(support)}")
         return Part("", MappingProxyType(values))
     selector, makers = MAKERS[table]
     values = dict(values)

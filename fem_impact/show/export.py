@@ -32,7 +32,6 @@ PACKAGES = ("fem-impact", "numpy", "scipy", "scikit-fem", "netgen-mesher", "numb
 WARP = 0.1  # [-] largest deflection of the warp vector over the body's extent
 CELL_TYPE = {1: 1, 2: 3, 3: 5}  # number of points: VTK's code for a vertex, line or triangle
 KIND = {"f": "Float64", "i": "Int64", "u": "UInt8"}
-MOST_FRAMES = 1000  # [-] most frames of an animation: 0.2 GB
 DISTINCT = 1e-9  # [-] relative spacing given to equal frequencies, because a collection drops equal times
 
 
@@ -107,7 +106,7 @@ def write_animation(path: str | Path, modes: Modes, mode: int, *, frames: int = 
     frequency = float(modes.frequencies[mode - 1])
     if frequency == 0.0:
         raise ValueError(f"mode must be a flexible mode, but mode {mode} is a rigid motion; take a higher one")
-    turns = np.arange(check.count("frames", frames, low=2, high=MOST_FRAMES)) / frames
+    turns = np.arange(check.count("frames", frames, low=2, high=sampling.MOST_FRAMES)) / frames
     points, cells = sampling.grid(modes)
     arrays, fields = _mode_parts(modes, points)[mode - 1]
     parts = [({"warp": np.cos(2.0 * np.pi * turn) * arrays["warp"]}, fields) for turn in turns]
@@ -276,7 +275,7 @@ def _motion_parts(response: Response, points: np.ndarray, times: np.ndarray) -> 
             field[name] = force
     if response.striker is not None and response.at is not None:
         striker = response.striker
-        tip = response.displacement(striker.at[None] if striker.modes.dimension else None, times, body=0)[:, 0]
+        tip = response.displacement(striker.at[None], times, body=0)[:, 0]
         for field, way in zip(fields, tip):
             place = np.zeros((1, 3))
             place[0, : len(response.at)], place[0, 2] = response.at, way

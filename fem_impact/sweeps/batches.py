@@ -47,7 +47,7 @@ class Family:
         """The family of a blow; if ``lossy``, the residual compliance becomes an extra mode, as in `strike`."""
         parts = []
         for body, point in ((modes, at), (striker.modes, striker.at)):
-            place = point[None] if body.dimension else None
+            place = point[None]
             rest = float(body.residual_compliance(place)[0, 0]) if residual and body.dimension else 0.0
             rest = max(0.0, rest) * body.mass
             omega, zeta = np.array(body.omega), np.array(body.damping_ratio)

@@ -20,9 +20,10 @@ from ..impact.collision import strike
 from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
+from ..model.plan import COSTLY
 from ..modes.modal import Modes, SampledShapes
 from . import batches
-from .store import Texts, by_cluster, by_store
+from .store import LARGEST_BLOCK, Texts, by_cluster, by_store
 
 TOLERANCE = 1e-3  # [-] default error limit of a map
 AXES = {  # name: unit, what it is
@@ -53,7 +54,6 @@ ALIASES = {  # the same parameters as a scene file names them
 }
 FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  # each value needs new kernels
 REACH = 1e30  # [SI] speeds, masses and frequencies lie between 1/REACH and REACH: beyond, the kernels never finish
-BLOCK = 2**17  # [-] cells computed together; needs about 30 MB
 LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
     "n_impacts": ("", "number of separate contacts"),
     "contact_time": ("s", "total time in contact"),
@@ -67,8 +67,6 @@ LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
 
 MOST_CELLS = 10**8  # [-] default limit of a map: half an hour to two hours of work, 8 GB
 SECONDS = {True: 1e-5, False: 2e-3}  # [s] per blow, in a batch or alone: the slower plates of studies/map_speed.py
-NUMBER = 8  # [byte] per float
-COSTLY = 10.0, 2e9  # [s], [byte] a map announces its cost above either of these
 Watch = Callable[[int, int], Any]
 Tell = Callable[[str], Any]
 
@@ -257,7 +255,7 @@ def sweep(
     ValueError
         If an axis is unknown, a value is not allowed, or the map is too large.
     """
-    tolerance = check.between("tolerance", tolerance, 1e-12, 1.0)
+    tolerance = check.tolerance(tolerance)
     base = Case(modes, striker, contact, modes.point("at", at)[0], check.positive("speed", speed, "m/s", reach=REACH))
     band = None if max_frequency is None else check.positive("max_frequency", max_frequency, "Hz")
     workers = None if workers is None else check.count("workers", workers)
@@ -279,7 +277,7 @@ def sweep(
 def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, tell: Tell | None = None) -> None:
     """Refuse a map with too many cells; announce the cost of a large one."""
     seconds = n_cells * SECONDS[quick] / (os.cpu_count() or 1)
-    memory = n_cells * NUMBER * (n_layers + 2.0)
+    memory = 8.0 * n_cells * (n_layers + 2.0)  # [byte]
     cost = f"{n_cells:.3g} cells: about {seconds:.2g} s on this machine and {memory / 1e9:.2g} GB of memory"
     if n_cells > max_cells:
         raise ValueError(f"over asks for {cost}; give fewer values, or raise max_cells, now {max_cells:.3g}")
@@ -297,8 +295,8 @@ def _solve_all(
         return by_store(grid, store, partial(solve, workers=workers), watch)
     numbers = np.empty((len(grid.layers), grid.n_cases))
     texts: Texts = {}
-    for start in range(0, grid.n_cases, BLOCK):
-        stop = min(start + BLOCK, grid.n_cases)
+    for start in range(0, grid.n_cases, LARGEST_BLOCK):
+        stop = min(start + LARGEST_BLOCK, grid.n_cases)
         numbers[:, start:stop], new = solve(grid, start, stop, workers=workers)
         texts |= new
         if watch is not None:
@@ -442,12 +440,12 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray) -> xarray.Da
 
 def _plain(modes: Modes, at: np.ndarray) -> dict[str, Any]:
     """A body and its contact point as plain numbers."""
-    place = at[None] if modes.dimension else None
+    place = at[None]
     return {
         "mass": modes.mass,
         "frequencies": modes.frequencies.tolist(),
         "damping_ratios": modes.damping_ratio.tolist(),
         "at": at.tolist(),
         "shape": modes.shape_at(place)[0].tolist(),
-        "residual_compliance": float(modes.residual_compliance(place)[0, 0]) if modes.dimension else 0.0,
+        "residual_compliance": float(modes.residual_compliance(place)[0, 0]),
     }
