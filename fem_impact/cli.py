@@ -21,16 +21,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
+from rich import progress as bars
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
 import fem_impact as fi
 
@@ -572,38 +564,41 @@ def _show_cursor() -> None:
 
 
 @contextmanager
-def _progress(stage: str) -> Iterator[None]:
-    """On a terminal, show which stage is running and for how long."""
+def _bar(*columns: Any) -> Iterator[bars.Progress | None]:
+    """A line that shows progress on a terminal; None if there is no terminal."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield
+        yield None
         return
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with undoable(_show_cursor), Progress(*columns, console=console, transient=True) as progress:
-        progress.add_task(stage, total=None)
+    with undoable(_show_cursor), bars.Progress(*columns, console=console, transient=True) as bar:
+        yield bar
+
+
+@contextmanager
+def _progress(stage: str) -> Iterator[None]:
+    """On a terminal, show which stage is running and for how long."""
+    with _bar(bars.SpinnerColumn(), bars.TextColumn("{task.description}"), bars.TimeElapsedColumn()) as bar:
+        if bar is not None:
+            bar.add_task(stage, total=None)
         yield
 
 
 @contextmanager
 def _counted(what: str) -> Iterator[Any]:
     """On a terminal, show the number done, the rate and the time left."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield None
-        return
-    columns = (
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"), TimeRemainingColumn(),
-    )  # fmt: skip
-    with undoable(_show_cursor), Progress(*columns, console=console, transient=True) as progress:
-        task, began = progress.add_task(what, total=None, rate=""), time.perf_counter()
+    name, rate = (bars.TextColumn(text) for text in ("{task.description}", "{task.fields[rate]}"))
+    with _bar(name, bars.BarColumn(), bars.MofNCompleteColumn(), rate, bars.TimeRemainingColumn()) as bar:
+        if bar is None:
+            yield None
+            return
+        task, began = bar.add_task(what, total=None, rate=""), time.perf_counter()
         known: list[int] = []
 
         def watch(done: int, total: int) -> None:
             if not known:
                 known.append(done)
-            rate = (done - known[0]) / max(1e-9, time.perf_counter() - began)
-            progress.update(task, completed=done, total=total, rate=f"{rate:.3g}/s" if rate else "")
+            speed = (done - known[0]) / max(1e-9, time.perf_counter() - began)
+            bar.update(task, completed=done, total=total, rate=f"{speed:.3g}/s" if speed else "")
 
         yield watch
 

@@ -345,7 +345,7 @@ def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, masses: list, mark
     held = [kind in ("clamped", "hinged") for kind in kinds]
     ends = points[mesh.facets[:, 0], 0]
     nodes = beam_elements.nodes(points[:, 0], (marked - centre[0]) / length, ends[held])
-    line = beam_elements.segments(beam_elements.divisions(fields, nodes))
+    line = beam_elements.divided(fields, nodes)
     space = HermiteSpace(line)
     K, M, stiffness, inertia, dx = beam_elements.integrals(space, fields)
     frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))

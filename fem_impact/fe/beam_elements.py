@@ -62,7 +62,7 @@ class HermiteSpace:
         h = self.length[cells][:, None]
         s = (points[..., 0] - self.start[cells][:, None]) / h
         cubic = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], float)
-        legendre = _legendre(2.0 * s - 1.0)
+        legendre = np.polynomial.legendre.legvander(2.0 * s - 1.0, DEGREE + 1)  # (n, n_q, DEGREE + 2)
         j = np.arange(2, DEGREE - 1)
         norm = np.sqrt(j + 0.5)
         result = []
@@ -98,20 +98,6 @@ class HermiteSpace:
             result[element_dofs[2 * k], 1] = self.start + k * self.length
             result[element_dofs[2 * k + 1], 1] = 1.0
         return result
-
-
-def _legendre(x: np.ndarray) -> np.ndarray:
-    """Legendre polynomials of degree 0 to DEGREE + 1 at points (...), shape (..., DEGREE + 2)."""
-    result = np.empty((*x.shape, DEGREE + 2))
-    result[..., 0], result[..., 1] = 1.0, x
-    for n in range(1, DEGREE + 1):
-        result[..., n + 1] = ((2 * n + 1) * x * result[..., n] - n * result[..., n - 1]) / (n + 1)
-    return result
-
-
-def segments(nodes: np.ndarray) -> MeshLine:
-    """Make scikit-fem's mesh of line elements between ascending nodes (n,)."""
-    return MeshLine(nodes[None], np.stack([np.arange(len(nodes) - 1), np.arange(1, len(nodes))]))
 
 
 def nodes(points: np.ndarray, marked: np.ndarray, held: np.ndarray) -> np.ndarray:
@@ -157,8 +143,8 @@ def quadrature(space: HermiteSpace) -> tuple[np.ndarray, np.ndarray]:
     return space.start[:, None] + 0.5 * (node + 1.0) * space.length[:, None], 0.5 * weight * space.length[:, None]
 
 
-def divisions(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes: np.ndarray) -> np.ndarray:
-    """Add nodes until a polynomial fits the section between any two neighbours; return them ascending.
+def divided(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes: np.ndarray) -> MeshLine:
+    """Line elements between nodes, with more nodes until a polynomial fits the section between any two neighbours.
 
     Steps and kinks of stiffness and inertia are found by halving every interval that no polynomial fits. An interval
     that still has a bad fit when it is as narrow as NARROW contains a step or kink and gets a node.
@@ -173,7 +159,7 @@ def divisions(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nod
         middle = 0.5 * (low + high)[rough]
         every = np.append(every, middle)
         low, high = np.append(low[rough], middle), np.append(middle, high[rough])
-    return np.sort(every)
+    return MeshLine(np.sort(every))
 
 
 def _breaks(fields: Callable, nodes: np.ndarray) -> np.ndarray:

@@ -41,11 +41,11 @@ def _wanted(mesh: Mesh, held: np.ndarray, point: np.ndarray, breadth: float, ext
     if not held.any():
         return DEPTH * breadth
     ends = np.stack([mesh.points[mesh.facets[held, 0]], mesh.middles[held], mesh.points[mesh.facets[held, 1]]], axis=1)
-    distance = float(_distance(point, ends[:, :-1], ends[:, 1:]).min())
-    return DEPTH * (breadth if distance < AT_EDGE * extent else min(breadth, distance))
+    away = float(distance(point, ends[:, :-1], ends[:, 1:]).min())
+    return DEPTH * (breadth if away < AT_EDGE * extent else min(breadth, away))
 
 
-def _distance(point: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
+def distance(point: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
     """Distance [m] of a point (2,) to segments (..., 2)."""
     along = stop - start
     share = ((point - start) * along).sum(axis=-1) / (along**2).sum(axis=-1)
@@ -63,7 +63,7 @@ def _too_large(mesh: Mesh, points: np.ndarray, size: np.ndarray) -> np.ndarray:
         off = point - corner
         turn = side[..., 0] * off[..., 1] - side[..., 1] * off[..., 0]
         inside = (turn >= 0.0).all(axis=1) | (turn <= 0.0).all(axis=1)
-        away = np.where(inside, 0.0, _distance(point, corner, after).min(axis=1))
+        away = np.where(inside, 0.0, distance(point, corner, after).min(axis=1))
         tall |= longest > np.maximum(least, GROWTH * away)
     return tall
 

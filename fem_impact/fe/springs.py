@@ -32,7 +32,7 @@ def along_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.
 def edge_springs(supports: Sequence[Any], frame: Any) -> np.ndarray:
     """Support stiffness (n_facets, 2) against deflection and slope of each facet, in the frame's units."""
     pairs = [(kind.stiffness, kind.rotation) if isinstance(kind, Elastic) else (0.0, 0.0) for kind in supports]
-    return np.array(pairs) * [frame.length**3, frame.length] / frame.stiffness
+    return np.array(pairs).reshape(-1, 2) * [frame.length**3, frame.length] / frame.stiffness
 
 
 def plate_springs(space: Any, facets: np.ndarray, cells: np.ndarray, springs: np.ndarray) -> np.ndarray:
@@ -49,8 +49,7 @@ def plate_springs(space: Any, facets: np.ndarray, cells: np.ndarray, springs: np
 def beam_springs(dofs: list[tuple[int, int]], held: list[Elastic], frame: Any, n_all: int) -> csr_matrix:
     """Stiffness (n_all, n_all) of elastic supports, on the deflection and slope at the ends of a beam."""
     numbers = np.array(dofs, int).ravel()
-    pairs = [[s.stiffness * frame.length**3, s.rotation * frame.length] for s in held]
-    values = np.array(pairs).ravel() / frame.stiffness
+    values = edge_springs(held, frame).ravel()
     return coo_matrix((values, (numbers, numbers)), shape=(n_all, n_all)).tocsr()
 
 

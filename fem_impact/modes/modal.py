@@ -225,14 +225,7 @@ class Modes:
         Modes
             Known only at the measured points; shapes are divided by the root of the modal mass in the file.
         """
-        found = universal_files.read(path, direction)
-        return cls.from_arrays(
-            found["frequencies"],
-            found["shapes"],
-            points=found["points"],
-            mass=mass,
-            damping_ratio=found["damping_ratio"],
-        )
+        return cls.from_arrays(**universal_files.read(path, direction), mass=mass)
 
     @property
     def n_modes(self) -> int:
@@ -356,14 +349,9 @@ class Modes:
             keep = min(keep, check.count("n_modes", n_modes))
         if keep == 0:
             raise ValueError(f"max_frequency must reach the first mode at {self.frequencies[0]:g} Hz")
-        return replace(
-            self,
-            omega=self.omega[:keep],
-            damping_ratio=self.damping_ratio[:keep],
-            shapes=self.shapes.take(keep),
-            frequency_error=None if self.frequency_error is None else self.frequency_error[:keep].copy(),
-            bounds=None if self.bounds is None else self.bounds[:keep].copy(),
-        )
+        fields = {name: getattr(self, name) for name in ("omega", "damping_ratio", "frequency_error", "bounds")}
+        kept: dict[str, Any] = {name: x if x is None else x[:keep].copy() for name, x in fields.items()}
+        return replace(self, shapes=self.shapes.take(keep), **kept)
 
     def damped(self, damping_ratio: Damping) -> "Modes":
         """The same modes with other damping ratios: a number, an array (n_modes,) or a function of frequency [Hz]."""

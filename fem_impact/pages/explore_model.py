@@ -21,10 +21,7 @@ TOLERANCE = 1e-3  # [-] of the blows shown: errors smaller than the plots can sh
 MAP_TOLERANCE = 1e-2  # [-] of the blows on the map, which only counts impacts
 FIRST_LOOK = 30  # [-] modes found first, to estimate the number needed
 MOST_MODES = 100  # [-] largest number; the residual compliance replaces the rest, and the page shows the error
-CELLS = {
-    False: 24,
-    True: 10,
-}  # [-] along each axis of the map, without and with loss: contacts with loss are struck one by one
+CELLS = {False: 24, True: 10}  # [-] along each axis of the map, without and with loss, where blows take longer
 SPANS = {"mass": 20.0, "stiffness": 1000.0, "speed": 10.0, "bending": 20.0}  # [-] slider end over the scene's value
 EXPONENTS = (1.0, 3.0)  # [-] from a linear spring to a felt-covered head
 

@@ -185,14 +185,10 @@ def _modelled(response: Response, run: Run) -> list[tuple[str, str]]:
 def _shares(response: Response) -> list[dict[str, Any]]:
     energies = response.energies
     total = sum(max(value, 0.0) for value in energies.values()) or 1.0
+    called = {"target": "struck body"}
     return [
-        {
-            "name": "struck body" if name == "target" else name,
-            "key": name,
-            "joule": value,
-            "part": max(value, 0.0) / total,
-        }
-        for name, value in energies.items()
+        {"name": called.get(name, name), "key": name, "joule": joule, "part": max(joule, 0.0) / total}
+        for name, joule in energies.items()
     ]
 
 

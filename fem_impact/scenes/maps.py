@@ -178,21 +178,14 @@ def number_of_modes(first: Any, frequency: float) -> int:
 
 def with_theory(table: xarray.Dataset, case: grid.Case, axes: Mapping[str, np.ndarray]) -> xarray.Dataset:
     """Add ``contact_resonance`` and ``threshold`` [Hz] to a map, each along the axes it depends on."""
-    for name, needs, find, meaning in (
-        (
-            "contact_resonance",
-            ("mass", "striker_frequency", "stiffness", "exponent", "speed"),
-            lambda cell: cell.resonance,
-            "one over twice the contact time on a rigid wall",
-        ),
-        (
-            "threshold",
-            ("mass", "striker_frequency", "at", "target_mass", "target_frequency"),
-            _threshold,
-            "contact resonance above which the struck body stops the striker",
-        ),
-    ):
-        mine = {axis: values for axis, values in axes.items() if axis in needs}
+    striker = ("mass", "striker_frequency")
+    for name, find, needs, meaning in (
+        ("contact_resonance", lambda cell: cell.resonance, ("stiffness", "exponent", "speed"),
+         "one over twice the contact time on a rigid wall"),
+        ("threshold", _threshold, ("at", "target_mass", "target_frequency"),
+         "contact resonance above which the struck body stops the striker"),
+    ):  # fmt: skip
+        mine = {axis: values for axis, values in axes.items() if axis in (*striker, *needs)}
         found = np.empty([len(values) for values in mine.values()])
         for place in np.ndindex(*found.shape):
             cell = case

@@ -165,37 +165,26 @@ def write_json(path: str | Path, data: dict[str, Any]) -> None:
         temporary.write_text(json.dumps(plain(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
+SCALARS = (
+    "n_impacts", "contact_time", "peak_force", "impulse", "restitution", "speed", "energies", "dissipated",
+    "energy_error", "momentum_error", "tolerance", "finished", "scheme",
+)  # fmt: skip
 ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "sensitivity", "total", "resolvable")
+IMPACT_PARTS = ("start", "end", "peak_force", "impulse")
 
 
 @check.typed
 def numbers(response: Response) -> dict[str, Any]:
     """All scalars of a response by name, in SI units, and its impacts."""
-    error = response.error
+    data = {name: getattr(response, name) for name in SCALARS} | {
+        "spectral_centroid": {"value": _centroid(response), "max_frequency": CENTROID_BAND},
+        "error": {name: getattr(response.error, name) for name in ERROR_PARTS},
+        "n_modes": response.target.n_modes,
+        "max_frequency": response.target.frequencies[-1],
+    }
     return {
-        "response": {
-            "n_impacts": response.n_impacts,
-            "contact_time": response.contact_time,
-            "peak_force": response.peak_force,
-            "impulse": response.impulse,
-            "restitution": response.restitution,
-            "speed": response.speed,
-            "spectral_centroid": {"value": _centroid(response), "max_frequency": CENTROID_BAND},
-            "energies": response.energies,
-            "dissipated": response.dissipated,
-            "energy_error": response.energy_error,
-            "momentum_error": response.momentum_error,
-            "error": {name: getattr(error, name) for name in ERROR_PARTS},
-            "tolerance": response.tolerance,
-            "finished": response.finished,
-            "scheme": response.scheme,
-            "n_modes": response.target.n_modes,
-            "max_frequency": response.target.frequencies[-1],
-        },
-        "impacts": [
-            {"start": hit.start, "end": hit.end, "peak_force": hit.peak_force, "impulse": hit.impulse}
-            for hit in response.impacts
-        ],
+        "response": data,
+        "impacts": [{name: getattr(impact, name) for name in IMPACT_PARTS} for impact in response.impacts],
     }
 
 

@@ -26,32 +26,20 @@ from . import batches
 from .store import LARGEST_BLOCK, Texts, by_cluster, by_store
 
 TOLERANCE = 1e-3  # [-] default error limit of a map
-AXES = {  # name: unit, what it is
-    "mass": ("kg", "mass of the striker"),
-    "striker_frequency": ("Hz", "first flexible frequency of the striker"),
-    "stiffness": ("N/m**exponent", "stiffness of the contact"),
-    "exponent": ("", "exponent of the contact"),
-    "loss": ("s/m", "loss factor of the contact"),
-    "gap": ("m", "distance the striker travels before contact"),
-    "speed": ("m/s", "speed of the striker's contact point"),
-    "at": ("m", "strike point"),
-    "target_mass": ("kg", "mass of the struck body"),
-    "target_frequency": ("Hz", "first flexible frequency of the struck body"),
-    "damping_ratio": ("", "damping ratio of the struck body"),
+AXES = {  # name: unit, what it is, its name in a scene file
+    "mass": ("kg", "mass of the striker", "striker.mass"),
+    "striker_frequency": ("Hz", "first flexible frequency of the striker", "striker.first_frequency"),
+    "stiffness": ("N/m**exponent", "stiffness of the contact", "contact.stiffness"),
+    "exponent": ("", "exponent of the contact", "contact.exponent"),
+    "loss": ("s/m", "loss factor of the contact", "contact.loss"),
+    "gap": ("m", "distance the striker travels before contact", "contact.gap"),
+    "speed": ("m/s", "speed of the striker's contact point", "strike.speed"),
+    "at": ("m", "strike point", "strike.at"),
+    "target_mass": ("kg", "mass of the struck body", "target.mass"),
+    "target_frequency": ("Hz", "first flexible frequency of the struck body", "target.first_frequency"),
+    "damping_ratio": ("", "damping ratio of the struck body", "target.damping_ratio"),
 }
-ALIASES = {  # the same parameters as a scene file names them
-    "striker.mass": "mass",
-    "striker.first_frequency": "striker_frequency",
-    "contact.stiffness": "stiffness",
-    "contact.exponent": "exponent",
-    "contact.loss": "loss",
-    "contact.gap": "gap",
-    "strike.speed": "speed",
-    "strike.at": "at",
-    "target.mass": "target_mass",
-    "target.first_frequency": "target_frequency",
-    "target.damping_ratio": "damping_ratio",
-}
+ALIASES = {alias: name for name, (_, _, alias) in AXES.items()}
 FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  # each value needs new kernels
 REACH = 1e30  # [SI] speeds, masses and frequencies lie between 1/REACH and REACH: beyond, the kernels never finish
 LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
@@ -161,7 +149,7 @@ class Grid:
         return {
             "target": _plain(self.base.modes, self.base.at),
             "striker": _plain(self.base.striker.modes, self.base.striker.at),
-            "contact": {"stiffness": law.stiffness, "exponent": law.exponent, "loss": law.loss, "gap": law.gap},
+            "contact": dict(vars(law)),
             "speed": self.base.speed,
         }
 
@@ -330,17 +318,10 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
     numbers = np.full((len(names), stop - start), np.nan)
     place = dict(zip(grid.axes, np.unravel_index(np.arange(start, stop), grid.shape)))
     law = grid.base.contact
+    base = {"target_mass": grid.base.modes.mass, "mass": grid.base.striker.mass, "speed": grid.base.speed, **vars(law)}
     column = {
         name: grid.axes[name][place[name]] if name in place else np.full(stop - start, value)
-        for name, value in (
-            ("target_mass", grid.base.modes.mass),
-            ("mass", grid.base.striker.mass),
-            ("stiffness", law.stiffness),
-            ("exponent", law.exponent),
-            ("speed", grid.base.speed),
-            ("loss", law.loss),
-            ("gap", law.gap),
-        )
+        for name, value in base.items()
     }
     quick = (column["exponent"] >= 1.0) & (column["gap"] >= 0.0) & (not grid.extra)
     cells = np.flatnonzero(quick)
