@@ -49,7 +49,7 @@ INNER = {
     "mesh.Mesh", "mesh.straight", "mesh.fill", "Modes.points",
     "analytic.RectangleShapes", "analytic.BeamShapes", "analytic.DiskShapes",  # behind the checks of Modes
     "export.plain", "export.versions", "export.csv_text", "export.run_data", "export.vtk_ending", "figures.snapshot",
-    "figures.in_hertz", "sound.Sound",
+    "figures.in_hertz", "figures.styled", "sound.Sound",
     "hammers.Hammer", "hammers.bandwidth_of", "hammers.half_sine_reach",
     "report.Player", "report.audio", "report.template",
     "explore.serve",  # ends at an interruption only, see test_explore

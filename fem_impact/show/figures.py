@@ -51,7 +51,8 @@ MARGIN = 0.1  # [-] time shown before and after the blow, over its duration
 
 
 @contextmanager
-def _styled(width: float, height: float) -> Iterator[Figure]:
+def styled(width: float, height: float) -> Iterator[Figure]:
+    """A figure of a size [inch], drawn in `STYLE` inside the block."""
     with matplotlib.rc_context(STYLE):
         yield Figure(figsize=(width, height), layout="constrained")
 
@@ -87,7 +88,7 @@ def force(response: Response, *, band: tuple[float, float] = SPECTRUM_BAND) -> F
         Contacts are shaded and numbered; ticks at the bottom of the spectrum mark the modes of the struck body.
     """
     low, high = check.band("band", band, "Hz")
-    with _styled(7.0, 6.0) as figure:
+    with styled(7.0, 6.0) as figure:
         above, below = figure.subplots(2, 1)
         _draw_force(above, response)
         frequencies = np.geomspace(low, high, SPECTRUM_POINTS)
@@ -128,7 +129,7 @@ def energies(response: Response) -> Figure:
     end = (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
     times = np.linspace(0.0, (1.0 + MARGIN) * end, TIMES)
     parts = [response.modal_energy(times, body=body).sum(axis=1) for body in (0, -1)]
-    with _styled(7.0, 3.6) as figure:
+    with styled(7.0, 3.6) as figure:
         axes = figure.subplots()
         axes.plot(times, parts[0], label="striker")
         axes.plot(times, parts[1], label="struck body")
@@ -146,7 +147,7 @@ def mode_energies(response: Response) -> Figure:
     energy = response.modal_energy([end])[0]
     shown = (response.target.omega > 0.0) & (energy > 0.0)
     top = float(energy[shown].max(initial=0.0)) or 1.0
-    with _styled(7.0, 3.6) as figure:
+    with styled(7.0, 3.6) as figure:
         axes = figure.subplots()
         axes.vlines(response.target.frequencies[shown], MODE_DEPTH * top, energy[shown], lw=2.0, color=BLUE)
         axes.set(xscale="log", yscale="log", ylim=(MODE_DEPTH * top, 3.0 * top))
@@ -179,7 +180,7 @@ def mobility(modes: Modes, at: Any, to: Any = None, *, band: tuple[float, float]
     grid = np.geomspace(low, high, SPECTRUM_POINTS)
     frequencies = np.union1d(grid, flexible[(flexible > low) & (flexible < high)] * (1.0 + 1e-6))  # misses no peak
     value = spectra.mobility(modes, at, at if to is None else to, frequencies)
-    with _styled(7.0, 5.0) as figure:
+    with styled(7.0, 5.0) as figure:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         above.loglog(frequencies, np.abs(value))
         above.set(ylabel="mobility [m/(N s)]", title="Mobility", xlim=(low, high))
@@ -212,7 +213,7 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
     shapes = modes.shapes.at(points)[:, :count]
     shapes = shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300)
     rim = boundary(cells) if modes.dimension == 2 else None
-    with _styled(2.2 * columns, 1.9 * rows) as figure:
+    with styled(2.2 * columns, 1.9 * rows) as figure:
         grid = figure.subplots(rows, columns, squeeze=False)
         for i, axes in enumerate(grid.flat):
             if i >= count:
@@ -245,7 +246,7 @@ def snapshot(plane: np.ndarray, cells: np.ndarray, deflection: np.ndarray, at: n
     at : ndarray, shape (dimension,) [m]
     title : str
     """
-    with _styled(7.2, 4.8) as figure:
+    with styled(7.2, 4.8) as figure:
         axes: Any = figure.subplots()
         axes.tripcolor(*plane.T, cells, deflection, cmap=COLOURS, vmin=-1, vmax=1, shading="gouraud")
         axes.add_collection(LineCollection(list(plane[boundary(cells)]), colors="#888888", linewidths=0.8))
