@@ -28,9 +28,9 @@ import fem_impact as fi
 
 from ._base.files import undo_all, undoable
 
-BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses
+BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses, as Unix tools use them; 130 is 128 + SIGINT
 WIDEST = 88  # [-] columns: printed text is never wider, and narrower on a narrow terminal
-MOTION_TIMES = 100  # [-] instants in motion.pvd
+MOTION_TIMES = 100  # [-] instants in motion.pvd: four seconds at 25 per second
 SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` writes any number
 
 

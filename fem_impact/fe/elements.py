@@ -18,7 +18,7 @@ CANDIDATES = 8  # [-] nearest triangles searched first; if none holds the point,
 REACH = 0.5  # [-] share of a triangle's size; no curved edge bulges this far
 CURVE_STEPS = 12  # [-] fixed-point steps to find the coordinates of a point in a curved triangle
 REFERENCE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) - 1.0 / 3.0  # corners in local coordinates
-DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))  # unknowns at a vertex: orders in x and y
 
 
 def monomials(local: np.ndarray, dx: int, dy: int) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from .._base import check
+from .elements import REFERENCE
 from .section import Elastic
 
 FACET_POINTS = 8  # [-] Gauss points on a boundary facet; exact for products of quintics
@@ -19,8 +20,7 @@ def along_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.
     corner = space.vertices[cells][:, None]  # (n, 1, 3)
     first, last = (np.equal(corner, facets[:, end, None, None]).astype(float) for end in (0, 1))
     area = (1.0 - s) * first + s * last  # (n, n_q, 3)
-    reference = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) - 1.0 / 3.0
-    corners = space.origin[cells, None] + reference @ space.jacobian[cells].transpose(0, 2, 1)
+    corners = space.origin[cells, None] + REFERENCE @ space.jacobian[cells].transpose(0, 2, 1)
     x, gradient = area @ corners, corners.transpose(0, 2, 1)[:, None]
     if space.bent is not None:
         moved, turned = space.bent.shift(cells, area)

@@ -20,13 +20,13 @@ from .quantities import asked_for
 from .response import Dip, Error, History, Response
 from .striker import Striker
 
-TOLERANCE = 1e-4  # [-] default tolerance
+TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
 SCHEMES = ("A", "A4", "collocation")
 MAX_STEPS = 500_000  # [-] of one run: takes about one second
 MAX_WORK = 500_000_000  # [-] modes times steps of one run: takes about one second
 PLAIN_WORK = 300_000  # [-] modes times steps of one run, if the kernels are not compiled
 FIRST_STEPS = 24.0  # [-] with 24 steps per contact, A4 errs by less than FIRST_ERROR; cheapest first run of 12 to 32
-FIRST_ERROR = 1e-4  # [-] error of A4 with FIRST_STEPS
+FIRST_ERROR = 1e-4  # [-] error of A4 with FIRST_STEPS, over many blows
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
 AVERAGED = 0.5  # [-] fraction of the usual steps that these quantities need
 GRAZE = 2.0  # [-] a touch or gap below 2 tolerance times the deepest approach may be a numerical error
@@ -398,13 +398,7 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
                 for (i, sign), share in zip(part.touched, vector):
                     column[i] += sign * share * np.sqrt(value) * above
                 extra.append((above, damping, column))
-    lists: list[list] = [
-        [part.omega for part in parts],
-        [part.zeta for part in parts],
-        [part.bias for part in parts],
-        [part.q for part in parts],
-        [part.p for part in parts],
-    ]
+    lists = [[getattr(part, name) for part in parts] for name in ("omega", "zeta", "bias", "q", "p")]
     if extra:
         shape = np.ascontiguousarray(np.hstack([shape, *(column[:, None] for _, _, column in extra)]))
         added = [[omega for omega, _, _ in extra], [zeta for _, zeta, _ in extra], *[[0.0] * len(extra)] * 3]

@@ -421,12 +421,8 @@ def beam(
     if count <= len(rigid):
         raise ValueError(f"n_modes must exceed the {len(rigid)} rigid motions; max_frequency must reach a bending mode")
     k = _beam_roots(pair, count - len(rigid))
-    shapes = BeamShapes(
-        length,
-        pair,
-        np.concatenate([np.zeros(len(rigid)), k]),
-        np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), _beam_weights(pair, k)]),
-    )
+    weights = np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), _beam_weights(pair, k)])
+    shapes = BeamShapes(length, pair, np.concatenate([np.zeros(len(rigid)), k]), weights)
     values = np.concatenate([np.zeros(len(rigid)), k**4])
     return _finished(shapes, values, mass, first_frequency, physical, damping_ratio)
 

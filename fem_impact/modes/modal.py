@@ -15,7 +15,7 @@ from ..fe.eigenvalues import Flexibility
 from . import universal_files
 
 HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 2 pi times it must stay in reach
-SHOWN = 10  # [-] modes listed in a notebook
+SHOWN = 10  # [-] modes listed in a notebook: a table without scrolling
 REMEMBERED = 16  # [-] points whose shapes and static deflections a body keeps, because one blow needs them many times
 ROUNDING = 1e-12  # [-] rounding error of a compliance, relative to itself and to that of the first mode
 SHAPE_ERROR = 10.0  # [-] relative error of a mode's compliance divided by the relative error of its frequency

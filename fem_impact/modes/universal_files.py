@@ -9,7 +9,7 @@ from .._base import check, isolated
 
 NORMAL_MODE, DISPLACEMENT, STRUCTURAL, REAL = 2, 8, 1, 2  # codes of data set 55
 CELL_CODE = {2: 11, 3: 91, 4: 94}  # nodes of a cell -> rod, thin shell triangle, thin shell quadrilateral
-WANTED = (15, 55, 2411)  # data sets to read
+WANTED = (15, 55, 2411)  # data sets to read: nodes, shapes, nodes in double precision
 PHASE = 0.3  # [-] largest imaginary over largest real part, at the best phase, of a complex shape taken as real
 DIRECTIONS = {"x": "r1", "y": "r2", "z": "r3"}
 
@@ -74,12 +74,8 @@ def read(path: Any, direction: str) -> dict[str, np.ndarray]:
     dict
         frequencies (n_modes,), damping_ratio (n_modes,), shapes (n_points, n_modes), points (n_points, 1 or 2)
     """
-    return isolated.read(
-        check.path("path", path),
-        "a universal file",
-        "modes.universal_files:arrays",
-        check.one_of("direction", direction, DIRECTIONS),
-    )
+    path, direction = check.path("path", path), check.one_of("direction", direction, DIRECTIONS)
+    return isolated.read(path, "a universal file", "modes.universal_files:arrays", direction)
 
 
 def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:

@@ -14,22 +14,22 @@ from ..impact.contact import Contact
 from ..impact.response import Response
 from ..scenes.sentences import RAISED, place, power, si
 from ..show import sound
+from ..show.figures import SPECTRUM_DEPTH
 from ..sweeps.grid import Case
 from . import report
 from .explore_model import Bench, Picture, Settings, blow, limit_of
 
-BAND = (20.0, 20e3)  # [Hz] of the spectrum
+BAND = (20.0, 20e3)  # [Hz] of the spectrum: the audible range
 SPECTRUM_POINTS = 240  # [-] more points take time but show no more
-DEPTH = 1e-4  # [-] lower end of the spectrum's axis over its largest value
-PLAYED = 2.0  # [s] of sound
-HEIGHT = 270  # [px] of a picture
+PLAYED = 2.0  # [s] of sound: short enough to compute at each press of the button
+HEIGHT = 270  # [px] of a picture: two rows fit on a laptop
 COLOURS = ("#9a958c", "#d6e4f0", "#f0c75e", "#e08a1e", "#a63d0c")  # colours of NAMES, in order
 HERE: dict[str, Any] = {"fill_color": "#d55e00", "line_color": "white", "line_width": 2}  # marker of the current blow
 NAMES = ("failed", "one impact", "two", "three", "more")
 LABELS = {
     "mass": "Mass", "stiffness": "Stiffness", "exponent": "Exponent", "speed": "Speed", "bending": "First bending mode"
 }  # fmt: skip
-STEPS = 200  # [-] per slider
+STEPS = 200  # [-] per slider: about one per pixel
 MOMENT = 8  # [ms] during which slider messages are collected before the next blow
 REST = 200  # [ms] without a change before the map is redrawn: a map takes as long as many blows
 TICKS = """
@@ -273,8 +273,8 @@ class Page:
         frequencies = np.geomspace(*BAND, SPECTRUM_POINTS)
         size = force_spectrum.magnitude(hit.time, hit.force, frequencies)
         top = float(size.max()) or 1.0
-        self.sources["spectrum-data"].data = {"x": frequencies, "y": np.maximum(size, 0.1 * DEPTH * top)}
-        self.document.get_model_by_name("spectrum").y_range.update(start=DEPTH * top, end=2.0 * top)
+        self.sources["spectrum-data"].data = {"x": frequencies, "y": np.maximum(size, 0.1 * SPECTRUM_DEPTH * top)}
+        self.document.get_model_by_name("spectrum").y_range.update(start=SPECTRUM_DEPTH * top, end=2.0 * top)
 
     def _label(self, settings: Settings, law: Contact) -> None:
         raised = "" if settings.exponent == 1.0 else f"{settings.exponent:.3g}".translate(RAISED)

@@ -22,13 +22,13 @@ from ..scenes.scene import Run, Scene, load_scene, scene_of
 from ..scenes.schema import PATHS, fault, read_bytes
 from ..scenes.sentences import place, power, si, tidy, words
 from ..show import export, sampling, sound
+from ..show.figures import SPECTRUM_BAND
 
-BAND = (10.0, 20e3)  # [Hz] of the spectrum shown: roughly the audible range; more if LOBES asks for it
 LOBES = 3.0  # [-] the spectrum reaches at least LOBES / duration of the shortest impact
-SPECTRUM_POINTS = 1000  # [-] about one per pixel
+SPECTRUM_POINTS = 1000  # [-] of the spectrum: about one per pixel of a wide page
 ENERGY_TIMES = 400  # [-] times at which the energies are drawn
 FRAMES = 72  # [-] frames of the wave: three seconds at 24 per second
-SHAPES = 12  # [-] mode shapes shown
+SHAPES = 12  # [-] mode shapes shown: more would double the size of the page
 DIGITS = 6  # [-] of the numbers in the plots; the downloads have full precision
 QUIET = -20.0  # [dB] re full scale: a quieter sound is offered again, amplified
 DISTANCE = 1.0  # [m] from the plate to the default listener
@@ -99,12 +99,11 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
         words=words(scene, response),
         picture=scene.picture(),
         observed=bool(scene.watched),
-        verdict=response.outcome,
         tiles=_tiles(response),
-        error=_errors(response),
+        response=response,
+        budget=_budget(response),
         modelled=_modelled(response, run),
         reasons=map(tidy, (*run.plan.reasons, *run.notes)),
-        impacts=response.impacts,
         energies=_shares(response),
         sounds=_sounds(scene, response),
         files=_downloads(scene, run),
@@ -152,25 +151,16 @@ def _tiles(response: Response) -> list[tuple[str, str]]:
     ]
 
 
-def _errors(response: Response) -> dict[str, Any]:
+def _budget(response: Response) -> list[tuple[str, str, float, float]]:
+    """The parts of the estimated error: name, how it was found, value, and that over the largest."""
     error = response.error
-    shares = [
-        ("time step", error.step, "from a second run of the same blow"),
-        ("modes left out", error.truncation, "from a run with fewer modes"),
-        ("finite elements", error.mesh, "from the frequency errors, weighted by energy"),
+    rows = [
+        ("time step", "from a second run of the same blow", error.step),
+        ("modes left out", "from a run with fewer modes", error.truncation),
+        ("finite elements", "from the frequency errors, weighted by energy", error.mesh),
     ]
-    scale = max(response.tolerance, *(value for _, value, _ in shares))
-    return {
-        "rows": [
-            {"name": name, "value": value, "how": how, "part": max(0.0, min(1.0, value / scale))}
-            for name, value, how in shares
-        ],
-        "total": error.total,
-        "tolerance": response.tolerance,
-        "met": error.total <= response.tolerance,
-        "resolvable": error.resolvable,
-        "energy": response.energy_error,
-    }
+    scale = max(response.tolerance, *(value for _, _, value in rows))
+    return [(name, how, value, max(0.0, min(1.0, value / scale))) for name, how, value in rows]
 
 
 def _modelled(response: Response, run: Run) -> list[tuple[str, str]]:
@@ -304,7 +294,7 @@ def _plots(response: Response) -> dict[str, Any]:
 
 def _frequencies(response: Response) -> np.ndarray:
     shortest = min((impact.duration for impact in response.impacts), default=1.0)
-    return np.geomspace(BAND[0], max(BAND[1], LOBES / shortest), SPECTRUM_POINTS)
+    return np.geomspace(SPECTRUM_BAND[0], max(SPECTRUM_BAND[1], LOBES / shortest), SPECTRUM_POINTS)
 
 
 def _view(response: Response, end: float) -> dict[str, Any]:

@@ -31,7 +31,9 @@ PICTURED = {  # layers drawn for a map with two axes: name in the picture
     "peak_force": "peak force",
     "centroid": "spectral centroid",
 }
-RESONANCES = tuple(m * 10.0**e for e in range(6) for m in (1, 2, 5))  # [Hz] levels of the contours
+RESONANCES = tuple(
+    m * 10.0**e for e in range(6) for m in (1, 2, 5)
+)  # [Hz] contours drawn: three per decade of the audible range
 
 
 @check.typed

@@ -49,12 +49,8 @@ def target_values(*, mass=None, first_frequency=None, nu=0.3, damping_ratio=0.0,
     check.non_negative("damping_ratio", damping_ratio)
     scale = {"mass": (mass, "kg"), "first_frequency": (first_frequency, "Hz")}
     given = {name: check.positive(name, value, unit) for name, (value, unit) in scale.items() if value is not None}
-    return {
-        "scale": given,
-        "nu": nu,
-        "damping_ratio": damping_ratio,
-        "source": check.one_of("source", source, SOURCES),
-    }
+    source = check.one_of("source", source, SOURCES)
+    return {"scale": given, "nu": nu, "damping_ratio": damping_ratio, "source": source}
 
 
 def _observe(*, points: Any = None, listener: Any = None) -> None:
@@ -94,35 +90,22 @@ SOURCES = ("auto", "fe", "analytic")
 # Functions that build each part of a scene; their arguments are the keys of its table.
 # The first entry is the key that selects the function, '' if there is only one.
 MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
-    "mesh": (
-        "shape",
-        {
-            "rectangle": mesh.rectangle,
-            "disk": mesh.disk,
-            "polygon": mesh.polygon,
-            "outline": mesh.outline,
-            "line": mesh.line,
-            "file": mesh.load,
-        },
-    ),
+    "mesh": ("shape", {
+        "rectangle": mesh.rectangle, "disk": mesh.disk, "polygon": mesh.polygon, "outline": mesh.outline,
+        "line": mesh.line, "file": mesh.load,
+    }),
     "material": ("", {"": Material}),
     "section": ("kind", {"plate": Plate, "beam": _beam}),
     "target": ("", {"": target_values}),
     "striker": ("kind", {"rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick}),
-    "contact": (
-        "kind",
-        {
-            "linear": Contact.linear,
-            "hertz": Contact.hertz,
-            "power": Contact.power,
-            "restituting": Contact.restituting,
-            "between": Contact.between,
-        },
-    ),
+    "contact": ("kind", {
+        "linear": Contact.linear, "hertz": Contact.hertz, "power": Contact.power,
+        "restituting": Contact.restituting, "between": Contact.between,
+    }),
     "strike": ("", {"": collision.strike}),
     "observe": ("", {"": _observe}),
     "map": ("", {"": map_values}),
-}
+}  # fmt: skip
 TABLES = [*MAKERS, "supports"]
 REQUIRED = ("mesh", "striker", "contact", "strike")
 SUPPLIED = {"material", "modes", "striker", "contact", "sphere", "plate"}  # arguments that come from other tables

@@ -205,13 +205,9 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
     -------
     matplotlib.figure.Figure
     """
-    count = min(check.count("count", count), modes.n_modes)
-    columns = min(check.count("columns", columns), count)
-    rows = -(-count // columns)
-    check.between("dimension of modes", modes.dimension, 1, 2)
     points, cells = sampling.grid(modes)
-    shapes = modes.shapes.at(points)[:, :count]
-    shapes = shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300)
+    shapes, rows, columns = sampling.gallery(modes, points, count, columns)
+    count = shapes.shape[1]
     rim = boundary(cells) if modes.dimension == 2 else None
     with styled(2.2 * columns, 1.9 * rows) as figure:
         grid = figure.subplots(rows, columns, squeeze=False)

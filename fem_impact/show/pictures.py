@@ -26,14 +26,14 @@ PROBE = (
     "assert p.screenshot(None).std() > 0"
 )
 WINDOW = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
-SIZE = (720, 480)  # [px] size of a frame
-TILE = (320, 250)  # [px] size of one mode shape
+SIZE = (720, 480)  # [px] size of a frame: a GIF stays below a few megabytes
+TILE = (320, 250)  # [px] size of one mode shape: four side by side on a screen
 FRAMES = 48  # [-] default length of an animation: four seconds
-RATE = 12  # [1/s] frames per second
+RATE = 12  # [1/s] frames per second: enough for a wave, half the size of a film
 HEIGHT = 0.12  # [-] largest drawn deflection over the body's extent
 LIFT = 0.0015  # [-] height of lines above the surface, over their extent
 BALL = 0.03  # [-] drawn radius of the striker over the body's extent
-VIEW = (-0.55, -1.0, 0.75)  # direction to the camera
+VIEW = (-0.55, -1.0, 0.75)  # direction to the camera: from the front left, above the plate
 
 
 @cache
@@ -68,14 +68,10 @@ def mode_shapes(path: str | Path, modes: Modes, *, count: int = 12, columns: int
     if not can_render():
         figures.save(path, figures.mode_shapes(modes, count=count, columns=columns))
         return REMEDY
-    count = min(check.count("count", count), modes.n_modes)
-    columns = min(check.count("columns", columns), count)
-    rows = -(-count // columns)
     points, cells, plane = sampling.surface(modes)
-    shapes = modes.truncated(n_modes=count).shapes.at(points)
-    shapes = shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300)
+    shapes, rows, columns = sampling.gallery(modes, points, count, columns)
     plotter = _plotter((TILE[0] * columns, TILE[1] * rows), shape=(rows, columns))
-    for i in range(count):
+    for i in range(shapes.shape[1]):
         plotter.subplot(*divmod(i, columns))
         mesh = _mesh(plane, cells, HEIGHT * _extent(plane) * shapes[:, i], shapes[:, i])
         _add(plotter, mesh, 1.0)

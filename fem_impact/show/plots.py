@@ -20,7 +20,7 @@ from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, styled
 BLACK, GREY = "#222222", "#777777"
 PALETTE = "cividis"  # perceptually uniform, also for colour-blind readers
 FINER = 8  # [-] each pixel is split into this many parts to draw contours
-MOST_NAMES = 5  # [-] most names along an axis
+MOST_NAMES = 5  # [-] most names along an axis: more would overlap
 FEW = 10  # [-] a range of fewer whole numbers gets one colour per number
 HALO = withStroke(linewidth=2.2, foreground=BLACK)  # keeps white lines visible on bright colours
 RIM = withStroke(linewidth=4.0, foreground="white")  # keeps circles visible on dark colours
@@ -187,11 +187,7 @@ def colour_map(
     return figure
 
 
-_LINES = (
-    ("white", "solid"),
-    ("white", "dashed"),
-    ("white", "dotted"),
-)  # colour and style of each set of contours, in order
+_LINES = [("white", style) for style in ("solid", "dashed", "dotted")]  # of each set of contours, in order
 
 
 def _finer(x: np.ndarray, y: np.ndarray, data: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

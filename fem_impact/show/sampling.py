@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from .._base import check
 from ..impact.response import Response
 from ..mesh.mesh_files import quartered
 from ..modes.modal import Modes
@@ -46,6 +47,15 @@ def surface(modes: Modes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     cells = np.vstack([np.column_stack(corner) for corner in corners])
     plane = np.column_stack([np.tile(x, 2), np.repeat([-half, half], n)])
     return plane[:, :1], cells, plane
+
+
+def gallery(modes: Modes, points: np.ndarray, count: int, columns: int) -> tuple[np.ndarray, int, int]:
+    """The first shapes at points, each with largest value 1, (n_points, n); rows and columns to draw them in."""
+    check.between("dimension of modes", modes.dimension, 1, 2)
+    count = min(check.count("count", count), modes.n_modes)
+    columns = min(check.count("columns", columns), count)
+    shapes = modes.truncated(n_modes=count).shapes.at(points)
+    return shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300), -(-count // columns), columns
 
 
 def gap(response: Response, times: np.ndarray) -> np.ndarray:
