@@ -31,9 +31,7 @@ PICTURED = {  # layers drawn for a map with two axes: name in the picture
     "peak_force": "peak force",
     "centroid": "spectral centroid",
 }
-RESONANCES = tuple(
-    m * 10.0**e for e in range(6) for m in (1, 2, 5)
-)  # [Hz] contours drawn: three per decade of the audible range
+RESONANCES = tuple(m * 10.0**e for e in range(6) for m in (1, 2, 5))  # [Hz] contours drawn: three per decade
 
 
 @check.typed
