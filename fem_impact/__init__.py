@@ -4,44 +4,27 @@ from importlib import import_module
 from typing import Any
 
 # Public names and their modules, imported at first use so that the command line starts quickly.
-_HOME = {
-    "SimulationError": "_base.check",
-    "Material": "fe.section",
-    "Plate": "fe.section",
-    "Beam": "fe.section",
-    "Elastic": "fe.section",
-    "Contact": "impact.contact",
-    "assemble": "fe.assembly",
-    "Modes": "modes.modal",
-    "find_modes": "modes.modal",
-    "rayleigh": "modes.modal",
-    "Striker": "impact.striker",
-    "Response": "impact.response",
-    "Impact": "impact.response",
-    "Touch": "impact.collision",
-    "mobility": "impact.spectra",
-    "threshold_frequency": "impact.threshold",
-    "strike": "model.planner",
-    "collide": "impact.collision",
-    "Scene": "scenes.scene",
-    "load_scene": "scenes.scene",
-    "plan": "scenes.scene",
-    "Plan": "model.planner",
-    "sweep": "sweeps.grid",
+_NAMES = {
+    "_base.check": "SimulationError",
+    "fe.section": "Material Plate Beam Elastic",
+    "fe.assembly": "assemble",
+    "modes.modal": "Modes find_modes rayleigh",
+    "impact.contact": "Contact",
+    "impact.striker": "Striker",
+    "impact.response": "Response Impact",
+    "impact.collision": "Touch collide",
+    "impact.spectra": "mobility",
+    "impact.threshold": "threshold_frequency",
+    "model.planner": "Plan strike",
+    "scenes.scene": "Scene load_scene plan",
+    "sweeps.grid": "sweep",
 }
+_HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 _MODULES = {
-    "mesh": "mesh",
-    "analytic": "modes.analytic",
-    "spectra": "impact.spectra",
-    "threshold": "impact.threshold",
-    "figures": "show.figures",
-    "pictures": "show.pictures",
-    "sound": "show.sound",
-    "export": "show.export",
-    "hammers": "sweeps.hammers",
-    "report": "pages.report",
-    "explore": "pages.explore",
-}
+    "mesh": "mesh", "analytic": "modes.analytic", "spectra": "impact.spectra", "threshold": "impact.threshold",
+    "figures": "show.figures", "pictures": "show.pictures", "sound": "show.sound", "export": "show.export",
+    "hammers": "sweeps.hammers", "report": "pages.report", "explore": "pages.explore",
+}  # fmt: skip
 
 __all__ = [*_HOME, *_MODULES, "__version__"]
 

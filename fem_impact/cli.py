@@ -21,24 +21,16 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
+from rich import progress as bars
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
 import fem_impact as fi
 
 from ._base.files import undo_all, undoable
 
-BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses
+BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses, as Unix tools use them; 130 is 128 + SIGINT
 WIDEST = 88  # [-] columns: printed text is never wider, and narrower on a narrow terminal
-MOTION_TIMES = 100  # [-] instants in motion.pvd
+MOTION_TIMES = 100  # [-] instants in motion.pvd: four seconds at 25 per second
 SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` writes any number
 
 
@@ -46,9 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run one command; the exit status is 0, 2 for bad input, 1 for a run that failed, 130 after Ctrl-C."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(
-                errors="backslashreplace"
-            )  # a title may contain characters that this terminal cannot show
+            stream.reconfigure(errors="backslashreplace")  # a title may hold characters that this terminal lacks
     options = _parser().parse_args(arguments)
     plain = _prepare(os.environ, once=options.run in (_strike, _modes, _report))
     try:
@@ -207,119 +197,99 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     verbs = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
-    strike = verbs.add_parser("strike", help="strike a scene; write force, spectrum, modes and sound")
-    strike.set_defaults(run=_strike)
-    strike.add_argument(
-        "scene", metavar="SCENE", type=_place, help="a TOML file, such as studies/scenes/drumstick.toml"
-    )
-    strike.add_argument("--out", metavar="DIR", type=_place, help="output folder (default: out/NAME-OF-SCENE)")
-    _add_choices(strike)
-    strike.add_argument(
-        "--verify", action="store_true", help="strike again with a finer model and print the differences"
-    )
-    strike.add_argument(
-        "--pictures", action="store_true", help="write 3-D pictures of the mode shapes and the wave, as PNG and GIF"
-    )
-    strike.add_argument("--vtk", action="store_true", help="write motion.pvd, the motion for ParaView and pyvista")
-    strike.add_argument(
+    def verb(run: Any, name: str, help: str, scene: str = "a TOML file", called: str = "SCENE") -> Any:
+        """Add a command and return the function that adds its arguments."""
+        made = verbs.add_parser(name, help=help)
+        made.set_defaults(run=run)
+        if scene:
+            made.add_argument("scene", metavar=called, type=_place, help=scene)
+        return made.add_argument
+
+    add = verb(
+        _strike, "strike", "strike a scene; write force, spectrum, modes and sound",
+        scene="a TOML file, such as studies/scenes/drumstick.toml",
+    )  # fmt: skip
+    add("--out", metavar="DIR", type=_place, help="output folder (default: out/NAME-OF-SCENE)")
+    _add_choices(add)
+    add("--verify", action="store_true", help="strike again with a finer model and print the differences")
+    add("--pictures", action="store_true", help="write 3-D pictures of the mode shapes and the wave, as PNG and GIF")
+    add("--vtk", action="store_true", help="write motion.pvd, the motion for ParaView and pyvista")
+    add(
         "--listener", metavar=("X", "Y", "Z"), nargs=3, type=float,
         help="write radiated.wav, the sound the plate radiates to this point [m]; Z is the height above the plate",
     )  # fmt: skip
-    strike.add_argument(
-        "--json", action="store_true", help="print the contents of response.json instead of the summary"
-    )
+    add("--json", action="store_true", help="print the contents of response.json instead of the summary")
 
-    plan = verbs.add_parser("plan", help="show the model, its reasons, expected errors and cost, without striking")
-    plan.set_defaults(run=_plan)
-    plan.add_argument("scene", metavar="SCENE", type=_place, help="a TOML file")
-    _add_choices(plan)
-    plan.add_argument("--json", action="store_true", help="print the plan as JSON")
+    add = verb(_plan, "plan", "show the model, its reasons, expected errors and cost, without striking")
+    _add_choices(add)
+    add("--json", action="store_true", help="print the plan as JSON")
 
-    modes = verbs.add_parser("modes", help="list the modes of the struck body; write their shapes")
-    modes.set_defaults(run=_modes)
-    modes.add_argument("scene", metavar="SCENE", type=_place, help="a TOML file")
-    modes.add_argument("--count", metavar="N", type=int, default=12, help="how many modes (default: 12)")
-    modes.add_argument("--vtk", metavar="FILE", type=_place, help="write the shapes to a .pvd or .vtu file")
-    modes.add_argument("--json", action="store_true", help="print the numbers as JSON")
+    add = verb(_modes, "modes", "list the modes of the struck body; write their shapes")
+    add("--count", metavar="N", type=int, default=12, help="how many modes (default: 12)")
+    add("--vtk", metavar="FILE", type=_place, help="write the shapes to a .pvd or .vtu file")
+    add("--json", action="store_true", help="print the numbers as JSON")
 
-    chart = verbs.add_parser("map", help="strike a scene on the grid of its table [map]; write numbers and pictures")
-    chart.set_defaults(run=_map)
-    chart.add_argument(
-        "scene", metavar="SCENE", type=_place, help="a TOML file, such as studies/scenes/drumstick_map.toml"
-    )
-    chart.add_argument(
+    add = verb(
+        _map, "map", "strike a scene on the grid of its table [map]; write numbers and pictures",
+        scene="a TOML file, such as studies/scenes/drumstick_map.toml",
+    )  # fmt: skip
+    add(
         "--out", metavar="DIR", type=_place,
         help="folder for map.nc, map.csv and, for two axes, a PNG of each layer (default: out/NAME-OF-SCENE)",
     )  # fmt: skip
-    chart.add_argument("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
-    chart.add_argument(
+    add("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
+    add(
         "--format", choices=("nc", "zarr"), default="nc", help="format of the numbers: map.nc or map.zarr (default: nc)"
     )
-    chart.add_argument("--workers", metavar="N", type=int, help="number of threads (default: one per core)")
-    chart.add_argument("--cluster", metavar="ADDRESS", help="run on the Dask cluster whose scheduler has this address")
-    chart.add_argument(
-        "--store",
-        metavar="DIR",
-        type=_place,
-        help="keep finished cells in this folder; an interrupted run continues from it",
-    )
-    chart.add_argument(
-        "--max-cells", metavar="N", type=float, default=1e8, help="refuse maps with more cells (default: 1e8)"
-    )
+    add("--workers", metavar="N", type=int, help="number of threads (default: one per core)")
+    add("--cluster", metavar="ADDRESS", help="run on the Dask cluster whose scheduler has this address")
+    add("--store", metavar="DIR", type=_place, help="keep finished cells there; an interrupted run continues from them")
+    add("--max-cells", metavar="N", type=float, default=1e8, help="refuse maps with more cells (default: 1e8)")
 
-    hammer = verbs.add_parser("hammer", help="find the hammers that reach a bandwidth without a double hit")
-    hammer.set_defaults(run=_hammer)
-    hammer.add_argument("scene", metavar="SCENE", type=_place, help="a TOML file; its body and strike point are used")
-    hammer.add_argument("--bandwidth", metavar="F", type=float, required=True, help="bandwidth to reach [Hz]")
-    hammer.add_argument(
-        "--drop",
-        metavar="D",
-        type=float,
-        default=10.0,
+    add = verb(
+        _hammer, "hammer", "find the hammers that reach a bandwidth without a double hit",
+        scene="a TOML file; its body and strike point are used",
+    )  # fmt: skip
+    add("--bandwidth", metavar="F", type=float, required=True, help="bandwidth to reach [Hz]")
+    add(
+        "--drop", metavar="D", type=float, default=10.0,
         help="how far the spectrum may fall within the bandwidth [dB] (default: 10)",
-    )
-    hammer.add_argument(
-        "--masses", metavar="KG", type=float, nargs="+", help="masses of the hammers [kg] (default: 1 g to 1 kg)"
-    )
-    hammer.add_argument("--out", metavar="FILE", type=_place, help="write a picture to this file: .png, .pdf or .svg")
-    hammer.add_argument("--json", action="store_true", help="print the numbers as JSON")
+    )  # fmt: skip
+    add("--masses", metavar="KG", type=float, nargs="+", help="masses of the hammers [kg] (default: 1 g to 1 kg)")
+    add("--out", metavar="FILE", type=_place, help="write a picture to this file: .png, .pdf or .svg")
+    add("--json", action="store_true", help="print the numbers as JSON")
 
-    report = verbs.add_parser("report", help="strike a scene; write one HTML page with everything about the blow")
-    report.set_defaults(run=_report)
-    report.add_argument(
-        "scene", metavar="SCENE|RESULT", type=_place, help="a TOML file, or a folder written by `strike`"
-    )
-    report.add_argument("--out", metavar="FILE", type=_place, help="the page to write (default: out/NAME/report.html)")
-    report.add_argument("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
+    add = verb(
+        _report, "report", "strike a scene; write one HTML page with everything about the blow",
+        scene="a TOML file, or a folder written by `strike`", called="SCENE|RESULT",
+    )  # fmt: skip
+    add("--out", metavar="FILE", type=_place, help="the page to write (default: out/NAME/report.html)")
+    add("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
 
-    explore = verbs.add_parser("explore", help="serve a page on this machine where sliders and clicks change the blow")
-    explore.set_defaults(run=_explore)
-    explore.add_argument("scene", metavar="SCENE", type=_place, help="a TOML file")
-    explore.add_argument("--port", metavar="N", type=int, default=0, help="port on 127.0.0.1 (default: any free port)")
-    explore.add_argument("--no-open", action="store_true", help="print the address, but do not open it in a browser")
+    add = verb(_explore, "explore", "serve a page on this machine where sliders and clicks change the blow")
+    add("--port", metavar="N", type=int, default=0, help="port on 127.0.0.1 (default: any free port)")
+    add("--no-open", action="store_true", help="print the address, but do not open it in a browser")
 
-    doctor = verbs.add_parser("doctor", help="check this installation and suggest a remedy for each failure")
-    doctor.set_defaults(run=_doctor)
+    verb(_doctor, "doctor", "check this installation and suggest a remedy for each failure", scene="")
 
-    completion = verbs.add_parser("completion", help="print a completion script for bash: eval it in ~/.bashrc")
-    completion.set_defaults(run=lambda options: print(_completion(parser)))
+    add = verb(
+        lambda options: print(_completion(parser, options.shell)), "completion",
+        "print a script that completes commands; eval it in ~/.bashrc", scene="",
+    )  # fmt: skip
+    add("shell", choices=("bash", "zsh", "tcsh"), nargs="?", default="bash", help="default: bash")
     return parser
 
 
-def _add_choices(verb: argparse.ArgumentParser) -> None:
+def _add_choices(add: Any) -> None:
     """Add the options that choose the model."""
-    verb.add_argument("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
-    verb.add_argument(
+    add("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
+    add(
         "--quantity", metavar="Q", action="append",
         help="what the tolerance is for; repeatable: restitution, contact_time, force ..., spectrum=5000 (up to 5 kHz)",
     )  # fmt: skip
-    verb.add_argument(
-        "--target",
-        metavar="KIND",
-        help="treat the struck body as rigid, infinite or modal, whatever the plan would choose",
-    )
-    verb.add_argument("--n-modes", metavar="N", type=int, help="number of modes to keep for the struck body")
-    verb.add_argument("--size", metavar="H", type=float, help="element size [m]")
+    add("--target", metavar="KIND", help="treat the struck body as rigid, infinite or modal, whatever the plan chooses")
+    add("--n-modes", metavar="N", type=int, help="number of modes to keep for the struck body")
+    add("--size", metavar="H", type=float, help="element size [m]")
 
 
 def _choices(options: argparse.Namespace) -> dict[str, Any]:
@@ -341,9 +311,7 @@ def _strike(options: argparse.Namespace) -> None:
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:
         needs = {"target": "modal"} if options.pictures or options.vtk else {}  # only a modal body shows motion
-        keep = folder.with_name(
-            f"{folder.name}.modes.npz"
-        )  # beside the folder, which an interrupted run leaves unchanged
+        keep = folder.with_name(f"{folder.name}.modes.npz")  # not in the folder: an interrupted run leaves that alone
         choices = {**needs, **_choices(options)}
         run = scene.run(_progress, before=_warn, verify=options.verify, keep=keep, **choices)
         start = time.perf_counter()
@@ -352,39 +320,28 @@ def _strike(options: argparse.Namespace) -> None:
     keep.unlink(missing_ok=True)
     seconds = {**run.seconds, "files": time.perf_counter() - start, "total": time.perf_counter() - began}
     if options.json:
-        print(json.dumps(data, indent=2, allow_nan=False))
+        _print_json(data)
         return
-    print(_wrapped(scene.title or str(scene.path)))
-    for note in run.notes:
-        print(_wrapped(f"mesh: {note}"))
-    print(_wrapped(run.response.summary()))
+    _say(_title(scene), *(f"mesh: {note}" for note in run.notes), run.response.summary())
     if run.plan.target != "modal":
-        print(
-            _wrapped(
-                f"Model: {run.plan.reasons[0]}; no modes and no sound (use --target modal or --quantity sound=5000)"
-            )
-        )
+        _say(f"Model: {run.plan.reasons[0]}; no modes and no sound (use --target modal or --quantity sound=5000)")
     if run.verified is not None:
-        tested = (
-            ""
-            if run.finer.target == "modal"
-            else f" (which also treats the body as {run.finer.target}: it has too many modes)"
-        )
+        coarse = run.finer.target != "modal"
+        tested = f" (which also treats the body as {run.finer.target}: it has too many modes)" if coarse else ""
         differences = ", ".join(f"{name} {value:.1e}" for name, value in run.verified.items())
-        print(_wrapped(f"Verified by a finer run{tested}: {differences}"))
+        _say(f"Verified by a finer run{tested}: {differences}")
     if "radiated" in data:
         heard = data["radiated"]
-        text = f"Listener: peak {heard['level']:.1f} dB re 20 µPa; 1.0 in radiated.wav is {heard['full_scale']:g} Pa"
-        print(_wrapped(text))
-    print(_wrapped("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())))
-    print(_wrapped(f"Files in {folder}{os.sep}: {', '.join(data['files'])}"))
+        _say(f"Listener: peak {heard['level']:.1f} dB re 20 µPa; 1.0 in radiated.wav is {heard['full_scale']:g} Pa")
+    _say("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items()))
+    _say(f"Files in {folder}{os.sep}: {', '.join(data['files'])}")
 
 
 def _warn(plan: Any) -> None:
     """Warn of a long run before it starts."""
     if plan.costly:
         text = f"{plan.cost}; Ctrl-C stops it, and the same command later reuses the modes already found"
-        print(_wrapped(f"fem-impact: {text} (`fem-impact plan` explains why)"), file=sys.stderr)
+        _tell(f"{text} (`fem-impact plan` explains why)")
 
 
 def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> dict[str, Any]:
@@ -408,25 +365,14 @@ def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> d
             fi.pictures.wave(folder / "wave.png", response)
             missing = fi.pictures.mode_shapes(folder / "modes.png", response.target)
             if missing:
-                print(_wrapped(f"fem-impact: pictures are drawn in two dimensions; {missing}"), file=sys.stderr)
+                _tell(f"pictures are drawn in two dimensions; {missing}")
             files += ["modes.png", "wave.png", "wave.gif"]
     if run.verified is not None:
         extra["verified"] = run.verified
     changes = {name: value for name, value in run.plan.changes.items() if name in ("tolerance", "quantity")}
     tables, copies = scene.kept(folder, **changes)
     files += copies
-    data = fi.export.plain(
-        {
-            **fi.export.numbers(response),
-            **extra,
-            "plan": run.plan.data(),
-            "scene": tables,
-            "seconds": dict(run.seconds),
-            "notes": list(run.notes),
-            "versions": fi.export.versions(),
-            "files": files,
-        }
-    )
+    data = fi.export.run_data(run, tables) | fi.export.plain({**extra, "files": files})
     fi.export.write_json(folder / "response.json", data)
     return data
 
@@ -447,10 +393,9 @@ def _plan(options: argparse.Namespace) -> None:
     scene = fi.load_scene(options.scene)
     plan = scene.plan(watch=_progress, **_choices(options))
     if options.json:
-        print(json.dumps(fi.export.plain({**plan.data(), "versions": fi.export.versions()}), indent=2, allow_nan=False))
+        _print_json({**plan.data(), "versions": fi.export.versions()})
         return
-    print(_wrapped(scene.title or str(scene.path)))
-    print(_wrapped(str(plan)))
+    _say(_title(scene), str(plan))
 
 
 def _map(options: argparse.Namespace) -> None:
@@ -468,17 +413,10 @@ def _map(options: argparse.Namespace) -> None:
             )  # fmt: skip
         with _progress("files"):
             names = maps.write(staging, table, options.format)
-    print(_wrapped(scene.title or str(scene.path)))
     axes = ", ".join(f"{name} ({size})" for name, size in table.sizes.items())
     single, failed = int((table.n_impacts == 1).sum()), int((table.n_impacts < 0).sum())
-    print(_wrapped(f"{table.n_impacts.size} blows over {axes}: {single} hit once, {failed} failed"))
-    print(_wrapped(f"Time: {time.perf_counter() - began:.2f} s"))
-    print(_wrapped(f"Files in {folder}{os.sep}: {', '.join(names)}"))
-
-
-def _tell(text: str) -> None:
-    """Print one sentence to stderr."""
-    print(_wrapped(f"fem-impact: {text}"), file=sys.stderr, flush=True)
+    _say(_title(scene), f"{table.n_impacts.size} blows over {axes}: {single} hit once, {failed} failed")
+    _say(f"Time: {time.perf_counter() - began:.2f} s", f"Files in {folder}{os.sep}: {', '.join(names)}")
 
 
 def _hammer(options: argparse.Namespace) -> None:
@@ -493,23 +431,25 @@ def _hammer(options: argparse.Namespace) -> None:
             fi.figures.save(options.out, plots.hammers(hammers, options.bandwidth, options.drop))
     if options.json:
         data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [vars(hammer) for hammer in hammers]}
-        print(json.dumps(fi.export.plain({**data, "versions": fi.export.versions()}), indent=2, allow_nan=False))
+        _print_json({**data, "versions": fi.export.versions()})
         return
-    print(_wrapped(scene.title or str(scene.path)))
-    print(
-        _wrapped(f"Tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:")
-    )
-    print(f"{'mass':>9} {'softest tip':>14} {'hardest tip':>14} {'its reach':>11}")
-    for hammer in hammers:
-        soft = f"{hammer.softest:10.3g} N/m" if hammer.softest else "none"
-        hard = f"{hammer.hardest:10.3g} N/m" if hammer.hardest else "none"
-        reach = f"{hammer.reach:8.4g} Hz" if hammer.reach else "-"
-        print(f"{1e3 * hammer.mass:7.4g} g {soft:>14} {hard:>14} {reach:>11}")
+    _say(_title(scene))
+    _say(f"Tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:")
+    rows = [
+        (
+            f"{1e3 * hammer.mass:.4g} g",
+            f"{hammer.softest:.3g} N/m" if hammer.softest else "none",
+            f"{hammer.hardest:.3g} N/m" if hammer.hardest else "none",
+            f"{hammer.reach:.4g} Hz" if hammer.reach else "-",
+        )
+        for hammer in hammers
+    ]
+    _print_table(rows, ("mass", "softest tip", "hardest tip", "its reach"))
     idle = ", ".join(f"{1e3 * hammer.mass:.4g} g" for hammer in hammers if not hammer.works)
     if idle:
-        print(_wrapped(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; try lighter hammers"))
+        _say(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; try lighter hammers")
     if options.out is not None:
-        print(_wrapped(f"Files: {options.out}"))
+        _say(f"Files: {options.out}")
 
 
 def _report(options: argparse.Namespace) -> None:
@@ -520,9 +460,7 @@ def _report(options: argparse.Namespace) -> None:
         run = scene.run(_progress, before=_warn, target="modal", **changes)
         with _progress("page"):
             fi.report.write(staging / path.name, scene, run)
-    print(_wrapped(scene.title or str(scene.path)))
-    print(_wrapped(run.response.summary()))
-    print(_wrapped(f"Files: {path}"))
+    _say(_title(scene), run.response.summary(), f"Files: {path}")
 
 
 def _explore(options: argparse.Namespace) -> None:
@@ -549,59 +487,73 @@ def _modes(options: argparse.Namespace) -> None:
             fi.export.write_vtk(staging / options.vtk.name, modes)
     if options.json:
         data = {"frequencies": modes.frequencies, "damping_ratios": modes.damping_ratio, "mass": modes.mass}
-        print(json.dumps(fi.export.plain({**data, "versions": fi.export.versions()}), indent=2, allow_nan=False))
+        _print_json({**data, "versions": fi.export.versions()})
         return
-    print(_wrapped(scene.title or str(scene.path)))
-    print(f"{'mode':>5} {'frequency':>14} {'damping ratio':>14}")
-    for i, (frequency, ratio) in enumerate(zip(modes.frequencies, modes.damping_ratio), 1):
-        print(f"{i:5d} {frequency:11.5g} Hz {ratio:14.3g}")
+    _say(_title(scene))
+    rows = [
+        (i, f"{frequency:.5g} Hz", f"{ratio:.3g}")
+        for i, (frequency, ratio) in enumerate(zip(modes.frequencies, modes.damping_ratio), 1)
+    ]
+    _print_table(rows, ("mode", "frequency", "damping ratio"))
     if options.vtk is not None:
-        print(_wrapped(f"Files: {options.vtk}"))
+        _say(f"Files: {options.vtk}")
 
 
 def _doctor(options: argparse.Namespace) -> None:
     from . import doctor  # imported only when needed
 
-    for name, version in fi.export.versions().items():
-        print(f"{name:<22} {version}")
+    _print_table(list(fi.export.versions().items()))
     with _progress("checking, and compiling if not yet done"):
         findings = doctor.examine()
     for finding in findings:
         state = "works" if finding.works else "fails" if finding.vital else "missing"
-        print(_wrapped(f"{finding.name:<22} {state:<8} {finding.seconds:5.2f} s  {finding.remedy}".rstrip()))
+        _say(f"{finding.name:<22} {state:<8} {finding.seconds:5.2f} s  {finding.remedy}".rstrip())
     failed = [finding.name for finding in findings if finding.vital and not finding.works]
     if failed:
         raise fi.SimulationError(f"{', '.join(failed)}: not working; see above")
 
 
-def _completion(parser: argparse.ArgumentParser) -> str:
-    """A bash script that completes the command, then its options and file names."""
+def _completion(parser: argparse.ArgumentParser, shell: str) -> str:
+    """A script that completes commands, options and file names."""
+    from ._base import check  # imports numpy, which --help and --version do not need
+
+    shtab = check.extra("shtab", "completion", "completion")
     (verbs,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
-    cases = [
-        f"        {name}) words='{' '.join(word for action in verb._actions for word in action.option_strings)}' ;;"
-        for name, verb in verbs.choices.items()
-    ]
-    return "\n".join(
-        [
-            "_fem_impact() {",
-            "    local words='--help --version'",
-            '    case "${COMP_WORDS[1]}" in',
-            *cases,
-            "    esac",
-            '    [ "$COMP_CWORD" = 1 ] && words="$words ' + " ".join(verbs.choices) + '"',
-            '    COMPREPLY=($(compgen -W "$words" -- "${COMP_WORDS[COMP_CWORD]}"))',
-            "}",
-            "complete -o default -F _fem_impact fem-impact",
-        ]
-    )
+    for action in (action for verb in verbs.choices.values() for action in verb._actions):
+        if action.type is _place:
+            action.complete = shtab.FILE
+    return shtab.complete(parser, shell)
+
+
+def _title(scene: Any) -> str:
+    return scene.title or str(scene.path)
+
+
+def _say(*texts: str) -> None:
+    """Print texts wrapped to the width of the terminal."""
+    for text in texts:
+        print(_wrapped(text))
+
+
+def _tell(text: str) -> None:
+    """Print one sentence to stderr."""
+    print(_wrapped(f"fem-impact: {text}"), file=sys.stderr, flush=True)
+
+
+def _print_table(rows: Sequence[Sequence[Any]], head: Sequence[str] = ()) -> None:
+    from ._base import markup  # imports numpy, which --help and --version do not need
+
+    print(*markup.columns(rows, head), sep="\n")
+
+
+def _print_json(data: dict[str, Any]) -> None:
+    print(json.dumps(fi.export.plain(data), indent=2, allow_nan=False))
 
 
 def _wrapped(text: str) -> str:
     """Wrap text to the width of the terminal and indent continued lines."""
     width = max(20, min(WIDEST, shutil.get_terminal_size().columns))
-    filled = textwrap.TextWrapper(
-        width, subsequent_indent="    ", break_on_hyphens=False
-    )  # so that paths can be copied
+    filled = textwrap.TextWrapper(width, subsequent_indent="    ", break_on_hyphens=False)  # keeps paths whole
     lines = (filled.wrap(line) or [""] for line in text.splitlines())
     return "\n".join(line for wrapped in lines for line in wrapped)
 
@@ -612,38 +564,41 @@ def _show_cursor() -> None:
 
 
 @contextmanager
-def _progress(stage: str) -> Iterator[None]:
-    """On a terminal, show which stage is running and for how long."""
+def _bar(*columns: Any) -> Iterator[bars.Progress | None]:
+    """A line that shows progress on a terminal; None if there is no terminal."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield
+        yield None
         return
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with undoable(_show_cursor), Progress(*columns, console=console, transient=True) as progress:
-        progress.add_task(stage, total=None)
+    with undoable(_show_cursor), bars.Progress(*columns, console=console, transient=True) as bar:
+        yield bar
+
+
+@contextmanager
+def _progress(stage: str) -> Iterator[None]:
+    """On a terminal, show which stage is running and for how long."""
+    with _bar(bars.SpinnerColumn(), bars.TextColumn("{task.description}"), bars.TimeElapsedColumn()) as bar:
+        if bar is not None:
+            bar.add_task(stage, total=None)
         yield
 
 
 @contextmanager
 def _counted(what: str) -> Iterator[Any]:
     """On a terminal, show the number done, the rate and the time left."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield None
-        return
-    columns = (
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"), TimeRemainingColumn(),
-    )  # fmt: skip
-    with undoable(_show_cursor), Progress(*columns, console=console, transient=True) as progress:
-        task, began = progress.add_task(what, total=None, rate=""), time.perf_counter()
+    name, rate = (bars.TextColumn(text) for text in ("{task.description}", "{task.fields[rate]}"))
+    with _bar(name, bars.BarColumn(), bars.MofNCompleteColumn(), rate, bars.TimeRemainingColumn()) as bar:
+        if bar is None:
+            yield None
+            return
+        task, began = bar.add_task(what, total=None, rate=""), time.perf_counter()
         known: list[int] = []
 
         def watch(done: int, total: int) -> None:
             if not known:
                 known.append(done)
-            rate = (done - known[0]) / max(1e-9, time.perf_counter() - began)
-            progress.update(task, completed=done, total=total, rate=f"{rate:.3g}/s" if rate else "")
+            speed = (done - known[0]) / max(1e-9, time.perf_counter() - began)
+            bar.update(task, completed=done, total=total, rate=f"{speed:.3g}/s" if speed else "")
 
         yield watch
 

@@ -1,9 +1,8 @@
 """Figure 7: the scene, a hinged plate struck through a spring by the free end of a hinged stick."""
 
 import numpy as np
+import sketches
 import source_scenes as source
-
-from fem_impact.show import plots
 
 
 def compute():
@@ -13,7 +12,7 @@ def compute():
 
 def draw(corners):
     """Draw the scene in oblique view."""
-    figure = plots.blow(corners, source.AT, title="A stick strikes a plate")
+    figure = sketches.blow(corners, source.AT, title="A stick strikes a plate")
     return figure, {"x [m]": [*corners[:, 0], source.AT[0]], "y [m]": [*corners[:, 1], source.AT[1]]}
 
 

@@ -1,6 +1,7 @@
 """Figure 14: the plate of 200 g and the four points where figure 15 strikes it."""
 
 import fig07
+import sketches
 import source_scenes as source
 
 from fem_impact.show import plots
@@ -17,7 +18,7 @@ def draw(points):
     """Draw the plate from above."""
     labels = [f"{place:g}" for place in PLACES]
     title = "Where the plate is struck, as a share of its length"
-    figure = plots.plan(fig07.compute(), points, labels, title=title, colors=list(PLACES.values()))
+    figure = sketches.plan(fig07.compute(), points, labels, title=title, colors=list(PLACES.values()))
     return figure, {"x [m]": [x for x, _ in points], "y [m]": [y for _, y in points]}
 
 

@@ -1,5 +1,6 @@
 """Figure 16: the free beam of 200 g and the four points where figure 17 strikes it."""
 
+import sketches
 import source_scenes as source
 
 from fem_impact.show import plots
@@ -16,7 +17,7 @@ def draw(points):
     """Draw the beam from the side."""
     labels = [f"{place:g}" for place in PLACES]
     title = "Where the free beam is struck, as a share of its length"
-    figure = plots.plan([[0.0], [1.0]], points, labels, title=title, colors=list(PLACES.values()))
+    figure = sketches.plan([[0.0], [1.0]], points, labels, title=title, colors=list(PLACES.values()))
     return figure, {"x [m]": [x for (x,) in points]}
 
 

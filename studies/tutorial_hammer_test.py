@@ -52,7 +52,7 @@ def judge(modes: fi.Modes) -> list[Verdict]:
         for tip, stiffness in TIPS.items():
             law = fi.Contact.linear(stiffness)
             hit = fi.strike(modes, fi.Striker.rigid(HAMMER), law, at=at, speed=SPEED, tolerance=1e-3)
-            resonance = 0.5 / accuracy.contact_duration(law, HAMMER, SPEED)
+            resonance = accuracy.contact_resonance(law, HAMMER, SPEED)
             ratio = resonance / limit if limit else np.inf
             found.append(Verdict(place, tip, hit.n_impacts, hammers.bandwidth_of(hit, DROP), ratio))
     return found

@@ -496,7 +496,7 @@ def work(category: str, numbers: range, pipe: int, keep: Path | None, again: boo
     resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY, resource.RLIM_INFINITY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     if not again:
-        isolated.run, isolated.confine = quick, lambda path: None  # which would bind this process for good
+        isolated.run = quick
     with tempfile.TemporaryDirectory() as name, open(os.devnull, "w") as null, os.fdopen(pipe, "w") as out:
         os.dup2(null.fileno(), 1)
         os.dup2(null.fileno(), 2)

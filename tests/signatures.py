@@ -48,10 +48,11 @@ INNER = {
     "Plan.data", "Plan.run", "Plan.strike", "Response.body_slice", "Response.summary", "Scene.picture",
     "mesh.Mesh", "mesh.straight", "mesh.fill", "Modes.points",
     "analytic.RectangleShapes", "analytic.BeamShapes", "analytic.DiskShapes",  # behind the checks of Modes
-    "export.plain", "export.versions", "export.vtk_ending", "figures.snapshot",
-    "figures.in_hertz", "sound.Sound",
+    "export.plain", "export.versions", "export.csv_text", "export.run_data", "export.vtk_ending", "figures.snapshot",
+    "figures.in_hertz", "figures.styled", "sound.Sound",
     "hammers.Hammer", "hammers.bandwidth_of", "hammers.half_sine_reach",
-    "report.Player", "report.audio", "explore.serve",  # serve ends at an interruption only, see test_explore
+    "report.Player", "report.audio", "report.template",
+    "explore.serve",  # ends at an interruption only, see test_explore
     "Modes",
 }  # fmt: skip
 
@@ -196,6 +197,7 @@ def table() -> dict[str, dict[str, Any]]:
         "Response.displacement": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "body": -1, "residual": True},
         "Response.velocity": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "body": -1, "residual": True},
         "Response.modal_state": {"self": t["hit"], "times": [0.0, 1e-3], "body": -1},
+        "Response.modal_energy": {"self": t["hit"], "times": [0.0, 1e-3], "body": -1},
         "Response.spectral_centroid": {"self": t["hit"], "max_frequency": 5e3},
         "Response.spectrum": {"self": t["hit"], "frequencies": [0.0, 1e3]},
         "mobility": {"modes": t["modes"], "at": at, "to": (0.2, 0.2), "frequencies": [50.0, 60.0]},

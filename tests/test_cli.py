@@ -271,18 +271,21 @@ def test_default_scene_runs_end_to_end(tmp_path, capsys):
     assert -1.0 < data["response"]["restitution"] < 1.0
 
 
-def test_completion_offers_verbs_and_their_options():
-    script = cli._completion(cli._parser())
+def test_completion_offers_verbs_options_and_files(tmp_path):
+    pytest.importorskip("shtab", reason="the extra completion is not installed")
+    script = cli._completion(cli._parser(), "bash")
+    (tmp_path / "plate.toml").touch()
 
     def offered(*words):
         line = " ".join(f"'{word}'" for word in words)
-        code = f"{script}\nCOMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _fem_impact; echo ${{COMPREPLY[@]}}"
-        run = subprocess.run(["bash", "-c", code], capture_output=True, text=True, check=True)
+        code = f"{script}\nCOMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _shtab_fem_impact; echo ${{COMPREPLY[@]}}"
+        run = subprocess.run(["bash", "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
         return sorted(set(run.stdout.split()))
 
     assert offered("fem-impact", "st") == ["strike"]
     assert offered("fem-impact", "strike", "--to") == ["--tolerance"]
     assert offered("fem-impact", "modes", "a.toml", "--") == ["--count", "--help", "--json", "--vtk"]
+    assert offered("fem-impact", "modes", "pl") == offered("fem-impact", "map", "x", "--out", "pl") == ["plate.toml"]
 
 
 def test_shapes_that_cannot_be_written_are_told_before_the_work(scene, tmp_path, capsys, monkeypatch):

@@ -19,7 +19,7 @@ def find(cls, name, path=None, target=None):
     return None if name.split(".")[0] in {hidden} else real(name, path, target)
 importlib.machinery.PathFinder.find_spec = classmethod(find)
 """
-HIDDEN = {"svgelements", "ezdxf", "pyuff", "h5py", "dask", "distributed", "zarr", "plotly", "bokeh", "jinja2"}
+HIDDEN = {"svgelements", "ezdxf", "pyuff", "h5py", "dask", "distributed", "zarr", "plotly", "bokeh", "jinja2", "shtab"}
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="shells, limits and devices of POSIX")
 
@@ -95,7 +95,7 @@ def test_kernels_compile_where_no_cache_can_be_written(tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-CORE = ["strike scene.toml --out o", "modes scene.toml", "hammer scene.toml --bandwidth 300", "doctor", "completion"]
+CORE = ["strike scene.toml --out o", "modes scene.toml", "hammer scene.toml --bandwidth 300", "doctor"]
 CORE += ["map scene.toml --out m", "plan scene.toml"]
 EXTRA = [
     ("report scene.toml --out r/r.html", "a report needs jinja2: pip install 'fem-impact[web]'"),

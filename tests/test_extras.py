@@ -45,7 +45,6 @@ def test_package_loads_without_any_extra():
         ["plan", "SCENE"],
         ["map", "SCENE", "--out", "OUT"],
         ["hammer", "SCENE", "--bandwidth", "500", "--masses", "0.01"],
-        ["completion"],
     ],
 )
 def test_core_commands_need_no_extra(bare, scene, tmp_path, words):
@@ -56,6 +55,7 @@ def test_core_commands_need_no_extra(bare, scene, tmp_path, words):
     ("words", "text"),
     [
         (["report", "SCENE", "--out", "OUT/r.html"], "a report needs jinja2: pip install 'fem-impact[web]'"),
+        (["completion"], "completion needs shtab: pip install 'fem-impact[completion]'"),
         (["explore", "SCENE", "--no-open"], "exploring needs bokeh: pip install 'fem-impact[web]'"),
         (
             ["map", "SCENE", "--out", "OUT", "--format", "zarr"],

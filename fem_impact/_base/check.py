@@ -97,6 +97,11 @@ def between(name: str, value: Any, low: float, high: float, unit: str = "") -> f
     return result
 
 
+def tolerance(value: Any) -> float:
+    """Return the tolerance of a blow as a float; beyond rounding, none can be met."""
+    return between("tolerance", value, 1e-12, 1.0)
+
+
 def count(name: str, value: Any, low: int = 1, high: int = MOST) -> int:
     """Return ``value`` as an int from ``low`` to ``high``."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
@@ -147,53 +152,42 @@ def path(name: str, value: Any) -> Path:
 def typed(function: Function) -> Function:
     """Decorator: check arguments against the annotations of the signature.
 
-    It checks the classes in `SOURCES`, paths, callables and bools; `Any` and numbers are left to the function.
+    It checks the classes in `SOURCES`, paths, callables and bools; `Any` and numbers are left to the function. No
+    library replaces it: beartype and typeguard take ten times as long to import as this module, refuse numpy's bools,
+    and their errors cannot say how to make the right object.
     """
-    tests: dict[str, Callable[[Any], Any]] = {}
+    checked: dict[str, tuple[tuple[Any, ...], tuple[type, ...]]] = {}
     parameters = inspect.signature(function).parameters
     for name, parameter in parameters.items():
         stated = parameter.annotation
         kinds = get_args(stated) if isinstance(stated, UnionType) else (stated,)
         ours = tuple(kind for kind in kinds if isinstance(kind, type) and kind.__name__ in SOURCES)
-        if Path in kinds:
-            test: Callable[..., Any] = functools.partial(_path_or, name, ours)
-        elif all(get_origin(kind) is Callable or kind is NoneType for kind in kinds):
-            test = functools.partial(_function, name)
-        elif ours:
-            test = functools.partial(_instance, name, ours)
-        elif stated is bool:
-            test = functools.partial(flag, name)
-        else:
-            continue
-        tests[name] = functools.partial(_unless_none, test) if NoneType in kinds else test
+        functions = all(get_origin(kind) is Callable or kind is NoneType for kind in kinds)
+        if ours or functions or Path in kinds or stated is bool:
+            checked[name] = kinds, ours
 
     @functools.wraps(function)
     def tested(*given: Any, **named: Any) -> Any:
         for name, value in chain(zip(parameters, given), named.items()):
-            if name in tests:
-                tests[name](value)
+            if name in checked:
+                _of_kind(name, value, *checked[name])
         return function(*given, **named)
 
     return tested  # type: ignore[return-value]
 
 
-def _unless_none(test: Callable[..., Any], value: Any) -> None:
-    if value is not None:
-        test(value)
-
-
-def _function(name: str, value: Any) -> None:
-    if not callable(value):
-        raise ValueError(f"{name} must be a function, got {shown(value)}")
-
-
-def _path_or(name: str, kinds: tuple[type, ...], value: Any) -> None:
-    if not isinstance(value, kinds):
+def _of_kind(name: str, value: Any, kinds: tuple[Any, ...], ours: tuple[type, ...]) -> None:
+    """Raise ValueError unless ``value`` has one of the annotated ``kinds``, of which ``ours`` are in `SOURCES`."""
+    if (value is None and NoneType in kinds) or isinstance(value, ours):
+        return
+    if Path in kinds:
         path(name, value)
-
-
-def _instance(name: str, kinds: tuple[type, ...], value: Any) -> None:
-    instance(name, value, *kinds)
+    elif ours:
+        instance(name, value, *ours)
+    elif bool in kinds:
+        flag(name, value)
+    elif not callable(value):
+        raise ValueError(f"{name} must be a function, got {shown(value)}")
 
 
 def array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "", *, lift: bool = False) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Small SVG pictures and HTML tables for notebooks and pages, without a drawing library."""
+"""Tables for the terminal and for notebooks, and small SVG pictures without a drawing library."""
 
 import html
 from collections.abc import Iterable, Mapping, Sequence
@@ -34,6 +34,16 @@ def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = ()) -> str:
         for first, *rest in rows
     )
     return f"<table>{f'<thead><tr>{top}</tr></thead>' if top else ''}<tbody>{body}</tbody></table>"
+
+
+def columns(rows: Iterable[Sequence[Any]], head: Sequence[str] = ()) -> list[str]:
+    """Rows of cells as lines of text: the first column to the left, the others to the right."""
+    cells = [[str(cell) for cell in row] for row in (*([head] if head else []), *rows)]
+    widths = [max(map(len, column)) for column in zip(*cells)]
+    return [
+        "  ".join([row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:]))])
+        for row in cells
+    ]
 
 
 def side_by_side(*parts: str) -> str:
@@ -112,12 +122,6 @@ def held_edges(mesh: Any, supports: Mapping[str, Any]) -> dict[int, str]:
         if name in mesh.edges
         for i in mesh.edges[name]
     }
-
-
-def rim(cells: np.ndarray) -> np.ndarray:
-    """Sides (n_sides, 2) that belong to a single triangle: the edge of the plate."""
-    sides, counts = np.unique(np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0, return_counts=True)
-    return sides[counts == 1]
 
 
 def _outline(mesh: Any, held: Mapping[int, str], place: Any) -> str:

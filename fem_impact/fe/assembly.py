@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags
+from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, eye_array
 
 from .._base import check
 from ..mesh.facets import Curves
@@ -14,13 +14,12 @@ from ..mesh.meshes import Mesh, aligned
 from . import beam_elements
 from .beam_elements import HermiteSpace
 from .corners import around_corners
-from .elements import Argyris, ArgyrisSpace, Bent, BentMapping, Morley, MorleySpace, numbering, quadrature, triangles
-from .section import Beam, Elastic, Plate
+from .elements import ArgyrisSpace, Bent, BentMapping, MorleySpace, numbering, quadrature, triangles
+from .section import KINDS, Beam, Elastic, Plate
 from .splitting import towards_points
 from .springs import beam_springs, check_masses, edge_springs, plate_springs
 from .supports import Rim, cells_of_facets, constrain
 
-KINDS = ("clamped", "hinged", "free")
 MORLEY_ORDER = 4  # [-] order of the quadrature on Morley elements; exact for products of quadratics
 MASS_ORDER = 10  # [-] order of the quadrature on Argyris elements; exact for products of quintics
 UNEVEN = 20.0  # [-] above this ratio of triangle sizes, eigenvalues are computed from the strain energy
@@ -53,6 +52,11 @@ class Frame:
         return (points - self.centre) / self.length
 
 
+def curvatures(hessian: np.ndarray) -> np.ndarray:
+    """Curvatures (xx, yy, 2 xy) of shape functions, (n, n_q, 3, n_local), from (xx, xy, yy), (n, 3, n_q, n_local)."""
+    return hessian[:, [0, 2, 1]].transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]
+
+
 @dataclass(frozen=True, eq=False)
 class Strain:
     """Data to compute the strain energy of a plate from curvatures, for meshes so uneven that K loses digits.
@@ -78,8 +82,7 @@ class Strain:
         total = np.einsum(pairs.replace("nqi", "n"), moved, self.springs @ moved)
         for start in range(0, len(self.x), CHUNK):
             cells = np.arange(start, min(start + CHUNK, len(self.x)))
-            hessian = system.space.functions(cells, self.x[cells], (2,))[0][:, [0, 2, 1]]
-            bend = hessian.transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]  # (n, n_q, 3, n_local)
+            bend = curvatures(*system.space.functions(cells, self.x[cells], (2,)))
             curved = bend @ moved[system.element_dofs[:, cells].T][:, None]  # (n, n_q, 3, n_modes)
             total += np.einsum(pairs, self.stiffness[cells] @ curved, curved)
         return total
@@ -122,8 +125,9 @@ class System:
 
     def interpolate(self, points: np.ndarray) -> csr_matrix:
         """Matrix (n_points, n_dofs) [-] from the unknowns to the deflection at points (n_points, dimension) [m]."""
-        full = _interpolation(self.space, self.element_dofs, self.expand.shape[0], self.frame.local(points))
-        return full @ self.expand
+        return (
+            _interpolation(self.space, self.element_dofs, self.expand.shape[0], self.frame.local(points)) @ self.expand
+        )
 
 
 @check.typed
@@ -175,25 +179,30 @@ def assemble(
     none = np.zeros((0, mesh.dimension))
     marked = np.vstack([none if near is None else near, none, *(point for point, _ in masses)])  # forces act here
     if mesh.dimension == 1 and isinstance(section, Beam):
-        made = replace(_assemble_beam(mesh, section, supports, marked[:, 0]), near=near)
+        made = _assemble_beam(mesh, section, supports, masses, marked[:, 0])
     elif isinstance(section, Plate) and element == "morley":
-        made = _assemble_morley(mesh, section, supports)
+        made = _assemble_morley(mesh, section, supports, masses)
     elif mesh.dimension == 2 and isinstance(section, Plate):
         order, unresolved, fine = around_corners(mesh, _kinds(support_of_facets(mesh, supports)), section.material.nu)
         fine = fine if graded else mesh
         if len(marked):
             held = np.array([kind != "free" for kind in support_of_facets(fine, supports)])
             fine = towards_points(fine, marked, held)
-        made = _assemble_plate(fine, section, supports)
-        made = replace(made, mesh=mesh, graded=graded, order=order, near=near, unresolved=unresolved)
+        made = _assemble_plate(fine, section, supports, masses)
+        made = replace(made, mesh=mesh, graded=graded, order=order, unresolved=unresolved)
     else:
         wanted = "Plate" if mesh.dimension == 2 else "Beam"
         raise ValueError(
             f"section must be a {wanted} on a mesh of dimension {mesh.dimension}, got {check.shown(section)}"
         )
-    if near is not None:
-        _check_on(made, "near", near)
-    return _reduced(made if not masses else _loaded(made, masses))
+    places = [] if near is None else [("near", near)]
+    places += [(f"point of point_masses[{i}]", point[None]) for i, (point, _) in enumerate(masses)]
+    for name, points in places:
+        inside = made.contains(points)
+        if not inside.all():
+            where = ", ".join(f"{x:g}" for x in points[int(np.argmin(inside))])
+            raise ValueError(f"{name} must lie on the body, got ({where}) m")
+    return replace(made, near=near)
 
 
 def reassemble(system: System, mesh: Mesh) -> System:
@@ -244,38 +253,8 @@ def _scatter(local: np.ndarray, element_dofs: np.ndarray, n_all: int) -> csc_mat
     return coo_matrix((local[held], (rows[held], columns[held])), shape=(n_all, n_all)).tocsc()
 
 
-@dataclass(frozen=True, eq=False)
-class _Raw:
-    """The fields of a System for all unknowns, before supports are applied to the matrices."""
-
-    mesh: Mesh
-    section: Plate | Beam
-    supports: dict[str, Any]
-    mass: float
-    frame: Frame
-    K: csc_matrix
-    M: csc_matrix
-    springs: csc_matrix  # (n_all, n_all) stiffness of elastic supports and tension
-    expand: csr_matrix
-    project: csr_matrix
-    element_dofs: np.ndarray
-    space: Any
-    softness: float
-    rim: Rim | None = None
-    graded: bool = True
-    order: float = np.inf
-    point_masses: tuple = ()
-    element: str = "argyris"
-    strain: Strain | None = None
-    near: np.ndarray | None = None
-    unresolved: float = 0.0
-
-    def interpolate(self, points: np.ndarray) -> csr_matrix:
-        """Matrix (n_points, n_all) [-] from all unknowns to the deflection at points (n_points, dimension) [m]."""
-        return _interpolation(self.space, self.element_dofs, self.expand.shape[0], self.frame.local(points))
-
-
 def _interpolation(space: Any, element_dofs: np.ndarray, n_all: int, local: np.ndarray) -> csr_matrix:
+    """Matrix (n_points, n_all) from all unknowns to the deflection at points (n_points, dimension) in the frame."""
     cells = space.locate(local)[0]
     values = space.functions(cells, local[:, None, :], (0,))[0][:, 0]  # (n_points, n_local)
     dofs = element_dofs[:, cells].T
@@ -283,91 +262,68 @@ def _interpolation(space: Any, element_dofs: np.ndarray, n_all: int, local: np.n
     return csr_matrix((values.ravel(), (rows, dofs.ravel())), shape=(len(local), n_all))
 
 
-def _check_on(raw: _Raw, name: str, points: np.ndarray) -> None:
-    """Raise ValueError unless every point lies on the body."""
-    inside = raw.space.locate(raw.frame.local(points))[1]
-    if not inside.all():
-        where = ", ".join(f"{x:g}" for x in points[int(np.argmin(inside))])
-        raise ValueError(f"{name} must lie on the body, got ({where}) m")
+def _supported(masses: list[tuple[np.ndarray, float]], matrices: tuple, maps: tuple, **known: Any) -> System:
+    """The system of a body from matrices for all unknowns, with point masses and supports applied.
 
-
-def _loaded(raw: _Raw, masses: list[tuple[np.ndarray, float]]) -> _Raw:
-    """The same body with point masses added."""
-    points, weights = np.array([point for point, _ in masses]), np.array([mass for _, mass in masses])
-    for i, point in enumerate(points):
-        _check_on(raw, f"point of point_masses[{i}]", point[None])
-    rows = raw.interpolate(points)
-    M = (raw.M + rows.T @ diags(weights / raw.frame.mass) @ rows).tocsc()
-    return replace(raw, M=M, mass=raw.mass + float(weights.sum()), point_masses=tuple(masses))
-
-
-def _rigid(raw: _Raw) -> np.ndarray:
-    """Rigid motions (n_dofs, n_rigid) that the supports allow without any strain energy."""
-    every = raw.space.linear(raw.element_dofs, raw.expand.shape[0])
-    left = raw.project @ every
-    lost = every - raw.expand @ left
-    scale = np.abs(every).max()
-    _, lengths, turn = np.linalg.svd(lost.T @ lost / scale**2)
-    kept = turn[np.sqrt(lengths) < RIGID * np.sqrt(len(every))].T  # (n_motions, n_rigid)
-    if raw.springs.nnz and kept.shape[1]:
-        moving = every @ kept
-        energy, turn = np.linalg.eigh(moving.T @ (raw.springs @ moving))
-        kept = kept @ turn[:, energy <= RIGID * energy[-1]]
-    return left @ kept
-
-
-def _reduced(raw: _Raw) -> System:
-    """Apply the supports to the matrices and find the rigid motions they allow."""
-    across = _across(raw)
-    expand, rigid = raw.expand[:, across].tocsr(), _rigid(raw)[across]
-    K, M = (expand.T @ (raw.K + raw.springs) @ expand).tocsc(), (expand.T @ raw.M @ expand).tocsc()
+    ``matrices`` are K, M and the stiffness of elastic supports and tension, each (n_all, n_all). ``maps`` go from the
+    unknowns not fixed by supports to all, (n_all, n_dofs), and back. ``known`` are the other fields of `System`.
+    """
+    (K, M, springs), (expand, project) = matrices, maps
+    space, dofs, frame, n_all = known["space"], known["element_dofs"], known["frame"], expand.shape[0]
+    if masses:
+        points, weights = (np.array(column) for column in zip(*masses))
+        rows = _interpolation(space, dofs, n_all, frame.local(points))
+        M = M + rows.T @ diags(weights / frame.mass) @ rows
+        known["mass"] += float(weights.sum())
+    across = _across(space.origin[:, 0], dofs, expand)
+    rigid = _rigid(space.linear(dofs, n_all), springs, expand, project)[across]
+    expand = expand[:, across].tocsr()
+    K, M = (expand.T @ (K + springs) @ expand).tocsc(), (expand.T @ M @ expand).tocsc()
     size = 1.0 / np.sqrt(K.diagonal())
     even = diags(size)
-    K, M, expand = (even @ K @ even).tocsc(), (even @ M @ even).tocsc(), (expand @ even).tocsr()
+    K, M = ((even @ matrix @ even).tocsc() for matrix in (K, M))
     held = qr(rigid.T, pivoting=True, mode="economic")[2][: rigid.shape[1]]
     rigid = rigid / size[:, None]
     if rigid.shape[1]:
         factor = np.linalg.cholesky(rigid.T @ (M @ rigid))
         rigid = np.linalg.solve(factor, rigid.T).T
-    return System(
-        raw.mesh,
-        raw.section,
-        raw.supports,
-        raw.element,
-        raw.mass,
-        raw.frame,
-        0.5 * (K + K.T).tocsc(),
-        0.5 * (M + M.T).tocsc(),
-        expand,
-        raw.element_dofs,
-        raw.space,
-        rigid,
-        held,
-        raw.graded,
-        raw.rim,
-        raw.order,
-        raw.softness,
-        raw.point_masses,
-        raw.strain,
-        raw.near,
-        raw.unresolved,
-    )
+    K, M = (0.5 * (matrix + matrix.T).tocsc() for matrix in (K, M))
+    expand = (expand @ even).tocsr()
+    return System(K=K, M=M, expand=expand, rigid=rigid, held=held, point_masses=tuple(masses), **known)
 
 
-def _across(raw: _Raw) -> np.ndarray:
-    """Order of the unknowns (n_dofs,) along the x axis, for a fast factorisation.
+def _rigid(every: np.ndarray, springs: csc_matrix, expand: csr_matrix, project: csr_matrix) -> np.ndarray:
+    """Those rigid motions (n_dofs, n_rigid), of ``every`` one (n_all, n), that the supports allow without strain."""
+    left = project @ every
+    lost = every - expand @ left
+    scale = np.abs(every).max()
+    _, lengths, turn = np.linalg.svd(lost.T @ lost / scale**2)
+    kept = turn[np.sqrt(lengths) < RIGID * np.sqrt(len(every))].T  # (n_motions, n_rigid)
+    if springs.nnz and kept.shape[1]:
+        moving = every @ kept
+        energy, turn = np.linalg.eigh(moving.T @ (springs @ moving))
+        kept = kept @ turn[:, energy <= RIGID * energy[-1]]
+    return left @ kept
+
+
+def _across(origin: np.ndarray, element_dofs: np.ndarray, expand: csr_matrix) -> np.ndarray:
+    """Order of the unknowns (n_dofs,) along the x axis, for a fast factorisation; ``origin`` (n_cells,) places cells.
 
     In the order left by dividing triangles into four, the minimum degree ordering takes five times as long.
     """
-    n_all = raw.expand.shape[0]
-    origin = raw.space.origin if raw.mesh.dimension == 2 else raw.space.start[:, None]
-    place, weight = np.zeros(n_all), np.zeros(n_all)
-    for row in raw.element_dofs:
-        np.add.at(place, row, origin[:, 0])
+    place, weight = np.zeros(expand.shape[0]), np.zeros(expand.shape[0])
+    for row in element_dofs:
+        np.add.at(place, row, origin)
         np.add.at(weight, row, 1.0)
-    used = abs(raw.expand).sign()
+    used = abs(expand).sign()
     shares = np.asarray(used.sum(axis=0)).ravel()
     return np.argsort((used.T @ (place / np.maximum(weight, 1.0))) / shares, kind="stable")
+
+
+def _selection(fixed: np.ndarray) -> tuple[csr_matrix, csr_matrix]:
+    """Maps of `_supported` that leave out the unknowns ``fixed`` (n_all,) bool."""
+    expand = eye_array(len(fixed), format="csr")[:, np.flatnonzero(~fixed)]
+    return csr_matrix(expand), csr_matrix(expand.T)
 
 
 def _centred(mesh: Mesh) -> tuple[np.ndarray, float, np.ndarray]:
@@ -377,7 +333,7 @@ def _centred(mesh: Mesh) -> tuple[np.ndarray, float, np.ndarray]:
     return centre, length, (mesh.points - centre) / length
 
 
-def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, marked: np.ndarray) -> _Raw:
+def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, masses: list, marked: np.ndarray) -> System:
     """Assemble a beam; ``marked`` are places (n,) [m] where the shear force jumps."""
     centre, length, points = _centred(mesh)
 
@@ -389,12 +345,12 @@ def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, marked: np.ndarray
     held = [kind in ("clamped", "hinged") for kind in kinds]
     ends = points[mesh.facets[:, 0], 0]
     nodes = beam_elements.nodes(points[:, 0], (marked - centre[0]) / length, ends[held])
-    line = beam_elements.segments(beam_elements.divisions(fields, nodes))
+    line = beam_elements.divided(fields, nodes)
     space = HermiteSpace(line)
     K, M, stiffness, inertia, dx = beam_elements.integrals(space, fields)
     frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
-    dofs, n_all = beam_elements.numbering(line, space)
-    fixed: list[int] = []
+    dofs, n_all = numbering(line, space)
+    fixed = np.zeros(n_all, bool)
     sprung: list[tuple[tuple[int, int], Elastic]] = []
     for vertex, kind in zip(mesh.facets[:, 0], kinds):
         left = points[vertex, 0] <= points[:, 0].min()
@@ -402,33 +358,37 @@ def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, marked: np.ndarray
         if isinstance(kind, Elastic):
             sprung.append(((deflection, slope), kind))
         else:
-            fixed += {"clamped": [deflection, slope], "hinged": [deflection], "free": []}[kind]
-    free = np.setdiff1d(np.arange(n_all), fixed)
-    expand = csr_matrix((np.ones(len(free)), (free, np.arange(len(free)))), shape=(n_all, len(free)))
+            fixed[deflection] |= kind != "free"
+            fixed[slope] |= kind == "clamped"
     springs = beam_springs([at for at, _ in sprung], [kind for _, kind in sprung], frame, n_all)
     matrices = _scatter(K / frame.stiffness, dofs, n_all), _scatter(M / frame.inertia, dofs, n_all), springs.tocsc()
     softness = float((inertia / stiffness).max()) * frame.stiffness / frame.inertia
-    return _Raw(
-        mesh,
-        section,
-        supports,
-        float((inertia * dx).sum()) * length,
-        frame,
-        *matrices,
-        expand,
-        expand.T.tocsr(),
-        dofs,
-        space,
-        softness,
-        element="hermite",
-    )
+    return _supported(
+        masses, matrices, _selection(fixed), mesh=mesh, section=section, supports=supports, element="hermite",
+        mass=float((inertia * dx).sum()) * length, frame=frame, element_dofs=dofs, space=space, softness=softness,
+    )  # fmt: skip
 
 
-def _fields(section, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Stiffness (n_cells, n_q, ...) and inertia (n_cells, n_q) at points (n_cells, n_q, dimension)."""
-    flat = points.reshape(-1, points.shape[-1])
-    stiffness, inertia = section.stiffness(flat), section.inertia(flat)
-    return stiffness.reshape(*points.shape[:2], *stiffness.shape[1:]), inertia.reshape(points.shape[:2])
+def _plate_fields(section: Plate, x: np.ndarray, centre: np.ndarray, length: float) -> tuple:
+    """The frame, and in it stiffness (n_cells, n_q, 3, 3), inertia (n_cells, n_q) and softness of a plate.
+
+    ``x`` are points (n_cells, n_q, 2) in the frame.
+    """
+    flat = centre + length * x.reshape(-1, 2)
+    stiffness, inertia = section.stiffness(flat).reshape(*x.shape[:2], 3, 3), section.inertia(flat).reshape(x.shape[:2])
+    frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
+    stiffness, inertia = stiffness / frame.stiffness, inertia / frame.inertia
+    softness = float((inertia / np.minimum(stiffness[..., 0, 0], stiffness[..., 1, 1])).max())
+    return frame, stiffness, inertia, softness
+
+
+def _integrated(space: Any, cells: np.ndarray, x: np.ndarray, stiffness: np.ndarray, inertia: np.ndarray) -> tuple:
+    """Bending and mass matrices (n, n_local, n_local) of cells (n,), from fields times quadrature weights at ``x``."""
+    value, hessian = space.functions(cells, x[cells], (0, 2))
+    bend = curvatures(hessian)
+    shape = (len(cells), 3 * x.shape[1], bend.shape[-1])
+    K = bend.reshape(shape).transpose(0, 2, 1) @ (stiffness[cells] @ bend).reshape(shape)
+    return K, (value * inertia[cells][..., None]).transpose(0, 2, 1) @ value
 
 
 def _bent(mesh: Mesh, centre: np.ndarray, length: float, points: np.ndarray, plane: Any) -> Bent | None:
@@ -442,18 +402,15 @@ def _bent(mesh: Mesh, centre: np.ndarray, length: float, points: np.ndarray, pla
     return Bent(curves, facets, *cells_of_facets(facets, plane.t.T), plane.t.T)
 
 
-def _assemble_plate(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
+def _assemble_plate(mesh: Mesh, section: Plate, supports: dict, masses: list) -> System:
     centre, length, points = _centred(mesh)
     plane = triangles(points, mesh.cells)
     bent = _bent(mesh, centre, length, points, plane)
     mapping = None if bent is None else BentMapping(plane, bent)
     space = ArgyrisSpace(plane, bent)
-    element = Argyris(space)
-    x, dx = quadrature(plane, element, MASS_ORDER, mapping)
-    stiffness, inertia = _fields(section, centre + length * x)
-    frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
-    stiffness, inertia = stiffness / frame.stiffness, inertia / frame.inertia
-    softness = float((inertia / np.minimum(stiffness[..., 0, 0], stiffness[..., 1, 1])).max())
+    x, dx = quadrature(plane, space, MASS_ORDER, mapping)
+    frame, stiffness, inertia, softness = _plate_fields(section, x, centre, length)
+    weighted = stiffness * dx[..., None, None], inertia * dx
     K, M = np.empty((len(x), 21, 21)), np.empty((len(x), 21, 21))
     plain = ~space.curved & (not callable(section.thickness))
     if plain.any():
@@ -461,16 +418,11 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
         K[cells], M[cells] = space.uniform(cells, stiffness[0, 0], MASS_ORDER)
     if not plain.all():
         cells = np.flatnonzero(~plain)
-        value, hessian = space.functions(cells, x[cells], (0, 2))
-        bend = hessian[:, [0, 2, 1]].transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]  # (n, n_q, 3, 21)
-        moment = (stiffness[cells] * dx[cells, :, None, None]) @ bend
-        shape = (len(cells), 3 * x.shape[1], 21)
-        K[cells] = bend.reshape(shape).transpose(0, 2, 1) @ moment.reshape(shape)
-        M[cells] = (value * (inertia * dx)[cells, :, None]).transpose(0, 2, 1) @ value
+        K[cells], M[cells] = _integrated(space, cells, x, *weighted)
     held = support_of_facets(mesh, supports)
     elastic = edge_springs(held, frame)
     rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, _kinds(held), elastic)
-    expand, project, dofs = constrain(rim, space.vertices, *numbering(plane, element))
+    expand, project, dofs = constrain(rim, space.vertices, *numbering(plane, space))
     n_all = expand.shape[0]
     springs = csc_matrix((n_all, n_all))
     on = np.flatnonzero(elastic.any(axis=1))
@@ -485,14 +437,16 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
         shape = (len(x), 2 * x.shape[1], 21)
         springs = springs + _scatter(slope.reshape(shape).transpose(0, 2, 1) @ pulled.reshape(shape), dofs, n_all)
     matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), springs
-    mass = float((inertia * dx).sum()) * frame.mass
-    made = _Raw(mesh, section, supports, mass, frame, *matrices, expand, project, dofs, space, softness, rim)
     area = np.abs(np.linalg.det(space.jacobian))
     uneven = area.min() < max(area.max() / UNEVEN**2, TINY**2)
-    return replace(made, strain=Strain(x, stiffness * dx[..., None, None], springs.tocsc())) if uneven else made
+    return _supported(
+        masses, matrices, (expand, project), mesh=mesh, section=section, supports=supports, element="argyris",
+        mass=float(weighted[1].sum()) * frame.mass, frame=frame, element_dofs=dofs, space=space, softness=softness,
+        rim=rim, strain=Strain(x, weighted[0], springs.tocsc()) if uneven else None,
+    )  # fmt: skip
 
 
-def _assemble_morley(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
+def _assemble_morley(mesh: Mesh, section: Plate, supports: dict, masses: list) -> System:
     if mesh.curved.any():
         raise ValueError("element 'morley' needs straight edges; use 'argyris', or a polygon")
     held = support_of_facets(mesh, supports)
@@ -501,17 +455,10 @@ def _assemble_morley(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
     centre, length, points = _centred(mesh)
     plane = triangles(points, mesh.cells)
     space = MorleySpace(plane)
-    x, dx = quadrature(plane, Morley(), MORLEY_ORDER)
-    stiffness, inertia = _fields(section, centre + length * x)
-    frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
-    stiffness, inertia = stiffness / frame.stiffness, inertia / frame.inertia
-    value, hessian = space.functions(np.arange(len(x)), x, (0, 2))
-    bend = hessian[:, [0, 2, 1]].transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]  # (n, n_q, 3, 6)
-    moment = (stiffness * dx[..., None, None]) @ bend
-    shape = (len(x), 3 * x.shape[1], 6)
-    K = bend.reshape(shape).transpose(0, 2, 1) @ moment.reshape(shape)
-    M = (value * (inertia * dx)[..., None]).transpose(0, 2, 1) @ value
-    dofs, n_all = numbering(plane, Morley())
+    x, dx = quadrature(plane, space, MORLEY_ORDER)
+    frame, stiffness, inertia, softness = _plate_fields(section, x, centre, length)
+    K, M = _integrated(space, np.arange(len(x)), x, stiffness * dx[..., None, None], inertia * dx)
+    dofs, n_all = numbering(plane, space)
     cells, sides = cells_of_facets(mesh.facets, space.vertices)
     fixed = np.zeros(n_all, bool)
     for facet, kind in enumerate(held):
@@ -520,12 +467,11 @@ def _assemble_morley(mesh: Mesh, section: Plate, supports: dict) -> _Raw:
             fixed[dofs[:3, cells[facet]][corner]] = True
         if kind == "clamped":
             fixed[dofs[3 + sides[facet], cells[facet]]] = True
-    free = np.flatnonzero(~fixed)
-    if not free.size:
+    if fixed.all():
         raise ValueError("supports fix every unknown of this mesh; refine it")
-    expand = csr_matrix((np.ones(len(free)), (free, np.arange(len(free)))), shape=(n_all, len(free)))
     matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), csc_matrix((n_all, n_all))
-    mass = float((inertia * dx).sum()) * frame.mass
-    softness = float((inertia / np.minimum(stiffness[..., 0, 0], stiffness[..., 1, 1])).max())
-    made = _Raw(mesh, section, supports, mass, frame, *matrices, expand, expand.T.tocsr(), dofs, space, softness)
-    return replace(made, order=2.0, element="morley")
+    return _supported(
+        masses, matrices, _selection(fixed), mesh=mesh, section=section, supports=supports, element="morley",
+        mass=float((inertia * dx).sum()) * frame.mass, frame=frame, element_dofs=dofs, space=space, softness=softness,
+        order=2.0,
+    )  # fmt: skip

@@ -9,23 +9,27 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from skfem import Dofs, ElementLineHermite, MeshLine
-from skfem.element import DiscreteField
+from skfem import ElementLineHermite, MeshLine
 
 from ..mesh.facets import powers
+from .elements import ON_BODY
 
 DEGREE = 32  # [-] polynomial degree of the deflection within an element
-QUADRATURE = 48  # [-] Gauss points of an element; exact for products of two shapes and a section of degree 31
-ON_BODY = 1e-9  # [-] distance in the frame by which rounding may put a point outside its element
+QUADRATURE = 3 * DEGREE // 2  # [-] Gauss points of an element; exact for two shapes and a section of degree 31
 APART = 0.01  # [-] nodes closer than this fraction of the beam cause a rounding error of 1e-9 in the stiffness
-SAME_NODE = 1e-9  # [-] the same at a held end, where deflections are so small that rounding does no harm
 ROUNDED = 1e-15  # [-] rounding error of an element as long as the beam; grows as 1 / length**3 for shorter ones
 SMOOTH = 12  # [-] degree of the polynomial that must fit the section within an element
 RESOLVED = 1e-9  # [-] largest error of this fit, relative to the largest value in the element
-NARROW = 1e-9  # [-] accuracy with which a step or kink is located, as a fraction of the beam
+NARROW = 1e-9  # [-] accuracy of the place of a step or kink as a fraction of the beam; nearer to a held end, no node
 NARROWEST = 1e-6  # [-] smallest element made to fit the section, as a fraction of the beam
 ROUNDING = 1e-14  # [-] a smaller misfit is just rounding
 MOST_BREAKS = 2000  # [-] most places where the section may jump or kink
+
+
+class Hermite(ElementLineHermite):
+    """scikit-fem's Hermite element with bubbles, used only to number the unknowns."""
+
+    interior_dofs = DEGREE - 3
 
 
 class HermiteSpace:
@@ -34,9 +38,12 @@ class HermiteSpace:
     The bubbles are the modes of the element clamped at both ends, so they do not couple to each other.
     """
 
+    element = Hermite
+
     def __init__(self, mesh: MeshLine) -> None:
         ends = mesh.p[0, mesh.t]  # (2, n_cells)
         self.start, self.length = ends[0], ends[1] - ends[0]
+        self.origin = self.start[:, None]  # (n_cells, 1)
         self.bubbles = np.broadcast_to(np.eye(DEGREE - 3), (len(self.start), DEGREE - 3, DEGREE - 3))  # Legendre
 
     def decouple(self, K: np.ndarray, M: np.ndarray) -> None:
@@ -55,7 +62,7 @@ class HermiteSpace:
         h = self.length[cells][:, None]
         s = (points[..., 0] - self.start[cells][:, None]) / h
         cubic = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], float)
-        legendre = _legendre(2.0 * s - 1.0)
+        legendre = np.polynomial.legendre.legvander(2.0 * s - 1.0, DEGREE + 1)  # (n, n_q, DEGREE + 2)
         j = np.arange(2, DEGREE - 1)
         norm = np.sqrt(j + 0.5)
         result = []
@@ -93,35 +100,6 @@ class HermiteSpace:
         return result
 
 
-def _legendre(x: np.ndarray) -> np.ndarray:
-    """Legendre polynomials of degree 0 to DEGREE + 1 at points (...), shape (..., DEGREE + 2)."""
-    result = np.empty((*x.shape, DEGREE + 2))
-    result[..., 0], result[..., 1] = 1.0, x
-    for n in range(1, DEGREE + 1):
-        result[..., n + 1] = ((2 * n + 1) * x * result[..., n] - n * result[..., n - 1]) / (n + 1)
-    return result
-
-
-class Hermite(ElementLineHermite):
-    """scikit-fem's Hermite element with the shape functions of `HermiteSpace`; make a new one for each mesh."""
-
-    interior_dofs = DEGREE - 3
-
-    def __init__(self, space: HermiteSpace) -> None:
-        self.space = space
-
-    def gbasis(self, mapping, X, i, tind=None):
-        cells = np.arange(len(self.space.start)) if tind is None else tind
-        points = mapping.F(X, tind=tind).transpose(1, 2, 0)
-        value, slope, bend = (f[..., i] for f in self.space.functions(cells, points, (0, 1, 2)))
-        return (DiscreteField(value=value, grad=slope[None], hess=bend[None, None]),)
-
-
-def segments(nodes: np.ndarray) -> MeshLine:
-    """Make scikit-fem's mesh of line elements between ascending nodes (n,)."""
-    return MeshLine(nodes[None], np.stack([np.arange(len(nodes) - 1), np.arange(1, len(nodes))]))
-
-
 def nodes(points: np.ndarray, marked: np.ndarray, held: np.ndarray) -> np.ndarray:
     """Ascending nodes of a beam: its ends, the places ``marked`` where the shear force jumps, and points of the mesh.
 
@@ -134,7 +112,7 @@ def nodes(points: np.ndarray, marked: np.ndarray, held: np.ndarray) -> np.ndarra
     apart = min(APART * (points[-1] - points[0]), 0.5 * np.diff(points).min())
     for place in marked:
         off = np.abs(place - np.array(kept))
-        if off.min() > (SAME_NODE if kept[off.argmin()] in held else apart):
+        if off.min() > (NARROW if kept[off.argmin()] in held else apart):
             kept.append(place)
     between = points[np.abs(points[:, None] - kept).min(axis=1) > apart]
     return np.unique(np.append(kept, between))
@@ -165,14 +143,8 @@ def quadrature(space: HermiteSpace) -> tuple[np.ndarray, np.ndarray]:
     return space.start[:, None] + 0.5 * (node + 1.0) * space.length[:, None], 0.5 * weight * space.length[:, None]
 
 
-def numbering(line: MeshLine, space: HermiteSpace) -> tuple[np.ndarray, int]:
-    """Numbers of the unknowns of each element, (n_local, n_cells), and how many unknowns there are."""
-    dofs = Dofs(line, Hermite(space))
-    return dofs.element_dofs, dofs.N
-
-
-def divisions(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes: np.ndarray) -> np.ndarray:
-    """Add nodes until a polynomial fits the section between any two neighbours; return them ascending.
+def divided(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes: np.ndarray) -> MeshLine:
+    """Line elements between nodes, with more nodes until a polynomial fits the section between any two neighbours.
 
     Steps and kinks of stiffness and inertia are found by halving every interval that no polynomial fits. An interval
     that still has a bad fit when it is as narrow as NARROW contains a step or kink and gets a node.
@@ -187,7 +159,7 @@ def divisions(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nod
         middle = 0.5 * (low + high)[rough]
         every = np.append(every, middle)
         low, high = np.append(low[rough], middle), np.append(middle, high[rough])
-    return np.sort(every)
+    return MeshLine(np.sort(every))
 
 
 def _breaks(fields: Callable, nodes: np.ndarray) -> np.ndarray:

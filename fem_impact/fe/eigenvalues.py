@@ -1,8 +1,8 @@
 """Solve K x = lambda M x with one factorisation, exact rigid motions and a check that no mode is missing."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import cache, wraps
+from dataclasses import dataclass
+from functools import cache, cached_property, wraps
 from typing import Any
 
 import numpy as np
@@ -67,17 +67,21 @@ class Flexibility:
     M: csc_matrix
     rigid: np.ndarray  # (n_dofs, n_rigid) mass-normalised
     held: np.ndarray  # (n_rigid,) unknowns that, when fixed, just prevent rigid motion
-    _lu: list = field(default_factory=list)
 
     def __reduce__(self):
         return Flexibility, (self.K, self.M, self.rigid, self.held)
 
+    @cached_property
+    def _factors(self) -> tuple[Any, Any]:
+        """Unknowns kept, and the factorisation of their stiffness."""
+        if not self.rigid.shape[1]:
+            return slice(None), factorise(self.K)
+        keep = np.setdiff1d(np.arange(self.K.shape[0]), self.held)
+        return keep, factorise(self.K[keep][:, keep])
+
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Static deflection under loads (n_dofs, n); inertia balances them if the body can move rigidly."""
-        if not self._lu:
-            keep = np.setdiff1d(np.arange(self.K.shape[0]), self.held) if self.rigid.shape[1] else slice(None)
-            self._lu.extend([keep, factorise(self.K[keep][:, keep] if self.rigid.shape[1] else self.K)])
-        keep, lu = self._lu
+        keep, lu = self._factors
         if not self.rigid.shape[1]:
             return lu.solve(np.ascontiguousarray(loads))
         moving = self.M @ self.rigid  # (n_dofs, n_rigid)

@@ -1,24 +1,24 @@
 """Triangular elements whose shape functions stay accurate for any size, shape and position of the triangle."""
 
 from itertools import product
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 from skfem import Dofs, ElementTriArgyris, ElementTriMorley, MappingAffine, MeshTri
-from skfem.element import DiscreteField
 from skfem.quadrature import get_quadrature
 
 from ..mesh.facets import Curves, powers
+from .supports import SIDES
 
 EXPONENTS = np.array([(i, j) for i in range(6) for j in range(6 - i)])  # the 21 monomials of degree 5
-SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in scikit-fem's order
 ON_BODY = 1e-9  # [-] share of a triangle's size by which rounding may put a point outside it
 NEAR_CURVE = 1e-5  # [-] the same at curved edges: the mesh is closer to the curve than this share of a triangle
 CANDIDATES = 8  # [-] nearest triangles searched first; if none holds the point, all are searched
 REACH = 0.5  # [-] share of a triangle's size; no curved edge bulges this far
 CURVE_STEPS = 12  # [-] fixed-point steps to find the coordinates of a point in a curved triangle
 REFERENCE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) - 1.0 / 3.0  # corners in local coordinates
-DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))  # unknowns at a vertex: orders in x and y
 
 
 def monomials(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
@@ -109,6 +109,21 @@ class Triangles:
             rows = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
         return np.stack([np.stack(row, axis=-1) for row in rows], axis=1)
 
+    def derivatives(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...], terms: Any, weights: Any):
+        """Derivatives of polynomials, one array for each order, as in `ArgyrisSpace.functions`.
+
+        ``terms(local, dx, dy)`` gives derivatives (..., n) of n terms; ``weights`` (n_cells, n, n_local) combine them.
+        """
+        local = self.local(cells, points)
+        result = []
+        for order in orders:
+            raw = [terms(local, order - k, k) @ weights[cells] for k in range(order + 1)]
+            stacked = np.stack(raw, axis=1)  # (n, order + 1, n_q, n_local)
+            if order:
+                stacked = (self.chain(cells, order) @ stacked.reshape(*stacked.shape[:2], -1)).reshape(stacked.shape)
+            result.append(stacked if order else raw[0])
+        return result
+
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cell that holds each point (n, 2), or else the nearest one, and whether the point lies in it."""
         near = self.tree.query(points, k=min(CANDIDATES, len(self.origin)))[1].reshape(len(points), -1)
@@ -154,6 +169,8 @@ class ArgyrisSpace:
     and its unknowns to the reference directions.
     """
 
+    element = ElementTriArgyris  # scikit-fem's class: it numbers the unknowns
+
     def __init__(self, mesh: MeshTri, bent: Bent | None = None) -> None:
         self.inner = Triangles(mesh, bent)
         self.origin, self.inverse, self.jacobian = self.inner.origin, self.inner.inverse, self.inner.jacobian
@@ -194,25 +211,14 @@ class ArgyrisSpace:
 
         The arrays are (n, n_q, 21) for order 0, (n, 2, n_q, 21) for order 1, (n, 3, n_q, 21) for order 2 (xx, xy, yy).
         """
-        local = self.inner.local(cells, points)
-        result = []
-        for order in orders:
-            raw = [monomials(local, order - k, k) @ self.coefficients[cells] for k in range(order + 1)]
-            if order == 0:
-                result.append(raw[0])
-                continue
-            stacked = np.stack(raw, axis=1)  # (n, order + 1, n_q, 21)
-            shape = stacked.shape
-            turned = self.inner.chain(cells, order) @ stacked.reshape(*shape[:2], -1)
-            result.append(turned.reshape(shape))
-        return result
+        return self.inner.derivatives(cells, points, orders, monomials, self.coefficients)
 
     def uniform(self, cells: np.ndarray, stiffness: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
         """Bending and mass matrices (n, 21, 21) of straight cells (n,) with uniform stiffness (3, 3) and unit inertia.
 
         The integrals of products of monomials are the same for all triangles, so they are computed once.
         """
-        X, weight = get_quadrature(Argyris.refdom, order)
+        X, weight = get_quadrature(self.element.refdom, order)
         local = X.T - 1.0 / 3.0
         values = monomials(local, 0, 0)
         bends = np.stack([monomials(local, 2 - k, k) for k in range(3)])  # (3, n_q, 21)
@@ -243,31 +249,14 @@ class ArgyrisSpace:
         return result
 
 
-class Argyris(ElementTriArgyris):
-    """scikit-fem's Argyris element with the shape functions of `ArgyrisSpace`; make a new one for each mesh."""
-
-    def __init__(self, space: ArgyrisSpace) -> None:
-        self.space = space
-        self.fields: list[np.ndarray] = []
-        self.asked: object = None
-
-    def gbasis(self, mapping, X, i, tind=None):
-        cells = np.arange(len(self.space.origin)) if tind is None else tind
-        if X is not self.asked:
-            points = mapping.F(X, tind=tind).transpose(1, 2, 0)  # (n_cells, n_q, 2)
-            self.fields, self.asked = self.space.functions(cells, points, (0, 1, 2)), X
-        value, gradient, hessian = self.fields
-        xx, xy, yy = hessian[:, 0, :, i], hessian[:, 1, :, i], hessian[:, 2, :, i]
-        grad = gradient[..., i].transpose(1, 0, 2)
-        return (DiscreteField(value=value[..., i], grad=grad, hess=np.array([[xx, xy], [xy, yy]])),)
-
-
 class MorleySpace:
     """Quadratic Morley shape functions of straight triangles: deflection at corners, slope at mid-sides.
 
     They are continuous only at those points and approach the frequencies from below, while Argyris elements approach
     them from above.
     """
+
+    element = ElementTriMorley
 
     def __init__(self, mesh: MeshTri) -> None:
         self.inner = Triangles(mesh)
@@ -285,18 +274,7 @@ class MorleySpace:
 
     def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
         """The same as `ArgyrisSpace.functions`, with six shape functions per cell."""
-        offset = points - self.origin[cells][:, None]
-        local = np.einsum("eij,eqj->eqi", self.inverse[cells], offset)
-        result = []
-        for order in orders:
-            raw = [_quadratic(local, order - k, k) @ self.coefficients[cells] for k in range(order + 1)]
-            if order == 0:
-                result.append(raw[0])
-                continue
-            stacked = np.stack(raw, axis=1)
-            shape = stacked.shape
-            result.append((self.inner.chain(cells, order) @ stacked.reshape(*shape[:2], -1)).reshape(shape))
-        return result
+        return self.inner.derivatives(cells, points, orders, _quadratic, self.coefficients)
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cell that holds each point (n, 2), or the nearest one, and whether the point lies in it."""
@@ -312,10 +290,6 @@ class MorleySpace:
         return result
 
 
-class Morley(ElementTriMorley):
-    """scikit-fem's Morley element, used only to number the unknowns; make a new one for each mesh."""
-
-
 def _quadratic(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
     """Derivative of the six monomials of degree 2 at local coordinates (..., 2), shape (..., 6)."""
     x, y = powers(local[..., 0], 2, dx), powers(local[..., 1], 2, dy)
@@ -328,14 +302,14 @@ def triangles(points: np.ndarray, cells: np.ndarray) -> MeshTri:
     return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
 
 
-def quadrature(mesh, element, order: int, mapping=None) -> tuple[np.ndarray, np.ndarray]:
+def quadrature(mesh, space, order: int, mapping=None) -> tuple[np.ndarray, np.ndarray]:
     """Quadrature on every cell: points (n_cells, n_q, dimension) and weights (n_cells, n_q)."""
-    X, weight = get_quadrature(element.refdom, order)
+    X, weight = get_quadrature(space.element.refdom, order)
     mapping = mesh._mapping() if mapping is None else mapping
     return mapping.F(X).transpose(1, 2, 0), np.abs(mapping.detDF(X)) * weight
 
 
-def numbering(mesh, element) -> tuple[np.ndarray, int]:
+def numbering(mesh, space) -> tuple[np.ndarray, int]:
     """Numbers of the unknowns of each cell, (n_local, n_cells), and how many unknowns there are."""
-    dofs = Dofs(mesh, element)
+    dofs = Dofs(mesh, space.element())  # a new object: scikit-fem's elements remember their first mesh
     return dofs.element_dofs, dofs.N

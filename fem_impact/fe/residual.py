@@ -19,14 +19,12 @@ import numpy as np
 from ..mesh.facets import powers
 from . import beam_elements
 from .assembly import System
-from .elements import SIDES
 from .springs import along_facets
-from .supports import cells_of_facets
+from .supports import SIDES, cells_of_facets
 
 CALIBRATION = 33.0  # [-] weighted squares over the energy error: 20 to 45 for 20 kinds of plates; test_residual.py
 DEGREE = 5  # [-] polynomial degree of the elements
-EDGE_POINTS = 3  # [-] Gauss points on a side
-CELL_POINTS = 3  # [-] Gauss points in each direction of a triangle
+POINTS = 3  # [-] Gauss points on a side, and in each direction of a triangle; CALIBRATION holds for this number
 BLOCK = 128  # [-] solutions processed together, to limit memory
 POWERS = np.array([(i, j) for i in range(4) for j in range(4 - i)])  # a quintic deflection has cubic moments
 NODES = 0.8 / 3.0 * POWERS + 0.2 / 3.0 - 1.0 / 3.0  # ten points inside the triangle, enough to define a cubic
@@ -37,7 +35,7 @@ def _cubic(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
     return powers(local[..., 0], 3, dx)[..., POWERS[:, 0]] * powers(local[..., 1], 3, dy)[..., POWERS[:, 1]]
 
 
-FIT = np.linalg.inv(_cubic(NODES, 0, 0))
+FIT = np.linalg.inv(_cubic(NODES, 0, 0))  # from values at NODES to the coefficients of the cubic
 
 
 class Moments:
@@ -99,7 +97,7 @@ class Residual:
     def _set_cells(self) -> None:
         space, frame = self.moments.space, self.system.frame
         cells = np.arange(self.moments.n_cells)
-        node, weight = np.polynomial.legendre.leggauss(CELL_POINTS)
+        node, weight = np.polynomial.legendre.leggauss(POINTS)
         a, b = (x.ravel() for x in np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij"))
         share = 0.25 * np.outer(weight, weight).ravel() * (1.0 - a)
         local = np.column_stack([a, b * (1.0 - a)]) - 1.0 / 3.0
@@ -133,7 +131,7 @@ class Residual:
         length = np.linalg.norm(stop - start, axis=1)
         along = (stop - start) / length[:, None]
         normal = np.column_stack([along[:, 1], -along[:, 0]])
-        node, weight = np.polynomial.legendre.leggauss(EDGE_POINTS)
+        node, weight = np.polynomial.legendre.leggauss(POINTS)
         x = start[:, None] + 0.5 * (node + 1.0)[:, None] * (stop - start)[:, None]
         every = np.broadcast_to(normal[:, None], x.shape)
         jump = [self.moments.across(self.beside[:, k], x, every) for k in range(2)]  # (n_sides, 2, n_q, 21)

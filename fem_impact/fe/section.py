@@ -8,6 +8,7 @@ import numpy as np
 
 from .._base import check
 
+KINDS = ("clamped", "hinged", "free")  # supports of an edge besides `Elastic`
 Varying = float | Callable[[np.ndarray], Any]
 
 

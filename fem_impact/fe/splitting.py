@@ -1,6 +1,7 @@
 """Divide triangles where a solution needs smaller ones, and keep the boundary on its true curve."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -40,11 +41,11 @@ def _wanted(mesh: Mesh, held: np.ndarray, point: np.ndarray, breadth: float, ext
     if not held.any():
         return DEPTH * breadth
     ends = np.stack([mesh.points[mesh.facets[held, 0]], mesh.middles[held], mesh.points[mesh.facets[held, 1]]], axis=1)
-    distance = float(_distance(point, ends[:, :-1], ends[:, 1:]).min())
-    return DEPTH * (breadth if distance < AT_EDGE * extent else min(breadth, distance))
+    away = float(distance(point, ends[:, :-1], ends[:, 1:]).min())
+    return DEPTH * (breadth if away < AT_EDGE * extent else min(breadth, away))
 
 
-def _distance(point: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
+def distance(point: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
     """Distance [m] of a point (2,) to segments (..., 2)."""
     along = stop - start
     share = ((point - start) * along).sum(axis=-1) / (along**2).sum(axis=-1)
@@ -62,7 +63,7 @@ def _too_large(mesh: Mesh, points: np.ndarray, size: np.ndarray) -> np.ndarray:
         off = point - corner
         turn = side[..., 0] * off[..., 1] - side[..., 1] * off[..., 0]
         inside = (turn >= 0.0).all(axis=1) | (turn <= 0.0).all(axis=1)
-        away = np.where(inside, 0.0, _distance(point, corner, after).min(axis=1))
+        away = np.where(inside, 0.0, distance(point, corner, after).min(axis=1))
         tall |= longest > np.maximum(least, GROWTH * away)
     return tall
 
@@ -152,15 +153,7 @@ class Rim:
     def finish(self, mesh: Mesh, points: np.ndarray, cells: np.ndarray) -> Mesh:
         parent = np.array(self.parent)
         edges = {name: np.flatnonzero(np.isin(parent, numbers)) for name, numbers in mesh.edges.items()}
-        arrays = (np.array(a) for a in (self.middles, self.tangents, self.curvatures))
-        middles, tangents, curvatures = arrays
-        return replace(
-            mesh,
-            points=points,
-            cells=cells,
-            facets=np.array(self.facets),
-            edges=edges,
-            middles=middles,
-            tangents=tangents,
-            curvatures=curvatures,
-        )
+        rim: dict[str, Any] = {
+            name: np.array(getattr(self, name)) for name in ("facets", "middles", "tangents", "curvatures")
+        }
+        return replace(mesh, points=points, cells=cells, edges=edges, **rim)

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from .._base import check
+from .elements import REFERENCE
 from .section import Elastic
 
 FACET_POINTS = 8  # [-] Gauss points on a boundary facet; exact for products of quintics
@@ -19,8 +20,7 @@ def along_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.
     corner = space.vertices[cells][:, None]  # (n, 1, 3)
     first, last = (np.equal(corner, facets[:, end, None, None]).astype(float) for end in (0, 1))
     area = (1.0 - s) * first + s * last  # (n, n_q, 3)
-    reference = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) - 1.0 / 3.0
-    corners = space.origin[cells, None] + reference @ space.jacobian[cells].transpose(0, 2, 1)
+    corners = space.origin[cells, None] + REFERENCE @ space.jacobian[cells].transpose(0, 2, 1)
     x, gradient = area @ corners, corners.transpose(0, 2, 1)[:, None]
     if space.bent is not None:
         moved, turned = space.bent.shift(cells, area)
@@ -32,7 +32,7 @@ def along_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.
 def edge_springs(supports: Sequence[Any], frame: Any) -> np.ndarray:
     """Support stiffness (n_facets, 2) against deflection and slope of each facet, in the frame's units."""
     pairs = [(kind.stiffness, kind.rotation) if isinstance(kind, Elastic) else (0.0, 0.0) for kind in supports]
-    return np.array(pairs) * [frame.length**3, frame.length] / frame.stiffness
+    return np.array(pairs).reshape(-1, 2) * [frame.length**3, frame.length] / frame.stiffness
 
 
 def plate_springs(space: Any, facets: np.ndarray, cells: np.ndarray, springs: np.ndarray) -> np.ndarray:
@@ -49,8 +49,7 @@ def plate_springs(space: Any, facets: np.ndarray, cells: np.ndarray, springs: np
 def beam_springs(dofs: list[tuple[int, int]], held: list[Elastic], frame: Any, n_all: int) -> csr_matrix:
     """Stiffness (n_all, n_all) of elastic supports, on the deflection and slope at the ends of a beam."""
     numbers = np.array(dofs, int).ravel()
-    pairs = [[s.stiffness * frame.length**3, s.rotation * frame.length] for s in held]
-    values = np.array(pairs).ravel() / frame.stiffness
+    values = edge_springs(held, frame).ravel()
     return coo_matrix((values, (numbers, numbers)), shape=(n_all, n_all)).tocsr()
 
 

@@ -3,11 +3,10 @@
 from typing import Any
 
 import numpy as np
-from scipy import special
 
 from .._base import check
 from ..modes.modal import Modes
-from .contact import Contact
+from .contact import Contact, wall_time
 
 SMOOTH = 1.5, 3.0  # [-] the error falls as (omega_0 / omega_c)**min(1.5 + exponent, 3): fitted, see `left_out_error`
 FACTOR = 1.0, 2.0  # [-] factor of that error, linear and from Hertz on: 90 % of random blows on plates err less
@@ -18,17 +17,14 @@ BAND = 4.0  # [-] kept modes reach at least this multiple of the contact frequen
 
 @check.typed
 def contact_duration(contact: Contact, mass: float, speed: float) -> float:
-    """Contact duration [s] of a rigid mass [kg] that hits a rigid wall at a speed [m/s], without loss.
-
-    References
-    ----------
-    Euphonics 12.1.1; for an exponent p: T = 2 sqrt(pi) Gamma(1 + 1/(p+1)) / Gamma(1/2 + 1/(p+1)) delta_max / v.
-    """
+    """Contact duration [s] of a rigid mass [kg] that hits a rigid wall at a speed [m/s], without loss or gap."""
     mass, speed = check.positive("mass", mass, "kg"), check.positive("speed", speed, "m/s")
-    q = 1.0 / (contact.exponent + 1.0)
-    # in logarithms: the direct form overflows for extreme stiffness or speed
-    indentation = np.exp(q * (np.log(0.5 / q) + np.log(mass) - np.log(contact.stiffness) + 2.0 * np.log(speed)))
-    return float(2.0 * np.sqrt(np.pi) * special.gamma(1.0 + q) / special.gamma(0.5 + q) * indentation / speed)
+    return float(wall_time(contact.stiffness, contact.exponent, 1.0 / mass, speed))
+
+
+def contact_resonance(contact: Contact, mass: float, speed: float) -> float:
+    """Contact resonance [Hz]: one over twice the `contact_duration`."""
+    return 0.5 / contact_duration(contact, mass, speed)
 
 
 @check.typed
@@ -105,8 +101,15 @@ def _order(exponent: Any) -> tuple[Any, Any]:
 
 def _density(modes: Modes, at: Any, contact: Contact, mass: float, speed: float) -> tuple[float, float, float, float]:
     """Contact frequency [rad/s], stiffness [N/m], and A and s of the density A omega**-s of the left-out modes."""
-    omega_0 = np.pi / contact_duration(contact, mass, speed)
-    point = modes.point("at", at)
-    rest = max(0.0, float(modes.residual_compliance(point)[0, 0]))
+    omega_0 = 2.0 * np.pi * contact_resonance(contact, mass, speed)
+    return omega_0, mass * omega_0**2, *left_out_density(modes, modes.point("at", at))
+
+
+def left_out_density(modes: Modes, point: np.ndarray) -> tuple[float, float]:
+    """A and s of the density A omega**-s [1/(kg rad/s)] of the squared shapes of the left-out modes at a point.
+
+    The residual compliance gives A; s is 0 on plates and 1/2 on beams.
+    """
     s = 0.5 if modes.dimension == 1 else 0.0
-    return omega_0, mass * omega_0**2, (1.0 + s) * rest * modes.omega[-1] ** (1.0 + s), s
+    rest = max(0.0, float(modes.residual_compliance(point)[0, 0]))
+    return (1.0 + s) * rest * modes.omega[-1] ** (1.0 + s), s

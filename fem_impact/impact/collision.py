@@ -7,27 +7,26 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.special import gamma
 
 from .._base import check
 from .._base.check import SimulationError
 from ..modes.modal import Modes, left_out
-from . import accuracy
+from . import accuracy, force_spectrum
 from .compiled import build, record
 from .compiled.collocation import run_collocation
 from .compiled.energy import run_energy
-from .contact import Contact
+from .contact import Contact, wall_time
 from .quantities import asked_for
 from .response import Dip, Error, History, Response
 from .striker import Striker
 
-TOLERANCE = 1e-4  # [-] default tolerance
+TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
 SCHEMES = ("A", "A4", "collocation")
 MAX_STEPS = 500_000  # [-] of one run: takes about one second
 MAX_WORK = 500_000_000  # [-] modes times steps of one run: takes about one second
 PLAIN_WORK = 300_000  # [-] modes times steps of one run, if the kernels are not compiled
 FIRST_STEPS = 24.0  # [-] with 24 steps per contact, A4 errs by less than FIRST_ERROR; cheapest first run of 12 to 32
-FIRST_ERROR = 1e-4  # [-] error of A4 with FIRST_STEPS
+FIRST_ERROR = 1e-4  # [-] error of A4 with FIRST_STEPS, over many blows
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
 AVERAGED = 0.5  # [-] fraction of the usual steps that these quantities need
 GRAZE = 2.0  # [-] a touch or gap below 2 tolerance times the deepest approach may be a numerical error
@@ -115,7 +114,7 @@ class _Options:
     @classmethod
     def checked(cls, tolerance, duration, max_impacts, scheme, dt, quantity) -> "_Options":
         return cls(
-            check.between("tolerance", tolerance, 1e-12, 1.0),
+            check.tolerance(tolerance),
             np.inf if duration is None else check.positive("duration", duration, "s"),
             0 if max_impacts is None else check.count("max_impacts", max_impacts),
             None if scheme is None else check.one_of("scheme", scheme, SCHEMES),
@@ -171,11 +170,10 @@ def strike(
     struck = _part(modes, ((0, -1.0),), point, rows, rest, forces[1])
 
     def blow(striker: Striker) -> Response:
-        touch = Touch(contact, 0, 1, striker.at[None] if striker.modes.dimension else None, point)
+        touch = Touch(contact, 0, 1, striker.at[None], point)
         rest = striker.left_out if residual and striker.modes.dimension else None
-        end = striker.at[None] if striker.modes.dimension else np.zeros((1, 0))
         motion = speed * striker.motion
-        arriving = _part(striker.modes, ((0, 1.0),), end, striker.shape[None], rest, forces[0], motion)
+        arriving = _part(striker.modes, ((0, 1.0),), striker.at[None], striker.shape[None], rest, forces[0], motion)
         return _follow((striker.modes, modes), [touch], [arriving, struck], speed, options, striker, point[0])
 
     if striker.fixed or not residual or speed == 0.0:
@@ -299,7 +297,7 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Pa
         if speed != 0.0:
             if not ends[body] or not rows[0, modes.omega == 0.0].any():
                 raise ValueError(f"speeds must be zero for a body that cannot move rigidly, got {speed:g} m/s")
-            part = replace(part, p=part.p + speed * modes.rigid_motion(points[:1] if modes.dimension else None))
+            part = replace(part, p=part.p + speed * modes.rigid_motion(points[:1]))
         arriving = arriving or speed
         parts.append(part)
     return parts, arriving
@@ -359,13 +357,7 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
                 for (i, sign), share in zip(part.touched, vector):
                     column[i] += sign * share * np.sqrt(value) * above
                 extra.append((above, damping, column))
-    lists: list[list] = [
-        [part.omega for part in parts],
-        [part.zeta for part in parts],
-        [part.bias for part in parts],
-        [part.q for part in parts],
-        [part.p for part in parts],
-    ]
+    lists = [[getattr(part, name) for part in parts] for name in ("omega", "zeta", "bias", "q", "p")]
     if extra:
         shape = np.ascontiguousarray(np.hstack([shape, *(column[:, None] for _, _, column in extra)]))
         added = [[omega for omega, _, _ in extra], [zeta for _, zeta, _ in extra], *[[0.0] * len(extra)] * 3]
@@ -422,22 +414,13 @@ def _pace(system: _System) -> tuple[float, float]:
             speed = max(speed, approach * np.sqrt(k * approach ** (exponent - 1.0) * mobile[-1]))
         if speed == 0.0:
             continue
-        free = _wall_duration(k, exponent, mobile, speed)
-        if exponent == 1.0:
-            free = free * np.sqrt(1.0 + k * compliance)
+        free = wall_time(k, exponent, mobile, speed, compliance)
         shortest = min(shortest, float(free[np.argmax(np.pi / free < above)]))
         fastest = max(fastest, float(speed))
     if not np.isfinite(shortest):
         k, exponent = system.law[0, :2]
         return float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0
     return shortest, fastest
-
-
-def _wall_duration(k: float, exponent: float, mobility: np.ndarray, speed: float) -> np.ndarray:
-    """Contact times [s] of masses 1/mobility on a rigid wall; logarithms avoid overflow."""
-    q = 1.0 / (exponent + 1.0)
-    deepest = np.exp(q * (2.0 * np.log(speed) - np.log(2.0 * q * k) - np.log(mobility)))
-    return 2.0 * np.sqrt(np.pi) * gamma(1.0 + q) / gamma(0.5 + q) * deepest / speed
 
 
 def _scheme_for(tolerance: float, exponent: float) -> str:
@@ -474,7 +457,7 @@ def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance
     modes = striker.modes
     law: dict[str, Any] = {"contact": contact, "mass": striker.felt_mass, "speed": speed}
     allowed = STRIKER_SHARE * tolerance / (LOSSY_STRIKER if contact.loss else 1.0)
-    omega_0 = np.pi / accuracy.contact_duration(**law)
+    omega_0 = 2.0 * np.pi * accuracy.contact_resonance(**law)
     whole = modes.truncated(n_modes=modes.n_rigid).residual_compliance(striker.at[None])[0, 0]
     if striker.felt_mass * omega_0**2 * whole <= allowed:
         return modes.n_rigid, allowed
@@ -639,7 +622,10 @@ def _difference(
     for name, band in quantities.items():
         if band is not None:
             frequencies = np.linspace(0.0, band, BAND_POINTS)
-            first, second = (_force_spectrum(history, frequencies) for history in (coarse, fine))
+            first, second = (
+                force_spectrum.of_pieces(force_spectrum.pieces(*history.samples(1.0)), frequencies)
+                for history in (coarse, fine)
+            )
             found[name] = float(np.abs(first - second).max() / (np.abs(second).max() or 1.0)) / over[0]
     return max(ROUNDING, *(float(found.get(name, 0.0)) for name in quantities))
 
@@ -680,10 +666,6 @@ def _totals(history: History) -> tuple[float, float, float]:
     """Impulse [N s], contact time [s] and peak force [N] of a run with impacts."""
     rows = history.contacts.tolist()
     return sum(row[3] for row in rows), sum(row[1] - row[0] for row in rows), max(row[2] for row in rows)
-
-
-def _force_spectrum(history: History, frequencies: np.ndarray) -> np.ndarray:
-    return Response((), (), history, 1.0, 1.0, "", Error(0.0, 0.0, 0.0)).spectrum(frequencies)
 
 
 def _sensitivity(coarse: History, fine: History) -> float:

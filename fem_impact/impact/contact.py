@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
+from scipy.special import gamma
 
 from .._base import check
 
@@ -115,6 +116,23 @@ def _isotropic(name: str, material: Any) -> tuple[float, float]:
             f"{name} must have an isotropic material (E, nu), got {check.shown(material)}; use Contact.hertz"
         )
     return float(E), float(nu)
+
+
+def wall_time(stiffness: Any, exponent: Any, mobility: Any, speed: Any, compliance: Any = 0.0) -> np.ndarray:
+    """Contact times [s] of masses 1 / ``mobility`` [1/kg] on a rigid wall, without loss; the arguments broadcast.
+
+    ``T = 2 sqrt(pi) Gamma(1 + q) / Gamma(1/2 + q) deepest / speed`` with ``q = 1 / (exponent + 1)``. A ``compliance``
+    [m/N] in series counts for a linear contact only.
+
+    References
+    ----------
+    Euphonics 12.1.1.
+    """
+    q = 1.0 / (np.asarray(exponent) + 1.0)
+    # in logarithms: the direct form overflows for extreme stiffness or speed
+    deepest = np.exp(q * (2.0 * np.log(speed) - np.log(2.0 * q * stiffness) - np.log(mobility)))
+    series = np.sqrt(1.0 + np.where(q == 0.5, stiffness * np.asarray(compliance), 0.0))
+    return np.asarray(2.0 * np.sqrt(np.pi) * gamma(1.0 + q) / gamma(0.5 + q) * deepest / speed * series)
 
 
 def loss_number(restitution: float) -> float:

@@ -5,22 +5,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy import fft, special
 
 from .._base import check, markup
 from ..modes.modal import Modes
-from .compiled import build, law, many_blows, propagation, record
+from . import force_spectrum
+from .compiled import law, propagation, record
 from .contact import Contact
 from .striker import Striker
 
 CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more than this factor
 TOUCH = 1e-12  # [-] of the largest approach rate: bodies that touch and approach more slowly count as pressed
-LEAST_SAMPLES = 800.0  # [-] per impact: its spectrum errs by less than 1e-3 up to the thirtieth lobe
 PEAK_LOOKS = 16  # [-] samples per step in the search for the peak force; misses (pi/11/16)**2/8 before the parabola
-MOST_TERMS = 2 * 10**7  # [-] pieces times frequencies of a spectrum summed directly: takes three seconds; above it, FFT
-MOST_PERIODS = 2.0**18  # [-] periods of the highest frequency in a blow: the FFT then takes half a gigabyte
-GRID = 8  # [-] time cells per half period of the highest frequency, in the FFT of a long blow
-WINDOW, BETA = 6, 28.1  # [-] half width and shape of the window for an FFT of twice the length: errs by 1e-11
 DIP_BLOCK = 8  # [-] points per static solution: each is a load, and the cost grows with the pairs of points
 
 
@@ -179,6 +174,45 @@ class History:
         found = [Impact(start, end, peak, impulse, int(i)) for start, end, peak, impulse, i in rows]
         return tuple(sorted(found, key=lambda impact: (impact.start, impact.contact)))
 
+    def samples(self, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+        """Times [s], (n_times,), dense enough for a tolerance, and the forces [N] there, (n_times, n_contacts)."""
+        steps, contacts = self.steps, range(self.n_contacts)
+        if not len(steps):
+            return np.zeros(1), np.zeros((1, self.n_contacts))
+        busy = np.asarray(self.pressed.any(axis=1))
+        per_step = 4.0
+        if busy.any():
+            per_impact = busy.sum() / max(1, len({impact.start for impact in self.impacts}))
+            wanted = max((3.0 / max(tolerance, 1e-10)) ** 0.5, force_spectrum.LEAST_SAMPLES)
+            per_step = np.clip(np.ceil(wanted / per_impact), 4, 4096)
+        part = np.arange(int(per_step)) / per_step
+
+        def within(rows: np.ndarray, i: int, part: np.ndarray) -> np.ndarray:
+            return np.where(self.pressed[rows, i][:, None], self.force(rows, i, part[None]), 0.0).ravel()
+
+        times, forces = [], []
+        edges = np.flatnonzero(np.diff(np.concatenate([[-1], busy.astype(int)])))
+        for first, last in zip(edges, np.append(edges[1:], len(steps))):
+            rows = np.arange(first, last)
+            if busy[first]:
+                times.append((steps[rows, :1] + part * steps[rows, 1:2]).ravel())
+                forces.append(np.stack([within(rows, i, part) for i in contacts], axis=1))
+            else:
+                times.append(steps[rows, 0])
+                forces.append(np.zeros((len(rows), self.n_contacts)))
+        times.append(np.array([self.end_time]))
+        forces.append(np.array([[within(np.array([len(steps) - 1]), i, np.ones(1))[0] for i in contacts]]))
+        return np.concatenate(times), np.concatenate(forces)
+
+    def energy(self, q: np.ndarray, p: np.ndarray, modes: slice = slice(None)) -> float:
+        """Energy [J] of some modes at a state, in the field of the constant forces."""
+        return float(mode_energy(self.omega[modes], q[modes], p[modes]).sum() - self.bias[modes] @ q[modes])
+
+
+def mode_energy(omega: np.ndarray, q: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Kinetic and elastic energy [J] of each mode, (..., n_modes)."""
+    return 0.5 * (p**2 + (omega * q) ** 2)
+
 
 @dataclass(frozen=True, eq=False)
 class Dip:
@@ -247,34 +281,7 @@ class Response:
 
     @cached_property
     def _samples(self) -> tuple[np.ndarray, np.ndarray]:
-        steps = self.history.steps
-        if not len(steps):
-            return np.zeros(1), np.zeros((1, self.history.n_contacts))
-        busy = np.asarray(self.history.pressed.any(axis=1))
-        per_step = 4.0
-        if busy.any():
-            per_impact = busy.sum() / max(1, len({impact.start for impact in self.impacts}))
-            per_step = np.clip(
-                np.ceil(max((3.0 / max(self.tolerance, 1e-10)) ** 0.5, LEAST_SAMPLES) / per_impact), 4, 4096
-            )
-        part = np.arange(int(per_step)) / per_step
-        times, forces = [], []
-        edges = np.flatnonzero(np.diff(np.concatenate([[-1], busy.astype(int)])))
-        for first, last in zip(edges, np.append(edges[1:], len(steps))):
-            rows = np.arange(first, last)
-            if busy[first]:
-                times.append((steps[rows, :1] + part * steps[rows, 1:2]).ravel())
-                forces.append(np.stack([self._within(rows, i, part) for i in range(self.history.n_contacts)], axis=1))
-            else:
-                times.append(steps[rows, 0])
-                forces.append(np.zeros((len(rows), self.history.n_contacts)))
-        times.append(np.array([self.history.end_time]))
-        last_row = np.array([len(steps) - 1])
-        forces.append(np.array([[self._within(last_row, i, np.ones(1))[0] for i in range(self.history.n_contacts)]]))
-        return np.concatenate(times), np.concatenate(forces)
-
-    def _within(self, rows: np.ndarray, i: int, part: np.ndarray) -> np.ndarray:
-        return np.where(self.history.pressed[rows, i][:, None], self.history.force(rows, i, part[None]), 0.0).ravel()
+        return self.history.samples(self.tolerance)
 
     @property
     def time(self) -> np.ndarray:
@@ -293,30 +300,7 @@ class Response:
         Exact for a force that is linear between the samples.
         """
         asked = check.array("frequencies", frequencies, (None,), "Hz", lift=True)
-        t, h, f0, f1 = self._pieces()
-        if len(t) * len(asked) > MOST_TERMS and 0.0 < np.abs(asked).max() * (t[-1] + h[-1]) < MOST_PERIODS:
-            return self._long_spectrum(asked, t[-1] + h[-1])
-        omega = 2.0 * np.pi * asked
-        total = np.zeros(len(omega), complex)
-        for block in np.array_split(np.arange(len(omega)), max(1, len(omega) * len(h) // 2**20)):
-            x = omega[block, None] * h  # (n_block, n_pieces)
-            small = np.abs(x) < 1e-2
-            safe = np.where(small, 1.0, x)
-            edge = np.exp(-1j * safe)
-            mean = np.where(small, 1.0 - 0.5j * x - x**2 / 6.0 + 1j * x**3 / 24.0, (1.0 - edge) / (1j * safe))
-            ramp = np.where(
-                small, 0.5 - 1j * x / 3.0 - x**2 / 8.0 + 1j * x**3 / 30.0, (edge * (1.0 + 1j * safe) - 1.0) / safe**2
-            )
-            start = np.exp(-1j * omega[block, None] * t)
-            total[block] = (start * h * (f0 * mean + (f1 - f0) * ramp)).sum(axis=1)
-        return total
-
-    def _pieces(self) -> tuple[np.ndarray, ...]:
-        """Start [s], length [s], first and last force [N] of all straight pieces that carry force."""
-        time, force = self._samples
-        force = force.sum(axis=1)
-        keep = (force[1:] != 0.0) | (force[:-1] != 0.0)
-        return time[:-1][keep], np.diff(time)[keep], force[:-1][keep], force[1:][keep]
+        return force_spectrum.of_pieces(force_spectrum.pieces(*self._samples), asked)
 
     def spectral_centroid(self, max_frequency: float) -> float:
         """Mean frequency [Hz] of the force spectrum's magnitude from zero to ``max_frequency`` [Hz]."""
@@ -324,40 +308,12 @@ class Response:
         span = max((impact.end for impact in self.impacts), default=0.0)
         if span == 0.0:
             raise ValueError("spectral_centroid needs a contact, but the bodies never touched; check gap and speed")
-        if limit * span > MOST_PERIODS:
-            raise ValueError(f"max_frequency must be at most {MOST_PERIODS / span:.4g} Hz for a blow of {span:.4g} s")
+        if limit * span > force_spectrum.MOST_PERIODS:
+            most = force_spectrum.MOST_PERIODS / span
+            raise ValueError(f"max_frequency must be at most {most:.4g} Hz for a blow of {span:.4g} s")
         frequencies = np.linspace(0.0, limit, int(np.clip(32.0 * limit * span, 512, 65536)))
-        t, h, f0, f1 = self._pieces()
-        if build.COMPILED and len(t) * len(frequencies) <= MOST_TERMS:
-            spectrum = np.zeros(len(frequencies), complex)
-            many_blows.straight_spectrum(2.0 * np.pi * frequencies[1], t, h, f0, f1, spectrum)
-        else:
-            spectrum = self.spectrum(frequencies)
-        size = np.abs(spectrum)
+        size = np.abs(force_spectrum.evenly(force_spectrum.pieces(*self._samples), frequencies))
         return float(np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies))
-
-    def _long_spectrum(self, frequencies: np.ndarray, span: float) -> np.ndarray:
-        """The spectrum by FFT, (n_frequencies,), for a blow of so many pieces that the direct sum would take minutes.
-
-        The force is replaced by its exact impulses in equal time cells; aliasing is small because the band ends far
-        below the cell rate. A Kaiser-Bessel window interpolates from the FFT frequencies to the requested ones.
-        """
-        t, h, f0, f1 = self._pieces()
-        before = np.concatenate([[0.0], np.cumsum(0.5 * h * (f0 + f1))])
-        step = min(0.5 / (GRID * np.abs(frequencies).max()), span / LEAST_SAMPLES)
-        edges = step * np.arange(int(span / step) + 2)
-        row = np.clip(np.searchsorted(t, edges, side="right") - 1, 0, None)
-        part = np.clip((edges - t[row]) / h[row], 0.0, 1.0)
-        impulse = np.diff(before[row] + h[row] * part * (f0[row] + 0.5 * (f1 - f0)[row] * part))
-        middle, length = 0.5 * (len(impulse) - 1), fft.next_fast_len(2 * len(impulse))
-        root = np.sqrt(BETA**2 - (2.0 * np.pi * WINDOW / length * (np.arange(len(impulse)) - middle)) ** 2)
-        even = fft.fft(impulse * root / (2.0 * WINDOW * np.sinh(root)), length)
-        place = frequencies * step * length
-        near = np.floor(place).astype(int)[:, None] + np.arange(1 - WINDOW, WINDOW + 1)  # (n_frequencies, 2 WINDOW)
-        weight = special.i0(BETA * np.sqrt(np.clip(1.0 - ((place[:, None] - near) / WINDOW) ** 2, 0.0, None)))
-        turn = np.exp(2j * np.pi * middle / length * near)
-        found = (weight * turn * even[near % length]).sum(axis=1)
-        return found * np.exp(-2j * np.pi * frequencies * step * (middle + 0.5)) / np.sinc(frequencies * step)
 
     def body_slice(self, body: int) -> slice:
         """The columns of a body's modes in the history's arrays."""
@@ -395,6 +351,10 @@ class Response:
         part = self.body_slice(body % len(self.bodies))
         n_modes = self.bodies[body].n_modes
         return q[back, part][:, :n_modes], p[back, part][:, :n_modes]
+
+    def modal_energy(self, times: Any, *, body: int = -1) -> np.ndarray:
+        """Energy [J] of each mode of the target at any times, (n_times, n_modes); parameters as in `modal_state`."""
+        return mode_energy(self.bodies[body].omega, *self.modal_state(times, body=body))
 
     @check.typed
     def displacement(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
@@ -467,18 +427,12 @@ class Response:
     def _balance(self) -> dict[str, float]:
         h = self.history
 
-        def modal(q: np.ndarray, p: np.ndarray, part: slice) -> float:
-            kinetic = 0.5 * (p[part] @ p[part]) + 0.5 * ((h.omega[part] * q[part]) @ (h.omega[part] * q[part]))
-            return float(kinetic - h.bias[part] @ q[part])
-
         def stored(d: np.ndarray) -> float:
             return float(law.stored(d, h.law))
 
-        everything = slice(0, len(h.omega))
         start_contact = stored(h.offset + h.shape @ h.start_q)
         end_contact = stored(np.atleast_1d(h.now[0]))
-        start = modal(h.start_q, h.start_p, everything)
-        end = modal(h.end_q, h.end_p, everything)
+        start, end = h.energy(h.start_q, h.start_p), h.energy(h.end_q, h.end_p)
         work = float(h.work.sum())
         return {
             "start": start + start_contact,
@@ -499,14 +453,9 @@ class Response:
         """
         h = self.history
         names = ["striker", "target"] if len(self.bodies) == 2 else [f"body {i}" for i in range(len(self.bodies))]
-        result = {}
-        for body, name in enumerate(names):
-            part = self.body_slice(body)
-            q, p = h.end_q[part], h.end_p[part]
-            result[name] = float(0.5 * (p @ p + (h.omega[part] * q) @ (h.omega[part] * q)) - h.bias[part] @ q)
+        result = {name: h.energy(h.end_q, h.end_p, self.body_slice(body)) for body, name in enumerate(names)}
         rest = slice(self.body_slice(len(self.bodies) - 1).stop, None)  # modes that replace the left-out ones
-        q, p = h.end_q[rest], h.end_p[rest]
-        result["contact"] = self._balance["contact"] + float(0.5 * (p @ p + (h.omega[rest] * q) @ (h.omega[rest] * q)))
+        result["contact"] = self._balance["contact"] + h.energy(h.end_q, h.end_p, rest)
         result["dissipated"] = sum(self.dissipated.values())
         return result
 

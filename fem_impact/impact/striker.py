@@ -43,7 +43,7 @@ class Striker:
             )
         at = self.modes.point("at", self.at)[0]
         object.__setattr__(self, "at", at)
-        shape = self.modes.shape_at(at[None] if self.modes.dimension else None)[0]
+        shape = self.modes.shape_at(at[None])[0]
         if not (shape[: self.modes.n_rigid] != 0.0).any():
             raise ValueError(
                 "at must be a point that moves when the striker moves rigidly, got one at rest; move it off the hinge"
@@ -90,24 +90,20 @@ class Striker:
         """Mass of the body [kg]."""
         return self.modes.mass
 
-    @property
-    def _points(self) -> np.ndarray:
-        return self.at[None] if self.modes.dimension else np.zeros((1, 0))
-
     @cached_property
     def shape(self) -> np.ndarray:
         """Mass-normalised shapes at the contact point, (n_modes,) [kg**-0.5]."""
-        return self.modes.shapes.at(self._points)[0]
+        return self.modes.shapes.at(self.at[None])[0]
 
     @cached_property
     def motion(self) -> np.ndarray:
         """Modal velocities per unit speed of the contact point on arrival, (n_modes,) [kg**0.5]."""
-        return self.modes.rigid_motion(self._points if self.modes.dimension else None)
+        return self.modes.rigid_motion(self.at[None])
 
     @cached_property
     def left_out(self) -> tuple[np.ndarray, np.ndarray]:
         """Residual compliance at the contact point, (1, 1) [m/N], and its estimated error, (1,)."""
-        return left_out(self.modes, self._points, self.shape[None])
+        return left_out(self.modes, self.at[None], self.shape[None])
 
     @property
     def felt_mass(self) -> float:

@@ -7,6 +7,7 @@ from scipy import optimize
 
 from .._base import check
 from ..modes.modal import Modes
+from .accuracy import left_out_density
 from .spectra import half_sine_spectrum
 
 STEP = 1.01  # [-] ratio of neighbouring frequencies in the search: much finer than the lobes of the pulse's spectrum
@@ -38,12 +39,11 @@ def _participation(modes: Modes, at: Any) -> tuple[np.ndarray, np.ndarray, float
     """Omega and squared shapes of the kept modes; A and s of the density A omega**-s [1/(kg rad/s)] beyond them."""
     point = modes.point("at", at)
     squared = modes.shape_at(point)[0] ** 2
-    exponent = {1: 0.5}.get(modes.dimension, 0.0)
-    rest = max(0.0, float(modes.residual_compliance(point)[0, 0]))
-    complete = rest + float(modes.modal_compliance(point)[0, 0])
-    if rest <= 1e-12 * complete:  # no modes are left out, or only rounding remains
-        return modes.omega, squared, 0.0, exponent
-    return modes.omega, squared, (1.0 + exponent) * rest * modes.omega[-1] ** (1.0 + exponent), exponent
+    density, exponent = left_out_density(modes, point)
+    kept = float(modes.modal_compliance(point)[0, 0])
+    if density <= 1e-12 * kept * modes.omega[-1] ** (1.0 + exponent):  # no modes are left out, or only rounding remains
+        density = 0.0
+    return modes.omega, squared, density, exponent
 
 
 def _energy(omega: np.ndarray, squared: np.ndarray, density: float, exponent: float, omega_c: float) -> float:

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -109,7 +110,6 @@ def svg_arrays(path: Path) -> dict[str, np.ndarray]:
     import svgelements
 
     _refuse_entities(path)
-    isolated.confine(path)
     drawing = svgelements.SVG.parse(str(path))
     if not isinstance(drawing, svgelements.SVG):
         raise ValueError("it contains no <svg> element")
@@ -178,7 +178,6 @@ def dxf_arrays(path: Path) -> dict[str, np.ndarray]:
     """Pieces and unit of a DXF file; runs in the reader process (see `isolated`)."""
     import ezdxf
 
-    isolated.confine(path)
     drawing = ezdxf.readfile(path)
     found: list[Piece] = []
     for entity in drawing.modelspace():
@@ -331,7 +330,7 @@ def _nested(name: str, loops: list[Loop]) -> Outline:
 
 
 def _renamed(piece: Piece, name: str) -> Piece:
-    return piece if piece.name else piece.named(name)
+    return piece if piece.name else replace(piece, name=name)
 
 
 def _edges(loop: Loop) -> Loop:

@@ -101,13 +101,8 @@ def divided(ends, middles, tangents, curvatures, share: float):
     cut, zero = np.full(len(ends), share), np.zeros(len(ends))
     point, tangent, curvature = curves.at(cut)
     first, second = curves.halfway(zero, cut), curves.halfway(cut, zero + 1.0)
+    tangent, curvature = np.where(straight[:, None], tangents[:, 0], tangent), np.where(straight, 0.0, curvature)
     point = np.where(straight[:, None], plain, point)
     first = np.where(straight[:, None], 0.5 * (ends[:, 0] + point), first)
     second = np.where(straight[:, None], 0.5 * (point + ends[:, 1]), second)
-    return (
-        point,
-        np.where(straight[:, None], tangents[:, 0], tangent),
-        np.where(straight, 0.0, curvature),
-        first,
-        second,
-    )
+    return point, tangent, curvature, first, second

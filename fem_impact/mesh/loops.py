@@ -38,10 +38,6 @@ class Arc:
         """The same piece traversed backwards."""
         return replace(self, start=self.start + self.sweep, sweep=-self.sweep)
 
-    def named(self, name: str) -> "Arc":
-        """The same piece as part of a named edge."""
-        return replace(self, name=name)
-
     def moved(self, matrix: np.ndarray, shift: np.ndarray) -> "Arc":
         """The piece transformed by ``matrix`` (2, 2), then shifted by ``shift`` (2,) [m]."""
         return replace(self, centre=matrix @ self.centre + shift, a=matrix @ self.a, b=matrix @ self.b)
@@ -68,10 +64,6 @@ class Bezier:
     def reversed(self) -> "Bezier":
         """The same piece traversed backwards."""
         return replace(self, control=self.control[::-1].copy())
-
-    def named(self, name: str) -> "Bezier":
-        """The same piece as part of a named edge."""
-        return replace(self, name=name)
 
     def moved(self, matrix: np.ndarray, shift: np.ndarray) -> "Bezier":
         """The piece transformed by ``matrix`` (2, 2), then shifted by ``shift`` (2,) [m]."""

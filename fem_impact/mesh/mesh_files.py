@@ -193,11 +193,31 @@ def _mend(path: Path, points: np.ndarray, cells: np.ndarray, notes: list[str]):
     return points[used], number[cells], number[leader]
 
 
+def sides_of(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sides (n_sides, 2) of triangles, each once and sorted; those of each cell, (n_cells, 3); how many cells share it.
+
+    A cell's sides go from its first vertex to its second, from there to its third, and back.
+    """
+    pairs = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
+    unique, number, counts = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    return unique, number.reshape(-1, 3), counts
+
+
 def boundary(cells: np.ndarray) -> np.ndarray:
     """Sides (n_facets, 2) of a single triangle, body on the left; the cells must be anticlockwise."""
-    sides = np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])
-    _, index, counts = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
-    return sides[index[counts == 1]]
+    _, number, counts = sides_of(cells)
+    cell, side = np.nonzero(counts[number] == 1)
+    order = np.argsort(number[cell, side])
+    cell, side = cell[order], side[order]
+    return np.column_stack([cells[cell, side], cells[cell, (side + 1) % 3]])
+
+
+def quartered(cells: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Each triangle split in four, (4 n_cells, 3); the new points, from number n on, halve the sides (n_new, 2)."""
+    sides, number, _ = sides_of(cells)
+    (a, b, c), (ab, bc, ca) = cells.T, n + number.T
+    quarters = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    return np.concatenate([np.column_stack(part) for part in quarters]), sides
 
 
 def _hanging(points: np.ndarray, cells: np.ndarray, names: dict, notes: list[str]) -> np.ndarray:
@@ -243,12 +263,11 @@ def _hanging(points: np.ndarray, cells: np.ndarray, names: dict, notes: list[str
 def _refuse_overlap(path: Path, points: np.ndarray, cells: np.ndarray) -> None:
     """Raise ValueError if triangles overlap, branch or form several pieces."""
     name = path.name
-    sides = np.sort(np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]]), axis=1)
-    unique, inverse, counts = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    unique, number, counts = sides_of(cells)
     if (counts > 2).any():
         x, y = points[unique[counts > 2][0]].mean(axis=0)
         raise ValueError(f"{name} has a side shared by three triangles near ({x:g}, {y:g}) m; remove the extra one")
-    owner = np.tile(np.arange(len(cells)), 3)[np.argsort(inverse.ravel(), kind="stable")]
+    owner = np.argsort(number.ravel(), kind="stable") // 3
     starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
     inner = starts[counts == 2]
     links = coo_matrix((np.ones(len(inner)), (owner[inner], owner[inner + 1])), shape=(len(cells), len(cells)))
@@ -313,8 +332,7 @@ def write(path: Path, points, cells, facets, middles, curved, edges: dict[str, n
     place = [points]
     blocks: list[tuple[str, np.ndarray]] = [("line", facets), ("triangle", cells)]
     if curved.any():
-        sides = np.sort(np.stack([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]], axis=1).reshape(-1, 2), axis=1)
-        unique, inverse = np.unique(sides, axis=0, return_inverse=True)
+        unique, number, _ = sides_of(cells)
         halfway = points[unique].mean(axis=1)
         key = unique[:, 0] * len(points) + unique[:, 1]
         ends = np.sort(facets, axis=1)
@@ -323,13 +341,13 @@ def write(path: Path, points, cells, facets, middles, curved, edges: dict[str, n
         place.append(halfway)
         blocks = [
             ("line3", np.column_stack([facets, len(points) + on_rim])),
-            ("triangle6", np.column_stack([cells, len(points) + inverse.reshape(-1, 3)])),
+            ("triangle6", np.column_stack([cells, len(points) + number])),
         ]
     import meshio  # imported here because it takes 0.1 s and only saving needs it
 
     flat = np.concatenate(place)
-    number = [tag, np.full(len(cells), len(own) + 1)]
-    data = {"gmsh:physical": number, "gmsh:geometrical": number}
+    tags = [tag, np.full(len(cells), len(own) + 1)]
+    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
     made = meshio.Mesh(np.column_stack([flat, np.zeros(len(flat))]), blocks, cell_data=data, field_data=names)
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         made.write(path, file_format="gmsh22", binary=True)

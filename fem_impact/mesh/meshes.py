@@ -96,16 +96,8 @@ def straight(points: np.ndarray, cells: np.ndarray, facets: np.ndarray, edges: d
     ends = points[facets]
     along = ends[:, 1] - ends[:, 0]
     unit = along / np.linalg.norm(along, axis=1, keepdims=True)
-    return Mesh(
-        points,
-        cells,
-        facets,
-        edges,
-        ends.mean(axis=1),
-        np.stack([unit, unit], axis=1),
-        np.zeros((len(facets), 2)),
-        **rest,
-    )
+    tangents, curvatures = np.stack([unit, unit], axis=1), np.zeros((len(facets), 2))
+    return Mesh(points, cells, facets, edges, ends.mean(axis=1), tangents, curvatures, **rest)
 
 
 def _element_size(size: float | None, default: float) -> tuple[float, bool]:
@@ -138,12 +130,7 @@ def rectangle(length: float, width: float, *, size: float | None = None) -> Mesh
     first = np.where(odd, np.stack([a, b, d], axis=-1), np.stack([a, b, c], axis=-1))
     second = np.where(odd, np.stack([b, c, d], axis=-1), np.stack([a, c, d], axis=-1))
     cells = np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)])
-    sides = {
-        "left": number[0, ::-1],
-        "right": number[-1, :],
-        "bottom": number[:, 0],
-        "top": number[::-1, -1],
-    }
+    sides = {"left": number[0, ::-1], "right": number[-1, :], "bottom": number[:, 0], "top": number[::-1, -1]}
     facets, edges, start = [], {}, 0
     for name, line in sides.items():
         facets.append(np.column_stack([line[:-1], line[1:]]))
@@ -162,19 +149,10 @@ def line(length: float, *, size: float | None = None) -> Mesh:
     n = max(1, round(length / size))
     cells = np.column_stack([np.arange(n), np.arange(1, n + 1)])
     edges = {"left": np.array([0]), "right": np.array([1]), "boundary": np.array([0, 1])}
-    return Mesh(
-        np.linspace(0.0, length, n + 1)[:, None],
-        cells,
-        np.array([[0], [n]]),
-        edges,
-        np.array([[0.0], [length]]),
-        np.zeros((2, 2, 2)),
-        np.zeros((2, 2)),
-        recipe=partial(line, length),
-        size=size,
-        size_stated=stated,
-        form=("line", length),
-    )
+    points, ends, rim = np.linspace(0.0, length, n + 1)[:, None], np.array([[0.0], [length]]), np.zeros((2, 2))
+    rest: dict[str, Any] = {"recipe": partial(line, length), "size": size, "size_stated": stated}
+    rest["form"] = ("line", length)
+    return Mesh(points, cells, np.array([[0], [n]]), edges, ends, np.zeros((2, 2, 2)), rim, **rest)
 
 
 def fill(outline: Outline, *, size: float | None = None) -> Mesh:
@@ -303,17 +281,10 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     edges["boundary"] = np.arange(len(facets))
     longest = np.linalg.norm(points[cells] - points[np.roll(cells, 1, axis=1)], axis=2).max(axis=1)
     made = Mesh(
-        points,
-        cells,
-        facets,
-        edges,
-        curve.middles,
-        curve.tangents,
-        curve.curvatures,
-        size=float(longest.max()) / LONGEST,
-        size_stated=False,
+        points, cells, facets, edges, curve.middles, curve.tangents, curve.curvatures,
+        size=float(longest.max()) / LONGEST, size_stated=False,
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
-    )
+    )  # fmt: skip
     return replace(made, recipe=partial(_resized, made))
 
 
@@ -369,12 +340,8 @@ def _divided(mesh: Mesh, *, size: float) -> Mesh:
 
 def _quartered(mesh: Mesh) -> Mesh:
     """Each triangle split in four; new boundary points lie on the curve of their facet."""
-    cells, n = mesh.cells, len(mesh.points)
-    sides = np.sort(np.stack([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]], axis=1).reshape(-1, 2), axis=1)
-    unique, inverse = np.unique(sides, axis=0, return_inverse=True)
-    m = n + inverse.reshape(-1, 3)
-    a, b, c = cells.T
-    new = [[a, m[:, 0], m[:, 2]], [m[:, 0], b, m[:, 1]], [m[:, 2], m[:, 1], c], [m[:, 0], m[:, 1], m[:, 2]]]
+    n = len(mesh.points)
+    cells, unique = mesh_files.quartered(mesh.cells, n)
     points = np.concatenate([mesh.points, mesh.points[unique].mean(axis=1)])
     keys = unique[:, 0] * n + unique[:, 1]
     ends = np.sort(mesh.facets, axis=1)
@@ -385,14 +352,9 @@ def _quartered(mesh: Mesh) -> Mesh:
     rim = np.stack([mesh.facets[:, 0], middle, middle, mesh.facets[:, 1]], axis=1).reshape(-1, 2)
     tangents = np.stack([mesh.tangents[:, 0], tangent, tangent, mesh.tangents[:, 1]], axis=1).reshape(-1, 2, 2)
     curvatures = np.stack([mesh.curvatures[:, 0], bend, bend, mesh.curvatures[:, 1]], axis=1).reshape(-1, 2)
+    edges = {name: both[numbers].ravel() for name, numbers in mesh.edges.items()}
+    middles = np.stack([first, second], axis=1).reshape(-1, 2)
     return replace(
-        mesh,
-        points=points,
-        cells=np.concatenate([np.stack(part, axis=1) for part in new]),
-        facets=rim,
-        edges={name: both[numbers].ravel() for name, numbers in mesh.edges.items()},
-        middles=np.stack([first, second], axis=1).reshape(-1, 2),
-        tangents=tangents,
-        curvatures=curvatures,
-        size=0.5 * mesh.size,
-    )
+        mesh, points=points, cells=cells, facets=rim, edges=edges, middles=middles, tangents=tangents,
+        curvatures=curvatures, size=0.5 * mesh.size,
+    )  # fmt: skip

@@ -20,7 +20,6 @@ class Rim:
     tangents: np.ndarray  # (n_facets, 2, 2) unit tangent at both ends
     curvatures: np.ndarray  # (n_facets, 2) [1/m] at both ends
     n_curved: int  # number of curved facets
-    n_corners: int
 
 
 def follow(points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndarray]) -> Rim:
@@ -35,12 +34,11 @@ def follow(points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndar
     """
     n = sum(len(loop) for loop in loops)
     middles, tangents, curvatures = np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros((n, 2))
-    start = n_corners = 0
+    start = 0
     for loop in loops:
         numbers = np.arange(start, start + len(loop))
         start += len(loop)
         corner = _corners(points[loop[:, 0]])
-        n_corners += int(corner.sum())
         for run, closed in _runs(corner):
             facets = numbers[run]
             place = points[np.append(loop[run, 0], loop[run[-1], 1])]
@@ -50,7 +48,7 @@ def follow(points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndar
     ends = points[np.concatenate(loops)]
     sag = np.linalg.norm(middles - ends.mean(axis=1), axis=1)
     curved = sag > 1e-9 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    return Rim(middles, tangents, curvatures, int(curved.sum()), n_corners)
+    return Rim(middles, tangents, curvatures, int(curved.sum()))
 
 
 def join(pairs: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> None:
@@ -158,9 +156,8 @@ def _circle(place: np.ndarray) -> tuple[np.ndarray, float]:
     local = place - middle
     scale = np.abs(local).max()
     local = local / scale
-    solution = np.linalg.lstsq(np.column_stack([2.0 * local, np.ones(len(local))]), (local**2).sum(axis=1), rcond=None)[
-        0
-    ]
+    rows = np.column_stack([2.0 * local, np.ones(len(local))])
+    solution = np.linalg.lstsq(rows, (local**2).sum(axis=1), rcond=None)[0]
     return middle + scale * solution[:2], float(scale * np.sqrt(max(solution[2] + solution[:2] @ solution[:2], 0.0)))
 
 

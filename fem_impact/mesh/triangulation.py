@@ -62,11 +62,7 @@ def _follow(
     points: np.ndarray, cells: np.ndarray, facets: np.ndarray, owner: np.ndarray, chords: list, outer: tuple
 ) -> dict:
     """Move the boundary points onto the true curve and take tangents and curvatures from it."""
-    middles, tangents, curvatures = (
-        np.zeros((len(facets), 2)),
-        np.zeros((len(facets), 2, 2)),
-        np.zeros((len(facets), 2)),
-    )
+    middles, tangents, curvatures = (np.zeros((len(facets), *shape)) for shape in ((2,), (2, 2), (2,)))
     place = points.copy()
     edges: dict[str, list[int]] = {}
     pieces = list({id(piece): piece for piece, _, _ in chords}.values())
@@ -98,12 +94,5 @@ def _follow(
     if "outer" not in named:
         named["outer"] = np.flatnonzero([any(chords[j][0] is piece for piece in outer) for j in owner])
     named["boundary"] = np.arange(len(facets))
-    return {
-        "points": place,
-        "cells": cells,
-        "facets": facets,
-        "edges": named,
-        "middles": middles,
-        "tangents": tangents,
-        "curvatures": curvatures,
-    }
+    rim = {"facets": facets, "edges": named, "middles": middles, "tangents": tangents, "curvatures": curvatures}
+    return {"points": place, "cells": cells, **rim}

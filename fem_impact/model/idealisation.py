@@ -8,6 +8,7 @@ import numpy as np
 from .._base import check
 from ..fe.assembly import support_of_facets
 from ..fe.section import Plate
+from ..fe.splitting import distance
 from ..impact import threshold
 from ..mesh.meshes import Mesh
 from ..modes.modal import Modes, SampledShapes
@@ -58,14 +59,11 @@ class Surroundings:
         ends = np.stack([mesh.points[mesh.facets[:, 0]], mesh.middles, mesh.points[mesh.facets[:, 1]]], axis=1)
         start, along = ends[:, :-1].reshape(-1, 2), np.diff(ends, axis=1).reshape(-1, 2)
         length = np.linalg.norm(along, axis=1)
-        part = np.clip(((at - start) * along).sum(axis=1) / length**2, 0.0, 1.0)
-        distance = np.linalg.norm(at - start - part[:, None] * along, axis=1)
+        away = distance(at, start, start + along)
         chord = ends[:, 2] - ends[:, 0]
         bulge = ends[:, 1] - 0.5 * (ends[:, 0] + ends[:, 2])
         segments = 2.0 / 3.0 * float((chord[:, 1] * bulge[:, 0] - chord[:, 0] * bulge[:, 1]).sum())  # body on the left
-        return cls(
-            mesh.area + segments, float(length.sum()), float(distance.min()), np.column_stack([distance, length])
-        )
+        return cls(mesh.area + segments, float(length.sum()), float(away.min()), np.column_stack([away, length]))
 
     def mirrors(self, nearness: float) -> float:
         """Number of straight edges, at least 1, that reflect as much as all edges near the nearest one."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .._base import check
+from .._base import check, markup
 from ..fe import refinement
 from ..fe.assembly import System
 from ..impact import accuracy, collision
@@ -37,7 +37,7 @@ RATES = {"start": 0.02, "dofs": 6e-5, "pairs": 3.5e-7, "steps": 1e-8}  # [s] eac
 BYTES = {"start": 2e8, "dofs": 6e3, "pairs": 40.0}  # [byte] each, measured likewise
 
 ELEMENTS = {"analytic": "closed form"}
-COSTLY = 10.0, 2e9  # [s], [byte] a plan that costs more warns the user
+COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +139,8 @@ class Plan:
         wanted = ", ".join(name if band is None else f"{name} to {band:g} Hz" for name, band in self.quantities.items())
         lines = [f"Plan for {wanted} to {self.tolerance:g}:", *(f"  {line}" for line in self.reasons)]
         lines.append("Predicted errors:")
-        lines += [f"  {name:<22} {error:.1e}" for name, error in [*self.errors.items(), ("total", self.error)]]
+        errors = [*self.errors.items(), ("total", self.error)]
+        lines += [f"  {line}" for line in markup.columns([(name, f"{error:.1e}") for name, error in errors])]
         lines.append(f"Cost: {self.cost}")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")
@@ -186,7 +187,7 @@ class _Asked:
             for name in values:
                 if name not in ARGUMENTS:
                     raise ValueError(f"{name} is not an argument of a blow{check.nearest(name, [*ARGUMENTS, *PIECES])}")
-            tolerance = check.between("tolerance", values.get("tolerance", collision.TOLERANCE), 1e-12, 1.0)
+            tolerance = check.tolerance(values.get("tolerance", collision.TOLERANCE))
             speed = check.positive("speed", values["speed"], "m/s")
             quantities = asked_for(values.get("quantity"))
         duration = accuracy.contact_duration(blow.contact, blow.striker.felt_mass, speed)

@@ -11,9 +11,9 @@ from scipy.optimize import elementwise
 
 from .._base import check
 from ..fe.assembly import support_of_facets
-from ..fe.section import Beam, Plate
+from ..fe.section import KINDS, Beam, Plate
 from ..mesh.meshes import Mesh
-from .modal import Damping, Modes, damping_ratios
+from .modal import Damping, Modes, Shapes, damping_ratios
 
 IMAGES = 6  # [-] image forces beyond each shorter side of a hinged plate; the n-th contributes exp(-2 pi n)
 NEAR_POLE = 1.0  # [-] distance x below which polylogarithms are summed as power series, which converge up to 2 pi
@@ -27,7 +27,6 @@ MOST_MODES = 1_000_000  # [-] largest number of modes of a rectangle or beam; th
 MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a root search
 MOST_PAIRS = 4 * MOST_MODES  # [-] half-wave number pairs tried on a rectangle; MOST_MODES never needs half of them
 DISK_SCAN = 0.5  # [-] step in z = k radius when scanning for roots; roots of one order are about pi apart
-ENDS = ("clamped", "hinged", "free")
 
 
 def closed_form(mesh: Mesh, section: Plate | Beam, supports: dict[str, Any]) -> Callable[..., Modes] | None:
@@ -76,13 +75,33 @@ def _finished(
     return scaled.damped(damping_ratios(damping_ratio, scaled.omega))
 
 
-def _check_scale(section: Any, kind: type, mass: float | None, first_frequency: float | None) -> None:
-    """Raise ValueError unless the caller gave either a section or both mass and first frequency."""
+def _physical(
+    section: Any, kind: type, mass: float | None, first_frequency: float | None, size: float
+) -> tuple[float, float] | None:
+    """Mass [kg] of a body of a section, and the factor from omega at unit mass and rigidity to omega.
+
+    ``size`` is its area [m^2] or length [m]. None without a section: then mass and first frequency must both be given.
+    """
     given = mass is not None, first_frequency is not None
     if (section is None and not all(given)) or (section is not None and any(given)):
         raise ValueError("give either section, or both mass [kg] and first_frequency [Hz]")
-    if section is not None:
-        check.instance("section", section, kind)
+    if section is None:
+        return None
+    check.instance("section", section, kind)
+    if kind is Beam:
+        if callable(section.width) or callable(section.height):
+            raise ValueError("section must be constant along the beam; else use find_modes")
+        point = np.zeros((1, 1))
+        rigidity = section.stiffness(point)[0] / size**3
+    else:
+        if callable(section.thickness) or section.material.E_across is not None or section.tension:
+            raise ValueError(
+                "section must be isotropic, of constant thickness and without tension; else use find_modes"
+            )
+        point = np.zeros((1, 2))
+        rigidity = section.stiffness(point)[0, 0, 0]
+    mass = float(section.inertia(point)[0]) * size
+    return mass, float(np.sqrt(rigidity / mass))
 
 
 def _check_number(about: float, most: int = MOST_MODES) -> None:
@@ -92,29 +111,29 @@ def _check_number(about: float, most: int = MOST_MODES) -> None:
 
 
 def _enough(
-    n_modes: int | None, max_frequency: float | None, per_unit: Callable[[float], float], most: int = MOST_MODES
+    n_modes: int | None,
+    max_frequency: float | None,
+    physical: tuple[float, float] | None,
+    first_frequency: float | None,
+    first: float,
+    most: int = MOST_MODES,
 ) -> tuple[int, float]:
-    """Largest number of modes and largest omega (at unit mass and rigidity); the one not asked for is no limit."""
+    """Largest number of modes and largest omega (at unit mass and rigidity); the one not asked for is no limit.
+
+    ``first`` is the lowest omega at unit mass and rigidity.
+    """
     if (n_modes is None) == (max_frequency is None):
         raise ValueError("give either n_modes or max_frequency [Hz]")
     if n_modes is not None:
         return check.count("n_modes", n_modes, high=most), np.inf
-    return 10**9, per_unit(check.positive("max_frequency", max_frequency, "Hz"))
-
-
-def _unit_omega(physical: tuple[float, float] | None, first_frequency: float | None, first: float) -> Callable:
-    """Function that converts a frequency [Hz] to omega at unit mass and rigidity, where ``first`` is the lowest."""
-
-    def convert(frequency: float) -> float:
-        if physical is not None:
-            return 2.0 * np.pi * frequency / physical[1]
-        return frequency / check.positive("first_frequency", first_frequency, "Hz") * first
-
-    return convert
+    frequency = check.positive("max_frequency", max_frequency, "Hz")
+    if physical is not None:
+        return check.MOST, 2.0 * np.pi * frequency / physical[1]
+    return check.MOST, frequency / check.positive("first_frequency", first_frequency, "Hz") * first
 
 
 @dataclass(frozen=True, eq=False)
-class RectangleShapes:
+class RectangleShapes(Shapes):
     """Sine shapes of a hinged rectangle of unit mass and rigidity with one corner at the origin."""
 
     length: float  # [m]
@@ -132,12 +151,6 @@ class RectangleShapes:
         slack = 1e-9 * max(self.length, self.width)
         inside = (points >= -slack) & (points <= np.array([self.length, self.width]) + slack)
         return np.asarray(inside.all(axis=1))
-
-    def compliance(self, points: np.ndarray) -> np.ndarray:
-        return self.deflection(points, points)
-
-    def compliance_error(self, points: np.ndarray) -> np.ndarray:
-        return np.zeros(len(points))
 
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Sum of closed-form deflections of an infinite strip (`_strip`); images make the shorter sides hinged."""
@@ -238,15 +251,14 @@ def rectangle(
     Leissa (1969), Vibration of plates, NASA SP-160, eq. 4.20; Timoshenko and Woinowsky-Krieger, art. 35 (static sum).
     """
     length, width = check.positive("length", length, "m"), check.positive("width", width, "m")
-    _check_scale(section, Plate, mass, first_frequency)
-    physical = _plate_scale(section, length * width)
+    physical = _physical(section, Plate, mass, first_frequency, length * width)
     # with unit mass and unit D the mass per area is 1 / area, so omega = wavenumber**2 * sqrt(area)
     root_area = np.sqrt(length * width)
 
     def omega(m, n):
         return np.pi**2 * ((m / length) ** 2 + (n / width) ** 2) * root_area
 
-    count, reach = _enough(n_modes, max_frequency, _unit_omega(physical, first_frequency, float(omega(1, 1))))
+    count, reach = _enough(n_modes, max_frequency, physical, first_frequency, float(omega(1, 1)))
     if not np.isfinite(reach):  # start from Weyl's law, then raise the limit until there are enough modes
         reach = 4.0 * np.pi * (count + 2.0) / root_area
         while _lattice(length, width, reach / root_area, count)[0].size < count:
@@ -272,18 +284,6 @@ def _lattice(length: float, width: float, wavenumber_squared: float, most: int) 
     return m[keep], n[keep]
 
 
-def _plate_scale(section: Any, area: float) -> tuple[float, float] | None:
-    """Mass [kg] and the factor that turns omega at unit mass and rigidity into omega of the section."""
-    if section is None:
-        return None
-    material, thickness = section.material, section.thickness
-    if callable(thickness) or material.E_across is not None or section.tension:
-        raise ValueError("section must be isotropic, of constant thickness and without tension; else use find_modes")
-    mass = material.rho * thickness * area
-    rigidity = material.E * thickness**3 / (12.0 * (1.0 - material.nu**2))
-    return mass, float(np.sqrt(rigidity / mass))
-
-
 def _beam_roots(ends: tuple[str, str], n: int) -> np.ndarray:
     """The first n flexible roots kL, from cos kL = +-1/cosh kL, tan kL = tanh kL or sin kL = 0."""
     i = np.arange(1, n + 1)
@@ -304,7 +304,7 @@ def _beam_roots(ends: tuple[str, str], n: int) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class BeamShapes:
+class BeamShapes(Shapes):
     """Shapes of a uniform Euler-Bernoulli beam of unit mass, length and rigidity over x / length in 0 ... 1.
 
     A flexible shape is A cos kx + B sin kx + C exp(-kx) + D exp(k (x - 1)): bounded terms, so that mode 1000 keeps
@@ -332,9 +332,6 @@ class BeamShapes:
     def compliance(self, points: np.ndarray) -> np.ndarray:
         result = self.deflection(points, points)
         return 0.5 * (result + result.T)
-
-    def compliance_error(self, points: np.ndarray) -> np.ndarray:
-        return np.zeros(len(points))
 
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Exact static deflection under each load; a beam that can move rigidly gets inertia relief."""
@@ -438,24 +435,19 @@ def beam(
     length = check.positive("length", length, "m")
     if not isinstance(ends, (list, tuple)) or len(ends) != 2:
         raise ValueError(f"ends must be two words, one for each end, got {check.shown(ends)}")
-    pair = (check.one_of("ends", ends[0], ENDS), check.one_of("ends", ends[1], ENDS))
+    pair = (check.one_of("ends", ends[0], KINDS), check.one_of("ends", ends[1], KINDS))
     rigid = _beam_rigid(pair)
-    _check_scale(section, Beam, mass, first_frequency)
-    physical = _beam_scale(section, length)
+    physical = _physical(section, Beam, mass, first_frequency, length)
     first = float(_beam_roots(pair, 1)[0] ** 2)
-    count, reach = _enough(n_modes, max_frequency, _unit_omega(physical, first_frequency, first))
+    count, reach = _enough(n_modes, max_frequency, physical, first_frequency, first)
     if np.isfinite(reach):
         _check_number(np.sqrt(reach) / np.pi)
         count = len(rigid) + int(np.count_nonzero(_beam_roots(pair, int(np.sqrt(reach) / np.pi) + 2) ** 2 <= reach))
     if count <= len(rigid):
         raise ValueError(f"n_modes must exceed the {len(rigid)} rigid motions; max_frequency must reach a bending mode")
     k = _beam_roots(pair, count - len(rigid))
-    shapes = BeamShapes(
-        length,
-        pair,
-        np.concatenate([np.zeros(len(rigid)), k]),
-        np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), _beam_weights(pair, k)]),
-    )
+    weights = np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), _beam_weights(pair, k)])
+    shapes = BeamShapes(length, pair, np.concatenate([np.zeros(len(rigid)), k]), weights)
     values = np.concatenate([np.zeros(len(rigid)), k**4])
     return _finished(shapes, values, mass, first_frequency, physical, damping_ratio)
 
@@ -472,8 +464,7 @@ def _beam_weights(ends: tuple[str, str], k: np.ndarray) -> np.ndarray:
         [nought, -one, -one, far],
     ]
     right = [[c, s, far, one], [-s, c, -far, one], [-c, -s, far, one], [s, -c, -far, one]]
-    orders = {"clamped": (0, 1), "hinged": (0, 2), "free": (2, 3)}
-    rows = [left[i] for i in orders[ends[0]]] + [right[i] for i in orders[ends[1]]]
+    rows = [left[i] for i in VANISHING[ends[0]]] + [right[i] for i in VANISHING[ends[1]]]
     matrix = np.moveaxis(np.array(rows), 2, 0)  # (n, 4, 4)
     weights = np.linalg.svd(matrix)[2][:, 3, :]
     value, slope, curve, shear = (np.einsum("in,ni->n", np.array(r), weights) for r in right)
@@ -483,16 +474,6 @@ def _beam_weights(ends: tuple[str, str], k: np.ndarray) -> np.ndarray:
     turn = np.einsum("in,ni->n", np.array(left[1]), weights)
     clear = np.where(np.abs(start) > 1e-6, start, np.where(np.abs(turn) > 1e-6, turn, weights[:, 0]))
     return weights * np.where(clear < 0.0, -1.0, 1.0)[:, None]
-
-
-def _beam_scale(section: Any, length: float) -> tuple[float, float] | None:
-    if section is None:
-        return None
-    if callable(section.width) or callable(section.height):
-        raise ValueError("section must be constant along the beam; else use find_modes")
-    middle = np.array([[0.5 * length]])
-    mass = float(section.inertia(middle)[0]) * length
-    return mass, float(np.sqrt(section.stiffness(middle)[0] / (mass * length**3)))
 
 
 def _bessel(n: Any, z: Any) -> tuple[Any, ...]:
@@ -548,7 +529,7 @@ def _disk_count(z: np.ndarray, order: np.ndarray, reach: float = np.inf) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class DiskShapes:
+class DiskShapes(Shapes):
     """Bessel shapes of a disk of unit mass and rigidity centred at the origin, computed on the unit disk."""
 
     radius: float  # [m]
@@ -572,12 +553,6 @@ class DiskShapes:
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         return np.hypot(points[:, 0], points[:, 1]) <= (1 + 1e-9) * self.radius
-
-    def compliance(self, points: np.ndarray) -> np.ndarray:
-        return self.deflection(points, points)
-
-    def compliance_error(self, points: np.ndarray) -> np.ndarray:
-        return np.zeros(len(points))
 
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         x, y = points / self.radius, loads / self.radius
@@ -688,18 +663,17 @@ def disk(
     Leissa (1969), NASA SP-160, ch. 2; Boggio (1905) for the static deflection of the clamped disk.
     """
     radius = check.positive("radius", radius, "m")
-    check.one_of("edge", edge, ENDS)
+    check.one_of("edge", edge, KINDS)
     if section is not None and nu is not None:
         raise ValueError("give nu or section, not both: the section's material has its own nu")
-    _check_scale(section, Plate, mass, first_frequency)
-    physical = _plate_scale(section, np.pi * radius**2)
+    physical = _physical(section, Plate, mass, first_frequency, np.pi * radius**2)
     if physical is not None:  # the shapes belong to the unit disk
         physical = physical[0], physical[1] / radius
     ratio = section.material.nu if section is not None else 0.3 if nu is None else check.between("nu", nu, -0.99, 0.5)
     n_rigid = 3 if edge == "free" else 0
     root_area = np.sqrt(np.pi)
     first = _disk_roots(edge, ratio, 5.0)[0][0] ** 2 * root_area
-    count, reach = _enough(n_modes, max_frequency, _unit_omega(physical, first_frequency, first), MOST_OF_DISK)
+    count, reach = _enough(n_modes, max_frequency, physical, first_frequency, first, MOST_OF_DISK)
     if np.isfinite(reach):
         limit = np.sqrt(reach / root_area)
         _check_number(0.25 * limit**2, MOST_OF_DISK)  # Weyl

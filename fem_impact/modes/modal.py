@@ -8,14 +8,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from .._base import check, markup
+from .._base.remembered import Remembered
 from ..fe import point_load, refinement
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility
 from . import universal_files
 
-HIGHEST = 1e74  # [Hz] highest frequency that scaling may produce; its powers must stay finite, see `check.REACH`
-SHOWN = 10  # [-] modes listed in a notebook
-REMEMBERED = 16  # [-] points whose shapes and static deflections are cached, because one blow needs them many times
+HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 2 pi times it must stay in reach
+SHOWN = 10  # [-] modes listed in a notebook: a table without scrolling
+REMEMBERED = 16  # [-] points whose shapes and static deflections a body keeps, because one blow needs them many times
 ROUNDING = 1e-12  # [-] rounding error of a compliance, relative to itself and to that of the first mode
 SHAPE_ERROR = 10.0  # [-] relative error of a mode's compliance divided by the relative error of its frequency
 
@@ -35,9 +36,11 @@ class Shapes(Protocol):
 
     def compliance(self, points: np.ndarray) -> np.ndarray:
         """Static compliance (n_points, n_points) [m/N] of the complete body, with inertia relief if it is free."""
+        return self.deflection(points, points)
 
     def compliance_error(self, points: np.ndarray) -> np.ndarray:
-        """Estimated relative error (n_points,) [-] of the diagonal of `compliance`."""
+        """Estimated relative error (n_points,) [-] of the diagonal of `compliance`; closed formulas have none."""
+        return np.zeros(len(points))
 
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Static deflection (n_points, n_loads) [m/N] of the complete body under unit forces at ``loads``."""
@@ -50,7 +53,7 @@ class Shapes(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class ScaledShapes:
+class ScaledShapes(Shapes):
     """The shapes of the same body with another mass and stiffness, see `Modes.scaled`."""
 
     base: Shapes
@@ -84,7 +87,7 @@ class ScaledShapes:
 
 
 @dataclass(frozen=True, eq=False)
-class RigidShapes:
+class RigidShapes(Shapes):
     """A rigid mass that can only translate: one mode of frequency zero, with the same shape everywhere."""
 
     mass: float  # [kg]
@@ -97,12 +100,6 @@ class RigidShapes:
     def contains(self, points: np.ndarray) -> np.ndarray:
         return np.ones(len(points), bool)
 
-    def compliance(self, points: np.ndarray) -> np.ndarray:
-        return np.zeros((len(points), len(points)))
-
-    def compliance_error(self, points: np.ndarray) -> np.ndarray:
-        return np.zeros(len(points))
-
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         return np.zeros((len(points), len(loads)))
 
@@ -114,7 +111,7 @@ class RigidShapes:
 
 
 @dataclass(frozen=True, eq=False)
-class SampledShapes:
+class SampledShapes(Shapes):
     """Shapes known only at points, as from a modal test; the striker must hit one of these points."""
 
     points: np.ndarray  # (n_points, dimension) [m]
@@ -139,12 +136,6 @@ class SampledShapes:
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         return self._index(points)[1]
-
-    def compliance(self, points: np.ndarray) -> np.ndarray:
-        return self.deflection(points, points)
-
-    def compliance_error(self, points: np.ndarray) -> np.ndarray:
-        return np.zeros(len(points))
 
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         return self.static[np.ix_(self._index(points)[0], self._index(loads)[0])]
@@ -213,9 +204,7 @@ class Modes:
         points = check.array("points", points, (None, None), "m")
         values = check.array("shapes", shapes, (len(points), len(omega)), "kg**-0.5")
         if compliance is None:
-            flexible = omega > 0.0
-            scaled = values[:, flexible] / omega[flexible]
-            static = scaled @ scaled.T
+            static = _carried(omega, values)
         else:
             static = check.array("compliance", compliance, (len(points), len(points)), "m/N")
         damping = damping_ratios(damping_ratio, omega)
@@ -236,14 +225,7 @@ class Modes:
         Modes
             Known only at the measured points; shapes are divided by the root of the modal mass in the file.
         """
-        found = universal_files.read(path, direction)
-        return cls.from_arrays(
-            found["frequencies"],
-            found["shapes"],
-            points=found["points"],
-            mass=mass,
-            damping_ratio=found["damping_ratio"],
-        )
+        return cls.from_arrays(**universal_files.read(path, direction), mass=mass)
 
     @property
     def n_modes(self) -> int:
@@ -327,7 +309,7 @@ class Modes:
 
     def modal_compliance(self, points: Any) -> np.ndarray:
         """Static compliance of the kept modes between points, (n_points, n_points) [m/N]."""
-        return self._carried(self.shape_at(points))
+        return _carried(self.omega, self.shape_at(points))
 
     def residual_compliance(self, points: Any) -> np.ndarray:
         """Static compliance of the modes left out, (n_points, n_points) [m/N].
@@ -339,11 +321,6 @@ class Modes:
         """
         place = self.points("points", points)
         return left_out(self, place, self.shapes.at(place))[0]
-
-    def _carried(self, rows: np.ndarray, weight: Any = 1.0) -> np.ndarray:
-        flexible = self.omega > 0.0
-        scaled = rows[:, flexible] / self.omega[flexible]
-        return (weight * scaled) @ scaled.T
 
     def scaled(self, *, mass: float | None = None, first_frequency: float | None = None) -> "Modes":
         """The same body with another mass [kg] or lowest flexible frequency [Hz]; its size stays the same."""
@@ -372,18 +349,20 @@ class Modes:
             keep = min(keep, check.count("n_modes", n_modes))
         if keep == 0:
             raise ValueError(f"max_frequency must reach the first mode at {self.frequencies[0]:g} Hz")
-        return replace(
-            self,
-            omega=self.omega[:keep],
-            damping_ratio=self.damping_ratio[:keep],
-            shapes=self.shapes.take(keep),
-            frequency_error=None if self.frequency_error is None else self.frequency_error[:keep].copy(),
-            bounds=None if self.bounds is None else self.bounds[:keep].copy(),
-        )
+        fields = {name: getattr(self, name) for name in ("omega", "damping_ratio", "frequency_error", "bounds")}
+        kept: dict[str, Any] = {name: x if x is None else x[:keep].copy() for name, x in fields.items()}
+        return replace(self, shapes=self.shapes.take(keep), **kept)
 
     def damped(self, damping_ratio: Damping) -> "Modes":
         """The same modes with other damping ratios: a number, an array (n_modes,) or a function of frequency [Hz]."""
         return replace(self, damping_ratio=damping_ratios(damping_ratio, self.omega))
+
+
+def _carried(omega: np.ndarray, rows: np.ndarray, weight: Any = 1.0) -> np.ndarray:
+    """Static compliance (n_points, n_points) [m/N] of modes with shapes (n_points, n_modes), times their weights."""
+    flexible = omega > 0.0
+    scaled = rows[:, flexible] / omega[flexible]
+    return (weight * scaled) @ scaled.T
 
 
 def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -392,10 +371,10 @@ def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.nd
     The error is (n_points,) [m/N].
     """
     whole = modes.shapes.compliance(place)
-    rest = whole - modes._carried(rows)
+    rest = whole - _carried(modes.omega, rows)
     doubt = np.diag(whole) * (modes.shapes.compliance_error(place) + ROUNDING)
     if modes.frequency_error is not None:
-        doubt = doubt + np.diag(modes._carried(rows, SHAPE_ERROR * modes.frequency_error[modes.omega > 0.0]))
+        doubt = doubt + np.diag(_carried(modes.omega, rows, SHAPE_ERROR * modes.frequency_error[modes.omega > 0.0]))
     allowed = doubt.copy()
     if modes.omega[-1] > 0.0:  # at a support both compliances are pure rounding
         allowed += ROUNDING / (modes.mass * modes.omega[modes.omega > 0.0][0] ** 2)
@@ -440,14 +419,14 @@ def rayleigh(mass_factor: float, stiffness_factor: float) -> Callable[[np.ndarra
 
 
 @dataclass(frozen=True, eq=False)
-class FieldShapes:
+class FieldShapes(Shapes):
     """Shapes of an FE solution, evaluated anywhere on the body with the shape functions of its elements."""
 
     system: System
     vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
     flexibility: Flexibility
-    _static: dict[bytes, point_load.Deflection] = field(default_factory=dict, repr=False)  # cache, by loads
-    _single: dict[bytes, np.ndarray] = field(default_factory=dict, init=False, repr=False)  # cache, by point
+    _under: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), repr=False)  # deflections, by loads
+    _at: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), init=False, repr=False)  # shapes, by point
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)
@@ -457,36 +436,29 @@ class FieldShapes:
         return self.system.mesh.dimension
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        key = points.tobytes() if len(points) == 1 else b""
-        if key and key in self._single:
-            return self._single[key]
-        shapes = self.system.interpolate(points) @ self.vectors * self.system.frame.mass**-0.5
-        if key:
-            if len(self._single) >= REMEMBERED:
-                self._single.clear()
-            shapes.flags.writeable = False
-            self._single[key] = shapes
+        if len(points) != 1:
+            return self._shapes(points)
+        shapes = self._at.found(points, self._shapes)
+        shapes.flags.writeable = False
         return shapes
+
+    def _shapes(self, points: np.ndarray) -> np.ndarray:
+        return self.system.interpolate(points) @ self.vectors * self.system.frame.mass**-0.5
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         return self.system.contains(points)
 
-    def _under(self, loads: np.ndarray) -> point_load.Deflection:
-        key = loads.tobytes()
-        if key not in self._static:
-            if len(self._static) >= REMEMBERED:
-                self._static.clear()
-            self._static[key] = point_load.static_deflection(self.system, loads)
-        return self._static[key]
+    def _deflection(self, loads: np.ndarray) -> point_load.Deflection:
+        return self._under.found(loads, lambda loads: point_load.static_deflection(self.system, loads))
 
     def compliance(self, points: np.ndarray) -> np.ndarray:
-        return self._under(points).compliance
+        return self._deflection(points).compliance
 
     def compliance_error(self, points: np.ndarray) -> np.ndarray:
-        return self._under(points).error
+        return self._deflection(points).error
 
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
-        return self._under(loads).at(points)
+        return self._deflection(loads).at(points)
 
     def take(self, n_modes: int) -> "FieldShapes":
         return replace(self, vectors=self.vectors[:, :n_modes].copy())

@@ -9,7 +9,7 @@ from .._base import check, isolated
 
 NORMAL_MODE, DISPLACEMENT, STRUCTURAL, REAL = 2, 8, 1, 2  # codes of data set 55
 CELL_CODE = {2: 11, 3: 91, 4: 94}  # nodes of a cell -> rod, thin shell triangle, thin shell quadrilateral
-WANTED = (15, 55, 2411)  # data sets to read
+WANTED = (15, 55, 2411)  # data sets to read: nodes, shapes, nodes in double precision
 PHASE = 0.3  # [-] largest imaginary over largest real part, at the best phase, of a complex shape taken as real
 DIRECTIONS = {"x": "r1", "y": "r2", "z": "r3"}
 
@@ -38,41 +38,19 @@ def write(path: Any, frequencies, damping_ratio, shapes, points, cells) -> None:
     zero, one = np.zeros(n_points, int), np.ones(n_points, int)
     x, y, z = place.T
     nodes = {"node_nums": node, "def_cs": zero, "disp_cs": zero, "color": one, "x": x, "y": y, "z": z}
-    sets: list[dict[Any, Any]] = [
-        nodes | {"type": 15},
-        nodes | {"type": 2411},
-    ]  # data set 2411 keeps all digits of the coordinates
+    sets: list[dict[Any, Any]] = [nodes | {"type": 15}, nodes | {"type": 2411}]  # 2411 keeps all digits
     code = CELL_CODE.get(cells.shape[1] if len(cells) else 0)
     if code is not None:
         sets.append({"type": 2412, code: [_element(i, code, cell) for i, cell in enumerate(cells.tolist())]})
     for i, (frequency, damping) in enumerate(zip(frequencies, damping_ratio)):
         still = np.zeros(n_points)
-        sets.append(
-            {
-                "type": 55,
-                "id1": f"mode {i + 1}",
-                "id2": "mass-normalised, kg**-0.5",
-                "id3": "NONE",
-                "id4": "NONE",
-                "id5": "NONE",
-                "model_type": STRUCTURAL,
-                "analysis_type": NORMAL_MODE,
-                "data_ch": 2,
-                "spec_data_type": DISPLACEMENT,
-                "data_type": REAL,
-                "n_data_per_node": 3,
-                "r1": still,
-                "r2": still,
-                "r3": shapes[:, i].copy(),
-                "load_case": 1,
-                "mode_n": i + 1,
-                "freq": float(frequency),
-                "modal_m": 1.0,
-                "modal_damp_vis": float(damping),
-                "modal_damp_his": 0.0,
-                "node_nums": node,
-            }
-        )
+        sets.append({
+            "type": 55, "id1": f"mode {i + 1}", "id2": "mass-normalised, kg**-0.5", "id3": "NONE", "id4": "NONE",
+            "id5": "NONE", "model_type": STRUCTURAL, "analysis_type": NORMAL_MODE, "data_ch": 2,
+            "spec_data_type": DISPLACEMENT, "data_type": REAL, "n_data_per_node": 3, "r1": still, "r2": still,
+            "r3": shapes[:, i].copy(), "load_case": 1, "mode_n": i + 1, "freq": float(frequency), "modal_m": 1.0,
+            "modal_damp_vis": float(damping), "modal_damp_his": 0.0, "node_nums": node,
+        })  # fmt: skip
     path.unlink(missing_ok=True)
     pyuff.UFF(str(path)).write_sets(sets, mode="add")
 
@@ -96,12 +74,8 @@ def read(path: Any, direction: str) -> dict[str, np.ndarray]:
     dict
         frequencies (n_modes,), damping_ratio (n_modes,), shapes (n_points, n_modes), points (n_points, 1 or 2)
     """
-    return isolated.read(
-        check.path("path", path),
-        "a universal file",
-        "modes.universal_files:arrays",
-        check.one_of("direction", direction, DIRECTIONS),
-    )
+    path, direction = check.path("path", path), check.one_of("direction", direction, DIRECTIONS)
+    return isolated.read(path, "a universal file", "modes.universal_files:arrays", direction)
 
 
 def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:

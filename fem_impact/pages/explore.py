@@ -14,7 +14,7 @@ from .explore_view import Page
 
 LOCAL = "127.0.0.1"
 LARGEST_REQUEST = 64 * 1024  # [byte] of a request or a message: a slider's value takes a few hundred
-LARGEST_HEADER = 16 * 1024  # [byte]
+LARGEST_HEADER = 16 * 1024  # [byte] of a request: browsers send one or two thousand
 
 
 @check.typed

@@ -22,10 +22,7 @@ TOLERANCE = 1e-3  # [-] of the blows shown: errors smaller than the plots can sh
 MAP_TOLERANCE = 1e-2  # [-] of the blows on the map, which only counts impacts
 FIRST_LOOK = 30  # [-] modes found first, to estimate the number needed
 MOST_MODES = 100  # [-] largest number; the residual compliance replaces the rest, and the page shows the error
-CELLS = {
-    False: 24,
-    True: 10,
-}  # [-] along each axis of the map, without and with loss: contacts with loss are struck one by one
+CELLS = {False: 24, True: 10}  # [-] along each axis of the map, without and with loss, where blows take longer
 SPANS = {"mass": 20.0, "stiffness": 1000.0, "speed": 10.0, "bending": 20.0}  # [-] slider end over the scene's value
 EXPONENTS = (1.0, 3.0)  # [-] from a linear spring to a felt-covered head
 
@@ -94,10 +91,9 @@ class Bench:
     def law(self, settings: Settings) -> Contact:
         """The contact law for these settings."""
         start, law = self.start, self.base.contact
-        wanted = accuracy.contact_duration(
-            Contact(law.stiffness, law.exponent), self.base.striker.felt_mass, start.speed
-        )
-        unit = accuracy.contact_duration(Contact(1.0, settings.exponent), self.base.striker.felt_mass, start.speed)
+        mass = self.base.striker.felt_mass
+        wanted = accuracy.contact_duration(law, mass, start.speed)
+        unit = accuracy.contact_duration(Contact(1.0, settings.exponent), mass, start.speed)
         same = (unit / wanted) ** (settings.exponent + 1.0)  # contact time ~ stiffness**(-1 / (exponent + 1))
         return replace(law, stiffness=settings.stiffness * same, exponent=settings.exponent)
 
@@ -135,7 +131,7 @@ class Bench:
         )  # fmt: skip
         there = [self.case(replace(settings, mass=float(value), stiffness=1.0)) for value in mass]
         found = np.array([limit_of(one) for one in there])
-        ratio = found / np.array([resonance_of(one) for one in there])
+        ratio = found / np.array([one.resonance for one in there])
         ratio[~((ratio > 0.0) & (ratio < math.inf))] = math.nan
         # contact resonance ~ stiffness**(1 / (exponent + 1))
         return Picture(mass, stiffness, np.asarray(table.n_impacts), found, ratio ** (settings.exponent + 1.0))
@@ -154,23 +150,7 @@ def blow(case: grid.Case) -> Response:
     return strike(case.modes, case.striker, case.contact, at=case.at, speed=case.speed, tolerance=TOLERANCE)
 
 
-def resonance_of(case: grid.Case) -> float:
-    """Contact resonance [Hz]: 1 / (2 T), with T the contact time on a rigid wall."""
-    law = Contact(case.contact.stiffness, case.contact.exponent)
-    return 0.5 / accuracy.contact_duration(law, case.striker.felt_mass, case.speed)
-
-
 def limit_of(case: grid.Case) -> float:
     """Contact resonance [Hz] above which the body stops the striker; 0: always stops, inf: never stops."""
     found = threshold.threshold_frequency(case.modes, case.at, case.striker.felt_mass)
     return 0.0 if found is None else found
-
-
-def spectrum(hit: Response, frequencies: np.ndarray) -> np.ndarray:
-    """Magnitude of the force spectrum [N s] by the trapezoidal rule: three times as fast as the exact one."""
-    weights = np.zeros(len(hit.time))
-    weights[1:] = 0.5 * np.diff(hit.time)
-    weights[:-1] += 0.5 * np.diff(hit.time)
-    used = hit.force > 0.0
-    turns = np.exp(-2j * np.pi * np.outer(frequencies, hit.time[used]))  # (n_frequencies, n_times)
-    return np.abs(turns @ (weights * hit.force)[used])

@@ -1,6 +1,5 @@
 """Lays out the live page: sliders, the body to click on, the plots that follow, and the sound."""
 
-import html
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -10,50 +9,29 @@ from typing import Any
 import numpy as np
 
 from .._base.check import SimulationError
+from ..impact import force_spectrum
 from ..impact.contact import Contact
 from ..impact.response import Response
 from ..scenes.sentences import RAISED, place, power, si
 from ..show import sound
+from ..show.figures import SPECTRUM_DEPTH
 from ..sweeps.grid import Case
 from . import report
-from .explore_model import Bench, Picture, Settings, blow, limit_of, resonance_of, spectrum
+from .explore_model import Bench, Picture, Settings, blow, limit_of
 
-BAND = (20.0, 20e3)  # [Hz] of the spectrum
+BAND = (20.0, 20e3)  # [Hz] of the spectrum: the audible range
 SPECTRUM_POINTS = 240  # [-] more points take time but show no more
-DEPTH = 1e-4  # [-] lower end of the spectrum's axis over its largest value
-PLAYED = 2.0  # [s] of sound
-HEIGHT = 270  # [px] of a picture
+PLAYED = 2.0  # [s] of sound: short enough to compute at each press of the button
+HEIGHT = 270  # [px] of a picture: two rows fit on a laptop
 COLOURS = ("#9a958c", "#d6e4f0", "#f0c75e", "#e08a1e", "#a63d0c")  # colours of NAMES, in order
-HERE: dict[str, Any] = {
-    "fill_color": "#d55e00",
-    "line_color": "white",
-    "line_width": 2,
-}  # marker of the current blow on body and map
+HERE: dict[str, Any] = {"fill_color": "#d55e00", "line_color": "white", "line_width": 2}  # marker of the current blow
 NAMES = ("failed", "one impact", "two", "three", "more")
 LABELS = {
-    "mass": "Mass",
-    "stiffness": "Stiffness",
-    "exponent": "Exponent",
-    "speed": "Speed",
-    "bending": "First bending mode",
-}
-STEPS = 200  # [-] per slider
+    "mass": "Mass", "stiffness": "Stiffness", "exponent": "Exponent", "speed": "Speed", "bending": "First bending mode"
+}  # fmt: skip
+STEPS = 200  # [-] per slider: about one per pixel
 MOMENT = 8  # [ms] during which slider messages are collected before the next blow
 REST = 200  # [ms] without a change before the map is redrawn: a map takes as long as many blows
-SLIDER = """
-.bk-slider-title { display: none; }
-.said { display: flex; justify-content: space-between; font-size: 14px; }
-.noUi-target { margin-block: 8px; background: color-mix(in srgb, var(--ink) 14%, transparent); border: 0; }
-.noUi-target { box-shadow: none !important; }
-.noUi-connects { background: transparent !important; box-shadow: none !important; border: 0 !important; }
-.noUi-connect { background: var(--accent) !important; }
-.noUi-handle { border-radius: 50%; width: 24px !important; height: 24px !important; top: -9px !important; }
-.noUi-handle::before, .noUi-handle::after { display: none; }
-"""
-FOCUS = """
-.noUi-handle:focus-visible, button:focus-visible { outline: 3px solid #3b8fd4 !important; outline-offset: 2px; }
-button.bk-btn { background: var(--accent) !important; color: var(--paper) !important; font-size: 15px; border: 0; }
-"""
 TICKS = """
     if (unit === "kg" && Math.abs(tick) < 1) { tick *= 1000; unit = "g" }
     const power = tick ? Math.max(-5, Math.min(4, Math.floor(Math.log10(Math.abs(tick)) / 3 + 1e-9))) : 0
@@ -72,14 +50,10 @@ class Page:
         self.picture: Picture | None = None
         self.waiting = self.mapping = False
         self.hit: Response | None = None
-        self.refined, self.rest = (
-            bench.start.at,
-            bench.residual(bench.start),
-        )  # the point with the exact residual compliance
+        self.refined, self.rest = bench.start.at, bench.residual(bench.start)  # where the compliance is exact, and it
 
     def show(self) -> None:
         """Put everything on the page and strike once."""
-        import jinja2
         from bokeh.models import ColumnDataSource
 
         title = self.bench.scene.title or self.bench.scene.path.stem
@@ -92,15 +66,11 @@ class Page:
             for name, names in columns.items()
         }
         roots = [self._readout(), self._hands(), self._body(), self._map(), self._force(), self._spectrum()]
-        roots[0].tags = [
-            self.sources["sound"],
-            self.sources["said"],
-        ]  # Bokeh sends only what is attached to the page
+        roots[0].tags = [self.sources["sound"], self.sources["said"]]  # Bokeh sends only what is attached to the page
         for root in roots:
             self.document.add_root(root)
-        environment = jinja2.Environment(loader=jinja2.FileSystemLoader(report.WEB), autoescape=True)
         self.document.title = title
-        self.document.template = environment.get_template("explore.html")
+        self.document.template, self.numbers = (report.template(name) for name in ("explore.html", "readout.html"))
         self.document.template_variables.update(
             heading=title,
             where=f"at {place(self.bench.scene.points[0])}",
@@ -123,7 +93,7 @@ class Page:
         from bokeh.models import InlineStyleSheet
         from bokeh.models.widgets import Button, Slider
 
-        sheet = InlineStyleSheet(css=SLIDER + FOCUS)
+        sheet = InlineStyleSheet(css=(report.WEB / "sliders.css").read_text(encoding="utf-8"))
         self.sliders: dict[str, Any] = {}
         for name, label in LABELS.items():
             value = getattr(self.settings, name)
@@ -269,16 +239,16 @@ class Page:
         at = settings.at if len(settings.at) > 1 else (*settings.at, 0.0)
         self._put("at", x=[at[0]], y=[at[1]])
         self._put("here", x=[settings.mass], y=[settings.stiffness])
-        resonance, limit = resonance_of(case), self._limit(case)
+        resonance, limit = case.resonance, self._limit(case)
         self.resonance.location, self.threshold.location = resonance, min(max(limit, 1.0), 1e9)
         try:
             self.hit = blow(case)
         except SimulationError as error:
             self.hit = None
-            self.readout.text = f"<p>{html.escape(str(error))}</p>"
+            self.readout.text = self.numbers.render(failed=str(error))
         else:
             self._draw(self.hit)
-            self.readout.text = _told(self.hit, resonance, limit, known)
+            self.readout.text = self.numbers.render(cells=_told(self.hit, resonance, limit, known))
         self._remap()
 
     def _put(self, name: str, **columns: list[float]) -> None:
@@ -301,10 +271,10 @@ class Page:
         shown = hit.time <= end
         self.sources["force-data"].data = {"x": hit.time[shown], "y": hit.force[shown]}
         frequencies = np.geomspace(*BAND, SPECTRUM_POINTS)
-        size = spectrum(hit, frequencies)
+        size = force_spectrum.magnitude(hit.time, hit.force, frequencies)
         top = float(size.max()) or 1.0
-        self.sources["spectrum-data"].data = {"x": frequencies, "y": np.maximum(size, 0.1 * DEPTH * top)}
-        self.document.get_model_by_name("spectrum").y_range.update(start=DEPTH * top, end=2.0 * top)
+        self.sources["spectrum-data"].data = {"x": frequencies, "y": np.maximum(size, 0.1 * SPECTRUM_DEPTH * top)}
+        self.document.get_model_by_name("spectrum").y_range.update(start=SPECTRUM_DEPTH * top, end=2.0 * top)
 
     def _label(self, settings: Settings, law: Contact) -> None:
         raised = "" if settings.exponent == 1.0 else f"{settings.exponent:.3g}".translate(RAISED)
@@ -377,17 +347,12 @@ class Page:
         self.sources["sound"].data = {"uri": [uri], "note": [note.replace("-", "−")]}
 
 
-def _told(hit: Response, resonance: float, limit: float, exact: bool) -> str:
-    """The blow in numbers, as HTML; without an error until the compliance of a new strike point is known."""
+def _told(hit: Response, resonance: float, limit: float, exact: bool) -> list[tuple[str, str]]:
+    """The blow in names and values; without an error until the compliance of a new strike point is known."""
     error = "refining …" if not exact else power(hit.error.total) if hit.error.resolvable else "not resolvable"
-    ratio = (
-        "body always stops it"
-        if not limit
-        else "body never stops it"
-        if math.isinf(limit)
-        else f"{resonance / limit:.2g} × threshold"
-    )
-    cells = [
+    ratio = f"{resonance / limit:.2g} × threshold" if 0.0 < limit < math.inf else ""
+    ratio = ratio or f"body {'never' if limit else 'always'} stops it"
+    return [
         ("impacts", str(hit.n_impacts)),
         ("peak force", si(hit.peak_force, "N", 3)),
         ("time in contact", si(hit.contact_time, "s", 3)),
@@ -395,12 +360,6 @@ def _told(hit: Response, resonance: float, limit: float, exact: bool) -> str:
         ("contact resonance", f"{si(resonance, 'Hz', 3)}, {ratio}"),
         ("estimated error", error),
     ]
-    items = "".join(
-        f'<div style="min-width:4.5em"><div style="font-size:12px;opacity:.75">{name}</div>'
-        f'<div style="font-size:17px;font-weight:600">{html.escape(value)}</div></div>'
-        for name, value in cells
-    )
-    return f'<div style="display:flex;flex-wrap:wrap;gap:4px 22px">{items}</div>'
 
 
 def _quads(picture: Picture) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """Writes one self-contained HTML page about a strike: the scene, the errors, the results and the sound."""
 
 import base64
-import csv
 import io
 import json
 import math
@@ -18,17 +17,18 @@ from scipy.io import wavfile
 from .._base import check, markup
 from .._base.files import replacing
 from ..impact.response import Response
+from ..mesh.mesh_files import boundary
 from ..scenes.scene import Run, Scene, load_scene, scene_of
 from ..scenes.schema import PATHS, fault, read_bytes
 from ..scenes.sentences import place, power, si, tidy, words
 from ..show import export, sampling, sound
+from ..show.figures import SPECTRUM_BAND
 
-BAND = (10.0, 20e3)  # [Hz] of the spectrum shown: roughly the audible range; more if LOBES asks for it
 LOBES = 3.0  # [-] the spectrum reaches at least LOBES / duration of the shortest impact
-SPECTRUM_POINTS = 1000  # [-] about one per pixel
+SPECTRUM_POINTS = 1000  # [-] of the spectrum: about one per pixel of a wide page
 ENERGY_TIMES = 400  # [-] times at which the energies are drawn
 FRAMES = 72  # [-] frames of the wave: three seconds at 24 per second
-SHAPES = 12  # [-] mode shapes shown
+SHAPES = 12  # [-] mode shapes shown: more would double the size of the page
 DIGITS = 6  # [-] of the numbers in the plots; the downloads have full precision
 QUIET = -20.0  # [dB] re full scale: a quieter sound is offered again, amplified
 DISTANCE = 1.0  # [m] from the plate to the default listener
@@ -90,24 +90,20 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
     ValueError
         If the extra ``web`` is not installed, or ``run`` has no modes.
     """
-    jinja2, plotly = _tools()
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(WEB), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
-    )
+    _, plotly = _tools()
     response = run.response
     if run.plan.target != "modal":
         raise ValueError(f"run must have target 'modal' because a report shows motion, got {run.plan.target!r}")
-    page = environment.get_template("report.html").render(
+    page = template("report.html").render(
         title=scene.title or scene.path.stem,
         words=words(scene, response),
         picture=scene.picture(),
         observed=bool(scene.watched),
-        verdict=response.outcome,
         tiles=_tiles(response),
-        error=_errors(response),
+        response=response,
+        budget=_budget(response),
         modelled=_modelled(response, run),
         reasons=map(tidy, (*run.plan.reasons, *run.notes)),
-        impacts=response.impacts,
         energies=_shares(response),
         sounds=_sounds(scene, response),
         files=_downloads(scene, run),
@@ -123,6 +119,15 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
     )
     with replacing(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def template(name: str) -> Any:
+    """A template of the folder ``web``; it escapes all text."""
+    import jinja2
+
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(WEB), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
+    ).get_template(name)
 
 
 def _command(scene: Scene, response: Response) -> str:
@@ -146,25 +151,16 @@ def _tiles(response: Response) -> list[tuple[str, str]]:
     ]
 
 
-def _errors(response: Response) -> dict[str, Any]:
+def _budget(response: Response) -> list[tuple[str, str, float, float]]:
+    """The parts of the estimated error: name, how it was found, value, and that over the largest."""
     error = response.error
-    shares = [
-        ("time step", error.step, "from a second run of the same blow"),
-        ("modes left out", error.truncation, "from a run with fewer modes"),
-        ("finite elements", error.mesh, "from the frequency errors, weighted by energy"),
+    rows = [
+        ("time step", "from a second run of the same blow", error.step),
+        ("modes left out", "from a run with fewer modes", error.truncation),
+        ("finite elements", "from the frequency errors, weighted by energy", error.mesh),
     ]
-    scale = max(response.tolerance, *(value for _, value, _ in shares))
-    return {
-        "rows": [
-            {"name": name, "value": value, "how": how, "part": max(0.0, min(1.0, value / scale))}
-            for name, value, how in shares
-        ],
-        "total": error.total,
-        "tolerance": response.tolerance,
-        "met": error.total <= response.tolerance,
-        "resolvable": error.resolvable,
-        "energy": response.energy_error,
-    }
+    scale = max(response.tolerance, *(value for _, _, value in rows))
+    return [(name, how, value, max(0.0, min(1.0, value / scale))) for name, how, value in rows]
 
 
 def _modelled(response: Response, run: Run) -> list[tuple[str, str]]:
@@ -179,14 +175,10 @@ def _modelled(response: Response, run: Run) -> list[tuple[str, str]]:
 def _shares(response: Response) -> list[dict[str, Any]]:
     energies = response.energies
     total = sum(max(value, 0.0) for value in energies.values()) or 1.0
+    called = {"target": "struck body"}
     return [
-        {
-            "name": "struck body" if name == "target" else name,
-            "key": name,
-            "joule": value,
-            "part": max(value, 0.0) / total,
-        }
-        for name, value in energies.items()
+        {"name": called.get(name, name), "key": name, "joule": joule, "part": max(joule, 0.0) / total}
+        for name, joule in energies.items()
     ]
 
 
@@ -243,36 +235,23 @@ def audio(samples: np.ndarray, rate: int) -> str:
 
 
 def _downloads(scene: Scene, run: Run) -> list[dict[str, str]]:
-    response = run.response
+    response, modes = run.response, run.response.target
     frequencies = _frequencies(response)
     spectrum = response.spectrum(frequencies)
-    changes = {"tolerance": response.tolerance}
-    data = {**export.numbers(response), "scene": scene.data(**changes), "seconds": dict(run.seconds)}
-    data |= {"plan": run.plan.data(), "notes": list(run.notes), "versions": export.versions()}
-    texts = {
-        "response.json": ("application/json", json.dumps(export.plain(data), indent=2, allow_nan=False)),
-        "force.csv": ("text/csv", _csv(("time [s]", response.time), ("force [N]", response.force))),
-        "spectrum.csv": (
-            "text/csv",
-            _csv(("frequency [Hz]", frequencies), ("real [N s]", spectrum.real), ("imaginary [N s]", spectrum.imag)),
-        ),
-        "modes.csv": (
-            "text/csv",
-            _csv(("frequency [Hz]", response.target.frequencies), ("damping ratio [-]", response.target.damping_ratio)),
-        ),
-    }
+    data = export.run_data(run, scene.data(tolerance=response.tolerance))
+    tables = {
+        "force.csv": {"time [s]": response.time, "force [N]": response.force},
+        "spectrum.csv": {
+            "frequency [Hz]": frequencies, "real [N s]": spectrum.real, "imaginary [N s]": spectrum.imag
+        },
+        "modes.csv": {"frequency [Hz]": modes.frequencies, "damping ratio [-]": modes.damping_ratio},
+    }  # fmt: skip
+    texts = {"response.json": ("application/json", json.dumps(data, indent=2, allow_nan=False))}
+    texts |= {name: ("text/csv", export.csv_text(**columns)) for name, columns in tables.items()}
     return [
         {"name": name, "size": si(len(text.encode()), "B", 3), "uri": _uri(kind, text.encode())}
         for name, (kind, text) in texts.items()
     ]
-
-
-def _csv(*columns: tuple[str, np.ndarray]) -> str:
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow([name for name, _ in columns])
-    writer.writerows(zip(*(values.tolist() for _, values in columns)))
-    return file.getvalue()
 
 
 def _uri(kind: str, raw: bytes) -> str:
@@ -291,7 +270,7 @@ def _plots(response: Response) -> dict[str, Any]:
     shown = response.time <= end
     frequencies = _frequencies(response)
     times = np.linspace(0.0, end, ENERGY_TIMES)
-    energy = [_energy(response, times, body) for body in (0, -1)]
+    energy = [response.modal_energy(times, body=body) for body in (0, -1)]
     moving = (modes.omega > 0.0) & (modes.frequencies < 2.0 * frequencies[-1])
     last = response.impacts[-1].end if response.impacts else 0.0
     return {
@@ -307,7 +286,7 @@ def _plots(response: Response) -> dict[str, Any]:
         },
         "modal": {
             "x": _short(modes.frequencies[moving]),
-            "y": _short(_energy(response, np.array([last]), -1)[0, moving]),
+            "y": _short(response.modal_energy([last])[0, moving]),
         },
         "view": _view(response, end),
     }
@@ -315,13 +294,7 @@ def _plots(response: Response) -> dict[str, Any]:
 
 def _frequencies(response: Response) -> np.ndarray:
     shortest = min((impact.duration for impact in response.impacts), default=1.0)
-    return np.geomspace(BAND[0], max(BAND[1], LOBES / shortest), SPECTRUM_POINTS)
-
-
-def _energy(response: Response, times: np.ndarray, body: int) -> np.ndarray:
-    """Energy [J] of each mode of a body, (n_times, n_modes)."""
-    q, p = response.modal_state(times, body=body)
-    return 0.5 * (p**2 + (response.bodies[body].omega * q) ** 2)
+    return np.geomspace(SPECTRUM_BAND[0], max(SPECTRUM_BAND[1], LOBES / shortest), SPECTRUM_POINTS)
 
 
 def _view(response: Response, end: float) -> dict[str, Any]:
@@ -335,7 +308,7 @@ def _view(response: Response, end: float) -> dict[str, Any]:
     struck = response.displacement(response.at[None], times)
     count = min(SHAPES, modes.n_modes)
     shapes = rows[:, :count].T / np.maximum(np.abs(rows[:, :count]).max(axis=0), 1e-300)[:, None]
-    edge = surface[markup.rim(cells)]  # (n_sides, 2, 2)
+    edge = surface[boundary(cells)]  # (n_sides, 2, 2)
     return {
         "x": _short(surface[:, 0]),
         "y": _short(surface[:, 1]),

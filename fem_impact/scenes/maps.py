@@ -13,7 +13,6 @@ import xarray
 
 from .._base import check
 from ..impact import accuracy, threshold
-from ..impact.contact import Contact
 from ..model import planner
 from ..show import figures, plots
 from ..sweeps import grid, hammers
@@ -32,7 +31,7 @@ PICTURED = {  # layers drawn for a map with two axes: name in the picture
     "peak_force": "peak force",
     "centroid": "spectral centroid",
 }
-RESONANCES = tuple(m * 10.0**e for e in range(6) for m in (1, 2, 5))  # [Hz] levels of the contours
+RESONANCES = tuple(m * 10.0**e for e in range(6) for m in (1, 2, 5))  # [Hz] contours drawn: three per decade
 
 
 @check.typed
@@ -72,7 +71,7 @@ def map_scene(
         raise ValueError(f"over must map the names of axes to their values, got {check.shown(over)}")
     band = table.get("max_frequency") if max_frequency is None else max_frequency
     limit = scene.blow.values.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance
-    limit = check.between("tolerance", limit, 1e-12, 1.0)
+    limit = check.tolerance(limit)
     if not over:
         raise ValueError(
             f'{scene.path}: [map] is missing; add it and name the axes, as in over = {{ "striker.mass" = [0.01, 0.1] }}'
@@ -179,21 +178,14 @@ def number_of_modes(first: Any, frequency: float) -> int:
 
 def with_theory(table: xarray.Dataset, case: grid.Case, axes: Mapping[str, np.ndarray]) -> xarray.Dataset:
     """Add ``contact_resonance`` and ``threshold`` [Hz] to a map, each along the axes it depends on."""
-    for name, needs, find, meaning in (
-        (
-            "contact_resonance",
-            ("mass", "striker_frequency", "stiffness", "exponent", "speed"),
-            _resonance,
-            "one over twice the contact time on a rigid wall",
-        ),
-        (
-            "threshold",
-            ("mass", "striker_frequency", "at", "target_mass", "target_frequency"),
-            _threshold,
-            "contact resonance above which the struck body stops the striker",
-        ),
-    ):
-        mine = {axis: values for axis, values in axes.items() if axis in needs}
+    striker = ("mass", "striker_frequency")
+    for name, find, needs, meaning in (
+        ("contact_resonance", lambda cell: cell.resonance, ("stiffness", "exponent", "speed"),
+         "one over twice the contact time on a rigid wall"),
+        ("threshold", _threshold, ("at", "target_mass", "target_frequency"),
+         "contact resonance above which the struck body stops the striker"),
+    ):  # fmt: skip
+        mine = {axis: values for axis, values in axes.items() if axis in (*striker, *needs)}
         found = np.empty([len(values) for values in mine.values()])
         for place in np.ndindex(*found.shape):
             cell = case
@@ -202,11 +194,6 @@ def with_theory(table: xarray.Dataset, case: grid.Case, axes: Mapping[str, np.nd
             found[place] = find(cell)
         table[name] = (tuple(mine), found, {"units": "Hz", "long_name": meaning})
     return table
-
-
-def _resonance(case: grid.Case) -> float:
-    law = Contact(case.contact.stiffness, case.contact.exponent)
-    return 0.5 / accuracy.contact_duration(law, case.striker.felt_mass, case.speed)
 
 
 def _threshold(case: grid.Case) -> float:

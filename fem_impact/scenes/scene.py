@@ -58,7 +58,7 @@ class Scene:
             raise fault(self.path, f"count must be at most {most} modes for this scene, got {count}; ask for fewer")
         tolerance = self.blow.values.get("tolerance", collision.TOLERANCE)
         with self.blame("strike"):
-            check.between("tolerance", tolerance, 1e-12, 1.0)
+            check.tolerance(tolerance)
         return target.finished(target.find(count, tolerance=tolerance))
 
     @check.typed

@@ -16,7 +16,7 @@ import numpy as np
 from .. import mesh
 from .._base import check
 from ..fe.assembly import assemble
-from ..fe.section import Beam, Elastic, Material, Plate
+from ..fe.section import KINDS, Beam, Elastic, Material, Plate
 from ..impact import collision
 from ..impact.contact import Contact
 from ..impact.striker import Striker
@@ -132,39 +132,25 @@ SOURCES = ("auto", "fe", "analytic")
 # Functions that build each part of a scene; their arguments are the keys of its table.
 # The first entry is the key that selects the function, '' if there is only one.
 MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
-    "mesh": (
-        "shape",
-        {
-            "rectangle": mesh.rectangle,
-            "disk": mesh.disk,
-            "polygon": mesh.polygon,
-            "outline": mesh.outline,
-            "line": mesh.line,
-            "file": mesh.load,
-        },
-    ),
+    "mesh": ("shape", {
+        "rectangle": mesh.rectangle, "disk": mesh.disk, "polygon": mesh.polygon, "outline": mesh.outline,
+        "line": mesh.line, "file": mesh.load,
+    }),
     "material": ("", {"": Material}),
     "section": ("kind", {"plate": _plate, "beam": _beam}),
     "target": ("", {"": target_values}),
     "striker": ("kind", {"rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick, "bar": _bar}),
-    "contact": (
-        "kind",
-        {
-            "linear": Contact.linear,
-            "hertz": Contact.hertz,
-            "power": Contact.power,
-            "restituting": Contact.restituting,
-            "between": Contact.between,
-        },
-    ),
+    "contact": ("kind", {
+        "linear": Contact.linear, "hertz": Contact.hertz, "power": Contact.power,
+        "restituting": Contact.restituting, "between": Contact.between,
+    }),
     "strike": ("", {"": collision.strike}),
     "observe": ("", {"": _observe}),
     "map": ("", {"": map_values}),
-}
+}  # fmt: skip
 TABLES = [*MAKERS, "supports"]
 REQUIRED = ("mesh", "striker", "contact", "strike")
 SUPPLIED = {"material", "modes", "striker", "contact", "sphere", "plate"}  # arguments that come from other tables
-SUPPORTS = ("clamped", "hinged", "free")
 PATHS = ("source", "path")  # keys that name a file, relative to the scene file
 
 
@@ -220,10 +206,9 @@ def read_part(path: Path, table: str, values: dict[str, Any], folder: Path) -> P
                     Elastic(**support)
                 except ValueError as error:
                     raise wrong(f"{edge}: {error}") from None
-            elif support not in SUPPORTS:
+            elif support not in KINDS:
                 raise wrong(
-                    f"{edge} must be one of {', '.join(SUPPORTS)} or {{ stiffness, rotation }}, got "
-                    f"{check.shown(support)}"
+                    f"{edge} must be one of {', '.join(KINDS)} or {{ stiffness, rotation }}, got {check.shown(support)}"
                 )
         return Part("", MappingProxyType(values))
     selector, makers = MAKERS[table]

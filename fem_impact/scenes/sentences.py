@@ -101,7 +101,7 @@ def _single_or_multiple(response: Response, law: Contact) -> str:
     """What the kinetic-energy criterion predicts for the blow."""
     assert response.striker is not None
     mass = response.striker.felt_mass
-    resonance = 0.5 / accuracy.contact_duration(Contact(law.stiffness, law.exponent), mass, response.speed)
+    resonance = accuracy.contact_resonance(law, mass, response.speed)
     limit = threshold.threshold_frequency(response.target, response.at, mass)
     said = f"On a rigid wall the contact would resonate at {si(resonance, 'Hz', 3)}. "
     if limit is None:

@@ -2,6 +2,7 @@
 
 import base64
 import csv
+import io
 import json
 import math
 import platform
@@ -16,30 +17,21 @@ from scipy.io import wavfile
 from .._base import check
 from .._base.files import replacing, staged
 from ..impact.response import Response
+from ..model.planner import Run
 from ..modes import universal_files
 from ..modes.modal import Modes
 from . import sampling, sound
 
 __all__ = [
-    "numbers",
-    "plain",
-    "staged",
-    "versions",
-    "vtk_ending",
-    "write_animation",
-    "write_force",
-    "write_json",
-    "write_uff",
-    "write_vtk",
-    "write_wav",
-]
+    "csv_text", "numbers", "plain", "run_data", "staged", "versions", "vtk_ending", "write_animation", "write_force",
+    "write_json", "write_uff", "write_vtk", "write_wav",
+]  # fmt: skip
 
 CENTROID_BAND = 20e3  # [Hz] upper end of the spectral centroid's band: about the limit of hearing
 PACKAGES = ("fem-impact", "numpy", "scipy", "scikit-fem", "netgen-mesher", "numba")
 WARP = 0.1  # [-] largest deflection of the warp vector over the body's extent
 CELL_TYPE = {1: 1, 2: 3, 3: 5}  # number of points: VTK's code for a vertex, line or triangle
 KIND = {"f": "Float64", "i": "Int64", "u": "UInt8"}
-MOST_FRAMES = 1000  # [-] most frames of an animation: 0.2 GB
 DISTINCT = 1e-9  # [-] relative spacing given to equal frequencies, because a collection drops equal times
 
 
@@ -114,7 +106,7 @@ def write_animation(path: str | Path, modes: Modes, mode: int, *, frames: int = 
     frequency = float(modes.frequencies[mode - 1])
     if frequency == 0.0:
         raise ValueError(f"mode must be a flexible mode, but mode {mode} is a rigid motion; take a higher one")
-    turns = np.arange(check.count("frames", frames, low=2, high=MOST_FRAMES)) / frames
+    turns = np.arange(check.count("frames", frames, low=2, high=sampling.MOST_FRAMES)) / frames
     points, cells = sampling.grid(modes)
     arrays, fields = _mode_parts(modes, points)[mode - 1]
     parts = [({"warp": np.cos(2.0 * np.pi * turn) * arrays["warp"]}, fields) for turn in turns]
@@ -161,10 +153,9 @@ def write_wav(
 @check.typed
 def write_force(path: str | Path, response: Response) -> None:
     """Write the force history as CSV in full precision: a header with units, then one row per instant."""
-    with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["time [s]", "force [N]"])
-        writer.writerows(zip(response.time.tolist(), response.force.tolist()))
+    with replacing(path) as temporary:
+        text = csv_text(**{"time [s]": response.time, "force [N]": response.force})
+        temporary.write_text(text, encoding="utf-8", newline="")
 
 
 @check.typed
@@ -174,40 +165,26 @@ def write_json(path: str | Path, data: dict[str, Any]) -> None:
         temporary.write_text(json.dumps(plain(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
+SCALARS = (
+    "n_impacts", "contact_time", "peak_force", "impulse", "restitution", "speed", "energies", "dissipated",
+    "energy_error", "momentum_error", "tolerance", "finished", "scheme",
+)  # fmt: skip
 ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "sensitivity", "total", "resolvable")
+IMPACT_PARTS = ("start", "end", "peak_force", "impulse")
 
 
 @check.typed
 def numbers(response: Response) -> dict[str, Any]:
     """All scalars of a response by name, in SI units, and its impacts."""
-    error = response.error
+    data = {name: getattr(response, name) for name in SCALARS} | {
+        "spectral_centroid": {"value": _centroid(response), "max_frequency": CENTROID_BAND},
+        "error": {name: getattr(response.error, name) for name in ERROR_PARTS},
+        "n_modes": response.target.n_modes,
+        "max_frequency": response.target.frequencies[-1],
+    }
     return {
-        "response": {
-            "n_impacts": response.n_impacts,
-            "contact_time": response.contact_time,
-            "peak_force": response.peak_force,
-            "impulse": response.impulse,
-            "restitution": response.restitution,
-            "speed": response.speed,
-            "spectral_centroid": {
-                "value": _centroid(response),
-                "max_frequency": CENTROID_BAND,
-            },
-            "energies": response.energies,
-            "dissipated": response.dissipated,
-            "energy_error": response.energy_error,
-            "momentum_error": response.momentum_error,
-            "error": {name: getattr(error, name) for name in ERROR_PARTS},
-            "tolerance": response.tolerance,
-            "finished": response.finished,
-            "scheme": response.scheme,
-            "n_modes": response.target.n_modes,
-            "max_frequency": response.target.frequencies[-1],
-        },
-        "impacts": [
-            {"start": hit.start, "end": hit.end, "peak_force": hit.peak_force, "impulse": hit.impulse}
-            for hit in response.impacts
-        ],
+        "response": data,
+        "impacts": [{name: getattr(impact, name) for name in IMPACT_PARTS} for impact in response.impacts],
     }
 
 
@@ -217,6 +194,21 @@ def _centroid(response: Response) -> float | None:
         return response.spectral_centroid(CENTROID_BAND)
     except ValueError:
         return None
+
+
+def run_data(run: Run, scene: dict[str, Any]) -> dict[str, Any]:
+    """Everything a run found, as plain data: its numbers, plan, notes and seconds, and the tables of its scene."""
+    data = {"plan": run.plan.data(), "scene": scene, "seconds": dict(run.seconds), "notes": list(run.notes)}
+    return plain({**numbers(run.response), **data, "versions": versions()})
+
+
+def csv_text(**columns: np.ndarray) -> str:
+    """Columns of numbers as CSV in full precision, under a header with their names and units."""
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(values.tolist() for values in columns.values())))
+    return file.getvalue()
 
 
 def versions() -> dict[str, str]:
@@ -272,7 +264,7 @@ def _motion_parts(response: Response, points: np.ndarray, times: np.ndarray) -> 
             field[name] = force
     if response.striker is not None and response.at is not None:
         striker = response.striker
-        tip = response.displacement(striker.at[None] if striker.modes.dimension else None, times, body=0)[:, 0]
+        tip = response.displacement(striker.at[None], times, body=0)[:, 0]
         for field, way in zip(fields, tip):
             place = np.zeros((1, 3))
             place[0, : len(response.at)], place[0, 2] = response.at, way

@@ -12,15 +12,17 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from .._base import check, markup
+from .._base import check
 from .._base.files import replacing
 from ..impact import spectra
 from ..impact.response import Response
+from ..mesh.mesh_files import boundary
 from ..modes.modal import Modes
 from . import sampling
 
 # Okabe and Ito's palette: distinct for all common kinds of colour vision, and in print.
 BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
+COLOURS = "PuOr"  # of deflections: symmetric about zero, safe for colour-blind readers
 STYLE: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 10.0,
@@ -49,9 +51,17 @@ MARGIN = 0.1  # [-] time shown before and after the blow, over its duration
 
 
 @contextmanager
-def _styled(width: float, height: float) -> Iterator[Figure]:
+def styled(width: float, height: float) -> Iterator[Figure]:
+    """A figure of a size [inch], drawn in `STYLE` inside the block."""
     with matplotlib.rc_context(STYLE):
         yield Figure(figsize=(width, height), layout="constrained")
+
+
+def _units(axes: Any, x: str, y: str = "") -> None:
+    """Label the ticks with SI prefixes and units."""
+    axes.xaxis.set_major_formatter(EngFormatter(unit=x, sep=" "))
+    if y:
+        axes.yaxis.set_major_formatter(EngFormatter(unit=y, sep=" "))
 
 
 @check.typed
@@ -78,7 +88,7 @@ def force(response: Response, *, band: tuple[float, float] = SPECTRUM_BAND) -> F
         Contacts are shaded and numbered; ticks at the bottom of the spectrum mark the modes of the struck body.
     """
     low, high = check.band("band", band, "Hz")
-    with _styled(7.0, 6.0) as figure:
+    with styled(7.0, 6.0) as figure:
         above, below = figure.subplots(2, 1)
         _draw_force(above, response)
         frequencies = np.geomspace(low, high, SPECTRUM_POINTS)
@@ -87,17 +97,10 @@ def force(response: Response, *, band: tuple[float, float] = SPECTRUM_BAND) -> F
         below.loglog(frequencies, np.maximum(size, 0.1 * SPECTRUM_DEPTH * top))
         below.set(xlim=(low, high), ylim=(SPECTRUM_DEPTH * top, 2.0 * top))
         below.set(xlabel="frequency", ylabel="force spectrum [N s]", title="Spectrum of the force")
-        below.xaxis.set_major_formatter(EngFormatter(unit="Hz", sep=" "))
-        below.plot(
-            response.target.frequencies,
-            np.zeros(response.target.n_modes),
-            "|",
-            color=GREEN,
-            ms=9.0,
-            transform=below.get_xaxis_transform(),
-            label="modes of the struck body",
-            clip_on=True,
-        )
+        _units(below, "Hz")
+        marks: dict[str, Any] = {"color": GREEN, "ms": 9.0, "transform": below.get_xaxis_transform(), "clip_on": True}
+        natural = response.target.frequencies
+        below.plot(natural, np.zeros(len(natural)), "|", label="modes of the struck body", **marks)
         below.legend(loc="lower left")
     return figure
 
@@ -117,8 +120,7 @@ def _draw_force(axes: Any, response: Response) -> None:
             )
     axes.set(xlim=(start - room, end + room), xlabel="time", ylabel="contact force", title="Contact force")
     axes.set_ylim(0.0, HEADROOM * (response.peak_force or 1.0))
-    axes.xaxis.set_major_formatter(EngFormatter(unit="s", sep=" "))
-    axes.yaxis.set_major_formatter(EngFormatter(unit="N", sep=" "))
+    _units(axes, "s", "N")
 
 
 @check.typed
@@ -126,18 +128,14 @@ def energies(response: Response) -> Figure:
     """Plot the energy of striker and struck body during the blow, and the rest: in the contact or lost."""
     end = (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
     times = np.linspace(0.0, (1.0 + MARGIN) * end, TIMES)
-    parts = []
-    for body in (0, -1):
-        q, p = response.modal_state(times, body=body)
-        parts.append(0.5 * (p**2 + (response.bodies[body].omega * q) ** 2).sum(axis=1))
-    with _styled(7.0, 3.6) as figure:
+    parts = [response.modal_energy(times, body=body).sum(axis=1) for body in (0, -1)]
+    with styled(7.0, 3.6) as figure:
         axes = figure.subplots()
         axes.plot(times, parts[0], label="striker")
         axes.plot(times, parts[1], label="struck body")
         axes.plot(times, parts[0][0] - parts[0] - parts[1], label="contact and losses")
         axes.set(xlim=(0.0, times[-1]), xlabel="time", ylabel="energy", title="Energy during the blow")
-        axes.xaxis.set_major_formatter(EngFormatter(unit="s", sep=" "))
-        axes.yaxis.set_major_formatter(EngFormatter(unit="J", sep=" "))
+        _units(axes, "s", "J")
         axes.legend(loc="best")
     return figure
 
@@ -146,17 +144,15 @@ def energies(response: Response) -> Figure:
 def mode_energies(response: Response) -> Figure:
     """Plot the energy of each mode of the struck body when the striker leaves, over its frequency."""
     end = response.impacts[-1].end if response.impacts else 0.0
-    q, p = response.modal_state([end])
-    energy = 0.5 * (p**2 + (response.target.omega * q) ** 2)[0]
+    energy = response.modal_energy([end])[0]
     shown = (response.target.omega > 0.0) & (energy > 0.0)
     top = float(energy[shown].max(initial=0.0)) or 1.0
-    with _styled(7.0, 3.6) as figure:
+    with styled(7.0, 3.6) as figure:
         axes = figure.subplots()
         axes.vlines(response.target.frequencies[shown], MODE_DEPTH * top, energy[shown], lw=2.0, color=BLUE)
         axes.set(xscale="log", yscale="log", ylim=(MODE_DEPTH * top, 3.0 * top))
         axes.set(xlabel="natural frequency", ylabel="energy", title="Energy of each mode after the blow")
-        axes.xaxis.set_major_formatter(EngFormatter(unit="Hz", sep=" "))
-        axes.yaxis.set_major_formatter(EngFormatter(unit="J", sep=" "))
+        _units(axes, "Hz", "J")
     return figure
 
 
@@ -184,13 +180,13 @@ def mobility(modes: Modes, at: Any, to: Any = None, *, band: tuple[float, float]
     grid = np.geomspace(low, high, SPECTRUM_POINTS)
     frequencies = np.union1d(grid, flexible[(flexible > low) & (flexible < high)] * (1.0 + 1e-6))  # misses no peak
     value = spectra.mobility(modes, at, at if to is None else to, frequencies)
-    with _styled(7.0, 5.0) as figure:
+    with styled(7.0, 5.0) as figure:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         above.loglog(frequencies, np.abs(value))
         above.set(ylabel="mobility [m/(N s)]", title="Mobility", xlim=(low, high))
         below.semilogx(frequencies, np.angle(value, deg=True))
         below.set(ylabel="phase [degrees]", xlabel="frequency", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
-        below.xaxis.set_major_formatter(EngFormatter(unit="Hz", sep=" "))
+        _units(below, "Hz")
     return figure
 
 
@@ -209,15 +205,11 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
     -------
     matplotlib.figure.Figure
     """
-    count = min(check.count("count", count), modes.n_modes)
-    columns = min(check.count("columns", columns), count)
-    rows = -(-count // columns)
-    check.between("dimension of modes", modes.dimension, 1, 2)
     points, cells = sampling.grid(modes)
-    shapes = modes.shapes.at(points)[:, :count]
-    shapes = shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300)
-    rim = markup.rim(cells) if modes.dimension == 2 else None
-    with _styled(2.2 * columns, 1.9 * rows) as figure:
+    shapes, rows, columns = sampling.gallery(modes, points, count, columns)
+    count = shapes.shape[1]
+    rim = boundary(cells) if modes.dimension == 2 else None
+    with styled(2.2 * columns, 1.9 * rows) as figure:
         grid = figure.subplots(rows, columns, squeeze=False)
         for i, axes in enumerate(grid.flat):
             if i >= count:
@@ -229,7 +221,7 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
                 axes.axhline(0.0, color="#888888", lw=0.6)
                 axes.set(ylim=(-1.1, 1.1), yticks=[], xlabel="x [m]" if i >= count - columns else "")
             else:
-                axes.tripcolor(*points.T, cells, shapes[:, i], cmap="PuOr", vmin=-1, vmax=1, shading="gouraud")
+                axes.tripcolor(*points.T, cells, shapes[:, i], cmap=COLOURS, vmin=-1, vmax=1, shading="gouraud")
                 nodal = _unflattened(shapes[:, i], cells)
                 axes.tricontour(*points.T, cells, nodal, levels=[0.0], colors="black", linewidths=0.8)
                 axes.add_collection(LineCollection(list(points[rim]), colors="#888888", linewidths=0.8))
@@ -250,10 +242,10 @@ def snapshot(plane: np.ndarray, cells: np.ndarray, deflection: np.ndarray, at: n
     at : ndarray, shape (dimension,) [m]
     title : str
     """
-    with _styled(7.2, 4.8) as figure:
+    with styled(7.2, 4.8) as figure:
         axes: Any = figure.subplots()
-        axes.tripcolor(*plane.T, cells, deflection, cmap="PuOr", vmin=-1, vmax=1, shading="gouraud")
-        axes.add_collection(LineCollection(list(plane[markup.rim(cells)]), colors="#888888", linewidths=0.8))
+        axes.tripcolor(*plane.T, cells, deflection, cmap=COLOURS, vmin=-1, vmax=1, shading="gouraud")
+        axes.add_collection(LineCollection(list(plane[boundary(cells)]), colors="#888888", linewidths=0.8))
         axes.plot(at[0], at[1] if len(at) > 1 else 0.0, "o", mfc="none", mec=VERMILION, mew=2.0, ms=9.0)
         axes.set(aspect="equal", title=title)
         axes.set_axis_off()

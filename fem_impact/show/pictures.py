@@ -26,16 +26,14 @@ PROBE = (
     "assert p.screenshot(None).std() > 0"
 )
 WINDOW = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
-SIZE = (720, 480)  # [px] size of a frame
-TILE = (320, 250)  # [px] size of one mode shape
+SIZE = (720, 480)  # [px] size of a frame: a GIF stays below a few megabytes
+TILE = (320, 250)  # [px] size of one mode shape: four side by side on a screen
 FRAMES = 48  # [-] default length of an animation: four seconds
-MOST_FRAMES = 1000  # [-] most frames: minutes of work
-RATE = 12  # [1/s] frames per second
+RATE = 12  # [1/s] frames per second: enough for a wave, half the size of a film
 HEIGHT = 0.12  # [-] largest drawn deflection over the body's extent
 LIFT = 0.0015  # [-] height of lines above the surface, over their extent
 BALL = 0.03  # [-] drawn radius of the striker over the body's extent
-COLOURS = "PuOr"  # as in `figures`: symmetric about zero, safe for colour-blind readers
-VIEW = (-0.55, -1.0, 0.75)  # direction to the camera
+VIEW = (-0.55, -1.0, 0.75)  # direction to the camera: from the front left, above the plate
 
 
 @cache
@@ -70,14 +68,10 @@ def mode_shapes(path: str | Path, modes: Modes, *, count: int = 12, columns: int
     if not can_render():
         figures.save(path, figures.mode_shapes(modes, count=count, columns=columns))
         return REMEDY
-    count = min(check.count("count", count), modes.n_modes)
-    columns = min(check.count("columns", columns), count)
-    rows = -(-count // columns)
     points, cells, plane = sampling.surface(modes)
-    shapes = modes.truncated(n_modes=count).shapes.at(points)
-    shapes = shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300)
+    shapes, rows, columns = sampling.gallery(modes, points, count, columns)
     plotter = _plotter((TILE[0] * columns, TILE[1] * rows), shape=(rows, columns))
-    for i in range(count):
+    for i in range(shapes.shape[1]):
         plotter.subplot(*divmod(i, columns))
         mesh = _mesh(plane, cells, HEIGHT * _extent(plane) * shapes[:, i], shapes[:, i])
         _add(plotter, mesh, 1.0)
@@ -131,7 +125,7 @@ def animation(path: str | Path, response: Response, *, frames: int = FRAMES) -> 
     _ending(path, ".gif", ".mp4")
     film = Path(path).suffix.lower() == ".mp4"
     encoder = check.extra("imageio_ffmpeg", "film", "an MP4 file") if film else None
-    times = np.linspace(0.0, sampling.end_of(response), check.count("frames", frames, low=2, high=MOST_FRAMES))
+    times = np.linspace(0.0, sampling.end_of(response), check.count("frames", frames, low=2, high=sampling.MOST_FRAMES))
     if encoder is not None:
         with replacing(path) as temporary:
             _encode(encoder, temporary, _frames(response, times))
@@ -234,8 +228,8 @@ def _mesh(plane: np.ndarray, cells: np.ndarray, height: np.ndarray, value: np.nd
 
 def _add(plotter: Any, mesh: Any, limit: float) -> None:
     plotter.add_mesh(
-        mesh, scalars="deflection", cmap=COLOURS, clim=(-limit, limit), smooth_shading=True, show_scalar_bar=False,
-        ambient=0.4, diffuse=0.6, specular=0.0,
+        mesh, scalars="deflection", cmap=figures.COLOURS, clim=(-limit, limit), smooth_shading=True,
+        show_scalar_bar=False, ambient=0.4, diffuse=0.6, specular=0.0,
     )  # fmt: skip
     rim = mesh.extract_feature_edges(feature_edges=False, manifold_edges=False, non_manifold_edges=False)
     _add_line(plotter, rim, "#666666")

@@ -9,22 +9,21 @@ from matplotlib import colormaps
 from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Polygon
+from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 from scipy.interpolate import RegularGridInterpolator
 
 from ..sweeps.hammers import Hammer, half_sine_reach
-from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, _styled
+from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, styled
 
 BLACK, GREY = "#222222", "#777777"
 PALETTE = "cividis"  # perceptually uniform, also for colour-blind readers
 FINER = 8  # [-] each pixel is split into this many parts to draw contours
-MOST_NAMES = 5  # [-] most names along an axis
+MOST_NAMES = 5  # [-] most names along an axis: more would overlap
 FEW = 10  # [-] a range of fewer whole numbers gets one colour per number
 HALO = withStroke(linewidth=2.2, foreground=BLACK)  # keeps white lines visible on bright colours
 RIM = withStroke(linewidth=4.0, foreground="white")  # keeps circles visible on dark colours
-TILT = np.array([[1.0, 0.42], [0.0, 0.5]])  # oblique view of a plate's plane: rows give screen x and y
 __all__ = ["BLACK", "BLUE", "GREEN", "GREY", "ORANGE", "PURPLE", "SKY", "VERMILION", "Axis", "Curve", "Mark"]
 
 
@@ -89,7 +88,7 @@ def curves(
     matplotlib.figure.Figure
     """
     panels = list(dict.fromkeys(curve.panel for curve in drawn))
-    with _styled(6.4, 3.8 if len(panels) == 1 else 2.2 * len(panels)) as figure:
+    with styled(6.4, 3.8 if len(panels) == 1 else 2.2 * len(panels)) as figure:
         all_axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
         for axes, panel in zip(all_axes, panels):
             if filled is not None:
@@ -144,7 +143,7 @@ def colour_map(
     numbers = [float(n) for n in range(int(low or 0), int(high or 0) + 1)] if few else []
     if few:  # one colour per number
         norm = BoundaryNorm([number - 0.5 for number in [*numbers, numbers[-1] + 1.0]], colormaps[PALETTE].N)
-    with _styled(6.4, 4.6) as figure:
+    with styled(6.4, 4.6) as figure:
         axes = figure.subplots()
         axes.grid(False)
         edges = _edges(along_x, x.log), _edges(along_y, y.log)
@@ -188,11 +187,7 @@ def colour_map(
     return figure
 
 
-_LINES = (
-    ("white", "solid"),
-    ("white", "dashed"),
-    ("white", "dotted"),
-)  # colour and style of each set of contours, in order
+_LINES = [("white", style) for style in ("solid", "dashed", "dotted")]  # of each set of contours, in order
 
 
 def _finer(x: np.ndarray, y: np.ndarray, data: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -213,90 +208,6 @@ def _edges(centres: np.ndarray, log: bool) -> np.ndarray:
         middle = 0.5 * (place[1:] + place[:-1])
         place = np.concatenate([[2 * place[0] - middle[0]], middle, [2 * place[-1] - middle[-1]]])
     return np.exp(place) if log else place
-
-
-def plan(corners: Any, points: Any, labels: Sequence[str], *, title: str = "", colors: Sequence[str] = ()) -> Figure:
-    """Draw a plate from above, or a beam from the side, with its strike points.
-
-    Parameters
-    ----------
-    corners : array_like, shape (n_corners, 2) [m] of a plate; (2, 1) of a beam
-    points : array_like, shape (n_points, 2 or 1) [m]
-    labels : sequence of str, one for each point
-    colors : sequence of str, one for each point
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
-    outline, places = np.asarray(corners, float), np.atleast_2d(np.asarray(points, float))
-    beam = outline.shape[1] == 1
-    with _styled(6.4, 1.9 if beam else 4.2) as figure:
-        axes = figure.subplots()
-        axes.grid(False)
-        if beam:
-            thick = 0.02 * float(np.ptp(outline))
-            outline = np.array([[x, y] for x, y in zip(outline[[0, 1, 1, 0], 0], [-thick, -thick, thick, thick])])
-            places = np.column_stack([places[:, 0], np.full(len(places), thick)])
-        axes.add_patch(Polygon(outline, closed=True, facecolor=SKY, edgecolor=BLUE, alpha=0.5))
-        size = float(np.ptp(outline, axis=0).max())
-        for i, (place, label) in enumerate(zip(places, labels)):
-            paint = colors[i] if colors else VERMILION
-            if beam:
-                arrow = {"arrowstyle": "-|>", "color": paint, "lw": 2.0}
-                high = place + np.array([0.0, 0.1 * size])
-                axes.annotate("", place, high, arrowprops=arrow)
-                axes.text(high[0], high[1] + (0.012 + 0.04 * (i % 2)) * size, label, ha="center", color=paint)
-            else:
-                axes.plot(*place, "*", color=paint, ms=14)
-                axes.annotate(label, place, (0, 11), textcoords="offset points", ha="center", color=paint)
-        axes.set_title(title)
-        axes.set_aspect("equal")
-        axes.set(xlabel="position [m]", ylabel="" if beam else "position [m]")
-        if beam:
-            axes.set(ylim=(-0.06 * size, 0.2 * size), yticks=[])
-            axes.spines["left"].set_visible(False)
-        axes.margins(0.05)
-    return figure
-
-
-def blow(corners: Any, at: Any, *, title: str = "") -> Figure:
-    """Draw a plate in oblique view, struck through a spring by the free end of a stick hinged at its far end.
-
-    Parameters
-    ----------
-    corners : array_like, shape (n_corners, 2) [m]
-    at : strike point, (2,) [m]
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
-    outline = np.asarray(corners, float) @ TILT.T
-    foot = np.asarray(at, float) @ TILT.T
-    size = float(np.ptp(outline, axis=0).max())
-    tip, hinge = (foot + size * np.array(shift) for shift in ((0.0, 0.16), (0.8, 0.33)))
-    with _styled(6.4, 3.4) as figure:
-        axes = figure.subplots()
-        axes.axis("off")
-        axes.add_patch(Polygon(outline, closed=True, facecolor=SKY, edgecolor=BLUE, alpha=0.5, lw=1.5))
-        turns = np.linspace(0.0, 1.0, 17)
-        width = 0.018 * size * np.where((turns > 0.1) & (turns < 0.9), (-1.0) ** np.arange(17), 0.0)
-        axes.plot(foot[0] + width, foot[1] + turns * (tip - foot)[1], color=VERMILION, lw=1.8)
-        axes.plot(*foot, "*", color=VERMILION, ms=12)
-        axes.plot(*np.transpose([tip, hinge]), color="#7A1F1F", lw=7, solid_capstyle="round")
-        axes.plot(*hinge, "o", mfc="white", mec=BLACK, ms=9, mew=1.8)
-        for text, place, align in (
-            ("plate, hinged all round", outline.min(axis=0) + size * np.array([0.02, -0.05]), "left"),
-            ("contact spring", 0.5 * (foot + tip) - size * np.array([0.04, 0.0]), "right"),
-            ("stick", 0.5 * (tip + hinge) + size * np.array([0.0, 0.05]), "center"),
-            ("hinge", hinge + size * np.array([0.03, 0.0]), "left"),
-        ):
-            axes.text(place[0], place[1], text, ha=align, va="center")
-        axes.set_title(title)
-        axes.set_aspect("equal")
-        axes.margins(0.08)
-    return figure
 
 
 def hammers(found: Sequence[Hammer], bandwidth: float, drop: float = 10.0) -> Any:

@@ -2,12 +2,15 @@
 
 import numpy as np
 
+from .._base import check
 from ..impact.response import Response
+from ..mesh.mesh_files import quartered
 from ..modes.modal import Modes
 
 ENOUGH = 2500  # [-] points on a plate: several per half wave in the first hundred modes
 RIBBON = 0.06  # [-] a beam is drawn as a ribbon: width over length
 AFTER = 1.35  # [-] end of the animation over the end of the last contact
+MOST_FRAMES = 1000  # [-] most frames of an animation: 0.2 GB or minutes of work
 HALVINGS = 5  # [-] most refinements; each splits a triangle into four
 
 
@@ -20,7 +23,8 @@ def grid(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
     for _ in range(HALVINGS):
         if modes.dimension != 2 or cells.shape[1] != 3 or len(points) >= ENOUGH:
             break
-        points, cells = _halved(points, cells)
+        cells, sides = quartered(cells, len(points))
+        points = np.vstack([points, points[sides].mean(axis=1)])
     return points, cells
 
 
@@ -45,12 +49,21 @@ def surface(modes: Modes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return plane[:, :1], cells, plane
 
 
+def gallery(modes: Modes, points: np.ndarray, count: int, columns: int) -> tuple[np.ndarray, int, int]:
+    """The first shapes at points, each with largest value 1, (n_points, n); rows and columns to draw them in."""
+    check.between("dimension of modes", modes.dimension, 1, 2)
+    count = min(check.count("count", count), modes.n_modes)
+    columns = min(check.count("columns", columns), count)
+    shapes = modes.truncated(n_modes=count).shapes.at(points)
+    return shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300), -(-count // columns), columns
+
+
 def gap(response: Response, times: np.ndarray) -> np.ndarray:
     """Distance between striker and struck surface [m], (n_times,); zero during contact."""
     striker = response.striker
     if striker is None or response.at is None:
         raise ValueError("response must have a striker, got one of collide; use the response of strike")
-    tip = response.displacement(striker.at[None] if striker.modes.dimension else None, times, body=0)
+    tip = response.displacement(striker.at[None], times, body=0)
     return np.maximum(response.displacement(response.at[None], times) - tip, 0.0)[:, 0]
 
 
@@ -64,13 +77,3 @@ def telling(response: Response, times: np.ndarray) -> int:
     assert response.at is not None
     deflection = np.abs(response.displacement(response.at[None], times)[:, 0])
     return int(np.argmax(deflection >= 0.5 * deflection.max()))
-
-
-def _halved(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    sides = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)  # (3 n_cells, 2)
-    unique, number = np.unique(sides, axis=0, return_inverse=True)
-    middle = len(points) + number.reshape(-1, 3)  # (n_cells, 3) opposite vertices 2, 0, 1
-    a, b, c = cells.T
-    ab, bc, ca = middle.T
-    quarters = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    return np.vstack([points, points[unique].mean(axis=1)]), np.vstack([np.column_stack(q) for q in quarters])

@@ -8,10 +8,10 @@ from dataclasses import dataclass, fields
 from functools import partial
 
 import numpy as np
-from scipy import special
 
 from ..impact.collision import RESOLVED, rest_mode
 from ..impact.compiled import many_blows, propagation
+from ..impact.contact import wall_time
 from ..impact.striker import Striker
 from ..modes.modal import Modes
 
@@ -47,7 +47,7 @@ class Family:
         """The family of a blow; if ``lossy``, the residual compliance becomes an extra mode, as in `strike`."""
         parts = []
         for body, point in ((modes, at), (striker.modes, striker.at)):
-            place = point[None] if body.dimension else None
+            place = point[None]
             rest = float(body.residual_compliance(place)[0, 0]) if residual and body.dimension else 0.0
             rest = max(0.0, rest) * body.mass
             omega, zeta = np.array(body.omega), np.array(body.damping_ratio)
@@ -301,10 +301,7 @@ class _Engine:
         force depends on the rate of approach, so that more modes ring in it.
         """
         stiffness, exponent, rest, loss = self.law
-        q = 1.0 / (exponent + 1.0)
-        deepest = np.exp(q * np.log(0.5 / (q * stiffness * self.rigid)))
-        duration = 2.0 * np.sqrt(np.pi) * special.gamma(1.0 + q) / special.gamma(0.5 + q) * deepest
-        duration *= np.where(exponent == 1.0, np.sqrt(1.0 + stiffness * rest), 1.0)
+        duration = wall_time(stiffness, exponent, self.rigid, 1.0, rest)
         count = STEPS * (1e-3 / tolerance) ** (1.0 / STEP_ORDER)
         step = np.ceil(2.0 * np.log2(np.maximum(count / duration, PER_PERIOD * self.band))).astype(int)
         for body in (0, 1):

@@ -15,44 +15,33 @@ import xarray
 
 from .._base import check
 from .._base.check import SimulationError
+from ..impact import accuracy
 from ..impact.collision import strike
 from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
+from ..model.planner import COSTLY
 from ..modes.modal import Modes, SampledShapes
 from . import batches
-from .store import Texts, by_cluster, by_store
+from .store import LARGEST_BLOCK, Texts, by_cluster, by_store
 
 TOLERANCE = 1e-3  # [-] default error limit of a map
-AXES = {  # name: unit, what it is
-    "mass": ("kg", "mass of the striker"),
-    "striker_frequency": ("Hz", "first flexible frequency of the striker"),
-    "stiffness": ("N/m**exponent", "stiffness of the contact"),
-    "exponent": ("", "exponent of the contact"),
-    "loss": ("s/m", "loss factor of the contact"),
-    "gap": ("m", "distance the striker travels before contact"),
-    "speed": ("m/s", "speed of the striker's contact point"),
-    "at": ("m", "strike point"),
-    "target_mass": ("kg", "mass of the struck body"),
-    "target_frequency": ("Hz", "first flexible frequency of the struck body"),
-    "damping_ratio": ("", "damping ratio of the struck body"),
+AXES = {  # name: unit, what it is, its name in a scene file
+    "mass": ("kg", "mass of the striker", "striker.mass"),
+    "striker_frequency": ("Hz", "first flexible frequency of the striker", "striker.first_frequency"),
+    "stiffness": ("N/m**exponent", "stiffness of the contact", "contact.stiffness"),
+    "exponent": ("", "exponent of the contact", "contact.exponent"),
+    "loss": ("s/m", "loss factor of the contact", "contact.loss"),
+    "gap": ("m", "distance the striker travels before contact", "contact.gap"),
+    "speed": ("m/s", "speed of the striker's contact point", "strike.speed"),
+    "at": ("m", "strike point", "strike.at"),
+    "target_mass": ("kg", "mass of the struck body", "target.mass"),
+    "target_frequency": ("Hz", "first flexible frequency of the struck body", "target.first_frequency"),
+    "damping_ratio": ("", "damping ratio of the struck body", "target.damping_ratio"),
 }
-ALIASES = {  # the same parameters as a scene file names them
-    "striker.mass": "mass",
-    "striker.first_frequency": "striker_frequency",
-    "contact.stiffness": "stiffness",
-    "contact.exponent": "exponent",
-    "contact.loss": "loss",
-    "contact.gap": "gap",
-    "strike.speed": "speed",
-    "strike.at": "at",
-    "target.mass": "target_mass",
-    "target.first_frequency": "target_frequency",
-    "target.damping_ratio": "damping_ratio",
-}
+ALIASES = {alias: name for name, (_, _, alias) in AXES.items()}
 FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  # each value needs new kernels
 REACH = 1e30  # [SI] speeds, masses and frequencies lie between 1/REACH and REACH: beyond, the kernels never finish
-BLOCK = 2**17  # [-] cells computed together; needs about 30 MB
 LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
     "n_impacts": ("", "number of separate contacts"),
     "contact_time": ("s", "total time in contact"),
@@ -66,8 +55,6 @@ LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
 
 MOST_CELLS = 10**8  # [-] default limit of a map: half an hour to two hours of work, 8 GB
 SECONDS = {True: 1e-5, False: 2e-3}  # [s] per blow, in a batch or alone: the slower plates of studies/map_speed.py
-NUMBER = 8  # [byte] per float
-COSTLY = 10.0, 2e9  # [s], [byte] a map announces its cost above either of these
 Watch = Callable[[int, int], Any]
 Tell = Callable[[str], Any]
 
@@ -81,6 +68,11 @@ class Case:
     contact: Contact
     at: np.ndarray  # (dimension,) [m]
     speed: float  # [m/s]
+
+    @property
+    def resonance(self) -> float:
+        """Contact resonance [Hz] of the striker on a rigid wall."""
+        return accuracy.contact_resonance(self.contact, self.striker.felt_mass, self.speed)
 
     def changed(self, name: str, value: Any) -> "Case":
         """The same blow with one parameter of `AXES` replaced."""
@@ -157,7 +149,7 @@ class Grid:
         return {
             "target": _plain(self.base.modes, self.base.at),
             "striker": _plain(self.base.striker.modes, self.base.striker.at),
-            "contact": {"stiffness": law.stiffness, "exponent": law.exponent, "loss": law.loss, "gap": law.gap},
+            "contact": dict(vars(law)),
             "speed": self.base.speed,
         }
 
@@ -251,7 +243,7 @@ def sweep(
     ValueError
         If an axis is unknown, a value is not allowed, or the map is too large.
     """
-    tolerance = check.between("tolerance", tolerance, 1e-12, 1.0)
+    tolerance = check.tolerance(tolerance)
     base = Case(modes, striker, contact, modes.point("at", at)[0], check.positive("speed", speed, "m/s", reach=REACH))
     band = None if max_frequency is None else check.positive("max_frequency", max_frequency, "Hz")
     workers = None if workers is None else check.count("workers", workers)
@@ -273,7 +265,7 @@ def sweep(
 def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, tell: Tell | None = None) -> None:
     """Refuse a map with too many cells; announce the cost of a large one."""
     seconds = n_cells * SECONDS[quick] / (os.cpu_count() or 1)
-    memory = n_cells * NUMBER * (n_layers + 2.0)
+    memory = 8.0 * n_cells * (n_layers + 2.0)  # [byte]
     cost = f"{n_cells:.3g} cells: about {seconds:.2g} s on this machine and {memory / 1e9:.2g} GB of memory"
     if n_cells > max_cells:
         raise ValueError(f"over asks for {cost}; give fewer values, or raise max_cells, now {max_cells:.3g}")
@@ -291,8 +283,8 @@ def _solve_all(
         return by_store(grid, store, partial(solve, workers=workers), watch)
     numbers = np.empty((len(grid.layers), grid.n_cases))
     texts: Texts = {}
-    for start in range(0, grid.n_cases, BLOCK):
-        stop = min(start + BLOCK, grid.n_cases)
+    for start in range(0, grid.n_cases, LARGEST_BLOCK):
+        stop = min(start + LARGEST_BLOCK, grid.n_cases)
         numbers[:, start:stop], new = solve(grid, start, stop, workers=workers)
         texts |= new
         if watch is not None:
@@ -326,17 +318,10 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
     numbers = np.full((len(names), stop - start), np.nan)
     place = dict(zip(grid.axes, np.unravel_index(np.arange(start, stop), grid.shape)))
     law = grid.base.contact
+    base = {"target_mass": grid.base.modes.mass, "mass": grid.base.striker.mass, "speed": grid.base.speed, **vars(law)}
     column = {
         name: grid.axes[name][place[name]] if name in place else np.full(stop - start, value)
-        for name, value in (
-            ("target_mass", grid.base.modes.mass),
-            ("mass", grid.base.striker.mass),
-            ("stiffness", law.stiffness),
-            ("exponent", law.exponent),
-            ("speed", grid.base.speed),
-            ("loss", law.loss),
-            ("gap", law.gap),
-        )
+        for name, value in base.items()
     }
     quick = (column["exponent"] >= 1.0) & (column["gap"] >= 0.0) & (not grid.extra)
     cells = np.flatnonzero(quick)
@@ -436,12 +421,12 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray) -> xarray.Da
 
 def _plain(modes: Modes, at: np.ndarray) -> dict[str, Any]:
     """A body and its contact point as plain numbers."""
-    place = at[None] if modes.dimension else None
+    place = at[None]
     return {
         "mass": modes.mass,
         "frequencies": modes.frequencies.tolist(),
         "damping_ratios": modes.damping_ratio.tolist(),
         "at": at.tolist(),
         "shape": modes.shape_at(place)[0].tolist(),
-        "residual_compliance": float(modes.residual_compliance(place)[0, 0]) if modes.dimension else 0.0,
+        "residual_compliance": float(modes.residual_compliance(place)[0, 0]),
     }

@@ -20,7 +20,7 @@ TOLERANCE = 1e-2  # [-] error limit of the blows that decide
 TIPS = np.geomspace(0.03, 10.0, 61)  # [-] stiffnesses tried, over that whose half sine has the bandwidth; 24 per decade
 ROUNDS = 7  # [-] bisections for the softest tip that reaches the bandwidth
 MASSES = (1e-6, 1e4)  # [kg] allowed: outside, a blow takes too long to compute or overflows
-BANDWIDTHS = (1e-3, 1e9)  # [Hz] allowed, for the same reason
+BANDWIDTHS = (1e-3, 1e9)  # [Hz] allowed, for the same reason as the masses
 LOOKS = 400  # [-] frequencies at which the spectrum is evaluated to find where it falls
 
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from .._base import check
 
-LARGEST_BLOCK = 2**17  # [-] cells in a block at most: about half a second of work and 30 MB
+LARGEST_BLOCK = 2**17  # [-] cells computed together at most: about half a second of work and 30 MB
 BLOCKS = 64  # [-] fewest blocks of a large map: a killed run loses at most one block per worker
-TEXT = 240  # [byte] longer error texts are cut
+TEXT = 240  # [byte] longer error texts are cut, because every cell has room for one
 EXTRA = "pip install 'fem-impact[cluster]'"
 
 Texts = dict[int, str]  # failed cell: error text

@@ -1,4 +1,4 @@
-"""A mesh file is read apart: what never ends, fills the memory, dies or looks elsewhere becomes one sentence."""
+"""A mesh file is read apart: what never ends, fills the memory or dies becomes one sentence."""
 
 import os
 import subprocess
@@ -78,17 +78,6 @@ def test_file_that_unpacks_to_more_than_the_memory_is_refused(tmp_path):
         mesh.load(path)
 
 
-@pytest.mark.parametrize("place", ["{folder}/secret.inp", "../secret.inp", "/etc/passwd"])
-def test_files_that_a_mesh_includes_must_lie_beside_it(tmp_path, place):
-    (tmp_path / "in").mkdir()
-    (tmp_path / "secret.inp").write_text("*NODE\n1, 7.25, 7.5, 0.\n")
-    path = tmp_path / "in" / "plate.inp"
-    path.write_text("*INCLUDE, INPUT=" + place.format(folder=tmp_path) + "\n*NODE\n1, 0., 0., 0.\n")
-    with pytest.raises(ValueError, match="it refers to a file outside its folder") as caught:
-        mesh.load(path)
-    assert "7.25" not in str(caught.value) and "root" not in str(caught.value)
-
-
 def test_a_mesh_may_include_what_lies_beside_it(tmp_path):
     written(tmp_path / "part.inp")
     (tmp_path / "whole.inp").write_text("*INCLUDE, INPUT=part.inp\n")
@@ -132,7 +121,6 @@ def test_every_format_that_hdf5_holds_is_read(tmp_path):
 def test_missing_hdf5_is_named(tmp_path, monkeypatch):
     (tmp_path / "plate.med").write_bytes(b"\x89HDF\r\n\x1a\n")
     monkeypatch.setitem(sys.modules, "h5py", None)
-    monkeypatch.setattr(isolated, "confine", lambda path: None)  # it would bind this process for good
     assert isolated.main(tmp_path / "plate.med", "mesh.meshio_reader:arrays", []) == (
         1,
         b"this needs h5py: pip install 'fem-impact[hdf5]'",

@@ -53,7 +53,7 @@ def test_the_claim_covers_the_truth_and_is_of_its_size(body, divisions):
     assert 0.7 < np.median(ratio) < 6.0
 
 
-@pytest.mark.parametrize("edge", analytic.ENDS)
+@pytest.mark.parametrize("edge", analytic.KINDS)
 @pytest.mark.parametrize("radius", [0.01, 1.0, 100.0])
 def test_closed_form_disks(edge, radius):
     plate = fi.Plate(STEEL, 1e-2 * radius)

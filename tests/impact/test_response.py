@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.impact import response
+from fem_impact.impact import force_spectrum
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def test_spectrum_is_that_of_a_half_sine(half_sine):
 def test_spectrum_of_many_pieces_is_the_same_by_transform(half_sine, monkeypatch, highest):
     frequencies = np.append(np.linspace(-highest, highest, 501), 0.123 * highest)
     summed = half_sine.spectrum(frequencies)
-    monkeypatch.setattr(response, "MOST_TERMS", 0)
+    monkeypatch.setattr(force_spectrum, "MOST_TERMS", 0)
     # impulses in cells fold the kinks at both ends into the band: 2e-6 was measured at most, on blows with more of them
     assert_allclose(half_sine.spectrum(frequencies), summed, rtol=0, atol=1e-5 * np.abs(summed).max())
     assert_allclose(half_sine.spectrum([0.0]), [half_sine.impulse], rtol=1e-5)  # by the sum: a transform has no band

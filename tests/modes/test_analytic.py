@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from fem_impact.fe import section
 from fem_impact.modes import analytic
 
-ENDS = list(itertools.product(analytic.ENDS, repeat=2))
+ENDS = list(itertools.product(analytic.KINDS, repeat=2))
 
 
 def disk_quadrature(radius, n_radial=80, n_angle=128):
@@ -66,7 +66,7 @@ def test_beam_modes_are_orthonormal_up_to_high_order(ends):
     assert_allclose(gram, np.eye(300), atol=1e-12)  # 1000 points integrate the products to rounding
 
 
-@pytest.mark.parametrize("edge", analytic.ENDS)
+@pytest.mark.parametrize("edge", analytic.KINDS)
 def test_disk_modes_are_orthonormal(edge):
     modes = analytic.disk(0.7, edge=edge, mass=0.3, first_frequency=50.0, n_modes=120)
     points, weight = disk_quadrature(0.7)
@@ -90,7 +90,7 @@ PLATES = {
     "rectangle": lambda n: analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=n),
     **{
         edge: lambda n, edge=edge: analytic.disk(0.5, edge=edge, mass=0.2, first_frequency=100.0, n_modes=n)
-        for edge in analytic.ENDS
+        for edge in analytic.KINDS
     },
 }
 
@@ -130,7 +130,7 @@ def test_sections_give_absolute_frequencies():
 DISK_FIRST = {"clamped": 10.2158262, "hinged": 4.93514904, "free": 5.3583298}  # omega R**2 sqrt(rho h / D), nu = 0.3
 
 
-@pytest.mark.parametrize("edge", analytic.ENDS)
+@pytest.mark.parametrize("edge", analytic.KINDS)
 @pytest.mark.parametrize("radius", [0.01, 0.2, 3.0, 100.0])
 def test_a_disk_of_a_section_has_absolute_frequencies_and_compliance_at_every_size(edge, radius):
     plate = section.Plate(STEEL, thickness=1e-3 * radius)

@@ -7,7 +7,7 @@ import pytest
 from test_cli import TEXT
 
 import fem_impact as fi
-from fem_impact.impact import accuracy
+from fem_impact.impact import accuracy, force_spectrum
 from fem_impact.pages import explore_model
 
 
@@ -49,7 +49,7 @@ def test_map_counts_as_single_blows_do(stand):
 def test_limit_is_where_the_contact_resonates_at_the_threshold(stand):
     picture = stand.picture(replace(stand.start, exponent=2.0))
     there = replace(stand.start, exponent=2.0, mass=picture.mass[5], stiffness=picture.limit[5])
-    assert explore_model.resonance_of(stand.case(there)) == pytest.approx(picture.threshold[5], rel=1e-9)
+    assert stand.case(there).resonance == pytest.approx(picture.threshold[5], rel=1e-9)
 
 
 def test_guessed_compliance_gives_the_same_blow_where_it_is_right(stand):
@@ -64,7 +64,7 @@ def test_quick_spectrum_is_the_exact_one_to_the_eye(stand):
     frequencies = np.geomspace(20.0, 5e3, 50)
     exact = np.abs(hit.spectrum(frequencies))
     np.testing.assert_allclose(
-        explore_model.spectrum(hit, frequencies), exact, atol=2e-3 * exact.max()
+        force_spectrum.magnitude(hit.time, hit.force, frequencies), exact, atol=2e-3 * exact.max()
     )  # a pixel of 300
 
 
