@@ -355,8 +355,6 @@ def _strike(options: argparse.Namespace) -> None:
         print(json.dumps(data, indent=2, allow_nan=False))
         return
     print(_wrapped(scene.title or str(scene.path)))
-    for note in run.notes:
-        print(_wrapped(f"mesh: {note}"))
     print(_wrapped(run.response.summary()))
     if run.plan.target != "modal":
         print(
@@ -472,6 +470,7 @@ def _map(options: argparse.Namespace) -> None:
     axes = ", ".join(f"{name} ({size})" for name, size in table.sizes.items())
     single, failed = int((table.n_impacts == 1).sum()), int((table.n_impacts < 0).sum())
     print(_wrapped(f"{table.n_impacts.size} blows over {axes}: {single} hit once, {failed} failed"))
+    _print_notes(table.attrs["notes"].splitlines())
     print(_wrapped(f"Time: {time.perf_counter() - began:.2f} s"))
     print(_wrapped(f"Files in {folder}{os.sep}: {', '.join(names)}"))
 
@@ -549,9 +548,11 @@ def _modes(options: argparse.Namespace) -> None:
             fi.export.write_vtk(staging / options.vtk.name, modes)
     if options.json:
         data = {"frequencies": modes.frequencies, "damping_ratios": modes.damping_ratio, "mass": modes.mass}
+        data["notes"] = list(modes.notes)
         print(json.dumps(fi.export.plain({**data, "versions": fi.export.versions()}), indent=2, allow_nan=False))
         return
     print(_wrapped(scene.title or str(scene.path)))
+    _print_notes(modes.notes)
     print(f"{'mode':>5} {'frequency':>14} {'damping ratio':>14}")
     for i, (frequency, ratio) in enumerate(zip(modes.frequencies, modes.damping_ratio), 1):
         print(f"{i:5d} {frequency:11.5g} Hz {ratio:14.3g}")
@@ -594,6 +595,11 @@ def _completion(parser: argparse.ArgumentParser) -> str:
             "complete -o default -F _fem_impact fem-impact",
         ]
     )
+
+
+def _print_notes(notes: Sequence[str]) -> None:
+    for note in notes:
+        print(_wrapped(f"Note: {note}"))
 
 
 def _wrapped(text: str) -> str:

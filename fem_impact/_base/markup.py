@@ -35,6 +35,11 @@ def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = ()) -> str:
     return f"<table>{f'<thead><tr>{top}</tr></thead>' if top else ''}<tbody>{body}</tbody></table>"
 
 
+def notes(lines: Iterable[str]) -> str:
+    """Notes, each a paragraph; all text is escaped."""
+    return "".join(f"<p>Note: {html.escape(line)}</p>" for line in lines)
+
+
 def side_by_side(*parts: str) -> str:
     """HTML pieces side by side; the row wraps on narrow pages."""
     return f'<div style="display:flex;flex-wrap:wrap;gap:1.5em;align-items:flex-start">{"".join(parts)}</div>'

@@ -34,6 +34,7 @@ class Plan:
     memory: float  # [byte] predicted
     mass: float = 0.0  # [kg] mass of the target
     mobility: float = 0.0  # [m/(N s)] of an infinite plate
+    notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
     first: Any = field(default=None, repr=False, compare=False)  # the first modes of the target, if they were needed
 
     @property
@@ -85,4 +86,5 @@ class Plan:
         lines.append(f"Cost: {self.cost}")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")
+        lines += [f"Note: {note}" for note in self.notes]
         return "\n".join(lines)

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from .._base import check
-from ..fe import refinement
-from ..fe.assembly import System, support_of_facets
+from ..fe import plausible, refinement
+from ..fe.assembly import System, notes_on, support_of_facets
 from ..impact import accuracy, collision
 from ..impact.collision import BAND_POINTS
 from ..impact.contact import Contact
 from ..impact.quantities import asked_for
 from ..impact.response import Response
 from ..impact.striker import Striker
-from ..modes.modal import FieldShapes, Modes
+from ..modes.modal import FieldShapes, Modes, at_rest, damping_notes
 from . import idealisation
 from .plan import Plan
 
@@ -48,7 +48,7 @@ class Run:
     response: Response
     seconds: Mapping[str, float]  # [s] wall time of each stage, by its name
     plan: Plan  # the plan as run, with the actual number of modes and errors
-    notes: tuple[str, ...] = ()  # repairs of the mesh and assumptions about it
+    notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
     verified: Mapping[str, float] | None = None  # [-] differences from a finer run, see `verify`
     finer: Plan | None = None  # plan of the finer run
 
@@ -91,6 +91,7 @@ class _Outside:
     rigid: float  # [-] error of treating it as rigid
     endless: float  # [-] error of treating it as infinite; inf if that is wrong or unknown
     mobility: float  # [m/(N s)] of the infinite plate; inf if unknown
+    notes: tuple[str, ...]  # as in `Plan`
 
 
 def make(scene: Any, changes: Mapping[str, Any], stages: Stages) -> Plan:
@@ -129,8 +130,7 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     error = replace(response.error, idealisation=idealised)
     response = replace(response, tolerance=blow.tolerance, error=error)
     plan = replace(plan, n_modes=modes.n_modes if plan.target == "modal" else 0)
-    notes = plan.first.shapes.system.mesh.notes if plan.n_dofs else ()
-    return Run(response, MappingProxyType(stages.seconds), plan, notes)
+    return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
 
 
 def tolerance_of(scene: Any, values: Mapping[str, Any] | None = None) -> float:
@@ -223,7 +223,7 @@ def _idealised(scene: Any, changes: Mapping[str, Any], blow: _Blow, target: str 
     dropped = "no mesh and no modes are needed; the target's sound is not computed"
     return _plan(
         scene, changes, blow, target=target, errors=error, reasons=(kept, dropped), mass=seen.mass,
-        mobility=seen.mobility if target == "infinite" else 0.0,
+        mobility=seen.mobility if target == "infinite" else 0.0, notes=seen.notes,
     )  # fmt: skip
 
 
@@ -231,7 +231,7 @@ def _outside(scene: Any, blow: _Blow, stages: Stages) -> _Outside | None:
     """What is known of the target without finite elements; None if that is not enough."""
     scale, find = scene.scale, scene.closed_form()
     mass, duration = blow.striker.felt_mass, blow.duration
-    stretch, rigid = 1.0, np.inf
+    stretch, rigid, notes = 1.0, np.inf, damping_notes(np.array([scene.damping_ratio]), np.ones(1))
     if find is not None:
         with stages("modes"):
             first = find(FIRST_LOOK)
@@ -239,13 +239,14 @@ def _outside(scene: Any, blow: _Blow, stages: Stages) -> _Outside | None:
         stretch = modes.frequencies[-1] / first.frequencies[-1]
         with scene.blame("strike"):
             at = modes.point("at", blow.values["at"])[0]
+        notes = plausible.together(modes.notes, notes, at_rest(modes, at[None]))
         most = modes.frequencies[-1] * (MOST_LOOKED_AT / FIRST_LOOK) ** (2.0 / modes.dimension)
         limit = min(LOOK * 0.5 / duration, most)
         if limit > modes.frequencies[-1]:
             modes = find(FIRST_LOOK, limit / stretch, first).scaled(**scale)
         rigid = idealisation.rigid_error(modes, at, mass, duration)
         if modes.dimension == 1:
-            return _Outside(modes.mass, rigid, np.inf, np.inf)
+            return _Outside(modes.mass, rigid, np.inf, np.inf, notes)
     with stages("mesh"):
         body = scene.body()
     if body.dimension == 1:
@@ -258,7 +259,7 @@ def _outside(scene: Any, blow: _Blow, stages: Stages) -> _Outside | None:
     if view is None:
         return None
     section = scene.make_section("plate")
-    material = section.material
+    material, notes = section.material, plausible.together(notes_on(body, section), notes)
     rate = stretch * section.thickness * float(np.sqrt(material.E / 12.0 / (1.0 - material.nu**2) / material.rho))
     whole = scale.get("mass", section.thickness * material.rho * view.area)
     if find is None:
@@ -268,10 +269,10 @@ def _outside(scene: Any, blow: _Blow, stages: Stages) -> _Outside | None:
             low = rate * float(np.sqrt(min(material.E, material.E_across or np.inf) / material.E))
         rigid = idealisation.rigid_bound(view, whole, low, free, mass, duration)
         if "first_frequency" in scale or material.E_across is not None or section.tension:
-            return _Outside(whole, rigid, np.inf, np.inf)
+            return _Outside(whole, rigid, np.inf, np.inf, notes)
     mobility = view.area / (8.0 * rate * whole)
     far = idealisation.endless_error(view, mobility, rate, mass, duration)
-    return _Outside(whole, rigid, far, mobility)
+    return _Outside(whole, rigid, far, mobility, notes)
 
 
 def _modal(
@@ -315,6 +316,9 @@ def _modal(
     plan = _plan(
         scene, changes, blow, target="modal", errors={"target modes left out": left}, reasons=(why, kept),
         mass=modes.mass, n_modes=number, max_frequency=limit, first=first, element="closed form", margin=margin,
+        notes=plausible.together(
+            modes.damped(scene.damping_ratio).notes, at_rest(modes, modes.point("at", blow.values["at"]))
+        ),
     )  # fmt: skip
     if isinstance(first.shapes, FieldShapes):
         plan = _with_mesh(plan, first, first.shapes.system, limit * first.frequencies[-1] / modes.frequencies[-1])
@@ -339,7 +343,7 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
 
 
 def _plan(
-    scene: Any, changes: Mapping[str, Any], blow: _Blow, *, errors, reasons, n_modes=0, margin=1.0, **chosen: Any
+    scene: Any, changes: Mapping[str, Any], blow: _Blow, *, errors, reasons, notes, n_modes=0, margin=1.0, **chosen: Any
 ) -> Plan:
     """The plan for any target: adds striker modes and time steps, with their errors and cost."""
     kept, left = _striker_modes(blow, margin)
@@ -371,6 +375,7 @@ def _plan(
         reasons=reasons,
         seconds=RATES["start"] + RATES["steps"] * 10.0 * count * (n_modes + kept),
         memory=BYTES["start"],
+        notes=plausible.together(notes, blow.striker.notes, tuple(plausible.number("speed", blow.values["speed"]))),
     )
 
 
@@ -394,8 +399,10 @@ def target(plan: Plan, stages: Stages, keep: Any = None) -> Modes:
     if plan.target != "modal":
         at = np.atleast_1d(np.asarray(blow.values["at"], float))
         if plan.target == "rigid":
-            return idealisation.unyielding(at, plan.mass)
-        return idealisation.endless(at, plan.mass, plan.mobility, blow.duration)
+            found = idealisation.unyielding(at, plan.mass)
+        else:
+            found = idealisation.endless(at, plan.mass, plan.mobility, blow.duration)
+        return replace(found, notes=plan.notes)
     find = scene.finder(stages, blow.tolerance, blow.pieces.get("size"))
     with stages("modes"):
         first, modes, number = plan.first, plan.first, blow.pieces.get("n_modes")

@@ -106,7 +106,7 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
         tiles=_tiles(response),
         error=_errors(response),
         modelled=_modelled(response, run),
-        reasons=map(tidy, (*run.plan.reasons, *run.notes)),
+        reasons=map(tidy, (*run.plan.reasons, *(f"note: {note}" for note in run.notes))),
         impacts=response.impacts,
         energies=_shares(response),
         sounds=_sounds(scene, response),
