@@ -322,7 +322,7 @@ def _strike(options: argparse.Namespace) -> None:
     if options.json:
         _print_json(data)
         return
-    _say(_title(scene), *(f"mesh: {note}" for note in run.notes), run.response.summary())
+    _say(_title(scene), run.response.summary())
     if run.plan.target != "modal":
         _say(f"Model: {run.plan.reasons[0]}; no modes and no sound (use --target modal or --quantity sound=5000)")
     if run.verified is not None:
@@ -416,6 +416,7 @@ def _map(options: argparse.Namespace) -> None:
     axes = ", ".join(f"{name} ({size})" for name, size in table.sizes.items())
     single, failed = int((table.n_impacts == 1).sum()), int((table.n_impacts < 0).sum())
     _say(_title(scene), f"{table.n_impacts.size} blows over {axes}: {single} hit once, {failed} failed")
+    _print_notes(table.attrs["notes"].splitlines())
     _say(f"Time: {time.perf_counter() - began:.2f} s", f"Files in {folder}{os.sep}: {', '.join(names)}")
 
 
@@ -487,9 +488,10 @@ def _modes(options: argparse.Namespace) -> None:
             fi.export.write_vtk(staging / options.vtk.name, modes)
     if options.json:
         data = {"frequencies": modes.frequencies, "damping_ratios": modes.damping_ratio, "mass": modes.mass}
-        _print_json({**data, "versions": fi.export.versions()})
+        _print_json({**data, "notes": list(modes.notes), "versions": fi.export.versions()})
         return
     _say(_title(scene))
+    _print_notes(modes.notes)
     rows = [
         (i, f"{frequency:.5g} Hz", f"{ratio:.3g}")
         for i, (frequency, ratio) in enumerate(zip(modes.frequencies, modes.damping_ratio), 1)
@@ -548,6 +550,11 @@ def _print_table(rows: Sequence[Sequence[Any]], head: Sequence[str] = ()) -> Non
 
 def _print_json(data: dict[str, Any]) -> None:
     print(json.dumps(fi.export.plain(data), indent=2, allow_nan=False))
+
+
+def _print_notes(notes: Sequence[str]) -> None:
+    for note in notes:
+        print(_wrapped(f"Note: {note}"))
 
 
 def _wrapped(text: str) -> str:

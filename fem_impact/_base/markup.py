@@ -46,6 +46,11 @@ def columns(rows: Iterable[Sequence[Any]], head: Sequence[str] = ()) -> list[str
     ]
 
 
+def notes(lines: Iterable[str]) -> str:
+    """Notes, each a paragraph; all text is escaped."""
+    return "".join(f"<p>Note: {html.escape(line)}</p>" for line in lines)
+
+
 def side_by_side(*parts: str) -> str:
     """HTML pieces side by side; the row wraps on narrow pages."""
     return f'<div style="display:flex;flex-wrap:wrap;gap:1.5em;align-items:flex-start">{"".join(parts)}</div>'

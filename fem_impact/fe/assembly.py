@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, eye_array
 from .._base import check
 from ..mesh.facets import Curves
 from ..mesh.meshes import Mesh, aligned
-from . import beam_elements
+from . import beam_elements, plausible
 from .beam_elements import HermiteSpace
 from .corners import around_corners
 from .elements import ArgyrisSpace, Bent, BentMapping, MorleySpace, numbering, quadrature, triangles
@@ -119,6 +119,11 @@ class System:
         """Number of unknowns not fixed by supports."""
         return self.K.shape[0]
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the mesh assumed, and numbers that are probably a slip of a unit."""
+        return notes_on(self.mesh, self.section)
+
     def contains(self, points: np.ndarray) -> np.ndarray:
         """Whether each point (n_points, dimension) [m] lies on the body, (n_points,) bool."""
         return self.space.locate(self.frame.local(points))[1]
@@ -211,6 +216,11 @@ def reassemble(system: System, mesh: Mesh) -> System:
     return assemble(
         mesh, section, supports, system.element, point_masses=masses, near=system.near, graded=system.graded
     )
+
+
+def notes_on(mesh: Mesh, section: Plate | Beam) -> tuple[str, ...]:
+    """What a mesh assumed, and numbers of the body that are probably a slip of a unit."""
+    return plausible.together(mesh.notes, plausible.body(np.ptp(mesh.points, axis=0), section))
 
 
 def support_of_facets(mesh: Mesh, supports: dict) -> list[str | Elastic]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check
+from . import plausible
 
 KINDS = ("clamped", "hinged", "free")  # supports of an edge besides `Elastic`
 Varying = float | Callable[[np.ndarray], Any]
@@ -75,6 +76,11 @@ class Material:
         for name, value in (("E_along", E_along), ("E_across", E_across), ("G", G)):
             check.positive(name, value, "Pa")
         return cls(E_along, nu, rho, E_across, G, angle)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Numbers that are allowed but probably a slip of a unit, in plain words."""
+        return plausible.material(self)
 
     @property
     def plane_stress(self) -> np.ndarray:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
-from ..modes.modal import Modes
+from ..fe import plausible
+from ..modes.modal import Modes, at_rest
 from . import force_spectrum
 from .compiled import law, propagation, record
 from .contact import Contact
@@ -243,6 +244,14 @@ class Response:
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What the bodies assumed, and numbers that are allowed but probably a slip of a unit, in plain words."""
+        striker = () if self.striker is None else self.striker.notes
+        place = () if self.at is None else at_rest(self.target, self.at[None])
+        speed = tuple(plausible.number("speed", abs(self.speed)))
+        return plausible.together(*(modes.notes for modes in reversed(self.bodies)), striker, speed, place)
 
     @property
     def target(self) -> Modes:
@@ -510,7 +519,7 @@ class Response:
         said = f"Contact force over time: {self.n_impacts} impacts, peak {self.peak_force:.4g} N"
         return markup.side_by_side(
             markup.curve(self.time[shown], force[shown], label="force", unit="N", title=said), markup.table(rows)
-        )
+        ) + markup.notes(self.notes)
 
     def summary(self) -> str:
         """The blow in a few readable lines."""
@@ -540,6 +549,7 @@ class Response:
             )
         if not error.resolvable:
             lines.append("not resolvable: the left-out modes govern this contact; keep more modes")
+        lines += [f"Note: {note}" for note in self.notes]
         return "\n".join(lines)
 
     @property

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check
+from ..fe import plausible
 from ..fe.section import Material
 from ..modes.analytic import beam
 from ..modes.modal import Modes, left_out
@@ -104,6 +105,11 @@ class Striker:
     def left_out(self) -> tuple[np.ndarray, np.ndarray]:
         """Residual compliance at the contact point, (1, 1) [m/N], and its estimated error, (1,)."""
         return left_out(self.modes, self.at[None], self.shape[None])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed, and numbers that are probably a slip of a unit."""
+        return plausible.together(self.modes.notes, () if self.material is None else self.material.notes)
 
     @property
     def felt_mass(self) -> float:

@@ -88,7 +88,8 @@ class Mesh:
             raise ValueError(
                 "this mesh has no outline and cannot be refined; make it with fi.mesh, or load a finer file"
             )
-        return self.recipe(size=self.size / check.positive("factor", factor))
+        finer = self.recipe(size=self.size / check.positive("factor", factor))
+        return replace(finer, notes=self.notes)
 
 
 def straight(points: np.ndarray, cells: np.ndarray, facets: np.ndarray, edges: dict, **rest) -> Mesh:
@@ -326,7 +327,7 @@ def _resized(mesh: Mesh, *, size: float) -> Mesh:
     parts = arrays["edges"]
     edges = {name: np.concatenate([parts[names[i]] for i in numbers]) for name, numbers in mesh.edges.items()}
     recipe = partial(_resized, mesh)
-    return Mesh(**{**arrays, "edges": edges}, recipe=recipe, size=size, notes=mesh.notes)
+    return Mesh(**{**arrays, "edges": edges}, recipe=recipe, size=size)
 
 
 def _divided(mesh: Mesh, *, size: float) -> Mesh:

@@ -11,7 +11,7 @@ from ..fe.section import Plate
 from ..fe.splitting import distance
 from ..impact import threshold
 from ..mesh.meshes import Mesh
-from ..modes.modal import Modes, SampledShapes
+from ..modes.modal import Modes, SampledShapes, at_rest
 from .target import Target
 
 PULSE = 1.77  # [-] peak response of an oscillator to a half sine, over its static response
@@ -36,6 +36,7 @@ class Outside:
     rigid: float  # [-] error of treating it as rigid
     endless: float  # [-] error of treating it as infinite; inf if that is wrong or unknown
     mobility: float  # [m/(N s)] of the infinite plate; inf if unknown
+    notes: tuple[str, ...] = ()  # on the strike point
 
 
 @dataclass(frozen=True)
@@ -212,19 +213,21 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
     if mesh is None or section is None:
         return None
     stretch, rigid = 1.0, np.inf
+    notes: tuple[str, ...] = ()
     if find is not None:
         first = find(n_modes=FIRST_LOOK)
         modes = target.finished(first)
         stretch = modes.frequencies[-1] / first.frequencies[-1]
         with target.blame("strike"):
             at = modes.point("at", at)[0]
+        notes = at_rest(modes, at[None])
         most = modes.frequencies[-1] * (MOST_LOOKED_AT / FIRST_LOOK) ** (2.0 / modes.dimension)
         limit = min(LOOK * 0.5 / duration, most)
         if limit > modes.frequencies[-1]:
             modes = target.finished(find(max_frequency=limit / stretch))
         rigid = rigid_error(modes, at, mass, duration)
         if modes.dimension == 1:
-            return Outside(modes.mass, rigid, np.inf, np.inf)
+            return Outside(modes.mass, rigid, np.inf, np.inf, notes)
     if not isinstance(section, Plate) or callable(section.thickness) or target.point_masses:
         return None
     kinds = support_of_facets(mesh, dict(target.supports))
@@ -244,7 +247,7 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
             low = rate * float(np.sqrt(min(material.E, material.E_across or np.inf) / material.E))
         rigid = rigid_bound(view, whole, low, free, mass, duration)
         if "first_frequency" in target.scale or material.E_across is not None or section.tension:
-            return Outside(whole, rigid, np.inf, np.inf)
+            return Outside(whole, rigid, np.inf, np.inf, notes)
     mobility = view.area / (8.0 * rate * whole)
     far = endless_error(view, mobility, rate, mass, duration)
-    return Outside(whole, rigid, far, mobility)
+    return Outside(whole, rigid, far, mobility, notes)

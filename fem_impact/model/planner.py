@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
-from ..fe import refinement
+from ..fe import plausible, refinement
 from ..fe.assembly import System
 from ..impact import accuracy, collision
 from ..impact.collision import BAND_POINTS
@@ -17,7 +17,7 @@ from ..impact.contact import Contact
 from ..impact.quantities import asked_for
 from ..impact.response import Response
 from ..impact.striker import Striker
-from ..modes.modal import Damping, FieldShapes, Modes
+from ..modes.modal import Damping, FieldShapes, Modes, at_rest
 from . import idealisation
 from .target import Stages, Target, Watch
 
@@ -90,6 +90,7 @@ class Plan:
     memory: float  # [byte] predicted
     mass: float = 0.0  # [kg] mass of the target
     mobility: float = 0.0  # [m/(N s)] of an infinite plate
+    notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
     first: Modes | None = field(
         default=None, repr=False, compare=False
     )  # the first modes of the target, if they were needed
@@ -144,6 +145,7 @@ class Plan:
         lines.append(f"Cost: {self.cost}")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")
+        lines += [f"Note: {note}" for note in self.notes]
         return "\n".join(lines)
 
 
@@ -154,7 +156,7 @@ class Run:
     response: Response
     seconds: Mapping[str, float]  # [s] wall time of each stage, by its name
     plan: Plan  # the plan as run, with the actual number of modes and errors
-    notes: tuple[str, ...] = ()  # repairs of the mesh and assumptions about it
+    notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
     verified: Mapping[str, float] | None = None  # [-] differences from a finer run, see `verify`
     finer: Plan | None = None  # plan of the finer run
 
@@ -262,8 +264,7 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     error = replace(response.error, idealisation=idealised)
     response = replace(response, tolerance=asked.tolerance, error=error)
     plan = replace(plan, n_modes=modes.n_modes if plan.target == "modal" else 0)
-    mesh = blow.target.mesh
-    return Run(response, MappingProxyType(stages.seconds), plan, () if mesh is None else mesh.notes)
+    return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
 
 
 def verify(run: Run, watch: Watch | None = None) -> Run:
@@ -334,6 +335,7 @@ def _idealised(asked: _Asked, target: str | None, stages: Stages) -> Plan | None
     return _plan(
         asked, target=target, errors=error, reasons=(kept, dropped), mass=seen.mass,
         mobility=seen.mobility if target == "infinite" else 0.0,
+        notes=plausible.together(blow.target.notes, seen.notes),
     )  # fmt: skip
 
 
@@ -372,6 +374,7 @@ def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: fl
     plan = _plan(
         asked, target="modal", errors={"target modes left out": left}, reasons=(why, kept), mass=modes.mass,
         n_modes=number, max_frequency=limit, first=first, element=ELEMENTS.get(target.kind), margin=margin,
+        notes=plausible.together(target.notes, modes.notes, at_rest(modes, modes.point("at", at))),
     )  # fmt: skip
     if isinstance(first.shapes, FieldShapes):
         plan = _with_mesh(plan, first, first.shapes.system, limit * first.frequencies[-1] / modes.frequencies[-1])
@@ -396,7 +399,14 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
 
 
 def _plan(
-    asked: _Asked, *, errors: Mapping, reasons: tuple, n_modes: int = 0, margin: float = 1.0, **chosen: Any
+    asked: _Asked,
+    *,
+    errors: Mapping,
+    reasons: tuple,
+    notes: tuple,
+    n_modes: int = 0,
+    margin: float = 1.0,
+    **chosen: Any,
 ) -> Plan:
     """The plan for any target: adds striker modes and time steps, with their errors and cost."""
     kept, left = _striker_modes(asked, margin)
@@ -430,6 +440,9 @@ def _plan(
         reasons=reasons,
         seconds=RATES["start"] + RATES["steps"] * 10.0 * count * (n_modes + kept),
         memory=BYTES["start"],
+        notes=plausible.together(
+            notes, asked.blow.striker.notes, tuple(plausible.number("speed", asked.values["speed"]))
+        ),
     )
 
 
@@ -451,8 +464,10 @@ def struck(plan: Plan, stages: Stages, keep: Any = None) -> Modes:
     if plan.target != "modal":
         at = np.atleast_1d(np.asarray(asked.values["at"], float))
         if plan.target == "rigid":
-            return idealisation.unyielding(at, plan.mass)
-        return idealisation.endless(at, plan.mass, plan.mobility, asked.duration)
+            found = idealisation.unyielding(at, plan.mass)
+        else:
+            found = idealisation.endless(at, plan.mass, plan.mobility, asked.duration)
+        return replace(found, notes=plan.notes)
     assert plan.first is not None and plan.max_frequency is not None
     with stages("modes"):
         first, modes, number = plan.first, plan.first, asked.pieces.get("n_modes")

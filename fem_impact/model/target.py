@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from .._base import check
-from ..fe import refinement
-from ..fe.assembly import System, assemble, reassemble
+from ..fe import plausible, refinement
+from ..fe.assembly import System, assemble, notes_on, reassemble
 from ..fe.section import Beam, Plate
 from ..mesh.meshes import Mesh
 from ..modes import analytic, modal
@@ -89,6 +89,15 @@ class Target:
     def size_stated(self) -> bool:
         """Whether the user chose the element size."""
         return self.mesh is not None and self.mesh.size_stated
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the mesh assumed, and numbers of the body that are probably a slip of a unit."""
+        if self.mesh is None or self.section is None:
+            return () if self.modes is None else self.modes.notes
+        ratio = self.damping_ratio
+        damping = () if ratio is None or callable(ratio) else plausible.damping(np.atleast_1d(ratio))
+        return plausible.together(notes_on(self.mesh, self.section), damping)
 
     def finished(self, modes: Modes) -> Modes:
         """The modes as struck: scaled and damped."""

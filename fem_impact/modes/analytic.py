@@ -10,6 +10,7 @@ from scipy import special
 from scipy.optimize import elementwise
 
 from .._base import check
+from ..fe import plausible
 from ..fe.assembly import support_of_facets
 from ..fe.section import KINDS, Beam, Plate
 from ..mesh.meshes import Mesh
@@ -59,6 +60,7 @@ def _finished(
     first_frequency: float | None,
     physical: tuple[float, float] | None,
     damping_ratio: Damping,
+    notes: tuple[str, ...],
 ) -> Modes:
     """Modes for a section, or for a mass and first frequency, scaled from omega**2 at unit mass and rigidity."""
     if physical is not None:
@@ -70,7 +72,7 @@ def _finished(
     omega = np.sqrt(values)
     if not omega[-1] <= check.REACH:
         raise ValueError(f"size gives frequencies beyond all numbers, {omega[-1]:g} rad/s at unit mass and rigidity")
-    unit = Modes(omega, np.zeros(len(omega)), shapes, mass=1.0)
+    unit = Modes(omega, np.zeros(len(omega)), shapes, mass=1.0, notes=notes)
     scaled = unit.scaled(mass=mass, first_frequency=factor * unit.frequencies[omega > 0.0][0])
     return scaled.damped(damping_ratios(damping_ratio, scaled.omega))
 
@@ -270,7 +272,9 @@ def rectangle(
         raise ValueError(f"max_frequency must reach the first mode, got {max_frequency:g} Hz")
     numbers = np.column_stack([m[order], n[order]])
     values = omega(*numbers.T) ** 2
-    return _finished(RectangleShapes(length, width, numbers), values, mass, first_frequency, physical, damping_ratio)
+    notes = plausible.body((length, width), section)
+    shapes = RectangleShapes(length, width, numbers)
+    return _finished(shapes, values, mass, first_frequency, physical, damping_ratio, notes)
 
 
 def _lattice(length: float, width: float, wavenumber_squared: float, most: int) -> tuple[np.ndarray, np.ndarray]:
@@ -449,7 +453,8 @@ def beam(
     weights = np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), _beam_weights(pair, k)])
     shapes = BeamShapes(length, pair, np.concatenate([np.zeros(len(rigid)), k]), weights)
     values = np.concatenate([np.zeros(len(rigid)), k**4])
-    return _finished(shapes, values, mass, first_frequency, physical, damping_ratio)
+    notes = plausible.body((length,), section)
+    return _finished(shapes, values, mass, first_frequency, physical, damping_ratio, notes)
 
 
 def _beam_weights(ends: tuple[str, str], k: np.ndarray) -> np.ndarray:
@@ -696,7 +701,8 @@ def disk(
         [[1.0, 2.0, 2.0][:n_rigid], _disk_norm(*(x[n_rigid:] for x in (wavenumber, order, weights)))]
     )
     shapes = DiskShapes(radius, edge, ratio, wavenumber, order, weights, phases, scale)
-    return _finished(shapes, (wavenumber**2 * root_area) ** 2, mass, first_frequency, physical, damping_ratio)
+    notes = plausible.body((2.0 * radius, 2.0 * radius), section)
+    return _finished(shapes, (wavenumber**2 * root_area) ** 2, mass, first_frequency, physical, damping_ratio, notes)
 
 
 def _disk_norm(z: np.ndarray, n: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .._base import check, markup
 from .._base.remembered import Remembered
-from ..fe import point_load, refinement
+from ..fe import plausible, point_load, refinement
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility
 from . import universal_files
@@ -18,6 +18,7 @@ HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 
 SHOWN = 10  # [-] modes listed in a notebook: a table without scrolling
 REMEMBERED = 16  # [-] points whose shapes and static deflections a body keeps, because one blow needs them many times
 ROUNDING = 1e-12  # [-] rounding error of a compliance, relative to itself and to that of the first mode
+STILL = 1e-9  # [-] a point whose shapes times the root of the mass stay below this is at rest; rounding leaves 1e-12
 SHAPE_ERROR = 10.0  # [-] relative error of a mode's compliance divided by the relative error of its frequency
 
 
@@ -164,6 +165,7 @@ class Modes:
     mass: float  # [kg] of the whole body
     frequency_error: np.ndarray | None = None  # (n_modes,) [-] estimated relative error; find_modes always gives it
     bounds: np.ndarray | None = None  # (n_modes, 2) [Hz] guaranteed lower and upper bound of each frequency
+    notes: tuple[str, ...] = field(default=(), repr=False)  # what was assumed, and probable slips of a unit
 
     def __post_init__(self) -> None:
         omega = check.ascending("omega", self.omega, "rad/s")
@@ -208,7 +210,8 @@ class Modes:
         else:
             static = check.array("compliance", compliance, (len(points), len(points)), "m/N")
         damping = damping_ratios(damping_ratio, omega)
-        return cls(omega, damping, SampledShapes(points, values, static), check.positive("mass", mass, "kg"))
+        sampled = SampledShapes(points, values, static)
+        return cls(omega, damping, sampled, check.positive("mass", mass, "kg"), notes=damping_notes(damping, omega))
 
     @classmethod
     def from_uff(cls, path: Any, *, mass: float, direction: str = "z") -> "Modes":
@@ -255,7 +258,7 @@ class Modes:
         rows = [(i, *map(str.format, forms, row)) for i, row in enumerate(zip(*columns), 1)]
         more = f" The first {SHOWN}:" if self.n_modes > SHOWN else ""
         span = f"{self.n_modes} modes up to {self.frequencies[-1]:.5g} Hz of a body of {self.mass:.4g} kg."
-        return f"<p>{span}{more}</p>{markup.table(rows, head)}"
+        return f"<p>{span}{more}</p>{markup.table(rows, head)}{markup.notes(self.notes)}"
 
     def points(self, name: str, points: Any) -> np.ndarray:
         """Return points as (n_points, dimension) [m]; raise ValueError if one is not on the body."""
@@ -355,7 +358,23 @@ class Modes:
 
     def damped(self, damping_ratio: Damping) -> "Modes":
         """The same modes with other damping ratios: a number, an array (n_modes,) or a function of frequency [Hz]."""
-        return replace(self, damping_ratio=damping_ratios(damping_ratio, self.omega))
+        ratios = damping_ratios(damping_ratio, self.omega)
+        before = damping_notes(self.damping_ratio, self.omega)
+        others = [note for note in self.notes if note not in before]
+        return replace(self, damping_ratio=ratios, notes=plausible.together(others, damping_notes(ratios, self.omega)))
+
+
+def at_rest(modes: "Modes", point: np.ndarray) -> tuple[str, ...]:
+    """A note if a point (1, dimension) [m] of a body that vibrates cannot move itself."""
+    flexible, typical = modes.omega[modes.omega > 0.0], STILL * modes.mass**-0.5
+    if not modes.dimension or not len(flexible) or np.abs(modes.shapes.at(point)).max() > typical:
+        return ()
+    everywhere = modes.shapes.at(modes.shapes.grid()[0])  # zero for a body treated as rigid
+    softness = modes.shapes.compliance(point)[0, 0] * modes.mass * flexible[0] ** 2
+    if np.abs(everywhere).max() <= typical or softness > STILL:
+        return ()
+    where = ", ".join(f"{x:g}" for x in point[0])
+    return (f"the point struck, ({where}) m, cannot move: it lies on a support, and the blow is that on a wall",)
 
 
 def _carried(omega: np.ndarray, rows: np.ndarray, weight: Any = 1.0) -> np.ndarray:
@@ -404,6 +423,11 @@ def damping_ratios(damping_ratio: Any, omega: np.ndarray) -> np.ndarray:
     if (result < 0.0).any():
         raise ValueError(f"damping_ratio must not be negative, got {result.min():g}")
     return result
+
+
+def damping_notes(ratios: np.ndarray, omega: np.ndarray) -> tuple[str, ...]:
+    """Notes on the damping ratios (n_modes,) of modes with frequencies omega (n_modes,)."""
+    return plausible.damping(ratios[omega > 0.0])
 
 
 def rayleigh(mass_factor: float, stiffness_factor: float) -> Callable[[np.ndarray], np.ndarray]:
@@ -528,4 +552,5 @@ def find_modes(
             "give a tolerance instead, which works for any body"
         )
     in_hertz = None if enclosed is None else enclosed / (2.0 * np.pi)
-    return Modes(found.omega, damping, shapes, system.mass, frequency_error=found.error, bounds=in_hertz)
+    notes = plausible.together(system.notes, damping_notes(damping, found.omega))
+    return Modes(found.omega, damping, shapes, system.mass, found.error, in_hertz, notes)

@@ -103,7 +103,7 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
         response=response,
         budget=_budget(response),
         modelled=_modelled(response, run),
-        reasons=map(tidy, (*run.plan.reasons, *run.notes)),
+        reasons=map(tidy, (*run.plan.reasons, *(f"note: {note}" for note in run.notes))),
         energies=_shares(response),
         sounds=_sounds(scene, response),
         files=_downloads(scene, run),

@@ -12,6 +12,7 @@ import numpy as np
 import xarray
 
 from .._base import check
+from ..fe import plausible
 from ..impact import accuracy, threshold
 from ..model import planner
 from ..show import figures, plots
@@ -100,6 +101,7 @@ def map_scene(
     result.attrs["scene"] = json.dumps(
         {**scene.data(), "map": {name: list(map(_plain, v)) for name, v in over.items()}}
     )
+    result.attrs["notes"] = "\n".join(plausible.together(*(piece.attrs["notes"].splitlines() for piece in pieces)))
     result.attrs["title"] = scene.title or str(scene.path.name)
     return result
 

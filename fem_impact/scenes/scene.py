@@ -213,8 +213,9 @@ class Scene:
         """The section; without a material, any of the right kind, as mass and first frequency set the scale."""
         if self.section is None or self.material is None:
             with self.blame("target"):
-                material = Material(E=1.0, nu=target_values(**self.target.values)["nu"], rho=1.0)
-                return Plate(material, 1.0) if kind == "plate" else Beam.rectangular(material, width=1.0, height=1.0)
+                material = Material(E=1e10, nu=target_values(**self.target.values)["nu"], rho=1e3)
+                thin = 1e-9  # [m] thinner than any body is wide
+                return Plate(material, thin) if kind == "plate" else Beam.rectangular(material, width=thin, height=thin)
         material = self._make("material", self.material)
         section = self._make("section", self.section, material=material)
         if self.section.kind != kind:

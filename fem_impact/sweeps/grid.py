@@ -15,6 +15,7 @@ import xarray
 
 from .._base import check
 from .._base.check import SimulationError
+from ..fe import plausible
 from ..impact import accuracy
 from ..impact.collision import strike
 from ..impact.contact import Contact
@@ -236,7 +237,8 @@ def sweep(
     xarray.Dataset
         One dimension per axis, in the order given; variables as in `LAYERS` with their units, and ``failure``, the
         error text of a cell that failed (its numbers are then NaN and its n_impacts is -1).
-        ``attrs["scene"]`` holds the blow all cells share, as JSON.
+        ``attrs["scene"]`` holds the blow all cells share, as JSON; ``attrs["notes"]`` what was assumed, one note per
+        line.
 
     Raises
     ------
@@ -415,7 +417,8 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray) -> xarray.Da
             places["at"] = ("at", values[:, 0], attributes)
         else:
             places |= {f"at_{letter}": ("at", column, attributes) for letter, column in zip("xyz", values.T)}
-    about = {"title": "Map of blows", "scene": json.dumps(grid.scene())}
+    notes = plausible.together(grid.base.modes.notes, grid.base.striker.notes)
+    about = {"title": "Map of blows", "scene": json.dumps(grid.scene()), "notes": "\n".join(notes)}
     return xarray.Dataset(data, places, about | {"tolerance": grid.tolerance, "residual": int(grid.residual)})
 
 

@@ -1,0 +1,98 @@
+"""Numbers that are allowed but probably a slip of a unit: notes in plain words, from one table of real materials."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Range:
+    """What a quantity can be in the real world."""
+
+    low: float
+    softer: str  # what a number below ``low`` would mean
+    high: float
+    harder: str  # what a number above ``high`` would mean
+    unit: str
+    slip: str  # the usual slip
+
+
+# Lowest and highest values of solids that can be struck.
+# E, G: elastomers from about 1e6 Pa and their shear modulus, a third of that (Ashby, Materials Selection in Mechanical
+# Design, 4th ed. 2011, fig. 4.3); diamond has 1.22e12 Pa and 5.7e11 Pa (McSkimin and Andreatch 1972, J. Appl. Phys. 43,
+# 2944). rho: cork has 120 to 240 kg/m^3 and polymer foams 25 and more (Gibson and Ashby, Cellular Solids, 2nd ed. 1997,
+# tables 1.1 and 12.1); osmium has 22 590 kg/m^3 (CRC Handbook of Chemistry and Physics, section 4). damping: the loss
+# factor of the best damping polymers is about 1, but that of a structure made of them stays below 0.4, twice the ratio
+# (Cremer, Heckl and Petersson, Structure-Borne Sound, 3rd ed. 2005, section 3.4).
+STIFFNESS = "Pa are expected, and 210 GPa is 210e9"
+RANGES = {
+    "E": Range(1e6, "softer than rubber", 1.3e12, "stiffer than diamond", "Pa", STIFFNESS),
+    "E_across": Range(1e6, "softer than rubber", 1.3e12, "stiffer than diamond", "Pa", STIFFNESS),
+    "G": Range(3e5, "softer than rubber", 6e11, "stiffer than diamond", "Pa", STIFFNESS),
+    "rho": Range(
+        25.0, "lighter than cork", 2.3e4, "heavier than osmium", "kg/m^3",
+        "kg/m^3 are expected, and 7.85 g/cm^3 is 7850",
+    ),
+    "damping_ratio": Range(
+        0.0, "", 0.2, "more than any plate or beam has", "",
+        "a fraction of critical damping is expected, and 5 % is 0.05",
+    ),
+    "speed": Range(0.0, "", 300.0, "as fast as a bullet, and no contact stays elastic", "m/s", "m/s are expected"),
+    "length": Range(
+        1e-3, "smaller than a grain of rice", 50.0, "larger than anything usually struck", "m",
+        "m are expected, and 465 mm is 0.465",
+    ),
+}  # fmt: skip
+NAMES = {"rho": "density", "damping_ratio": "damping_ratio =", "speed": "speed", "length": "a length of"}
+TURN = 2.0 * np.pi  # [rad]
+THICK = 0.3  # [-] thickness over the shortest side above which a body is no longer thin
+
+
+def number(name: str, value: Any) -> Iterator[str]:
+    """A note if a number lies outside the `Range` of that name; none for a function of place."""
+    known = RANGES[name]
+    if callable(value) or value is None or known.low <= value <= known.high:
+        return
+    unit = f" {known.unit}" if known.unit else ""
+    meaning = known.softer if value < known.low else known.harder
+    yield f"{NAMES.get(name, name + ' =')} {value:g}{unit} is {meaning}; {known.slip}"
+
+
+def material(given: Any) -> tuple[str, ...]:
+    """Notes on the numbers of a `Material`."""
+    notes = [note for name in ("E", "E_across", "G", "rho") for note in number(name, getattr(given, name))]
+    if abs(given.angle) > TURN:
+        notes.append(
+            f"angle = {given.angle:g} rad is {abs(given.angle) / TURN:.3g} turns; rad are expected, and "
+            f"{given.angle:g} degrees are {np.radians(given.angle):.4g}"
+        )
+    return tuple(notes)
+
+
+def body(sides: Sequence[float], section: Any = None) -> tuple[str, ...]:
+    """Notes on a body with sides [m] in its plane, or along its line, and a section."""
+    notes = list(number("length", max(sides)))
+    if section is None:
+        return tuple(notes)
+    notes += section.material.notes
+    name = "thickness" if hasattr(section, "thickness") else "height"
+    thickness = getattr(section, name)
+    if not callable(thickness) and thickness > THICK * min(sides):
+        side = "the shortest side" if len(sides) > 1 else "the length"
+        notes.append(
+            f"{name} {thickness:g} m is {thickness / min(sides):.3g} times {side}, {min(sides):g} m; the theory is for "
+            "thin bodies, and 3 mm is 0.003"
+        )
+    return tuple(notes)
+
+
+def damping(ratios: np.ndarray) -> tuple[str, ...]:
+    """Notes on damping ratios (n_modes,) [-] of modes that are not rigid."""
+    return tuple(number("damping_ratio", float(np.median(ratios)))) if len(ratios) else ()
+
+
+def together(*several: Sequence[str]) -> tuple[str, ...]:
+    """All notes, each once, in order."""
+    return tuple(dict.fromkeys(note for notes in several for note in notes))

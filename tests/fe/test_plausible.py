@@ -1,0 +1,100 @@
+"""Numbers that are probably a slip of a unit give a note that names them; those of real materials give none."""
+
+import re
+
+import numpy as np
+import pytest
+
+import fem_impact as fi
+
+STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
+# Ashby, Materials Selection in Mechanical Design, 4th ed., appendix A: E [Pa], density [kg/m^3]
+REAL = {
+    "steel": (210e9, 7850.0), "aluminium": (70e9, 2700.0), "bronze": (110e9, 8800.0), "tungsten": (400e9, 19300.0),
+    "spruce": (10e9, 400.0), "balsa": (3.4e9, 130.0), "glass": (70e9, 2500.0), "cork": (20e6, 180.0),
+    "Mylar": (5e9, 1390.0), "rubber": (5e6, 950.0), "alumina": (390e9, 3900.0), "carbon fibre": (130e9, 1550.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "slip, words",
+    [
+        ({"E": 210.0}, "E = 210 Pa is softer than rubber; Pa are expected"),
+        ({"E": 210e3}, "E = 210000 Pa is softer than rubber"),
+        ({"E": 210e12}, "stiffer than diamond"),
+        ({"rho": 7.85}, "density 7.85 kg/m\\^3 is lighter than cork; kg/m\\^3 are expected"),
+        ({"rho": 7.85e6}, "heavier than osmium"),
+        ({"E_across": 0.8, "G": 0.7e9}, "E_across = 0.8 Pa"),
+        ({"E_across": 0.8e9, "G": 700.0}, "G = 700 Pa"),
+        ({"E_across": 0.8e9, "G": 0.7e9, "angle": 90.0}, "angle = 90 rad is 14.3 turns; .* degrees are 1.571"),
+    ],
+)
+def test_a_slip_in_a_material_is_noted(slip, words):
+    (note,) = fi.Material(**{**STEEL, **slip}).notes
+    assert re.search(words, note)
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_materials_get_no_note(name):
+    E, rho = REAL[name]
+    assert fi.Material(E, 0.3, rho).notes == ()
+
+
+def plate(thickness=3e-3, **changes):
+    return fi.Plate(fi.Material(**{**STEEL, **changes}), thickness)
+
+
+@pytest.mark.parametrize(
+    "make, words",
+    [
+        (lambda: fi.analytic.rectangle(465, 300, section=plate(), n_modes=4), "465 m is larger than anything"),
+        (lambda: fi.analytic.rectangle(0.465, 0.3, section=plate(0.5), n_modes=4), "thickness 0.5 m is 1.67 times"),
+        (lambda: fi.analytic.disk(120.0, section=plate(), n_modes=4), "240 m is larger"),
+        (lambda: fi.analytic.disk(0.1, section=plate(rho=7.85), n_modes=4), "density 7.85"),
+        (lambda: fi.analytic.disk(0.1, section=plate(), n_modes=4, damping_ratio=5), "damping_ratio = 5 is more than"),
+        (lambda: fi.analytic.disk(0.1, section=plate(), n_modes=4).damped(0.5), "damping_ratio = 0.5"),
+        (lambda: elements(fi.mesh.rectangle(0.3, 0.2), plate(E=210.0)), "E = 210 Pa"),
+        (lambda: elements(fi.mesh.rectangle(300, 200), plate()), "300 m is larger"),
+        (lambda: elements(fi.mesh.rectangle(0.3, 0.2), plate(3.0)), "thickness 3 m is 15 times the shortest side"),
+        (lambda: elements(fi.mesh.line(0.3), beam(height=0.2)), "height 0.2 m is 0.667 times the length, 0.3 m"),
+    ],
+)
+def test_a_slip_in_a_body_is_noted_by_closed_forms_and_by_elements(make, words):
+    (note,) = make().notes
+    assert words in note
+
+
+def beam(height):
+    return fi.Beam.rectangular(fi.Material(**STEEL), width=0.02, height=height)
+
+
+def elements(mesh, section):
+    return fi.find_modes(fi.assemble(mesh, section, supports={"boundary": "hinged"}), n_modes=4)
+
+
+def test_everyday_bodies_get_no_note():
+    assert elements(fi.mesh.rectangle(0.3, 0.2), plate()).notes == ()
+    assert elements(fi.mesh.line(0.3), beam(0.01)).notes == ()
+    assert fi.analytic.disk(0.1, section=plate(), n_modes=4, damping_ratio=0.02).notes == ()
+    assert fi.Striker.sphere(fi.Material(**STEEL), 0.01).notes == ()
+
+
+def test_a_new_damping_ratio_replaces_the_note_on_the_old_one():
+    slipped = fi.analytic.disk(0.1, section=plate(), n_modes=4, damping_ratio=5)
+    assert slipped.damped(0.05).notes == ()
+
+
+def test_a_blow_on_a_support_is_noted_and_one_beside_it_is_not():
+    modes = fi.analytic.rectangle(0.3, 0.2, section=plate(), n_modes=40)
+    rigid, law = fi.Striker.rigid(0.01), fi.Contact.linear(1e6)
+    (note,) = fi.strike(modes, rigid, law, at=(0.0, 0.0), speed=1.0).notes
+    assert note == "the point struck, (0, 0) m, cannot move: it lies on a support, and the blow is that on a wall"
+    assert fi.strike(modes, rigid, law, at=(0.003, 0.002), speed=1.0, tolerance=0.1).notes == ()
+
+
+def test_the_speed_and_the_sphere_of_a_blow_are_noted():
+    modes = fi.analytic.rectangle(0.3, 0.2, section=plate(), n_modes=40)
+    ball = fi.Striker.sphere(fi.Material(210.0, 0.3, 7850.0), 0.01)
+    hit = fi.strike(modes, ball, fi.Contact.linear(1e6), at=(0.1, 0.1), speed=2000.0, tolerance=0.1)
+    assert np.array([[word in note for word in ("E = 210 Pa", "speed 2000 m/s")] for note in hit.notes]).any(0).all()
+    assert "Note: speed 2000 m/s is as fast as a bullet" in hit.summary()
