@@ -44,6 +44,7 @@ MIXED = {
     "clamped rectangle": (SQUARE, ("clamped",) * 4),
     "cantilever": (SQUARE, ("free", "free", "free", "clamped")),
     "clamped triangle": (SLANTED, ("clamped",) * 3),
+    "L of mixed edges": (ELL, ("hinged", "free", "free", "clamped", "clamped", "free")),
 }
 
 
