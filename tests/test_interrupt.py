@@ -73,15 +73,21 @@ def run(folder, words, kind="whole", moment=0.0, number=0):
     return done.returncode, done.stderr, mark.read_text() if mark.exists() else ""
 
 
+def prepared(folder, name):
+    folder.mkdir()
+    (folder / "scene.toml").write_text(SCENE)
+    if name == "hammer":  # writes into a folder that there is; the others make it
+        (folder / "out").mkdir()
+    return folder
+
+
 def stop(parent, name, number, share):
     """Send a signal after a share of the command's CPU time; whether that ended it, all files being there or none."""
     words, expected = COMMANDS[name]
     moment = share * cpu_time(parent, name)
     sent, folder = "", None
     while not sent:  # where this run takes less CPU time than the whole one took: earlier
-        folder = parent / f"{name}-{len(list(parent.iterdir()))}"
-        folder.mkdir()
-        (folder / "scene.toml").write_text(SCENE)
+        folder = prepared(parent / f"{name}-{len(list(parent.iterdir()))}", name)
         status, said, sent = run(folder, words, "cpu", moment, number)
         moment *= 0.7
     out = folder / "out"
@@ -102,9 +108,7 @@ def stop(parent, name, number, share):
 @cache
 def cpu_time(parent, name):
     """CPU time [s] of a command that nobody interrupts; the first run may compile and find fonts, the second not."""
-    folder = parent / f"{name}-whole"
-    folder.mkdir()
-    (folder / "scene.toml").write_text(SCENE)
+    folder = prepared(parent / f"{name}-whole", name)
     taken = []
     for _ in range(2):
         shutil.rmtree(folder / "store", ignore_errors=True)
@@ -122,9 +126,9 @@ def test_strike_is_all_or_nothing(tmp_path):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_at_any_moment(tmp_path, name):
     chance = random.Random(name)
-    shares = [(i + chance.random()) / 6 for i in range(6)]
+    shares = [0.05 + 0.95 * (i + chance.random()) / 5 for i in range(5)]  # before, Python still starts
     ended = [stop(tmp_path, name, chance.choice(list(ENDS)), share) for share in shares]
-    assert all(ended[:4])  # in the last third a signal may come too late to stop the files
+    assert all(ended[:3])  # in the last two fifths a signal may come too late to stop the files
 
 
 @pytest.mark.slow  # compiles where that was not done before
