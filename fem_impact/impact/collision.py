@@ -200,6 +200,14 @@ def strike(
         If an argument is invalid.
     SimulationError
         If the tolerance cannot be met, or if the bodies do not separate for good and no other end was given.
+
+    Examples
+    --------
+    >>> plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    >>> stick, law = fi.Striker.stick(mass=0.1, first_frequency=10e3), fi.Contact.hertz(695e3)
+    >>> hit = fi.strike(plate, stick, law, at=(0.45, 0.3), speed=1.0, tolerance=1e-3)
+    >>> hit.n_impacts, round(hit.restitution, 2), hit.error.total < 1e-3
+    (1, 0.55, True)
     """
     speed = check.non_negative("speed", speed, "m/s")
     forces = [
@@ -261,6 +269,14 @@ def collide(
     Returns
     -------
     Response
+
+    Examples
+    --------
+    >>> balls, touch = [fi.Modes.rigid(0.1)] * 3, fi.Contact.linear(1e6)
+    >>> chain = [fi.Touch(touch, 0, 1), fi.Touch(fi.Contact.linear(1e6, gap=1e-3), 1, 2)]
+    >>> hit = fi.collide(balls, chain, speeds=[1.0, 0.0, 0.0])  # Newton's cradle
+    >>> [round(float(hit.velocity(None, [0.01], body=i)[0, 0]), 3) for i in range(3)]  # m/s
+    [0.0, 0.0, 1.0]
     """
     options = _Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
     bodies, contacts = check.several("bodies", bodies, Modes), check.several("contacts", contacts, Touch)

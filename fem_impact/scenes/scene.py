@@ -354,6 +354,12 @@ def load_scene(path: str | Path) -> Scene:
         `Scene.strike` find errors that need the finished body, such as a strike point off the plate.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> hit = fi.load_scene("studies/scenes/drumstick.toml").strike(tolerance=1e-2)
+    >>> hit.n_impacts, round(hit.restitution, 2)
+    (1, 0.41)
     """
     path = check.path("path", path)
     return scene_of(read_tables(path), path, folder=path.parent)
@@ -382,7 +388,13 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
 
 @check.typed
 def plan(scene: Scene | str | Path, **changes: Any) -> Plan:
-    """Decide how to model a scene, or a scene file, without striking (see `Scene.plan`)."""
+    """Decide how to model a scene, or a scene file, without striking (see `Scene.plan`).
+
+    Examples
+    --------
+    >>> print(fi.plan("studies/scenes/heavy_plate.toml", tolerance=1e-2).target)
+    rigid
+    """
     return (scene if isinstance(scene, Scene) else load_scene(scene)).plan(**changes)
 
 
