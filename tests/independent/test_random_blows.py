@@ -413,8 +413,8 @@ def few(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def many(tmp_path_factory, all_cases):
-    return judged_blows(SEED + 1, 225 if all_cases else 75, ALL, (-5.0, -2.0), tmp_path_factory.mktemp("many"))
+def many(tmp_path_factory):
+    return judged_blows(SEED + 1, 225, ALL, (-5.0, -2.0), tmp_path_factory.mktemp("many"))
 
 
 def check_promises(judged, left):
