@@ -1,7 +1,8 @@
-"""What several tests share: a real browser."""
+"""What several tests share: which of many cases alike are run, compiled kernels, a real browser."""
 
 import shutil
 import time
+from zlib import crc32
 
 import pytest
 from hypothesis import settings
@@ -27,7 +28,7 @@ class Page:
         self.tab.on("request", lambda request: self.requests.append(request.url))
         self.tab.on("websocket", lambda socket: self.requests.append(socket.url))
 
-    def until(self, expression, seconds=10.0):
+    def until(self, expression, seconds=120.0):
         """Wait until a JavaScript expression holds; Playwright's own way needs eval, which pages may forbid."""
         end = time.monotonic() + seconds
         while not self.tab.evaluate(expression):
@@ -55,8 +56,34 @@ class Page:
         return stops
 
 
+def pytest_addoption(parser):
+    text = "run every case of the slow tests, not a fixed share of the many that are alike"
+    parser.addoption("--all-cases", action="store_true", help=text)
+
+
+def pytest_collection_modifyitems(config, items):
+    """Of the slow cases of a test marked `thin(n)` about every n-th is run, in each run the same."""
+    if config.getoption("--all-cases"):
+        return
+    kept, left_out = [], []
+    for item in items:
+        thin, slow = item.get_closest_marker("thin"), item.get_closest_marker("slow")
+        (left_out if thin and slow and crc32(item.name.encode()) % thin.args[0] else kept).append(item)
+    items[:] = kept
+    config.hook.pytest_deselected(items=left_out)
+
+
+@pytest.fixture(scope="session")
+def all_cases(request):
+    """Whether every case was asked for."""
+    return request.config.getoption("--all-cases")
+
+
 def pytest_configure(config):
     """Compile the inner loops once, before workers start, so that no test waits for the compiler."""
+    from fem_impact._base import isolated
+
+    isolated.PATIENCE = 120.0  # [s] a busy machine must not refuse a file; tests of the limit set their own
     if not hasattr(config, "workerinput"):
         import fem_impact as fi
 

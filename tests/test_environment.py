@@ -29,7 +29,7 @@ def run(folder, command, path=(), **environment):
     search = os.pathsep.join([*map(str, path), ROOT])
     whole = {**os.environ, "PYTHONPATH": search, "FEM": f"{sys.executable} -m fem_impact", **environment}
     whole = {name: value for name, value in whole.items() if value is not None}
-    done = subprocess.run(["bash", "-c", command], cwd=folder, env=whole, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(["bash", "-c", command], cwd=folder, env=whole, capture_output=True, text=True, timeout=600)
     assert "Traceback" not in done.stderr and "Error" not in done.stderr, done.stderr
     return done
 

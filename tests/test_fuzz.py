@@ -13,7 +13,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 FUZZ = Path(fuzz.__file__)
-INPUTS = 10_000
+INPUTS, ALL = 1_500, 10_000  # of each category; with --all-cases
+DEAR = {"store": 600, "command": 600}  # those of which each takes 50 ms
 HERE = [name for name in fuzz.CATEGORIES if name != "command"]  # that one changes its process; see test_cli
 FEW = {"mesh": 4, "outline": 4, "uff": 4}  # [-] examples in the normal run where each starts a process
 MANY = 60  # [-] of the others
@@ -58,16 +59,17 @@ def test_mutated_inputs_give_a_result_or_one_clear_error(category, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("category", fuzz.CATEGORIES)
-def test_ten_thousand_mutated_inputs_give_a_result_or_one_clear_error(category):
+def test_very_many_mutated_inputs_give_a_result_or_one_clear_error(category, all_cases):
     skip_without_extras()
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, str(FUZZ), category, "--inputs", str(INPUTS)]
+    inputs = ALL if all_cases else DEAR.get(category, INPUTS)
+    command = [sys.executable, str(FUZZ), category, "--inputs", str(inputs)]
     run = subprocess.run(command, capture_output=True, text=True, env=environment)
     found = json.loads(run.stdout.splitlines()[-1])
     assert found["failed"] == []
-    assert found["results"] + found["refused"] == INPUTS
+    assert found["results"] + found["refused"] == inputs
     # else the mutations are too wild, or do nothing
-    assert found["results"] > INPUTS / 100 and found["refused"] > INPUTS / 10
+    assert found["results"] > inputs / 100 and found["refused"] > inputs / 10
 
 
 def test_the_judge_tells_traces_hangs_litter_and_murmurs_apart(tmp_path, monkeypatch):

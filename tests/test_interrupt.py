@@ -2,10 +2,11 @@
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
-import time
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -28,64 +29,125 @@ COMMANDS = {  # words, and what is there when they are done
 }
 
 
-def interrupted(folder, words, number, delay):
+# Runs a command that sends itself a signal: after some CPU time or some blocks of a store, however busy the machine.
+RUNNER = """
+import atexit, os, pathlib, runpy, signal, sys, time
+
+kind, moment, number, mark = sys.argv[1], float(sys.argv[2]), int(sys.argv[3]), pathlib.Path(sys.argv[4])
+
+
+def send(*_):
+    mark.write_text("sent")
+    os.kill(os.getpid(), number)
+
+
+if kind == "cpu":
+    signal.signal(signal.SIGPROF, send)
+    signal.setitimer(signal.ITIMER_PROF, moment)
+elif kind == "blocks":
+    from fem_impact.sweeps.store import Store
+
+    write, left = Store.write, [int(moment)]
+
+    def counted(*what):
+        write(*what)
+        left[0] -= 1
+        if left[0] == 0:
+            send()
+
+    Store.write = counted
+else:
+    atexit.register(lambda: mark.write_text(str(time.process_time())))
+sys.argv[1:] = sys.argv[5:]
+runpy.run_module("fem_impact", run_name="__main__", alter_sys=True)
+"""
+
+
+def run(folder, words, kind="whole", moment=0.0, number=0):
+    """Exit status, what was said, and the mark: CPU time [s] of a whole run, "sent" if the signal was, or nothing."""
+    mark = folder.with_name(f"{folder.name}.mark")
+    mark.unlink(missing_ok=True)
     environment = {**os.environ, "PYTHONPATH": str(Path(fem_impact.__file__).parents[1]), "TMPDIR": str(folder)}
-    command = [sys.executable, "-m", "fem_impact", *words.split()]
-    with subprocess.Popen(
-        command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as run:
-        time.sleep(delay)
-        run.send_signal(number)
-        _, said = run.communicate(timeout=60)
-    return run.returncode, said
+    command = [sys.executable, "-c", RUNNER, kind, str(moment), str(int(number)), str(mark), *words.split()]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    return done.returncode, done.stderr, mark.read_text() if mark.exists() else ""
 
 
-@pytest.mark.parametrize("delay", [0.6, 1.2])
-@pytest.mark.parametrize("number", ENDS)
-def test_strike_is_all_or_nothing(tmp_path, number, delay):
-    check(tmp_path, "strike", number, delay)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_at_any_moment(tmp_path, name):
-    chance = random.Random(name)
-    for i in range(6):
-        (tmp_path / str(i)).mkdir()
-        check(tmp_path / str(i), name, chance.choice(list(ENDS)), chance.uniform(0.05, 4.0))
-
-
-def check(folder, name, number, delay):
+def prepared(folder, name):
+    folder.mkdir()
     (folder / "scene.toml").write_text(SCENE)
+    if name == "hammer":  # writes into a folder that there is; the others make it
+        (folder / "out").mkdir()
+    return folder
+
+
+def stop(parent, name, number, share):
+    """Send a signal after a share of the command's CPU time; whether that ended it, all files being there or none."""
     words, expected = COMMANDS[name]
-    status, said = interrupted(folder, words, number, delay)
+    moment = share * cpu_time(parent, name)
+    sent, folder = "", None
+    while not sent:  # where this run takes less CPU time than the whole one took: earlier
+        folder = prepared(parent / f"{name}-{len(list(parent.iterdir()))}", name)
+        status, said, sent = run(folder, words, "cpu", moment, number)
+        moment *= 0.7
     out = folder / "out"
     there = sorted(path.name for path in out.iterdir()) if out.exists() else []
-    assert status in (0, *ENDS[number]), (delay, said)
-    assert not list(folder.rglob(f"{files.PARTIAL}*")), delay
-    if status == 0 or there:  # it was done before the signal came
-        assert set(expected) <= set(there), (delay, there)
-        return
-    assert "fem_impact" not in said, (delay, said)  # no trace of ours; Python's own start may leave one of its own
+    assert status in (0, *ENDS[number]), (share, said)
+    assert not list(folder.rglob(f"{files.PARTIAL}*")), share
+    if status == 0 or there:  # the files were on their way
+        assert set(expected) <= set(there), (share, there)
+        return False
+    assert "fem_impact" not in said, (share, said)  # no trace of ours; Python's own start may leave one of its own
     if status == ENDS[number][0] and said:
         assert said.startswith("fem-impact: ") and said.count("\n") == 1
     left = {path.name for path in folder.iterdir()} - {"scene.toml", "store", "out"}
     assert not {name for name in left if not name.startswith(("tmp", "pymp", "matplotlib"))}, left
+    return True
+
+
+@cache
+def cpu_time(parent, name):
+    """CPU time [s] of a command that nobody interrupts; the first run may compile and find fonts, the second not."""
+    folder = prepared(parent / f"{name}-whole", name)
+    taken = []
+    for _ in range(2):
+        shutil.rmtree(folder / "store", ignore_errors=True)
+        status, said, mark = run(folder, COMMANDS[name][0])
+        assert status == 0, said
+        taken.append(float(mark))
+    return min(taken)
+
+
+def test_strike_is_all_or_nothing(tmp_path):
+    assert all(stop(tmp_path, "strike", number, share) for number, share in zip(ENDS, (0.7, 0.4)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_at_any_moment(tmp_path, name, all_cases):
+    chance, n = random.Random(name), 10 if all_cases else 3
+    shares = [0.05 + 0.95 * (i + chance.random()) / n for i in range(n)]  # before, Python still starts
+    ended = [stop(tmp_path, name, chance.choice(list(ENDS)), share) for share in shares]
+    assert all(ended[: n // 2 + 1])  # later, a signal may come too late to stop the files
 
 
 @pytest.mark.slow  # compiles where that was not done before
 def test_stored_cells_are_kept_and_used(tmp_path):
-    (tmp_path / "scene.toml").write_text(SCENE)
-    words = COMMANDS["map"][0]
-    for delay in (1.5, 3.0):
-        status, said = interrupted(tmp_path, words, signal.SIGINT, delay)
-        if status == 130 and said:
-            assert (
-                said == "fem-impact: interrupted; finished cells are in store; run the same command again to continue\n"
-            )
-    environment = {**os.environ, "PYTHONPATH": str(Path(fem_impact.__file__).parents[1])}
-    run = subprocess.run([sys.executable, "-m", "fem_impact", *words.split()], cwd=tmp_path, env=environment)
-    assert run.returncode == 0 and (tmp_path / "out" / "map.nc").is_file()
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "scene.toml").write_text(SCENE)
+    words, kept = COMMANDS["map"][0], {}
+    for blocks in (3, 5):
+        status, said, sent = run(tmp_path / "in", words, "blocks", blocks, signal.SIGINT)
+        assert (status, sent) == (130, "sent")
+        assert said == "fem-impact: interrupted; finished cells are in store; run the same command again to continue\n"
+        done = {path: path.stat().st_mtime_ns for path in (tmp_path / "in" / "store" / "numbers" / "c").rglob("*")
+                if path.is_file()}  # fmt: skip
+        assert len(done) == len(kept) + blocks and kept.items() <= done.items()  # none lost, none computed again
+        kept = done
+    status, said, _ = run(tmp_path / "in", words)
+    assert status == 0, said
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept
+    assert (tmp_path / "in" / "out" / "map.nc").is_file()
 
 
 def test_undoing_takes_back_the_newest_first_and_nothing_that_is_appearing(tmp_path, monkeypatch):

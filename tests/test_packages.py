@@ -56,3 +56,17 @@ def test_a_package_says_what_it_is_for_and_where_to_start(name):
     assert text is not None and text.count(".") >= 2 and len(text) < 600
     modules = {path.stem for path in (HOME / name).glob("*.py")} - {"__init__"}
     assert name == "impact/compiled" or any(f"`{module}`" in text for module in modules)
+
+
+NOT_MIRRORED = {  # tested under the name of what uses them
+    "_base/check.py", "mesh/meshio_reader.py", "pages/explore_view.py", "scenes/maps.py", "scenes/schema.py",
+    "show/plots.py",
+}  # fmt: skip
+
+
+def test_every_module_has_a_test_file_of_its_name():
+    tests = Path(__file__).parent
+    for path in sorted(HOME.glob("*/*.py")):
+        name = path.relative_to(HOME).as_posix()
+        if path.name != "__init__.py" and name not in NOT_MIRRORED:
+            assert (tests / path.parent.name.lstrip("_") / f"test_{path.name}").is_file(), name

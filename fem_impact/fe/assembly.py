@@ -172,6 +172,13 @@ def assemble(
     ------
     ValueError
         If section and mesh do not match, an edge does not exist or a support is unknown.
+
+    Examples
+    --------
+    >>> plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), thickness=3e-3)
+    >>> system = fi.assemble(fi.mesh.rectangle(0.465, 0.3), plate, {"left": "clamped", "right": "hinged"})
+    >>> round(system.mass, 6)  # kg
+    0.188325
     """
     kinds = ("argyris", "morley") if mesh.dimension == 2 else ("hermite",)
     element = kinds[0] if element is None else check.one_of("element", element, kinds)

@@ -29,6 +29,12 @@ class Material:
         Young's modulus across the grain and shear modulus; the material is isotropic without them.
     angle : float [rad]
         Direction of the grain, anticlockwise from the x axis.
+
+    Examples
+    --------
+    >>> steel = fi.Material(E=210e9, nu=0.3, rho=7850.0)
+    >>> steel.plane_stress.round(-8).tolist()
+    [[230800000000.0, 69200000000.0, 0.0], [69200000000.0, 230800000000.0, 0.0], [0.0, 0.0, 80800000000.0]]
     """
 
     E: float
@@ -72,6 +78,12 @@ class Material:
         rho : float [kg/m^3]
         angle : float [rad]
             Direction of the grain, anticlockwise from the x axis.
+
+        Examples
+        --------
+        >>> spruce = fi.Material.orthotropic(E_along=11e9, E_across=0.8e9, nu=0.37, G=0.7e9, rho=430.0, angle=0.1)
+        >>> spruce.E_across, spruce.angle
+        (800000000.0, 0.1)
         """
         for name, value in (("E_along", E_along), ("E_across", E_across), ("G", G)):
             check.positive(name, value, "Pa")
@@ -120,6 +132,12 @@ class Plate:
     thickness : float or function of points (n_points, 2) returning (n_points,) [m]
     tension : float [N/m]
         Uniform in-plane tension, as in a drumhead; the whole edge must be supported.
+
+    Examples
+    --------
+    >>> plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), thickness=3e-3)
+    >>> plate.inertia(np.zeros((1, 2))).tolist()  # kg/m^2
+    [1.35]
     """
 
     material: Material
@@ -152,6 +170,13 @@ class Elastic:
         Force per deflection and length of a plate's edge [N/m^2]; force per deflection at a beam's end [N/m].
     rotation : float
         Moment per angle and length of a plate's edge [N]; moment per angle at a beam's end [N m].
+
+    Examples
+    --------
+    >>> rod = fi.Beam.circular(fi.Material(E=10e9, nu=0.3, rho=700.0), diameter=0.01)
+    >>> system = fi.assemble(fi.mesh.line(0.4), rod, {"left": fi.Elastic(1e4), "right": fi.Elastic(1e4)})
+    >>> fi.find_modes(system, n_modes=2).frequencies.round(2).tolist()
+    [80.74, 225.45]
     """
 
     stiffness: float
@@ -191,12 +216,26 @@ class Beam:
 
     @classmethod
     def rectangular(cls, material: Material, *, width: Varying, height: Varying) -> "Beam":
-        """Beam of rectangular section; the blow acts along its height."""
+        """Beam of rectangular section; the blow acts along its height.
+
+        Examples
+        --------
+        >>> bar = fi.Beam.rectangular(fi.Material(E=70e9, nu=0.33, rho=2700.0), width=0.03, height=0.01)
+        >>> round(float(bar.stiffness(np.zeros((1, 1)))[0]), 6)  # N m^2
+        175.0
+        """
         return cls(material, width, height)
 
     @classmethod
     def circular(cls, material: Material, *, diameter: Varying) -> "Beam":
-        """Beam of circular section."""
+        """Beam of circular section.
+
+        Examples
+        --------
+        >>> rod = fi.Beam.circular(fi.Material(E=10e9, nu=0.3, rho=700.0), diameter=0.015)
+        >>> round(float(rod.inertia(np.zeros((1, 1)))[0]), 6)  # kg/m
+        0.1237
+        """
         if not callable(diameter):
             check.positive("diameter", diameter, "m")
         return cls(material, diameter, diameter, round=True)

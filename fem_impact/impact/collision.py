@@ -218,6 +218,14 @@ def collide(
     Returns
     -------
     Response
+
+    Examples
+    --------
+    >>> balls, touch = [fi.Modes.rigid(0.1)] * 3, fi.Contact.linear(1e6)
+    >>> chain = [fi.Touch(touch, 0, 1), fi.Touch(fi.Contact.linear(1e6, gap=1e-3), 1, 2)]
+    >>> hit = fi.collide(balls, chain, speeds=[1.0, 0.0, 0.0])  # Newton's cradle
+    >>> [round(float(hit.velocity(None, [0.01], body=i)[0, 0]), 3) for i in range(3)]  # m/s
+    [0.0, 0.0, 1.0]
     """
     options = _Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
     bodies, contacts = check.several("bodies", bodies, Modes), check.several("contacts", contacts, Touch)

@@ -40,17 +40,36 @@ class Contact:
 
     @classmethod
     def linear(cls, stiffness: float, *, loss: float = 0.0, gap: float = 0.0) -> "Contact":
-        """A linear spring, stiffness in N/m."""
+        """A linear spring, stiffness in N/m.
+
+        Examples
+        --------
+        >>> fi.Contact.linear(1e5).force([-1e-3, 1e-3]).tolist()
+        [0.0, 100.0]
+        """
         return cls(stiffness, 1.0, loss, gap)
 
     @classmethod
     def hertz(cls, stiffness: float, *, loss: float = 0.0, gap: float = 0.0) -> "Contact":
-        """Hertz's law for smooth round bodies, stiffness in N/m**1.5."""
+        """Hertz's law for smooth round bodies, stiffness in N/m**1.5.
+
+        Examples
+        --------
+        >>> fi.Contact.hertz(1e6, loss=0.1).force([1e-4, 4e-4], rate=1.0).round(6).tolist()
+        [1.1, 8.8]
+        """
         return cls(stiffness, 1.5, loss, gap)
 
     @classmethod
     def power(cls, stiffness: float, exponent: float, *, loss: float = 0.0, gap: float = 0.0) -> "Contact":
-        """Any power of the approach, stiffness in N/m**exponent."""
+        """Any power of the approach, stiffness in N/m**exponent.
+
+        Examples
+        --------
+        >>> felt = fi.Contact.power(1e9, 2.5)
+        >>> felt.force([1e-3, 2e-3]).round(3).tolist()
+        [31.623, 178.885]
+        """
         return cls(stiffness, exponent, loss, gap)
 
     @classmethod
@@ -59,17 +78,24 @@ class Contact:
     ) -> "Contact":
         """A contact with the loss that gives a mass the stated restitution on a rigid wall.
 
-            Parameters
-            ----------
-            restitution : float [-]
+        Parameters
+        ----------
+        restitution : float [-]
             From 1e-6 to 1.
         speed : float [m/s]
             Approach speed at which this restitution holds.
 
-            Notes
-            -----
-            Solves ``L (1 + e) = ln((1 + L) / (1 - e L))`` with ``L = loss speed``. The equation holds for any mass,
-            stiffness and exponent.
+        Notes
+        -----
+        Solves ``L (1 + e) = ln((1 + L) / (1 - e L))`` with ``L = loss speed``. The equation holds for any mass,
+        stiffness and exponent.
+
+        Examples
+        --------
+        >>> law = fi.Contact.restituting(1e6, 1.5, restitution=0.8, speed=2.0)
+        >>> hit = fi.strike(fi.Modes.rigid(1e3), fi.Striker.rigid(1e-3), law, at=None, speed=2.0)
+        >>> round(hit.restitution, 3)
+        0.8
         """
         e = check.between("restitution", restitution, 1e-6, 1.0)
         speed = check.positive("speed", speed, "m/s")
@@ -85,6 +111,13 @@ class Contact:
             Made by `Striker.sphere`.
         plate : Plate or Material
             The flat body; isotropic.
+
+        Examples
+        --------
+        >>> steel = fi.Material(E=210e9, nu=0.3, rho=7850.0)
+        >>> ball = fi.Striker.sphere(steel, radius=5e-3)
+        >>> round(fi.Contact.between(ball, steel).stiffness / 1e9, 3)  # GN/m^1.5
+        10.879
         """
         for name in ("material", "radius"):
             if getattr(sphere, name, None) is None:

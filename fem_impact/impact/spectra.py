@@ -28,6 +28,12 @@ def mobility(modes: Modes, at: Any, to: Any, frequencies: Any) -> np.ndarray:
     -----
     The kept modes are summed; the others add i omega times their residual compliance. Reciprocal in ``at`` and ``to``.
     Infinite at the frequency of an undamped mode. Valid below the last kept mode.
+
+    Examples
+    --------
+    >>> plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300, damping_ratio=0.01)
+    >>> abs(fi.mobility(plate, (0.45, 0.3), (0.45, 0.3), [100.0, 150.0])).round(4).tolist()  # m/(N s)
+    [0.6517, 0.0178]
     """
     frequency = check.array("frequencies", frequencies, (None,), "Hz", lift=True)
     if (frequency <= 0.0).any():
@@ -58,6 +64,11 @@ def half_sine_spectrum(frequencies: Any, contact_frequency: float) -> np.ndarray
     References
     ----------
     Euphonics 2.2.6 and 12.1.
+
+    Examples
+    --------
+    >>> fi.spectra.half_sine_spectrum([0.0, 100.0, 300.0], contact_frequency=100.0).round(4).tolist()
+    [1.0, 0.7854, 0.0]
     """
     frequency = check.finite("frequencies", check.numbers("frequencies", frequencies, "Hz"), "Hz")
     x = frequency / check.positive("contact_frequency", contact_frequency, "Hz")

@@ -53,12 +53,25 @@ class Striker:
 
     @classmethod
     def rigid(cls, mass: float) -> "Striker":
-        """A rigid mass [kg]."""
+        """A rigid mass [kg].
+
+        Examples
+        --------
+        >>> fi.Striker.rigid(0.03).mass
+        0.03
+        """
         return cls(Modes.rigid(mass), np.zeros(0))
 
     @classmethod
     def sphere(cls, material: Material, radius: float) -> "Striker":
-        """A rigid solid sphere, radius in m; `Contact.between` computes its Hertz stiffness from the material."""
+        """A rigid solid sphere, radius in m; `Contact.between` computes its Hertz stiffness from the material.
+
+        Examples
+        --------
+        >>> ball = fi.Striker.sphere(fi.Material(E=210e9, nu=0.3, rho=7850.0), radius=5e-3)
+        >>> round(1e3 * ball.mass, 3)  # g
+        4.11
+        """
         check.instance("material", material, Material)
         radius = check.between("radius", radius, *SPHERES, "m")
         return cls(Modes.rigid(4.0 / 3.0 * np.pi * radius**3 * material.rho), np.zeros(0), material, radius)
@@ -76,6 +89,12 @@ class Striker:
         n_modes : int, optional
             Number of bending modes kept, besides the rigid rotation; the others act by their residual compliance. By
             default, each blow keeps as many as its tolerance needs.
+
+        Examples
+        --------
+        >>> stick = fi.Striker.stick(mass=0.1, first_frequency=10e3)
+        >>> round(stick.felt_mass, 6)  # kg
+        0.033333
         """
         kept = STICK_MODES if n_modes is None else check.count("n_modes", n_modes, high=MOST_MODES)
         modes = beam(1.0, ends=("hinged", "free"), mass=mass, first_frequency=first_frequency, n_modes=1 + kept)
@@ -83,7 +102,14 @@ class Striker:
 
     @classmethod
     def flexible(cls, modes: Modes, *, at: Any) -> "Striker":
-        """Any body that can move rigidly; it strikes with its point ``at`` [m]."""
+        """Any body that can move rigidly; it strikes with its point ``at`` [m].
+
+        Examples
+        --------
+        >>> bar = fi.analytic.beam(0.2, ends=("free", "free"), mass=0.1, first_frequency=2e3, n_modes=12)
+        >>> round(fi.Striker.flexible(bar, at=[0.0]).felt_mass, 6)  # kg: a quarter, at its end
+        0.025
+        """
         return cls(modes, at)
 
     @property

@@ -88,6 +88,12 @@ def threshold_frequency(modes: Modes, at: Any, mass: float) -> float | None:
     References
     ----------
     Euphonics 12.1.2; here the rigid motions of free bodies are included.
+
+    Examples
+    --------
+    >>> plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    >>> round(fi.threshold_frequency(plate, (0.45, 0.3), 0.1))  # Hz; a harder contact gives several impacts
+    124
     """
     mass = check.positive("mass", mass, "kg")
     omega, squared, density, exponent = _participation(modes, at)

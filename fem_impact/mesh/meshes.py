@@ -114,6 +114,12 @@ def rectangle(length: float, width: float, *, size: float | None = None) -> Mesh
     """Rectangle [0, length] x [0, width] [m]; edges left, right (x = 0, length), bottom, top (y = 0, width).
 
     Without ``size``, `find_modes` chooses one fine enough for the requested modes.
+
+    Examples
+    --------
+    >>> mesh = fi.mesh.rectangle(0.465, 0.3)
+    >>> round(mesh.area, 6), sorted(mesh.edges)
+    (0.1395, ['bottom', 'boundary', 'left', 'right', 'top'])
     """
     length = check.positive("length", length, "m")
     width = check.positive("width", width, "m")
@@ -143,7 +149,13 @@ def rectangle(length: float, width: float, *, size: float | None = None) -> Mesh
 
 
 def line(length: float, *, size: float | None = None) -> Mesh:
-    """Line [0, length] [m] for a beam; edges left (x = 0) and right (x = length)."""
+    """Line [0, length] [m] for a beam; edges left (x = 0) and right (x = length).
+
+    Examples
+    --------
+    >>> fi.mesh.line(0.4, size=0.1).points.ravel().round(3).tolist()
+    [0.0, 0.1, 0.2, 0.3, 0.4]
+    """
     length = check.positive("length", length, "m")
     size, stated = _element_size(size, length / BEAM_DIVISIONS)
     _check_affordable(length / size, size, MOST_BEAM_CELLS)
@@ -169,7 +181,14 @@ def fill(outline: Outline, *, size: float | None = None) -> Mesh:
 
 
 def disk(radius: float, hole: float = 0.0, *, size: float | None = None) -> Mesh:
-    """Disk or annulus around the origin with radii ``radius`` and ``hole`` [m]; edges outer, inner, boundary (both)."""
+    """Disk or annulus around the origin with radii ``radius`` and ``hole`` [m]; edges outer, inner, boundary (both).
+
+    Examples
+    --------
+    >>> ring = fi.mesh.disk(0.15, hole=0.05, size=0.05)
+    >>> sorted(ring.edges), round(float(ring.curvatures[ring.edges["inner"]].mean()), 6)  # 1/m, concave
+    (['boundary', 'inner', 'outer'], -20.0)
+    """
     radius = check.positive("radius", radius, "m")
     hole = check.non_negative("hole", hole, "m")
     if hole >= radius:
@@ -198,6 +217,12 @@ def polygon(corners: Any, holes: Sequence[Any] = (), *, size: float | None = Non
     Mesh
         Edge "edge0" runs from the first corner to the second, and so on; "hole0" is the rim of the first hole, "outer"
         the whole outer rim, "boundary" both.
+
+    Examples
+    --------
+    >>> plate = fi.mesh.polygon([(0, 0), (0.4, 0), (0.1, 0.3)], size=0.1)
+    >>> round(plate.area, 6), sorted(plate.edges)
+    (0.06, ['boundary', 'edge0', 'edge1', 'edge2', 'outer'])
     """
     outer = straight_loop("corners", corners, "edge{}")
     if not isinstance(holes, (list, tuple, np.ndarray)):
@@ -230,6 +255,13 @@ def outline(source: Any, *, size: float | None = None, unit: str | None = None) 
     ------
     ValueError
         If the outline is open, crosses itself, or looks like millimetres read as metres.
+
+    Examples
+    --------
+    >>> angle = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    >>> egg = fi.mesh.outline(np.column_stack([0.2 * np.cos(angle), 0.15 * np.sin(angle)]))  # or "guitar.svg"
+    >>> sorted(egg.edges), bool(egg.curved.all())
+    (['boundary', 'edge0', 'outer'], True)
     """
     curve, notes = drawings.read(source, unit)
     return replace(fill(curve, size=size), notes=tuple(notes))
@@ -259,6 +291,12 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     ------
     ValueError
         If the file cannot be read, is not one flat connected set of triangles, or looks like millimetres.
+
+    Examples
+    --------
+    >>> fi.mesh.save("plate.msh", fi.mesh.rectangle(0.4, 0.3, size=0.1))
+    >>> round(fi.mesh.load("plate.msh").area, 6)  # m^2
+    0.12
     """
     points, cells, given, pairs, notes = mesh_files.read(path, unit)
     rim = mesh_files.boundary(cells)
@@ -299,7 +337,14 @@ def aligned(mesh: Mesh) -> Mesh:
 
 @check.typed
 def save(path: Any, mesh: Mesh) -> None:
-    """Write the mesh of a plate and its named edges to a Gmsh file (.msh), readable by `load` and other programs."""
+    """Write the mesh of a plate and its named edges to a Gmsh file (.msh), readable by `load` and other programs.
+
+    Examples
+    --------
+    >>> fi.mesh.save("disk.msh", fi.mesh.disk(0.1, size=0.05))
+    >>> sorted(fi.mesh.load("disk.msh").edges)
+    ['boundary', 'outer']
+    """
     if not isinstance(mesh, Mesh) or mesh.dimension != 2:
         raise ValueError("mesh must be the mesh of a plate, got a beam; make a beam with fi.mesh.line")
     mesh_files.write(path, mesh.points, mesh.cells, mesh.facets, mesh.middles, mesh.curved, mesh.edges)

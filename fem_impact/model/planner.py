@@ -526,7 +526,6 @@ def strike(
         Time step in contact. If given, the step error is only estimated and may exceed the tolerance.
     striker_force, target_force : float [N]
         Constant forces at the contact points, positive along the blow; for example the weight of a falling ball.
-
     damping_ratio : float or function of frequency [Hz], optional
         Damping of a system, which has none of its own.
     target, size, n_modes, max_frequency, n_striker_modes : optional
@@ -542,6 +541,14 @@ def strike(
         If an argument is invalid.
     SimulationError
         If the tolerance cannot be met, or if the bodies do not separate for good and no other end was given.
+
+    Examples
+    --------
+    >>> plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    >>> stick, law = fi.Striker.stick(mass=0.1, first_frequency=10e3), fi.Contact.hertz(695e3)
+    >>> hit = fi.strike(plate, stick, law, at=(0.45, 0.3), speed=1.0, tolerance=1e-3)
+    >>> hit.n_impacts, round(hit.restitution, 2), hit.error.total < 1e-3
+    (1, 0.55, True)
     """
     if isinstance(body, Modes) and damping_ratio is None and not set(options) & set(PIECES):
         return collision.strike(body, striker, contact, at=at, speed=speed, **options)

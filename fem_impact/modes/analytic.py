@@ -251,6 +251,12 @@ def rectangle(
     References
     ----------
     Leissa (1969), Vibration of plates, NASA SP-160, eq. 4.20; Timoshenko and Woinowsky-Krieger, art. 35 (static sum).
+
+    Examples
+    --------
+    >>> modes = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=3)
+    >>> modes.frequencies.round(2).tolist()
+    [100.0, 188.17, 311.83]
     """
     length, width = check.positive("length", length, "m"), check.positive("width", width, "m")
     physical = _physical(section, Plate, mass, first_frequency, length * width)
@@ -435,6 +441,12 @@ def beam(
     References
     ----------
     Bishop and Johnson (1960), The mechanics of vibration, ch. 7.
+
+    Examples
+    --------
+    >>> modes = fi.analytic.beam(0.4, ends=("clamped", "free"), mass=0.1, first_frequency=100.0, n_modes=3)
+    >>> modes.frequencies.round(2).tolist()
+    [100.0, 626.69, 1754.75]
     """
     length = check.positive("length", length, "m")
     if not isinstance(ends, (list, tuple)) or len(ends) != 2:
@@ -666,6 +678,12 @@ def disk(
     References
     ----------
     Leissa (1969), NASA SP-160, ch. 2; Boggio (1905) for the static deflection of the clamped disk.
+
+    Examples
+    --------
+    >>> modes = fi.analytic.disk(0.15, edge="clamped", mass=0.2, first_frequency=100.0, n_modes=3)
+    >>> modes.frequencies.round(2).tolist()
+    [100.0, 208.11, 208.11]
     """
     radius = check.positive("radius", radius, "m")
     check.one_of("edge", edge, KINDS)

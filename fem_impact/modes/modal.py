@@ -179,7 +179,14 @@ class Modes:
 
     @classmethod
     def rigid(cls, mass: float) -> "Modes":
-        """A rigid mass [kg] free to translate: one mode of frequency zero."""
+        """A rigid mass [kg] free to translate: one mode of frequency zero.
+
+        Examples
+        --------
+        >>> ball = fi.Modes.rigid(0.2)
+        >>> ball.mass, ball.frequencies.tolist()
+        (0.2, [0.0])
+        """
         mass = check.positive("mass", mass, "kg")
         return cls(np.zeros(1), np.zeros(1), RigidShapes(mass), mass)
 
@@ -201,6 +208,13 @@ class Modes:
         ------
         ValueError
             If lengths disagree, a number is not finite or frequencies do not ascend.
+
+        Examples
+        --------
+        >>> shapes = np.array([[1.2, 0.4], [0.9, -1.1]])  # kg**-0.5, at two points
+        >>> modes = fi.Modes.from_arrays([110.0, 340.0], shapes, points=[(0.1, 0.1), (0.3, 0.1)], mass=0.5)
+        >>> modes.shape_at([(0.3, 0.1)]).tolist()
+        [[0.9, -1.1]]
         """
         omega = 2.0 * np.pi * check.ascending("frequencies", frequencies, "Hz")
         points = check.array("points", points, (None, None), "m")
@@ -431,7 +445,14 @@ def damping_notes(ratios: np.ndarray, omega: np.ndarray) -> tuple[str, ...]:
 
 
 def rayleigh(mass_factor: float, stiffness_factor: float) -> Callable[[np.ndarray], np.ndarray]:
-    """Damping ratio as a function of frequency [Hz] for C = mass_factor M + stiffness_factor K ([1/s], [s])."""
+    """Damping ratio as a function of frequency [Hz] for C = mass_factor M + stiffness_factor K ([1/s], [s]).
+
+    Examples
+    --------
+    >>> damping = fi.rayleigh(20.0, 1e-6)  # 1/s, s
+    >>> damping(2.0 * np.pi * np.array([50.0, 500.0])).round(4).tolist()
+    [0.0061, 0.0104]
+    """
     mass_factor = check.non_negative("mass_factor", mass_factor, "1/s")
     stiffness_factor = check.non_negative("stiffness_factor", stiffness_factor, "s")
 
@@ -530,6 +551,14 @@ def find_modes(
         If neither or both of n_modes and max_frequency are given, or the mesh has too few unknowns.
     SimulationError
         If the tolerance is not met, or modes are missing according to the inertia of the factorised matrix.
+
+    Examples
+    --------
+    >>> plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), thickness=3e-3)
+    >>> system = fi.assemble(fi.mesh.rectangle(0.465, 0.3), plate, {"boundary": "hinged"})
+    >>> modes = fi.find_modes(system, n_modes=3, damping_ratio=0.005)
+    >>> modes.frequencies.round(2).tolist()
+    [105.78, 199.05, 329.86]
     """
     if (n_modes is None) == (max_frequency is None):
         raise ValueError("find_modes needs either n_modes or max_frequency")

@@ -273,6 +273,12 @@ def load_scene(path: str | Path) -> Scene:
         `Scene.strike` find errors that need the finished body, such as a strike point off the plate.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> hit = fi.load_scene("studies/scenes/drumstick.toml").strike(tolerance=1e-2)
+    >>> hit.n_impacts, round(hit.restitution, 2)
+    (1, 0.41)
     """
     path = check.path("path", path)
     return scene_of(read_tables(path), path, folder=path.parent)
@@ -327,6 +333,11 @@ def plan(
     -------
     Plan
         If the target needs modes, this finds the first twenty to estimate how many.
+
+    Examples
+    --------
+    >>> print(fi.plan("studies/scenes/heavy_plate.toml", tolerance=1e-2).target)
+    rigid
     """
     if isinstance(blow, (System, Modes)):
         return planner.plan_of(blow, striker, contact, watch, **changes)

@@ -57,6 +57,11 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
     ------
     ValueError
         If the path has another ending, or times are missing.
+
+    Examples
+    --------
+    >>> modes = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=4)
+    >>> fi.export.write_vtk("modes.pvd", modes)  # opens in ParaView
     """
     path = check.path("path", path)
     suffix = vtk_ending(path)
@@ -124,6 +129,13 @@ def write_uff(path: str | Path, modes: Modes) -> None:
 
     The deflection is in z, normalised to modal mass 1; numbers have six digits. Needs pyuff:
     ``pip install 'fem-impact[uff]'``. `Modes.from_uff` reads the file back.
+
+    Examples
+    --------
+    >>> modes = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=4)
+    >>> fi.export.write_uff("modes.uff", modes)
+    >>> fi.Modes.from_uff("modes.uff", mass=0.2).frequencies.round(2).tolist()
+    [100.0, 208.0, 292.0, 388.0]
     """
     if modes.dimension == 0:
         raise ValueError("modes must be those of a plate or beam, got a rigid mass, which has no shape to write")
@@ -140,6 +152,14 @@ def write_wav(
 
     The sound is the velocity of the point ``at`` (see `sound.synthesise`) or, with a ``listener``, the pressure near a
     plate (see `sound.radiate`); ``options`` go to that function.
+
+    Examples
+    --------
+    >>> modes = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=20, damping_ratio=0.01)
+    >>> hit = fi.strike(modes, fi.Striker.rigid(0.03), fi.Contact.linear(1e5), at=(0.13, 0.1), speed=1.0)
+    >>> sound = fi.export.write_wav("strike.wav", hit, at=(0.2, 0.2))
+    >>> sound.rate, sound.full_scale, sound.unit
+    (48000, 10.0, 'm/s')
     """
     if listener is None:
         heard = sound.synthesise(response, at, **options)
@@ -152,7 +172,13 @@ def write_wav(
 
 @check.typed
 def write_force(path: str | Path, response: Response) -> None:
-    """Write the force history as CSV in full precision: a header with units, then one row per instant."""
+    """Write the force history as CSV in full precision: a header with units, then one row per instant.
+
+    Examples
+    --------
+    >>> hit = fi.strike(fi.Modes.rigid(1.0), fi.Striker.rigid(0.1), fi.Contact.linear(1e5), at=None, speed=1.0)
+    >>> fi.export.write_force("force.csv", hit)
+    """
     with replacing(path) as temporary:
         text = csv_text(**{"time [s]": response.time, "force [N]": response.force})
         temporary.write_text(text, encoding="utf-8", newline="")
@@ -160,7 +186,13 @@ def write_force(path: str | Path, response: Response) -> None:
 
 @check.typed
 def write_json(path: str | Path, data: dict[str, Any]) -> None:
-    """Write plain data as JSON that every reader accepts, without NaN or infinity (see `plain`)."""
+    """Write plain data as JSON that every reader accepts, without NaN or infinity (see `plain`).
+
+    Examples
+    --------
+    >>> hit = fi.strike(fi.Modes.rigid(1.0), fi.Striker.rigid(0.1), fi.Contact.linear(1e5), at=None, speed=1.0)
+    >>> fi.export.write_json("hit.json", fi.export.numbers(hit))
+    """
     with replacing(path) as temporary:
         temporary.write_text(json.dumps(plain(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
@@ -175,7 +207,14 @@ IMPACT_PARTS = ("start", "end", "peak_force", "impulse")
 
 @check.typed
 def numbers(response: Response) -> dict[str, Any]:
-    """All scalars of a response by name, in SI units, and its impacts."""
+    """All scalars of a response by name, in SI units, and its impacts.
+
+    Examples
+    --------
+    >>> hit = fi.strike(fi.Modes.rigid(1.0), fi.Striker.rigid(0.1), fi.Contact.linear(1e5), at=None, speed=1.0)
+    >>> round(fi.export.numbers(hit)["response"]["restitution"], 3)  # of 1 kg that yields
+    0.818
+    """
     data = {name: getattr(response, name) for name in SCALARS} | {
         "spectral_centroid": {"value": _centroid(response), "max_frequency": CENTROID_BAND},
         "error": {name: getattr(response.error, name) for name in ERROR_PARTS},

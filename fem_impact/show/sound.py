@@ -78,6 +78,14 @@ def synthesise(
     -----
     The motion of each mode is exact at every sample, during and after the blow. Leaves out rigid modes (inaudible) and
     modes at or above ``rate / 2`` (they would alias). This is the motion of the surface, not the radiated pressure.
+
+    Examples
+    --------
+    >>> modes = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=20, damping_ratio=0.01)
+    >>> hit = fi.strike(modes, fi.Striker.rigid(0.03), fi.Contact.linear(1e5), at=(0.13, 0.1), speed=1.0)
+    >>> sound = fi.sound.synthesise(hit, duration=0.5)
+    >>> len(sound.samples), sound.rate
+    (24000, 48000)
     """
     modes = response.target
     point: Any = modes.point("at", response.at if at is None else at)
@@ -125,6 +133,14 @@ def radiate(
     References
     ----------
     Rayleigh, The Theory of Sound, section 278.
+
+    Examples
+    --------
+    >>> modes = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=20, damping_ratio=0.01)
+    >>> hit = fi.strike(modes, fi.Striker.rigid(0.03), fi.Contact.linear(1e5), at=(0.13, 0.1), speed=1.0)
+    >>> heard = fi.sound.radiate(hit, (0.2, 0.15, 1.0), duration=0.1)  # a metre above the middle
+    >>> heard.unit
+    'Pa'
     """
     modes = response.target
     if modes.dimension != 2:

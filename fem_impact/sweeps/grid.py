@@ -244,6 +244,14 @@ def sweep(
     ------
     ValueError
         If an axis is unknown, a value is not allowed, or the map is too large.
+
+    Examples
+    --------
+    >>> plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    >>> over = {"mass": [0.01, 0.1], "stiffness": [1e4, 1e5, 1e6]}
+    >>> table = fi.sweep(plate, fi.Striker.rigid(0.1), fi.Contact.linear(1e5), at=(0.45, 0.3), speed=1.0, over=over)
+    >>> table.n_impacts.values.tolist()
+    [[1, 1, 4], [1, 2, 4]]
     """
     tolerance = check.tolerance(tolerance)
     base = Case(modes, striker, contact, modes.point("at", at)[0], check.positive("speed", speed, "m/s", reach=REACH))

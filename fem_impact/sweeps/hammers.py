@@ -40,7 +40,15 @@ class Hammer:
 
 
 def bandwidth_of(hit: Response, drop: float) -> float:
-    """Frequency [Hz] at which the force spectrum first falls ``drop`` [dB] below its value at 0 Hz."""
+    """Frequency [Hz] at which the force spectrum first falls ``drop`` [dB] below its value at 0 Hz.
+
+    Examples
+    --------
+    >>> plate = fi.Modes.rigid(1e3)
+    >>> hit = fi.strike(plate, fi.Striker.rigid(0.1), fi.Contact.linear(1e6), at=None, speed=1.0)
+    >>> round(fi.hammers.bandwidth_of(hit, 10.0))  # Hz
+    1026
+    """
     frequencies = np.linspace(0.0, 4.0 / hit.contact_time, LOOKS)
     size = np.abs(hit.spectrum(frequencies))
     level = 20.0 * np.log10(np.maximum(size, 1e-12 * size[0]) / size[0]) + drop
@@ -100,6 +108,13 @@ def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float 
     Computed blows decide, not the kinetic-energy criterion: multiple impacts happen well below its threshold. With
     linear tips the answer is the same at any speed. If several ranges of tips hit once, the widest one is used: a heavy
     hammer with a soft tip can graze the vibrating body a second time.
+
+    Examples
+    --------
+    >>> plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    >>> light, heavy = fi.hammers.choose(plate, (0.45, 0.3), 500.0, masses=[2e-3, 0.2])
+    >>> light.works, heavy.works
+    (True, False)
     """
     masses = _checked(masses)
     centre = _centre(bandwidth, drop)

@@ -166,8 +166,9 @@ def by_cluster(
         store = None if path is None else Store.open(path, grid)
         block = block_size(grid.n_cases)
         todo = store.missing() if store is not None else list(range(math.ceil(grid.n_cases / block)))
-        shared = connected.scatter(grid.sampled(), broadcast=True)
-        name = f"map-{uuid.uuid4().hex[:12]}"  # new keys: the scheduler may still hold those of an earlier run
+        # New keys for data (not its hash) and tasks: the scheduler may still be about to forget those of the last run
+        shared = connected.scatter(grid.sampled(), broadcast=True, hash=False)
+        name = f"map-{uuid.uuid4().hex[:12]}"
         futures = {
             connected.submit(_work, shared, i, block, solve, None if store is None else str(store.path),
                              key=f"{name}-{i}", pure=False): i
@@ -177,6 +178,8 @@ def by_cluster(
         texts: Texts = {}
         done = grid.n_cases - sum(min(block, grid.n_cases - i * block) for i in todo)
         for future, result in as_completed(futures, with_results=True):
+            if future.cancelled():
+                raise OSError(f"client: the cluster dropped the map ({check.line(str(result))}); run it again")
             start = futures[future] * block
             stop = min(start + block, grid.n_cases)
             if result is not None:

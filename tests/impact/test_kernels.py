@@ -667,7 +667,7 @@ def test_plain_python_form_agrees():
     )
     answers = [
         subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=300,
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=600,
             env={**os.environ, "NUMBA_DISABLE_JIT": flag},
         ).stdout
         for flag in ("0", "1")

@@ -183,22 +183,26 @@ def test_more_closed_forms_are_the_textbooks(seed):
     check_closed_form(seed)
 
 
+@pytest.mark.xdist_group("elements")  # the claims are of the same modes
 @pytest.mark.parametrize("seed", range(FAST))
 def test_elements_are_within_their_claim_of_the_textbook(seed):
     check_elements(seed)
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("more elements")
 @pytest.mark.parametrize("seed", range(FAST, SLOW))
 def test_more_elements_are_within_their_claim_of_the_textbook(seed):
     check_elements(seed)
 
 
+@pytest.mark.xdist_group("elements")
 def test_claims_cover_the_error_and_are_of_its_size():
     check_claims(range(FAST))
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("more elements")
 def test_claims_cover_the_error_and_are_of_its_size_over_all_bodies():
     check_claims(range(SLOW))
 

@@ -345,13 +345,19 @@ def pairs():
 QUICK = {("free L", "millimetres and grams"), ("free L", "the other way round"), ("free disk", "turned and mirrored")}
 
 
+def marks_of(name, quick):
+    """One process for each body, whose modes serve all its tests."""
+    group = pytest.mark.xdist_group(f"told otherwise: {name}")
+    return [group] if quick else [group, pytest.mark.slow]
+
+
 def cases(with_points):
     """Beams cost nothing; of the plates a few are quick enough for every run, at one point on a free edge."""
     for name, telling in pairs():
         for point in BODIES[name].points if with_points else [None]:
             quick = BODIES[name].dimension == 1 or ((name, telling) in QUICK and point in (None, "edge"))
             values = (name, telling, point) if with_points else (name, telling)
-            yield pytest.param(*values, marks=() if quick else pytest.mark.slow)
+            yield pytest.param(*values, marks=marks_of(name, quick))
 
 
 @pytest.mark.parametrize(("name", "telling"), list(cases(with_points=False)))
@@ -361,6 +367,7 @@ def test_frequencies(name, telling):
     compare(one, other, claim + other_claim)
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(("name", "telling", "point"), list(cases(with_points=True)))
 def test_static_compliance_and_blow(name, telling, point):
     """Inside, on free edges and in corners."""
@@ -371,9 +378,10 @@ def test_static_compliance_and_blow(name, telling, point):
 def each_point():
     for name, body in BODIES.items():
         for point in body.points:
-            yield pytest.param(name, point, marks=() if body.dimension == 1 else pytest.mark.slow)
+            yield pytest.param(name, point, marks=marks_of(name, body.dimension == 1))
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "point"), list(each_point()))
 def test_more_modes(name, point):
     """Twice as many: the static rest gives way to modes, and the blow stays."""
@@ -383,9 +391,7 @@ def test_more_modes(name, point):
     compare_at(point, body, modes_first_told(name), body, more_modes(name))
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=() if b.dimension == 1 else pytest.mark.slow) for n, b in BODIES.items()]
-)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=marks_of(n, b.dimension == 1)) for n, b in BODIES.items()])
 def test_frequencies_among_more_modes(name):
     one, claim = frequencies_first_told(name)
     other, other_claim = frequencies_of(BODIES[name], n_modes=40)

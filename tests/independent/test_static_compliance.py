@@ -15,8 +15,8 @@ FLOOR = 2e-8  # [-] of the references: their sums cancel beside held edges; two 
 RESTS = 1e-12  # [-] compliance of a point on a support over the largest of the body
 DISTANCES = (-4.0, -1.0)  # powers of ten of the size, of points beside edges and corners
 N_MODES = 12
-FAST, SLOW, BEAM_POINTS = 3, 35, 56  # points per body, of 500 as many as ten minutes allow; nine beams make 500
-MIXED_FAST, MIXED_SLOW = 1, 6  # where each reference takes seconds
+FAST, SLOW, ALL, BEAM_POINTS = 3, 12, 35, 56  # points per body: quick, slow, with --all-cases; nine beams make 500
+MIXED_FAST, MIXED_SLOW, MIXED_ALL = 1, 2, 6  # where each reference takes seconds
 
 SIDES = ("clamped", "hinged", "free")
 STRIPS = {
@@ -44,6 +44,7 @@ MIXED = {
     "clamped rectangle": (SQUARE, ("clamped",) * 4),
     "cantilever": (SQUARE, ("free", "free", "free", "clamped")),
     "clamped triangle": (SLANTED, ("clamped",) * 3),
+    "L of mixed edges": (ELL, ("hinged", "free", "free", "clamped", "clamped", "free")),
 }
 
 
@@ -214,15 +215,17 @@ def share_covered(cases):
 PLATES = [*STRIPS, *ROUND, "hinged triangle"]
 
 
+@pytest.mark.xdist_group("static few")  # the claims are of the same points
 @pytest.mark.parametrize("name", PLATES)
 def test_a_plate_gives_what_its_series_says_at_any_point(name):
     check(name, FAST)
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("static many")
 @pytest.mark.parametrize("name", PLATES)
-def test_a_plate_gives_what_its_series_says_at_many_points(name):
-    check(name, SLOW)
+def test_a_plate_gives_what_its_series_says_at_many_points(name, all_cases):
+    check(name, ALL if all_cases else SLOW)
 
 
 def test_a_clamped_rectangle_gives_what_mixed_elements_say():
@@ -231,21 +234,25 @@ def test_a_clamped_rectangle_gives_what_mixed_elements_say():
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("static many")
 @pytest.mark.parametrize("name", MIXED)
-def test_a_polygon_gives_what_mixed_elements_say(name):
+def test_a_polygon_gives_what_mixed_elements_say(name, all_cases):
     pytest.importorskip("ngsolve")
-    check(name, MIXED_SLOW)
+    check(name, MIXED_ALL if all_cases else MIXED_SLOW)
 
 
+@pytest.mark.xdist_group("static few")
 def test_claims_cover_the_error():
     covered, worst = share_covered([(name, FAST) for name in PLATES])
     assert covered >= 0.99, worst
 
 
 @pytest.mark.slow
-def test_claims_cover_the_error_at_many_points():
+@pytest.mark.xdist_group("static many")
+def test_claims_cover_the_error_at_many_points(all_cases):
     pytest.importorskip("ngsolve")
-    covered, worst = share_covered([(name, SLOW) for name in PLATES] + [(name, MIXED_SLOW) for name in MIXED])
+    count, mixed = (ALL, MIXED_ALL) if all_cases else (SLOW, MIXED_SLOW)
+    covered, worst = share_covered([(name, count) for name in PLATES] + [(name, mixed) for name in MIXED])
     assert covered >= 0.99, worst
 
 

@@ -9,7 +9,6 @@ from numpy.testing import assert_allclose
 import fem_impact as fi
 from fem_impact._base import check
 from fem_impact.fe import assembly, refinement
-from fem_impact.impact.quantities import USUAL, asked_for
 from fem_impact.model import planner
 
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
@@ -201,11 +200,6 @@ def test_every_piece_can_be_set():
 def test_wrong_pieces_are_named(changes, text):
     with pytest.raises(ValueError, match=text):
         fi.plan(SCENES / "drumstick_map.toml", **changes)
-
-
-def test_quantities_may_be_named_in_three_ways():
-    assert asked_for("spectrum=5000") == asked_for(["spectrum=5e3"]) == asked_for({"spectrum": 5000})
-    assert asked_for(None) == USUAL
 
 
 def test_verifying_run_finds_what_the_estimate_promises():

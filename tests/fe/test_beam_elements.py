@@ -1,0 +1,141 @@
+"""Beam elements of degree 32 against polynomials, exact deflections and the roots of clamped beams."""
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+from numpy.testing import assert_allclose
+from scipy.optimize import brentq
+
+from fem_impact.fe import beam_elements
+from fem_impact.fe.beam_elements import DEGREE, HermiteSpace, divisions, energy_errors, integrals, nodes, segments
+
+
+def uniform(x):
+    return np.ones_like(x), np.ones_like(x)
+
+
+def assembled(places):
+    """Space, stiffness and mass (n_dofs, n_dofs) of a uniform beam, unit EI and unit mass per length."""
+    line = segments(np.asarray(places))
+    space = HermiteSpace(line)
+    K, M, *_ = integrals(space, uniform)
+    dofs, n_dofs = beam_elements.numbering(line, space)
+    whole = np.zeros((2, n_dofs, n_dofs))
+    for cell, own in enumerate(dofs.T):
+        whole[0][np.ix_(own, own)] += K[cell]
+        whole[1][np.ix_(own, own)] += M[cell]
+    return space, dofs, *whole
+
+
+def test_shapes_hold_every_polynomial_up_to_their_degree():
+    space = HermiteSpace(segments(np.array([-0.3, 1.1])))
+    integrals(space, uniform)  # turns the bubbles
+    s = np.linspace(-0.3, 1.1, 200)
+    value, slope, bend = (f[0] for f in space.functions(np.zeros(1, int), s[None, :, None], (0, 1, 2)))
+    centred = (s - 0.4) / 0.7
+    for degree in (0, 1, 3, 7, DEGREE):
+        power = Polynomial.basis(degree)
+        weights = np.linalg.lstsq(value, power(centred), rcond=None)[0]
+        assert_allclose(value @ weights, power(centred), atol=1e-11)
+        assert_allclose(slope @ weights, power.deriv(1)(centred) / 0.7, atol=1e-8 * max(1, degree))
+        assert_allclose(bend @ weights, power.deriv(2)(centred) / 0.7**2, atol=1e-6 * max(1, degree**2))
+    above = np.linalg.lstsq(value, centred ** (DEGREE + 2), rcond=None)[1]
+    assert above.size == 0 or above > 1e-20  # and no polynomial beyond
+
+
+def test_bubbles_are_the_modes_of_the_clamped_beam():
+    """Unit stiffness, so their mass is 1 / k**4 of cos k cosh k = 1: ten half waves are resolved to rounding."""
+    space = HermiteSpace(segments(np.array([0.0, 1.0])))
+    K, M, *_ = integrals(space, uniform)
+    n = np.arange(1, 11)
+    k = np.array([brentq(lambda k: np.cos(k) - 1.0 / np.cosh(k), (i + 0.3) * np.pi, (i + 0.7) * np.pi) for i in n])
+    mass = np.sort(np.diag(M[0])[4:])[::-1][:10]
+    assert_allclose(mass ** (-1 / 4), k, rtol=1e-12)
+    assert_allclose(K[0, 4:, 4:], np.eye(DEGREE - 3), atol=1e-10)
+
+
+@pytest.mark.parametrize("places", [[0.0, 1.0], [0.0, 0.1, 0.55, 1.0]])
+def test_cantilever_under_its_weight_is_the_quartic(places):
+    _, dofs, K, M = assembled(places)
+    load = M @ rigid(places, dofs, len(K))[:, 0]  # a unit force per length
+    kept = np.setdiff1d(np.arange(len(K)), dofs[:2, 0])
+    solution = np.zeros(len(K))
+    solution[kept] = np.linalg.solve(K[np.ix_(kept, kept)], load[kept])
+    tip, turn = solution[dofs[2:4, -1]]
+    assert_allclose([tip, turn], [1.0 / 8.0, 1.0 / 6.0], rtol=1e-10)  # q L**4 / 8 EI and q L**3 / 6 EI
+    assert_allclose(solution @ load, 1.0 / 20.0, rtol=1e-10)  # twice the strain energy, q**2 L**5 / 20 EI
+
+
+def rigid(places, dofs, n_dofs):
+    return HermiteSpace(segments(np.asarray(places))).linear(dofs, n_dofs)
+
+
+def test_rigid_motions_cost_nothing_and_weigh_what_the_beam_does():
+    places = [0.0, 0.3, 1.0]
+    _, dofs, K, M = assembled(places)
+    motions = rigid(places, dofs, len(K))
+    assert_allclose(K @ motions, 0.0, atol=1e-9)  # of stiffnesses up to 12 / 0.3**3
+    assert_allclose(motions.T @ M @ motions, [[1.0, 0.5], [0.5, 1.0 / 3.0]], rtol=1e-13)
+
+
+def test_points_are_found_in_their_element_and_beyond_the_ends_in_none():
+    space = HermiteSpace(segments(np.array([0.0, 0.4, 1.0])))
+    cell, inside = space.locate(np.array([[0.0], [0.1], [0.7], [1.0], [-0.1], [1.0 + 1e-6], [1.0 + 1e-12]]))
+    assert cell.tolist() == [0, 0, 1, 1, 0, 1, 1]
+    assert inside.tolist() == [True, True, True, True, False, False, True]  # the last is off by rounding only
+
+
+def test_steps_and_kinks_of_the_section_become_nodes():
+    step, kink = 1.0 / np.pi, np.sqrt(0.5)
+
+    def fields(x):
+        return np.where(x < step, 1.0, 2.0), 1.0 + np.maximum(x - kink, 0.0)
+
+    found = divisions(fields, np.array([0.0, 1.0]))
+    assert np.abs(found - step).min() < 2e-9 and np.abs(found - kink).min() < 2e-9
+    assert len(found) == 4  # nothing else
+    assert divisions(uniform, np.array([0.0, 0.5, 1.0])).tolist() == [0.0, 0.5, 1.0]
+
+
+def test_smooth_sections_are_divided_until_a_polynomial_fits():
+    """A Runge function of width 0.01: intervals near it must be about as narrow, those far from it need not be."""
+
+    def fields(x):
+        return 1.0 + 1.0 / (1.0 + ((x - 0.4) / 0.01) ** 2), np.ones_like(x)
+
+    found = divisions(fields, np.array([0.0, 1.0]))
+    gap = np.diff(found)
+    near = np.abs(0.5 * (found[1:] + found[:-1]) - 0.4) < 0.01
+    assert gap[near].max() < 0.02 and gap[~near].max() > 0.1 and len(found) < 60
+
+
+def test_a_section_of_too_many_steps_is_refused():
+    with pytest.raises(ValueError, match="section must have at most 2000 steps and kinks"):
+        divisions(lambda x: (1.0 + (np.floor(5000 * x) % 2), np.ones_like(x)), np.array([0.0, 1.0]))
+
+
+def test_nodes_keep_ends_and_marks_and_no_points_close_to_them():
+    points, held = np.array([1.0, 0.0, 0.5, 0.25, 0.75]), np.array([0.0])
+    assert nodes(points, np.array([0.6]), held).tolist() == [0.0, 0.25, 0.5, 0.6, 0.75, 1.0]
+    assert nodes(points, np.array([0.503]), held).tolist() == [
+        0.0,
+        0.25,
+        0.503,
+        0.75,
+        1.0,
+    ]  # takes its neighbour's place
+    assert nodes(points, np.array([0.998]), held).tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]  # close to a free end: none
+    assert nodes(points, np.array([0.002]), held).tolist() == [0.0, 0.002, 0.25, 0.5, 0.75, 1.0]  # to a held end: one
+
+
+def test_error_of_a_solution_that_does_not_bend_is_the_energy_of_the_clamped_beam():
+    """Prager and Synge: the best linear moment is left out, as in a beam clamped at both ends, q**2 L**5 / 720 EI."""
+    space = HermiteSpace(segments(np.array([0.0, 0.35, 1.0])))
+    x, _ = beam_elements.quadrature(space)
+    load, none = np.ones((*x.shape, 1)), np.zeros((*x.shape, 1))
+    assert_allclose(energy_errors(space, np.ones_like(x), none, load, none), 1.0 / 720.0, rtol=1e-12)
+    moment = 0.5 * x[..., None] ** 2  # w'' in equilibrium with the load: nothing is missed
+    assert_allclose(energy_errors(space, np.ones_like(x), moment, load, none), 0.0, atol=1e-28)
+    push = np.maximum(x - 0.35, 0.0)[..., None]  # and a unit force at 0.35: a**3 b**3 / 3 L**3
+    exact = (0.35 * 0.65) ** 3 / 3.0
+    assert_allclose(energy_errors(space, np.ones_like(x), none, none, push), exact, rtol=1e-12)

@@ -1,0 +1,99 @@
+"""The size of elements from the waves wanted, the steps of refinement, and a kept spectrum."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.fe import refinement
+
+PLATE = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), thickness=2e-3)
+
+
+def wavenumber(modes, frequency):
+    """Of free bending waves [rad/m]: k**4 = m'' omega**2 / D."""
+    D = 70e9 * 2e-3**3 / 12.0 / (1.0 - 0.33**2)
+    return (2700.0 * 2e-3 / D) ** 0.25 * np.sqrt(2.0 * np.pi * frequency)
+
+
+@pytest.mark.parametrize("n_modes", [200, 1000])
+@pytest.mark.parametrize("edge", ["clamped", "hinged", "free"])
+def test_the_wave_of_the_last_mode_follows_weyls_law_with_its_edge_term(edge, n_modes):
+    exact = wavenumber(None, fi.analytic.disk(0.4, edge=edge, section=PLATE, n_modes=n_modes).frequencies[-1])
+    found = refinement._wave(fi.assemble(fi.mesh.disk(0.4), PLATE, {"boundary": edge}), n_modes, None)
+    assert_allclose(found, exact, rtol=3.0 / n_modes**0.75)  # the remainder of the law; without the edge 6 % at 200
+
+
+def test_the_wave_of_a_frequency_is_that_of_bending_waves():
+    system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), PLATE, {"left": "clamped"})
+    assert_allclose(refinement._wave(system, None, 2e3), wavenumber(None, 2e3), rtol=1e-12)
+    wood = fi.Material.orthotropic(E_along=11e9, E_across=0.8e9, nu=0.3, G=0.7e9, rho=450.0)
+    soft = fi.assemble(fi.mesh.rectangle(0.5, 0.3), fi.Plate(wood, 3e-3))
+    across = 0.8e9 / (1.0 - 0.3**2 * 0.8 / 11.0) * 3e-3**2 / 12.0 / 450.0  # D / m'' of the softest direction
+    assert refinement._wave(soft, None, 2e3) >= 0.999 * (2.0 * np.pi * 2e3) ** 0.5 / across**0.25
+
+
+@pytest.mark.parametrize("error", [1e-3, 1e-6, 1e-10])
+def test_wave_per_element_has_the_error_asked_for(error):
+    kh = refinement._wave_per_element(error)
+    factor, bend = refinement.ERROR_OF_WAVE
+    assert_allclose(factor * kh**8 / (1.0 + (kh / bend) ** 3), error, rtol=1e-9)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
+def test_elements_of_the_size_for_a_tolerance_meet_it_on_a_smooth_plate(tolerance):
+    """The hinged rectangle, exact; its elements are not a hundred times finer than needed either."""
+    system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), PLATE, {"boundary": "hinged"})
+    size = refinement.size_for(system, 30, None, tolerance)
+    fine = fi.assemble(fi.mesh.rectangle(0.5, 0.3, size=size), PLATE, {"boundary": "hinged"})
+    found = refinement.solve(fine, 30, None)
+    exact = 2.0 * np.pi * fi.analytic.rectangle(0.5, 0.3, section=PLATE, n_modes=30).frequencies
+    error = np.abs(found.omega / exact - 1.0)
+    assert 1e-3 * tolerance < error.max() <= tolerance
+    assert (error <= 3.0 * found.error).all()
+
+
+def test_the_step_of_refinement_solves_the_law_of_the_error():
+    parts, (smooth, curved) = np.zeros((3, 4)), refinement.ORDERS
+    parts[0] = [1e-7, 1e-6, 1e-5, 1e-4]
+    assert_allclose(refinement._needed(parts, 1e-6), 100.0 ** (1.0 / smooth), rtol=1e-9)
+    parts[1] = parts[0] * 100.0
+    step = refinement._needed(parts, 1e-6)
+    assert_allclose(1e-4 * step**-smooth + 1e-2 * step**-curved, 1e-6, rtol=1e-9)
+    assert refinement._needed(parts, 1.0) == refinement.LEAST_STEP
+    parts[2, 0] = 2e-6  # no mesh cures that
+    assert refinement._needed(parts, 1e-6) == np.inf
+
+
+def test_a_frequency_limit_counts_by_inertia_and_below_the_first_mode_is_told():
+    system = fi.assemble(fi.mesh.rectangle(0.5, 0.5, size=0.125), PLATE, {"boundary": "hinged"})
+    first = fi.analytic.rectangle(0.5, 0.5, section=PLATE, n_modes=1).frequencies[0]
+    # m**2 + n**2 < 10.5: (1,1), (1,2) twice, (2,2), (1,3) twice
+    assert len(refinement.solve(system, None, 10.5 / 2.0 * first).omega) == 6
+    with pytest.raises(ValueError, match="max_frequency must reach the first mode; there is none below"):
+        refinement.solve(system, None, 0.9 * first)
+
+
+def test_resolved_frequencies_grow_with_the_square_of_the_mesh():
+    def highest(size):
+        system = fi.assemble(fi.mesh.rectangle(0.5, 0.3, size=size), PLATE, {"boundary": "hinged"})
+        limit = np.geomspace(1.0, 1e6, 400)
+        return limit[[refinement.resolves(system, f) for f in limit]].max()
+
+    assert_allclose(highest(0.025) / highest(0.05), 4.0, rtol=0.08)  # the frequencies tried are 3.5 % apart
+
+
+def test_a_kept_spectrum_is_read_and_a_damaged_or_foreign_one_replaced(tmp_path, monkeypatch):
+    system = fi.assemble(fi.mesh.rectangle(0.5, 0.3, size=0.1), PLATE, {"left": "clamped"})
+    path = tmp_path / "modes.npz"
+    solved, real = [], refinement.solve
+    monkeypatch.setattr(refinement, "solve", lambda *what: solved.append(what) or real(*what))
+    first, second = (refinement.kept(system, 6, None, path) for _ in range(2))
+    assert len(solved) == 1
+    assert (first.omega == second.omega).all() and (first.vectors == second.vectors).all()
+    refinement.kept(system, 7, None, path)  # other modes
+    path.write_bytes(path.read_bytes()[:1000])  # cut off
+    again = refinement.kept(system, 7, None, path)
+    other = fi.assemble(fi.mesh.rectangle(0.5, 0.3, size=0.1), PLATE, {"left": "hinged"})
+    assert refinement.kept(other, 7, None, path).omega[0] < again.omega[0]  # another body
+    assert len(solved) == 4

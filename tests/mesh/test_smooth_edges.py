@@ -1,0 +1,95 @@
+"""Curves recovered from the points of a rim: circles exactly, others at the order of their fit, corners kept."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from fem_impact.mesh.smooth_edges import follow, smooth_runs
+
+
+def loop_of(place):
+    n = len(place)
+    return [np.column_stack([np.arange(n), (np.arange(n) + 1) % n])]
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])  # the rim of a disk, and that of a hole
+def test_points_of_a_circle_are_a_circle_wherever_they_lie(turn):
+    angle = turn * np.sort(np.random.default_rng(2).uniform(0.0, 2.0 * np.pi, 60))
+    place = np.array([5.0, -3.0]) + 2.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    rim = follow(place, loop_of(place), {})
+    assert (rim.n_curved, rim.n_corners) == (60, 0)
+    assert_allclose(np.linalg.norm(rim.middles - [5.0, -3.0], axis=1), 2.0, rtol=1e-12)
+    assert_allclose(rim.curvatures, turn / 2.0, rtol=1e-10)
+    assert_allclose(rim.tangents[:, 0], turn * np.column_stack([-np.sin(angle), np.cos(angle)]), atol=1e-11)
+
+
+def ellipse(n):
+    """Points of an ellipse of half axes 2 and 1, evenly in its angle, with tangents and curvatures there."""
+    t = np.linspace(0.0, 2.0 * np.pi, n, endpoint=False)
+    speed = np.hypot(2.0 * np.sin(t), np.cos(t))
+    tangent = np.column_stack([-2.0 * np.sin(t), np.cos(t)]) / speed[:, None]
+    return np.column_stack([2.0 * np.cos(t), np.sin(t)]), tangent, 2.0 / speed**3
+
+
+def test_fit_to_an_ellipse_converges():
+    """A quartic through five points: tangents of order four, curvatures of three, and middles of five."""
+    errors = []
+    for n in (40, 80):
+        place, tangent, curvature = ellipse(n)
+        rim = follow(place, loop_of(place), {})
+        assert (rim.n_curved, rim.n_corners) == (n, 0)
+        off = np.abs((rim.middles / [2.0, 1.0]) ** 2 @ [1.0, 1.0] - 1.0)
+        bend = np.abs(rim.curvatures[:, 0] - curvature)
+        errors.append([np.abs(rim.tangents[:, 0] - tangent).max(), bend.max(), off.max()])
+    order = np.log2(np.divide(*errors))
+    assert (order > [3.5, 2.7, 4.5]).all(), order
+
+
+def test_middles_from_the_file_are_kept_and_make_the_fit_finer():
+    place, tangent, _ = ellipse(40)
+    t = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False) + np.pi / 40
+    known = np.column_stack([2.0 * np.cos(t), np.sin(t)])
+    coarse = follow(place, loop_of(place), {})
+    fine = follow(place, loop_of(place), dict(enumerate(known)))
+    assert_allclose(fine.middles, known, atol=0.0)
+    missed = [np.abs(rim.tangents[:, 0] - tangent).max() for rim in (coarse, fine)]
+    assert missed[1] < missed[0] / 8.0  # half the distance between points: a sixteenth
+
+
+def stadium(n):
+    """Two half circles of radius 1 about (+-1, 0), of n facets each, and two sides of four facets."""
+    angle = np.pi * (np.arange(n + 1) / n - 0.5)
+    right = np.column_stack([1.0 + np.cos(angle), np.sin(angle)])
+    top = np.column_stack([[0.5, 0.0, -0.5], [1.0, 1.0, 1.0]])
+    return np.concatenate([right, top, -right, -top])
+
+
+def test_half_circles_and_straight_sides_meet_smoothly():
+    place = stadium(20)
+    rim = follow(place, loop_of(place), {})
+    assert (rim.n_curved, rim.n_corners) == (40, 4)
+    curved = rim.curvatures[:, 0] > 0.0
+    assert_allclose(rim.curvatures[curved], 1.0, rtol=1e-9)
+    centre = np.where(rim.middles[curved, :1] > 0.0, 1.0, -1.0) * [1.0, 0.0]
+    assert_allclose(np.linalg.norm(rim.middles[curved] - centre, axis=1), 1.0, rtol=1e-12)
+    assert_allclose(rim.tangents[:, 1], np.roll(rim.tangents[:, 0], -1, axis=0), atol=1e-9)  # no kink anywhere
+    runs = smooth_runs(place)
+    assert sorted(circle is not None for *_, circle in runs) == [False, False, True, True]
+    assert sorted(len(points) for points, *_ in runs) == [5, 5, 21, 21]
+
+
+def test_a_square_has_four_corners_and_no_curve():
+    side = np.linspace(0.0, 1.0, 5)[:-1]
+    place = np.concatenate([np.column_stack(x) for x in ((side, 0 * side), (1 + 0 * side, side))])
+    place = np.concatenate([place, 1.0 - place])
+    rim = follow(place, loop_of(place), {})
+    assert (rim.n_curved, rim.n_corners) == (0, 4)
+    assert_allclose(rim.curvatures, 0.0, atol=0.0)
+
+
+def test_a_polygon_of_few_sides_stays_one():
+    """An octagon turns by 45 degrees at each vertex: corners; 24 sides turn by 15: a circle."""
+    for n, n_corners in ((8, 8), (24, 0)):
+        angle = 2.0 * np.pi * np.arange(n) / n
+        place = np.column_stack([np.cos(angle), np.sin(angle)])
+        assert follow(place, loop_of(place), {}).n_corners == n_corners
