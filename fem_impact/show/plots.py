@@ -227,10 +227,6 @@ def hammers(found: Sequence[Hammer], bandwidth: float, drop: float = 10.0) -> An
         Curve(mass, softest, "softest tip that reaches the bandwidth", BLUE),
         Curve(mass, wanted, "softest tip on a rigid wall", GREY, "--"),
     ]
-    return curves(
-        drawn,
-        x=Axis("mass of the hammer", "g", log=True),
-        y=Axis("stiffness of the tip", "N/m", log=True),
-        title=f"Hammers for {bandwidth:g} Hz at -{drop:g} dB without a double hit",
-        between=(mass, softest, hardest),
-    )
+    x, y = Axis("mass of the hammer", "g", log=True), Axis("stiffness of the tip", "N/m", log=True)
+    title = f"Hammers for {bandwidth:g} Hz at -{drop:g} dB without a double hit"
+    return curves(drawn, x=x, y=y, title=title, between=(mass, softest, hardest))
