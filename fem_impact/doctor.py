@@ -26,7 +26,7 @@ EXTRAS = {  # extra: its purpose and the modules it needs
     "uff": ("universal files", "pyuff"),
     "cluster": ("clusters and stores", "distributed", "zarr"),
     "hdf5": ("meshes in HDF5", "h5py"),
-    "completion": ("completion of commands in a shell", "shtab"),
+    "completion": ("shell completion", "shtab"),
     "web": ("report and explore", "plotly", "bokeh", "jinja2"),
 }
 
