@@ -13,6 +13,7 @@ from .fe.assembly import assemble
 from .fe.section import Material, Plate
 from .impact.collision import strike
 from .impact.contact import Contact
+from .impact.response import Response
 from .impact.striker import Striker
 from .modes.modal import Modes, find_modes
 from .show import export, figures, pictures
@@ -25,7 +26,7 @@ EXTRAS = {  # extra: its purpose and the modules it needs
     "uff": ("universal files", "pyuff"),
     "cluster": ("clusters and stores", "distributed", "zarr"),
     "hdf5": ("meshes in HDF5", "h5py"),
-    "completion": ("completion of commands in a shell", "shtab"),
+    "completion": ("shell completion", "shtab"),
     "web": ("report and explore", "plotly", "bokeh", "jinja2"),
 }
 
@@ -76,17 +77,19 @@ def _finite_elements() -> bool:
     return bool(abs(modes.omega[0] / SQUARE - 1.0) < 1e-4)
 
 
+def _blow() -> Response:
+    return strike(Modes.rigid(1.0), Striker.rigid(1.0), Contact.linear(1e5), at=None, speed=1.0)
+
+
 def _kernels() -> bool:
-    hit = strike(Modes.rigid(1.0), Striker.rigid(1.0), Contact.linear(1e5), at=None, speed=1.0)
+    hit = _blow()
     return abs(hit.restitution) < 1e-9 and hit.n_impacts == 1  # equal masses exchange their speeds
 
 
 def _picture() -> bool:
     with scratch() as folder:
-        path = folder / "picture.png"
-        hit = strike(Modes.rigid(1.0), Striker.rigid(1.0), Contact.linear(1e5), at=None, speed=1.0)
-        figures.save(path, figures.force(hit))
-        return path.stat().st_size > 1000
+        figures.save(folder / "picture.png", figures.force(_blow()))
+        return (folder / "picture.png").stat().st_size > 1000
 
 
 def _vtk() -> bool:

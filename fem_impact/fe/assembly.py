@@ -207,14 +207,17 @@ def assemble(
         raise ValueError(
             f"section must be a {wanted} on a mesh of dimension {mesh.dimension}, got {check.shown(section)}"
         )
-    places = [] if near is None else [("near", near)]
-    places += [(f"point of point_masses[{i}]", point[None]) for i, (point, _) in enumerate(masses)]
-    for name, points in places:
-        inside = made.contains(points)
-        if not inside.all():
-            where = ", ".join(f"{x:g}" for x in points[int(np.argmin(inside))])
-            raise ValueError(f"{name} must lie on the body, got ({where}) m")
+    if near is not None:
+        _check_on(made.space, made.frame, "near", near)
     return replace(made, near=near)
+
+
+def _check_on(space: Any, frame: Frame, name: str, points: np.ndarray) -> None:
+    """Raise ValueError unless every point lies on the body."""
+    inside = space.locate(frame.local(points))[1]
+    if not inside.all():
+        where = ", ".join(f"{x:g}" for x in points[int(np.argmin(inside))])
+        raise ValueError(f"{name} must lie on the body, got ({where}) m")
 
 
 def reassemble(system: System, mesh: Mesh) -> System:
@@ -289,6 +292,8 @@ def _supported(masses: list[tuple[np.ndarray, float]], matrices: tuple, maps: tu
     space, dofs, frame, n_all = known["space"], known["element_dofs"], known["frame"], expand.shape[0]
     if masses:
         points, weights = (np.array(column) for column in zip(*masses))
+        for i, point in enumerate(points):
+            _check_on(space, frame, f"point of point_masses[{i}]", point[None])
         rows = _interpolation(space, dofs, n_all, frame.local(points))
         M = M + rows.T @ diags(weights / frame.mass) @ rows
         known["mass"] += float(weights.sum())

@@ -169,12 +169,13 @@ def _krylov(solve: Any, M: csc_matrix, n: int, available: int, allowed: float, w
     rng = np.random.default_rng(0)  # fixed seed, so that every run gives the same modes
     basis = np.empty((most + width, size))  # rows are vectors
     small = np.zeros((most + width, most + width))
-    block, carried, _ = _normal(*_with(M, solve(M @ rng.standard_normal((size, width)))))
-    block, carried, _ = _normal(block, carried)
+    block = solve(M @ rng.standard_normal((size, width)))
+    block, carried, _ = _normal(*_normal(block, M @ block)[:2])
     basis[:width], done, older = block.T, 0, np.zeros((size, 0))
     next_look = 2 * n + 2 * width
     while True:
-        new, heavy = _with(M, solve(carried))  # the operator applied to the newest block, and M times that
+        new = solve(carried)  # the operator applied to the newest block
+        heavy = M @ new
         near = slice(max(0, done - width), done + width)  # in exact arithmetic only these overlap
         overlap = basis[near] @ heavy
         new -= basis[near].T @ overlap
@@ -200,10 +201,6 @@ def _krylov(solve: Any, M: csc_matrix, n: int, available: int, allowed: float, w
             next_look = done + 4 * width
         basis[done : done + width] = new.T
         small[done : done + width, done - width : done] = factor
-
-
-def _with(M: csc_matrix, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return vectors, M @ vectors
 
 
 def _normal(vectors: np.ndarray, heavy: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

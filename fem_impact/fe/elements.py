@@ -12,7 +12,7 @@ from ..mesh.facets import Curves, powers
 from .supports import SIDES
 
 EXPONENTS = np.array([(i, j) for i in range(6) for j in range(6 - i)])  # the 21 monomials of degree 5
-ON_BODY = 1e-9  # [-] share of a triangle's size by which rounding may put a point outside it
+ON_BODY = 1e-9  # [-] share of the size of a triangle or body by which rounding may move a point off it
 NEAR_CURVE = 1e-5  # [-] the same at curved edges: the mesh is closer to the curve than this share of a triangle
 CANDIDATES = 8  # [-] nearest triangles searched first; if none holds the point, all are searched
 REACH = 0.5  # [-] share of a triangle's size; no curved edge bulges this far

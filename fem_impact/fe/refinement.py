@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from .._base import check
 from .._base.files import replacing
-from ..mesh.meshes import Mesh
+from ..mesh import mesh_files
 from . import residual
 from .assembly import System, assemble, reassemble
 from .eigenvalues import FIRST_SLICE, RESIDUAL, SPARE, STRICT, Flexibility, by_slices, count_below, lowest
@@ -296,7 +296,7 @@ def enclosure(found: Spectrum) -> np.ndarray | None:
     if nu < 0.0:
         return None
     second = _second_opinion(system, Plate(material, plate.thickness), len(found.omega))
-    longest = _longest(second.system.mesh) / system.frame.length
+    longest = mesh_files.longest(second.system.mesh.points, second.system.mesh.cells) / system.frame.length
     value = (second.omega / system.frame.rate) ** 2
     lower = value / (1.0 + MORLEY**2 * value * longest**4 / (1.0 - nu))
     bounds = np.column_stack([np.sqrt(lower) * system.frame.rate, found.omega])
@@ -313,9 +313,3 @@ def _second_opinion(system: System, plate: Plate, n_modes: int) -> Spectrum:
         if abs(factor - 1.0) > 0.1:
             morley = reassemble(morley, mesh.refined(factor))
     return solve(morley, n_modes, None)
-
-
-def _longest(mesh: Mesh) -> float:
-    """Length [m] of the longest side of all triangles."""
-    corners = mesh.points[mesh.cells]
-    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())

@@ -7,12 +7,12 @@ import numpy as np
 
 from ..mesh.facets import divided
 from ..mesh.meshes import Mesh
+from .elements import ON_BODY
 
 # [-] triangle size under a point load, as a fraction of the body's breadth or of the distance to a held edge. These
 # triangles miss 1e-6 of the compliance; rounding grows with the size to the power -2 and is smaller; test_point_load.py
 DEPTH = 2.0**-8
 GROWTH = 0.7  # [-] longest side of a triangle per distance to the point: 1.0 is ten times worse at curved edges
-AT_EDGE = 1e-9  # [-] a point nearer to a held edge than this share of the extent lies on the edge
 TIES = 1e-9  # [-] sides equal to this relative accuracy are ranked by number, so that neighbours pick the same one
 ROUNDS = 400  # [-] most passes over the mesh; about 30 reach a millionth of the extent
 
@@ -42,7 +42,7 @@ def _wanted(mesh: Mesh, held: np.ndarray, point: np.ndarray, breadth: float, ext
         return DEPTH * breadth
     ends = np.stack([mesh.points[mesh.facets[held, 0]], mesh.middles[held], mesh.points[mesh.facets[held, 1]]], axis=1)
     away = float(distance(point, ends[:, :-1], ends[:, 1:]).min())
-    return DEPTH * (breadth if away < AT_EDGE * extent else min(breadth, away))
+    return DEPTH * (breadth if away < ON_BODY * extent else min(breadth, away))
 
 
 def distance(point: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:

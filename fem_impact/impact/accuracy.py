@@ -27,6 +27,11 @@ def contact_resonance(contact: Contact, mass: float, speed: float) -> float:
     return 0.5 / contact_duration(contact, mass, speed)
 
 
+def resonant_stiffness(mass: Any, resonance: Any) -> Any:
+    """Stiffness [N/m] of the linear contact that gives a mass [kg] a contact resonance [Hz]."""
+    return mass * (2.0 * np.pi * resonance) ** 2
+
+
 @check.typed
 def cutoff_frequency(modes: Modes, at: Any, *, contact: Contact, mass: float, speed: float, tolerance: float) -> float:
     """Frequency [Hz] up to which modes must be kept so that the truncation error stays below a tolerance.

@@ -620,7 +620,7 @@ def _difference(
     """
     if len(coarse.contacts) != len(fine.contacts) or coarse.status != fine.status:
         return 1.0
-    momentum = _size(fine.start_p) or _size(fine.end_p) or 1.0
+    momentum = float(np.linalg.norm(fine.start_p) or np.linalg.norm(fine.end_p)) or 1.0
     speed = np.abs(coarse.end_p[coarse.omega == 0.0] - fine.end_p[fine.omega == 0.0])
     found = {"restitution": float(speed.max(initial=0.0)) / momentum / over[0]}
     if len(fine.contacts):
@@ -646,10 +646,6 @@ def _grazes(history: History, least: float) -> bool:
     if not 0 < len(history.contacts) <= FEW or history.bias.any():
         return False
     return record.nearest_turn(history.steps, history.now, 3 + history.n_coefficients) < least
-
-
-def _size(vector: np.ndarray) -> float:
-    return float(vector @ vector) ** 0.5
 
 
 def _force_missed(history: History) -> float:

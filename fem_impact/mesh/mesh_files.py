@@ -203,6 +203,11 @@ def sides_of(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return unique, number.reshape(-1, 3), counts
 
 
+def longest(points: np.ndarray, cells: np.ndarray) -> float:
+    """Length [m] of the longest side of all triangles."""
+    return float(np.linalg.norm(points[cells] - points[np.roll(cells, 1, axis=1)], axis=2).max())
+
+
 def boundary(cells: np.ndarray) -> np.ndarray:
     """Sides (n_facets, 2) of a single triangle, body on the left; the cells must be anticlockwise."""
     _, number, counts = sides_of(cells)

@@ -318,10 +318,9 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
         edges.setdefault("outer" if i == 0 else f"hole{i - 1}", np.arange(start, start + len(loop)))
         start += len(loop)
     edges["boundary"] = np.arange(len(facets))
-    longest = np.linalg.norm(points[cells] - points[np.roll(cells, 1, axis=1)], axis=2).max(axis=1)
     made = Mesh(
         points, cells, facets, edges, curve.middles, curve.tangents, curve.curvatures,
-        size=float(longest.max()) / LONGEST, size_stated=False,
+        size=mesh_files.longest(points, cells) / LONGEST, size_stated=False,
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
     )  # fmt: skip
     return replace(made, recipe=partial(_resized, made))

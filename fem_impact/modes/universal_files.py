@@ -103,13 +103,9 @@ def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:
     spread = np.ptp(points[:, others], axis=0)
     keep = [i for i, wide in zip(others, spread) if wide > 1e-9 * max(spread.max(), 1e-300)] or others[:1]
     table = [_mode(path.name, i, mode, component, measured) for i, mode in enumerate(modes)]
-    order = np.argsort([entry[0] for entry in table], kind="stable")
-    result = {
-        "frequencies": np.array([table[i][0] for i in order]),
-        "damping_ratio": np.array([table[i][1] for i in order]),
-        "shapes": np.column_stack([table[i][2] for i in order]),
-        "points": points[:, keep],
-    }
+    frequencies, damping, shapes = zip(*sorted(table, key=lambda entry: entry[0]))
+    result = {"frequencies": np.array(frequencies), "damping_ratio": np.array(damping)}
+    result |= {"shapes": np.column_stack(shapes), "points": points[:, keep]}
     if len(result["shapes"]) != len(points):
         raise ValueError(
             f"{path.name} has shapes at {len(result['shapes'])} nodes but names {len(points)}; export it again"

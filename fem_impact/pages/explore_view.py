@@ -71,13 +71,11 @@ class Page:
             self.document.add_root(root)
         self.document.title = title
         self.document.template, self.numbers = (report.template(name) for name in ("explore.html", "readout.html"))
+        style, script = ((report.WEB / f"explore.{kind}").read_text(encoding="utf-8") for kind in ("css", "js"))
         self.document.template_variables.update(
-            heading=title,
-            where=f"at {place(self.bench.scene.points[0])}",
-            legend=list(zip(NAMES, COLOURS)),
-            style=(report.WEB / "explore.css").read_text(encoding="utf-8"),
-            script=(report.WEB / "explore.js").read_text(encoding="utf-8"),
-        )
+            heading=title, where=f"at {place(self.bench.scene.points[0])}", legend=list(zip(NAMES, COLOURS)),
+            style=style, script=script,
+        )  # fmt: skip
         self.document.on_session_destroyed(lambda _: self.pool.shutdown(wait=False, cancel_futures=True))
         self.update()
 

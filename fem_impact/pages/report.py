@@ -309,20 +309,18 @@ def _view(response: Response, end: float) -> dict[str, Any]:
     count = min(SHAPES, modes.n_modes)
     shapes = rows[:, :count].T / np.maximum(np.abs(rows[:, :count]).max(axis=0), 1e-300)[:, None]
     edge = surface[boundary(cells)]  # (n_sides, 2, 2)
-    return {
-        "x": _short(surface[:, 0]),
-        "y": _short(surface[:, 1]),
+    columns = {
+        "x": surface[:, 0], "y": surface[:, 1], "times": times, "surface": struck[:, 0],
+        "gap": sampling.gap(response, times), "frequencies": modes.frequencies[:count],
+        "damping": modes.damping_ratio[:count],
+    }  # fmt: skip
+    return {name: _short(values) for name, values in columns.items()} | {
         "cells": cells.T.tolist(),
         "rim": [[x for a, b in edge[:, :, i].tolist() for x in (a, b, None)] for i in (0, 1)],
         "at": [float(response.at[0]), float(response.at[1]) if modes.dimension == 2 else 0.0],
-        "times": _short(times),
         "first": sampling.telling(response, times),
-        "surface": _short(struck[:, 0]),
-        "gap": _short(sampling.gap(response, times)),
         "wave": _packed(wave),
         "shapes": _packed(shapes),
-        "frequencies": _short(modes.frequencies[:count]),
-        "damping": _short(modes.damping_ratio[:count]),
     }
 
 

@@ -14,6 +14,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 from scipy.interpolate import RegularGridInterpolator
 
+from ..impact import accuracy
 from ..sweeps.hammers import Hammer, half_sine_reach
 from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, styled
 
@@ -220,16 +221,12 @@ def hammers(found: Sequence[Hammer], bandwidth: float, drop: float = 10.0) -> An
     mass = 1e3 * np.array([hammer.mass for hammer in found])
     hardest = np.array([hammer.hardest or np.nan for hammer in found])
     softest = np.array([hammer.softest or np.nan for hammer in found])
-    wanted = mass / 1e3 * (2.0 * np.pi * bandwidth / half_sine_reach(drop)) ** 2
+    wanted = accuracy.resonant_stiffness(mass / 1e3, bandwidth / half_sine_reach(drop))
     drawn = [
         Curve(mass, hardest, "hardest tip that hits once", VERMILION),
         Curve(mass, softest, "softest tip that reaches the bandwidth", BLUE),
         Curve(mass, wanted, "softest tip on a rigid wall", GREY, "--"),
     ]
-    return curves(
-        drawn,
-        x=Axis("mass of the hammer", "g", log=True),
-        y=Axis("stiffness of the tip", "N/m", log=True),
-        title=f"Hammers for {bandwidth:g} Hz at -{drop:g} dB without a double hit",
-        between=(mass, softest, hardest),
-    )
+    x, y = Axis("mass of the hammer", "g", log=True), Axis("stiffness of the tip", "N/m", log=True)
+    title = f"Hammers for {bandwidth:g} Hz at -{drop:g} dB without a double hit"
+    return curves(drawn, x=x, y=y, title=title, between=(mass, softest, hardest))

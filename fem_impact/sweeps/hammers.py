@@ -65,8 +65,8 @@ def highest_frequency(modes: Modes, at: Any, bandwidth: float, masses: Any, *, d
     centre = _centre(bandwidth, drop)
     return max(
         accuracy.cutoff_frequency(
-            modes, at, contact=Contact.linear(TIPS[-1] * mass * (2.0 * np.pi * centre) ** 2), mass=mass, speed=1.0,
-            tolerance=TOLERANCE,
+            modes, at, contact=Contact.linear(TIPS[-1] * accuracy.resonant_stiffness(mass, centre)), mass=mass,
+            speed=1.0, tolerance=TOLERANCE,
         )
         for mass in _checked(masses)
     )  # fmt: skip
@@ -121,7 +121,7 @@ def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float 
     found = []
     for mass in masses:
         striker = Striker.rigid(mass)
-        tips = mass * (2.0 * np.pi * centre) ** 2 * TIPS
+        tips = accuracy.resonant_stiffness(mass, centre) * TIPS
         table = grid.sweep(
             modes, striker, Contact.linear(1.0), at=at, speed=1.0, over={"stiffness": tips}, tolerance=TOLERANCE
         )
