@@ -64,7 +64,7 @@ def main(arguments: list[str] | None = None) -> int:
         _forget_output()
         return _complain(f"{error.filename}: {error.strerror}" if error.filename else error.strerror or error, FAILED)
     except MemoryError:
-        return _complain("not enough memory; allow a larger tolerance", FAILED)
+        return _complain("not enough memory; `fem-impact plan SCENE` shows what needs it", FAILED)
     except RuntimeError as error:
         if not isinstance(error, fi.SimulationError):
             raise
@@ -341,9 +341,8 @@ def _strike(options: argparse.Namespace) -> None:
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:
         needs = {"target": "modal"} if options.pictures or options.vtk else {}  # only a modal body shows motion
-        keep = folder.with_name(
-            f"{folder.name}.modes.npz"
-        )  # beside the folder, which an interrupted run leaves unchanged
+        place = folder.resolve()  # "." has no name of its own
+        keep = place.parent / f"{place.name}.modes.npz"  # beside the folder, which an interrupted run leaves unchanged
         choices = {**needs, **_choices(options)}
         run = scene.run(_progress, before=_warn, verify=options.verify, keep=keep, **choices)
         start = time.perf_counter()
@@ -491,19 +490,25 @@ def _hammer(options: argparse.Namespace) -> None:
         if options.out is not None:
             fi.figures.save(options.out, plots.hammers(hammers, options.bandwidth, options.drop))
     if options.json:
-        data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [vars(hammer) for hammer in hammers]}
+        data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [hammer.data() for hammer in hammers]}
         print(json.dumps(fi.export.plain({**data, "versions": fi.export.versions()}), indent=2, allow_nan=False))
         return
     print(_wrapped(scene.title or str(scene.path)))
     print(
         _wrapped(f"Tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:")
     )
-    print(f"{'mass':>9} {'softest tip':>14} {'hardest tip':>14} {'its reach':>11}")
+    _print_notes(hammers[0].notes)
+    print(f"{'mass':>9} {'softest tip':>14} {'hardest tip':>16} {'its reach':>11}")
     for hammer in hammers:
         soft = f"{hammer.softest:10.3g} N/m" if hammer.softest else "none"
-        hard = f"{hammer.hardest:10.3g} N/m" if hammer.hardest else "none"
+        hard = f"{'> ' * hammer.unlimited}{hammer.hardest:.3g} N/m" if hammer.hardest else "none"
         reach = f"{hammer.reach:8.4g} Hz" if hammer.reach else "-"
-        print(f"{1e3 * hammer.mass:7.4g} g {soft:>14} {hard:>14} {reach:>11}")
+        print(f"{1e3 * hammer.mass:7.4g} g {soft:>14} {hard:>16} {reach:>11}")
+        if len(hammer.working) > 1:
+            ranges = ", ".join(f"{low:.3g} to {high:.3g} N/m" for low, high in hammer.working)
+            print(_wrapped(f"          every range that works: {ranges}"))
+    if any(hammer.unlimited for hammer in hammers):
+        print(_wrapped(">: no limit up to this tip, where the model ends: it keeps too few modes for harder ones"))
     idle = ", ".join(f"{1e3 * hammer.mass:.4g} g" for hammer in hammers if not hammer.works)
     if idle:
         print(_wrapped(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; try lighter hammers"))

@@ -58,17 +58,17 @@ class Contact:
     ) -> "Contact":
         """A contact with the loss that gives a mass the stated restitution on a rigid wall.
 
-            Parameters
-            ----------
-            restitution : float [-]
+        Parameters
+        ----------
+        restitution : float [-]
             From 1e-6 to 1.
         speed : float [m/s]
             Approach speed at which this restitution holds.
 
-            Notes
-            -----
-            Solves ``L (1 + e) = ln((1 + L) / (1 - e L))`` with ``L = loss speed``. The equation holds for any mass,
-            stiffness and exponent.
+        Notes
+        -----
+        Solves ``L (1 + e) = ln((1 + L) / (1 - e L))`` with ``L = loss speed``. The equation holds for any mass,
+        stiffness and exponent.
         """
         e = check.between("restitution", restitution, 1e-6, 1.0)
         speed = check.positive("speed", speed, "m/s")
@@ -83,7 +83,7 @@ class Contact:
         sphere : Striker
             Made by `Striker.sphere`.
         plate : Plate or Material
-            The flat body; isotropic.
+            The flat body; isotropic. For wood, give an isotropic `Material` with its stiffness across the thickness.
         """
         for name in ("material", "radius"):
             if getattr(sphere, name, None) is None:
@@ -110,6 +110,11 @@ class Contact:
 
 def _isotropic(name: str, material: Any) -> tuple[float, float]:
     E, nu = getattr(material, "E", None), getattr(material, "nu", None)
+    if getattr(material, "E_across", None) is not None:
+        raise ValueError(
+            f"{name} must be isotropic, because the contact of an orthotropic body depends on its stiffness across the "
+            "thickness; give fi.Material with that E instead, or use Contact.hertz with a measured stiffness"
+        )
     if not isinstance(E, (int, float)) or not isinstance(nu, (int, float)):
         raise ValueError(
             f"{name} must have an isotropic material (E, nu), got {check.shown(material)}; use Contact.hertz"

@@ -135,9 +135,10 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
 
 def tolerance_of(scene: Any, values: Mapping[str, Any] | None = None) -> float:
     """The tolerance [-] of a scene; ``values`` replaces the values of its blow."""
-    with scene.blame("strike"):
-        wanted = (scene.blow.values if values is None else values).get("tolerance", collision.TOLERANCE)
-        return check.between("tolerance", wanted, 1e-12, 1.0)
+    if values is None:
+        with scene.blame("strike"):
+            return tolerance_of(scene, scene.blow.values)
+    return check.between("tolerance", values.get("tolerance", collision.TOLERANCE), 1e-12, 1.0)
 
 
 def verify(run: Run, watch: Watch | None = None) -> Run:
@@ -175,14 +176,14 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
 def _checked(scene: Any, changes: Mapping[str, Any]) -> _Blow:
     pieces = {name: changes[name] for name in PIECES if name in changes}
     values = {**scene.blow.values, **{name: value for name, value in changes.items() if name not in PIECES}}
-    with scene.blame("strike"):
-        for name, value in pieces.items():
-            if name == "target":
-                check.one_of("target", value, TARGETS)
-            elif PIECES[name]:
-                check.positive(name, value, PIECES[name])
-            else:
-                check.count(name, value)
+    for name, value in pieces.items():
+        if name == "target":
+            check.one_of("target", value, TARGETS)
+        elif PIECES[name]:
+            check.positive(name, value, PIECES[name])
+        else:
+            check.count(name, value)
+    with scene.blame("strike", changes):
         tolerance = tolerance_of(scene, values)
         speed = check.positive("speed", values["speed"], "m/s")
         quantities = asked_for(values.get("quantity"))
@@ -202,7 +203,7 @@ def _idealised(scene: Any, changes: Mapping[str, Any], blow: _Blow, target: str 
     allowed = SHARE * blow.tolerance
     if target is not None:
         if seen is None or (target == "infinite" and not np.isfinite(seen.mobility)):
-            raise scene.fault(f"[strike] target = {target!r} needs a plate of known rigidity; use target = 'modal'")
+            raise scene.fault(f"target = {target!r} {_unfit(scene, blow)}; use target = 'modal'")
     elif seen is None:
         return None
     elif seen.rigid <= allowed:
@@ -225,6 +226,19 @@ def _idealised(scene: Any, changes: Mapping[str, Any], blow: _Blow, target: str 
         scene, changes, blow, target=target, errors=error, reasons=(kept, dropped), mass=seen.mass,
         mobility=seen.mobility if target == "infinite" else 0.0, notes=seen.notes,
     )  # fmt: skip
+
+
+def _unfit(scene: Any, blow: _Blow) -> str:
+    """Why a target cannot be treated as rigid or infinite without its modes."""
+    body = scene.body()
+    if body.dimension == 1:
+        return "is not known for this beam"
+    view = idealisation.Surroundings.seen(body, check.array("at", blow.values["at"], (2,), "m", lift=True))
+    if view is None:
+        raise scene.fault(f"[strike] at must lie on the body, got {check.shown(blow.values['at'])} m")
+    if "first_frequency" in scene.scale:
+        return "needs E, nu, rho and thickness: first_frequency gives the rigidity only once the modes are known"
+    return "is known for isotropic plates without tension only"
 
 
 def _outside(scene: Any, blow: _Blow, stages: Stages) -> _Outside | None:
@@ -306,7 +320,7 @@ def _modal(
     if number > MOST_MODES[scene.source]:
         raise check.SimulationError(
             f"{scene.path}: this blow needs about {number:.2g} modes, up to {limit:.2g} Hz, more than the limit of "
-            f"{MOST_MODES[scene.source]}; use a larger tolerance, a softer contact or a lower speed"
+            f"{MOST_MODES[scene.source]}; {_fewer(scene, blow, modes, band > needed)}"
         )
     left = accuracy.truncation_error(modes, blow.values["at"], limit, mass=blow.striker.felt_mass, **law)
     kept = f"the target keeps its modes up to {limit:.4g} Hz, about {number}; the others act as a spring"
@@ -323,6 +337,35 @@ def _modal(
     if isinstance(first.shapes, FieldShapes):
         plan = _with_mesh(plan, first, first.shapes.system, limit * first.frequencies[-1] / modes.frequencies[-1])
     return plan
+
+
+def _fewer(scene: Any, blow: _Blow, first: Modes, banded: bool) -> str:
+    """What makes a blow that needs more modes than allowed affordable, given its first modes."""
+    most = MOST_MODES[scene.source]
+    reach = float(first.frequencies[-1]) * (most / first.n_modes) ** (2.0 / first.dimension)
+    if "n_modes" in blow.pieces:
+        return f"give n_modes of at most {most}"
+    if "max_frequency" in blow.pieces or banded:
+        name = "max_frequency" if "max_frequency" in blow.pieces else "a band of the quantity"
+        return f"give {name} of at most {float(f'{0.9 * reach:.1e}'):g} Hz"
+    loss = accuracy.LOSSY if blow.contact.loss else 1.0
+
+    def fits(tolerance: float, contact: Contact = blow.contact) -> bool:
+        allowed = SHARE * tolerance / (CAUTION * MARGINS[1] * loss)  # with room for a second, finer run
+        law = {"contact": contact, "speed": blow.values["speed"], "mass": blow.striker.felt_mass}
+        return accuracy.cutoff_frequency(first, blow.values["at"], tolerance=allowed, **law) <= reach
+
+    def soft(power: int) -> bool:
+        return fits(blow.tolerance, replace(blow.contact, stiffness=blow.contact.stiffness * 10.0**-power))
+
+    enough = accuracy.least_tolerance(fits)
+    first_word = "no tolerance is large enough" if enough is None else f"tolerance = {enough:g} is affordable"
+    powers = range(1, 31)
+    softer = next((power for power in powers if soft(power)), None)
+    second = "a heavier striker or a lower speed is needed" if softer is None else (
+        f"so is a contact with stiffness = {blow.contact.stiffness * 10.0**-softer:.2g}"
+    )  # fmt: skip
+    return f"{first_word}; {second if enough is not None or softer is None else second.replace('so is ', 'take ')}"
 
 
 def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:

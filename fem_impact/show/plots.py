@@ -308,12 +308,14 @@ def hammers(found: Sequence[Hammer], bandwidth: float, drop: float = 10.0) -> An
     """
     mass = 1e3 * np.array([hammer.mass for hammer in found])
     hardest = np.array([hammer.hardest or np.nan for hammer in found])
+    ended = np.array([hammer.limit for hammer in found])
     softest = np.array([hammer.softest or np.nan for hammer in found])
     wanted = mass / 1e3 * (2.0 * np.pi * bandwidth / half_sine_reach(drop)) ** 2
     drawn = [
         Curve(mass, hardest, "hardest tip that hits once", VERMILION),
         Curve(mass, softest, "softest tip that reaches the bandwidth", BLUE),
         Curve(mass, wanted, "softest tip on a rigid wall", GREY, "--"),
+        Curve(mass, ended, "hardest tip that the model resolves", GREY, ":"),
     ]
     return curves(
         drawn,

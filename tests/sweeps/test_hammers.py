@@ -1,0 +1,88 @@
+"""The choice of a hammer against a bisection over single blows, on bodies and hammers that were not used to make it."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.sweeps import hammers
+
+PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+AT = (0.465, 0.3)
+BODIES = {  # bodies, points and hammers, each drawn once and kept
+    "plate": (PLATE, AT, 0.01),
+    "plate, other point": (PLATE, (0.71, 0.52), 0.005),
+    "disk": (fi.analytic.disk(0.2, edge="free", mass=1.3, first_frequency=80.0, n_modes=150), (0.07, 0.03), 0.05),
+    "clamped disk": (fi.analytic.disk(0.15, mass=0.1, first_frequency=300.0, n_modes=120), (0.04, 0.0), 0.02),
+    "beam": (fi.analytic.beam(0.5, ends=("free", "free"), mass=0.4, first_frequency=60.0, n_modes=30), 0.11, 0.05),
+}
+
+
+def impacts(modes, at, mass, tip):
+    return fi.strike(modes, fi.Striker.rigid(mass), fi.Contact.linear(tip), at=at, speed=0.7, tolerance=1e-5).n_impacts
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_the_tips_that_hit_once_end_where_a_bisection_over_single_blows_ends(name):
+    modes, at, mass = BODIES[name]
+    (hammer,) = hammers.choose(modes, at, 300.0, [mass])
+    low, high = max(hammer.single, key=lambda ends: ends[1] / ends[0])
+    inside = np.geomspace(low, high, 12)
+    assert [impacts(modes, at, mass, tip) for tip in inside] == [1] * 12
+    good, bad = high, 1.05 * high  # 5 %: gaps and ranges narrower than 2 % may be missed
+    assert impacts(modes, at, mass, bad) != 1
+    while bad / good > 1.0001:
+        middle = (good * bad) ** 0.5
+        good, bad = (middle, bad) if impacts(modes, at, mass, middle) == 1 else (good, middle)
+    assert high == pytest.approx(good, rel=2.0 * hammers.WIDTH)
+
+
+def test_which_tips_hit_once_does_not_depend_on_the_bandwidth():
+    one, other = (hammers.choose(PLATE, AT, bandwidth, [0.02])[0] for bandwidth in (300.0, 600.0))
+    assert one.limit == other.limit
+    assert_allclose(one.single[-1][1], other.single[-1][1], rtol=2.0 * hammers.WIDTH)
+    assert one.softest < other.softest
+
+
+def test_without_a_limit_the_answer_ends_where_the_modes_no_longer_resolve_the_contact():
+    (hammer,) = hammers.choose(PLATE, AT, 500.0, [1e-3])
+    assert hammer.unlimited and hammer.hardest == hammer.limit
+    blow = PLATE, fi.Striker.rigid(1e-3)
+    wanted = {"at": AT, "speed": 1.0, "tolerance": 1e-2}
+    assert fi.strike(*blow, fi.Contact.linear(hammer.limit), **wanted).error.resolvable
+    assert not fi.strike(*blow, fi.Contact.linear(1.1 * hammer.limit), **wanted).error.resolvable
+
+
+def test_several_ranges_are_all_told():
+    (hammer,) = hammers.choose(PLATE, AT, 500.0, [1.0])
+    assert len(hammer.single) > 1  # 75 kN/m hits twice at any tolerance, softer and harder tips once
+    for low, high in hammer.single:
+        assert impacts(PLATE, AT, 1.0, 1.001 * low) == impacts(PLATE, AT, 1.0, high / 1.001) == 1
+    for (_, before), (after, _) in zip(hammer.single, hammer.single[1:]):
+        assert impacts(PLATE, AT, 1.0, (before * after) ** 0.5) != 1
+
+
+def test_working_tips_hit_once_and_reach_the_bandwidth_and_softer_ones_do_not():
+    light, heavy = hammers.choose(PLATE, AT, 500.0, [2e-3, 0.2])
+    assert light.works and not heavy.works and heavy.softest is None
+    for tip, reaches in ((light.softest, True), (light.hardest, True), (0.98 * light.softest, False)):
+        hit = fi.strike(PLATE, fi.Striker.rigid(2e-3), fi.Contact.linear(tip), at=AT, speed=1.0)
+        assert hit.n_impacts == 1
+        assert (hammers.bandwidth_of(hit, 10.0) >= 0.999 * 500.0) == reaches
+
+
+def test_on_an_unyielding_body_the_softest_tip_is_the_half_sines():
+    heavy = fi.analytic.rectangle(1.55, 1.0, mass=5e5, first_frequency=100.0, n_modes=30)
+    (hammer,) = hammers.choose(heavy, AT, 500.0, [0.02])
+    centre = 500.0 / 2.039  # Hz; a half sine is 10 dB down at 2.039 times its frequency
+    assert_allclose(hammer.softest, 0.02 * (2.0 * np.pi * centre) ** 2, rtol=3e-3)
+
+
+def test_a_bandwidth_beyond_every_tip_has_no_hammer():
+    (hammer,) = hammers.choose(PLATE, AT, 1e6, [0.01])
+    assert not hammer.works and hammer.hardest is not None
+
+
+def test_a_body_that_cannot_vibrate_is_refused():
+    with pytest.raises(ValueError, match="modes must be those of a body that vibrates"):
+        hammers.choose(fi.Modes.rigid(1.0), None, 500.0, [0.01])
