@@ -54,7 +54,7 @@ def main(arguments: list[str] | None = None) -> int:
         _forget_output()
         return _complain(f"{error.filename}: {error.strerror}" if error.filename else error.strerror or error, FAILED)
     except MemoryError:
-        return _complain("not enough memory; allow a larger tolerance", FAILED)
+        return _complain("not enough memory; `fem-impact plan SCENE` shows what needs it", FAILED)
     except RuntimeError as error:
         if not isinstance(error, fi.SimulationError):
             raise
@@ -311,7 +311,8 @@ def _strike(options: argparse.Namespace) -> None:
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:
         needs = {"target": "modal"} if options.pictures or options.vtk else {}  # only a modal body shows motion
-        keep = folder.with_name(f"{folder.name}.modes.npz")  # not in the folder: an interrupted run leaves that alone
+        place = folder.resolve()  # "." has no name of its own
+        keep = place.parent / f"{place.name}.modes.npz"  # not in the folder: an interrupted run leaves that alone
         choices = {**needs, **_choices(options)}
         run = scene.run(_progress, before=_warn, verify=options.verify, keep=keep, **choices)
         start = time.perf_counter()
@@ -431,21 +432,28 @@ def _hammer(options: argparse.Namespace) -> None:
         if options.out is not None:
             fi.figures.save(options.out, plots.hammers(hammers, options.bandwidth, options.drop))
     if options.json:
-        data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [vars(hammer) for hammer in hammers]}
+        data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [hammer.data() for hammer in hammers]}
         _print_json({**data, "versions": fi.export.versions()})
         return
     _say(_title(scene))
     _say(f"Tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:")
+    _print_notes(hammers[0].notes)
     rows = [
         (
             f"{1e3 * hammer.mass:.4g} g",
             f"{hammer.softest:.3g} N/m" if hammer.softest else "none",
-            f"{hammer.hardest:.3g} N/m" if hammer.hardest else "none",
+            f"{'> ' * hammer.unlimited}{hammer.hardest:.3g} N/m" if hammer.hardest else "none",
             f"{hammer.reach:.4g} Hz" if hammer.reach else "-",
         )
         for hammer in hammers
     ]
     _print_table(rows, ("mass", "softest tip", "hardest tip", "its reach"))
+    for hammer in hammers:
+        if len(hammer.working) > 1:
+            ranges = ", ".join(f"{low:.3g} to {high:.3g} N/m" for low, high in hammer.working)
+            _say(f"{1e3 * hammer.mass:.4g} g: every range that works: {ranges}")
+    if any(hammer.unlimited for hammer in hammers):
+        _say(">: no limit up to this tip, where the model ends: it keeps too few modes for harder ones")
     idle = ", ".join(f"{1e3 * hammer.mass:.4g} g" for hammer in hammers if not hammer.works)
     if idle:
         _say(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; try lighter hammers")

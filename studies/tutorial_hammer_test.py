@@ -86,9 +86,12 @@ def main(folder: Path, max_frequency: float = 8e3) -> list[Verdict]:
         print(f"{one.place:<8}{one.tip:<8}{one.n_impacts:8d}{one.reach:7.0f} Hz{one.ratio:14.2f}   {why}")
     chosen = hammers.choose(modes, PLACES["middle"], BANDWIDTH, [0.01, HAMMER], drop=DROP)
     for hammer in chosen:
-        advice = "no tip works" if not hammer.works else (
-            f"tips from {hammer.softest:.2g} to {hammer.hardest:.2g} N/m work"
-        )  # fmt: skip
+        end = (
+            f"at least {hammer.limit:.2g} N/m, where the model ends,"
+            if hammer.unlimited
+            else f"{hammer.hardest:.3g} N/m"
+        )
+        advice = f"tips from {hammer.softest:.3g} N/m to {end} work" if hammer.works else "no tip works"
         print(f"In the middle, with a hammer of {1e3 * hammer.mass:g} g: {advice}.")
     fi.figures.save(folder / "hammer_test.png", draw(modes))
     print(f"{folder / 'hammer_test.png'}")

@@ -77,6 +77,7 @@ def test_every_command_says_the_notes(scene, tmp_path, capsys):
     assert ASSUMED in json.loads(said("modes", "--count", "3", "--json"))["notes"][0]
     assert ASSUMED in said("plan")
     assert ASSUMED in json.loads(said("plan", "--json"))["notes"][0]
+    assert ASSUMED in said("hammer", "--bandwidth", "300", "--masses", "0.01")
     scene.write_text(scene.read_text() + '[map]\nover = { "striker.mass" = [0.03, 0.05] }\n')
     assert ASSUMED in said("map", "--out", str(tmp_path / "map"))
 

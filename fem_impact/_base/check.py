@@ -149,6 +149,13 @@ def path(name: str, value: Any) -> Path:
     raise ValueError(f"{name} must be the path of a file, got {shown(value)}")
 
 
+def absent(path: Path) -> str:
+    """Why a path that is not a regular file cannot be read."""
+    if path.is_dir():
+        return "it is a folder; name a file in it"
+    return "it is not a regular file" if path.exists() else "there is no such file"
+
+
 def typed(function: Function) -> Function:
     """Decorator: check arguments against the annotations of the signature.
 

@@ -46,7 +46,7 @@ def read(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.nd
         If the reader raises, takes too long or needs too much memory; one line that names the file.
     """
     if not path.is_file():
-        raise ValueError(f"path must name {kind}, got {str(path)!r}; there is no such file")
+        raise ValueError(f"path must name {kind}, got {str(path)!r}; {check.absent(path)}")
     with path.open("rb") as file:
         if not file.read(HEAD).strip(b"\0"):
             raise ValueError(f"{path.name} cannot be read as {kind} (it is empty or begins with zeros only)")

@@ -30,6 +30,7 @@ FINE_WAVE = 1.1  # [rad] as WAVE_PER_ELEMENT, if CHEAP_CELLS triangles suffice: 
 CHEAP_CELLS = 700  # [-] triangles that take little time to solve, so that fewer are not worthwhile
 LAYERS = 10.0  # [-] largest element under tension, in edge layers sqrt(D / tension): error 1e-5 on a disk
 FINEST_LAYER = 40.0  # [-] but elements are not made smaller than the body's extent divided by this
+LOOSEST = 0.1  # [-] largest tolerance of frequencies
 MOST_UNKNOWNS = 150_000  # [-] refinement gives up beyond this size
 AIM = 0.9  # [-] fraction of the tolerance that the first mesh aims at
 MARGIN = 0.6  # [-] fraction of the tolerance that later meshes aim at
@@ -38,6 +39,7 @@ LEAST_STEP = 1.05  # [-] smallest ratio of element sizes between two meshes
 MOST_STEPS = 40.0  # [-] logarithm of the largest ratio searched: beyond any mesh
 MOST_MESHES = 8  # [-] meshes tried to meet a tolerance
 SAY = 1e-3  # [-] errors at singular corners are added to the estimate above this value
+ROOMY = 8.0  # [-] unknowns per mode on a mesh that is proposed because another was too coarse
 SEARCHES = 3  # [-] attempts to find every mode of a cluster
 STEP = 2.0**0.5  # [-] a mesh file's elements are replaced by larger ones if they can grow by this factor
 
@@ -148,7 +150,11 @@ def _counted(system: System, flexibility: Flexibility, n: int, limit: float | No
     n_rigid = flexibility.rigid.shape[1]
     available = system.n_dofs - n_rigid
     if n > available:
-        raise ValueError(f"n_modes must not exceed the {system.n_dofs} unknowns of this mesh; refine it")
+        size = system.mesh.size * (max(1, available) / (ROOMY * n)) ** (1.0 / system.mesh.dimension)
+        raise ValueError(
+            f"size must be smaller or n_modes lower: elements of {system.mesh.size:g} m have {system.n_dofs} unknowns "
+            f"for {n + n_rigid} modes; elements of {size:.1g} m suffice"
+        )
     more, residual = min(n + (SPARE if limit is None else 0), available), RESIDUAL
     for _ in range(SEARCHES):
         values, vectors = lowest(flexibility, more, residual)
@@ -245,9 +251,11 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         size = mesh.size
         found = solve(reassemble(system, mesh.refined(step)), n_modes, max_frequency)
     mode = int(found.error.argmax())
+    least = float(f"{1.1 * found.error[mode]:.1e}")
+    advice = f"a tolerance of {least:g} is met" if least <= LOOSEST else "leave out the tolerance"
     raise check.SimulationError(
         f"tolerance = {tolerance:g} is not met: mode {mode + 1} is uncertain by {found.error[mode]:.1e} with "
-        f"{found.system.n_dofs} unknowns; raise the tolerance or ask for fewer modes"
+        f"{found.system.n_dofs} unknowns; {advice}, or ask for fewer modes"
     )
 
 

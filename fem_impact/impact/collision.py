@@ -539,12 +539,13 @@ def _controlled(
         return met
     if free and scheme == "A4" and (system.law[:, 1] >= 1.0).all():
         return _controlled(system, "collocation", dt, tolerance, quantities, pace, horizon, n_max)
-    hint = ""
+    hint, advice = "", "raise tolerance" if free else "leave out scheme"
     if len(fine.contacts) > 1:
         hint = f"; small errors grow {_sensitivity(*last):.1g}-fold over {len(fine.contacts)} impacts"
+        advice = "give duration or max_impacts" if free else advice
     raise SimulationError(
         f"the step error stays at {best:.1e}, above the tolerance {tolerance:.1e}, with {len(fine.steps)} steps{hint}; "
-        "raise tolerance, or give duration or max_impacts"
+        f"{advice}"
     )
 
 
@@ -594,7 +595,8 @@ def _run(system: _System, scheme: str, size: float, pace: tuple[float, float], h
     time, status = result[5], result[6]
     if status == record.EXHAUSTED:
         raise SimulationError(
-            f"no final separation was reached in {most} steps, up to {time:.4g} s; give duration or max_impacts"
+            f"no final separation was reached in {most} steps, up to {time:.4g} s; raise tolerance or dt, or give "
+            "duration or max_impacts"
         )
     if status == record.FAILED:
         raise SimulationError(

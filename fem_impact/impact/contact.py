@@ -110,7 +110,7 @@ class Contact:
         sphere : Striker
             Made by `Striker.sphere`.
         plate : Plate or Material
-            The flat body; isotropic.
+            The flat body; isotropic. For wood, give an isotropic `Material` with its stiffness across the thickness.
 
         Examples
         --------
@@ -144,6 +144,11 @@ class Contact:
 
 def _isotropic(name: str, material: Any) -> tuple[float, float]:
     E, nu = getattr(material, "E", None), getattr(material, "nu", None)
+    if getattr(material, "E_across", None) is not None:
+        raise ValueError(
+            f"{name} must be isotropic, because the contact of an orthotropic body depends on its stiffness across the "
+            "thickness; give fi.Material with that E instead, or use Contact.hertz with a measured stiffness"
+        )
     if not isinstance(E, (int, float)) or not isinstance(nu, (int, float)):
         raise ValueError(
             f"{name} must have an isotropic material (E, nu), got {check.shown(material)}; use Contact.hertz"

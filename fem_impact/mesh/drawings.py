@@ -43,7 +43,7 @@ def read(source: Any, unit: str | None) -> tuple[Outline, list[str]]:
     if isinstance(source, (str, Path)):
         path = check.path("source", source)
         if not path.is_file():
-            raise ValueError(f"source must name an .svg or .dxf file, got {str(source)!r}; there is no such file")
+            raise ValueError(f"source must name an .svg or .dxf file, got {str(source)!r}; {check.absent(path)}")
         readers = {".svg": _svg, ".dxf": _dxf}
         if path.suffix.lower() not in readers:
             raise ValueError(f"source must be an .svg or .dxf file, got {path.name!r}; meshes are read by fi.mesh.load")

@@ -178,14 +178,14 @@ class _Asked:
         changes = {name: value for name, value in changes.items() if value is not None}
         pieces = {name: changes[name] for name in PIECES if name in changes}
         values = {**blow.arguments, **{name: value for name, value in changes.items() if name not in PIECES}}
-        with blow.target.blame("strike"):
-            for name, value in pieces.items():
-                if name == "target":
-                    check.one_of("target", value, TARGETS)
-                elif PIECES[name]:
-                    check.positive(name, value, PIECES[name])
-                else:
-                    check.count(name, value)
+        for name, value in pieces.items():
+            if name == "target":
+                check.one_of("target", value, TARGETS)
+            elif PIECES[name]:
+                check.positive(name, value, PIECES[name])
+            else:
+                check.count(name, value)
+        with blow.target.blame("strike", changes):
             for name in values:
                 if name not in ARGUMENTS:
                     raise ValueError(f"{name} is not an argument of a blow{check.nearest(name, [*ARGUMENTS, *PIECES])}")
@@ -311,9 +311,7 @@ def _idealised(asked: _Asked, target: str | None, stages: Stages) -> Plan | None
     allowed = SHARE * asked.tolerance
     if target is not None:
         if seen is None or (target == "infinite" and not np.isfinite(seen.mobility)):
-            raise ValueError(
-                f"{blow.name}target = {target!r} needs a plate of one known rigidity; use target = 'modal'"
-            )
+            raise ValueError(f"{blow.name}target = {target!r} {_unfit(asked)}; use target = 'modal'")
     elif seen is None:
         return None
     elif seen.rigid <= allowed:
@@ -337,6 +335,47 @@ def _idealised(asked: _Asked, target: str | None, stages: Stages) -> Plan | None
         mobility=seen.mobility if target == "infinite" else 0.0,
         notes=plausible.together(blow.target.notes, seen.notes),
     )  # fmt: skip
+
+
+def _unfit(asked: _Asked) -> str:
+    """Why a target cannot be treated as rigid or infinite without its modes."""
+    target = asked.blow.target
+    if target.mesh is None or target.mesh.dimension == 1:
+        return "is not known for this body"
+    at = check.array("at", asked.values["at"], (2,), "m", lift=True)
+    if idealisation.Surroundings.seen(target.mesh, at) is None:
+        with target.blame("strike"):
+            raise ValueError(f"at must lie on the body, got {check.shown(asked.values['at'])} m")
+    if "first_frequency" in target.scale:
+        return "needs E, nu, rho and thickness: first_frequency gives the rigidity only once the modes are known"
+    return "is known for isotropic plates without tension only, of constant thickness and without point masses"
+
+
+def _fewer(asked: _Asked, first: Modes, banded: bool) -> str:
+    """What makes a blow that needs more modes than allowed affordable, given its first modes."""
+    contact, target = asked.blow.contact, asked.blow.target
+    most = MOST_MODES[target.kind]
+    reach = float(first.frequencies[-1]) * (most / first.n_modes) ** (2.0 / first.dimension)
+    if "n_modes" in asked.pieces:
+        return f"give n_modes of at most {most}"
+    if "max_frequency" in asked.pieces or banded:
+        name = "max_frequency" if "max_frequency" in asked.pieces else "a band of the quantity"
+        return f"give {name} of at most {float(f'{0.9 * reach:.1e}'):g} Hz"
+    loss = accuracy.LOSSY if contact.loss else 1.0
+
+    def fits(tolerance: float, contact: Contact = contact) -> bool:
+        allowed = SHARE * tolerance / (CAUTION * MARGINS[1] * loss)  # with room for a second, finer run
+        law = {"contact": contact, "speed": asked.values["speed"], "mass": asked.mass}
+        return accuracy.cutoff_frequency(first, asked.values["at"], tolerance=allowed, **law) <= reach
+
+    enough = accuracy.least_tolerance(fits)
+    powers = (10.0**-power for power in range(1, 31))
+    softer = next((p for p in powers if fits(asked.tolerance, replace(contact, stiffness=contact.stiffness * p))), None)
+    first_word = "no tolerance is large enough" if enough is None else f"tolerance = {enough:g} is affordable"
+    if softer is None:
+        return f"{first_word}; a heavier striker or a lower speed is needed"
+    word = "take" if enough is None else "so is"
+    return f"{first_word}; {word} a contact with stiffness = {contact.stiffness * softer:.2g}"
 
 
 def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: float = 1.0) -> Plan:
@@ -364,7 +403,7 @@ def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: fl
     if number > MOST_MODES[target.kind]:
         raise check.SimulationError(
             f"{asked.blow.name}this blow needs about {number:.2g} modes, up to {limit:.2g} Hz, more than the limit of "
-            f"{MOST_MODES[target.kind]}; use a larger tolerance, a softer contact or a lower speed"
+            f"{MOST_MODES[target.kind]}; {_fewer(asked, modes, band > needed)}"
         )
     left = accuracy.truncation_error(modes, at, limit, mass=mass, **asked.law)
     kept = f"the target keeps its modes up to {limit:.4g} Hz, about {number}; the others act as a spring"

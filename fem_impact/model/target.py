@@ -19,7 +19,12 @@ from ..modes.modal import Damping, FieldShapes, Modes
 WORST_FREQUENCY = 0.1  # [-] largest frequency error that `find_modes` accepts as a tolerance
 
 Watch = Callable[[str], AbstractContextManager[Any]]
-Blame = Callable[[str], AbstractContextManager[Any]]  # takes "mesh", "supports", ...; says where an error comes from
+# Says where an error comes from; takes "mesh", "supports" or another part of a scene, and the names of what was changed
+Blame = Callable[..., AbstractContextManager[Any]]
+
+
+def _nobody(*_: Any) -> AbstractContextManager[Any]:
+    return nullcontext()
 
 
 class Stages:
@@ -52,7 +57,7 @@ class Target:
     source: str = "auto"  # "fe", "analytic" or "auto": closed formulas if there are any and no size is stated
     system: System | None = None  # assembled by the user
     modes: Modes | None = None  # found by the user
-    blame: Blame = nullcontext
+    blame: Blame = _nobody
 
     def __post_init__(self) -> None:
         if self.source == "analytic" and self.closed is None:

@@ -567,7 +567,9 @@ def find_modes(
     if max_frequency is not None:
         max_frequency = check.positive("max_frequency", max_frequency, "Hz")
     if tolerance is not None:
-        found = refinement.refine(system, n_modes, max_frequency, check.between("tolerance", tolerance, 1e-10, 0.1))
+        found = refinement.refine(
+            system, n_modes, max_frequency, check.between("tolerance", tolerance, 1e-10, refinement.LOOSEST)
+        )
     else:
         fine = refinement.fine_enough(system, n_modes, max_frequency, None)
         wanted = n_modes, max_frequency

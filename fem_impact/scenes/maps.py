@@ -21,7 +21,7 @@ from .scene import Scene
 from .schema import MAKERS, Part
 
 FIRST_LOOK = 40  # [-] modes found first, to estimate how many a map needs
-MOST_MODES = 300  # [-] most modes used to choose a hammer; residual compliance replaces the others
+MOST_MODES = 300  # [-] modes used to choose a hammer, whatever the bandwidth; residual compliance replaces the others
 FORMATS = ("nc", "zarr")
 FILES = (".nc", ".zarr", ".csv", ".png")  # a folder name must not end like this
 MOST_ROWS = 10**6  # [-] a larger map gets no CSV file
@@ -133,17 +133,23 @@ def _quick_map(
     law, striker, blow = scene.make_contact(), scene.make_striker(), scene.blow.values
     case = grid.Case(scene.modes(FIRST_LOOK), striker, law, np.atleast_1d(np.asarray(blow["at"], float)), blow["speed"])
     axes = grid.checked_axes(case, over)
-    needed = max(
-        needed_frequency(corner, tolerance) * case.modes.frequencies[-1] / corner.modes.frequencies[-1]
-        for corner in _corners(case, axes)
-    )
+
+    def reach(tolerance: float) -> float:
+        return max(
+            needed_frequency(corner, tolerance) * case.modes.frequencies[-1] / corner.modes.frequencies[-1]
+            for corner in _corners(case, axes)
+        )
+
+    needed = reach(tolerance)
     modes = case.modes
     if needed > modes.frequencies[-1]:
         number, most = number_of_modes(modes, needed), planner.MOST_MODES[scene.built.target.kind]
         if number > most:
+            enough = accuracy.least_tolerance(lambda tolerance: number_of_modes(modes, reach(tolerance)) <= most)
             raise check.SimulationError(
                 f"{scene.path}: the shortest blow of the map needs about {number} modes, at most {most} are allowed; "
-                "allow a larger tolerance, or leave out the stiffest contacts and the lightest strikers"
+                f"{'no tolerance is large enough' if enough is None else f'tolerance = {enough:g} is affordable'}; or "
+                "leave out the stiffest contacts and the lightest strikers"
             )
         modes = scene.modes(number)
     case = replace(case, modes=modes)
@@ -339,8 +345,4 @@ def write(folder: Path, table: xarray.Dataset, form: str = "nc") -> list[str]:
 @check.typed
 def hammers_for(scene: Scene, bandwidth: float, masses: Any, *, drop: float = 10.0) -> tuple[hammers.Hammer, ...]:
     """What each hammer can do at the strike point of a scene; the scene's own striker is ignored."""
-    at, first = scene.blow.values["at"], scene.modes(FIRST_LOOK)
-    needed = hammers.highest_frequency(first, at, bandwidth, masses, drop=drop)
-    number = min(number_of_modes(first, needed), MOST_MODES)
-    modes = scene.modes(number) if number > first.n_modes else first
-    return hammers.choose(modes, at, bandwidth, masses, drop=drop)
+    return hammers.choose(scene.modes(MOST_MODES), scene.blow.values["at"], bandwidth, masses, drop=drop)

@@ -1,7 +1,7 @@
 """A strike in a text file: reads a TOML scene, checks all of it, builds it with the public functions and strikes."""
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -243,11 +243,13 @@ class Scene:
         return fault(self.path, text)
 
     @contextmanager
-    def blame(self, table: str) -> Iterator[None]:
-        """Put the file and the table in front of an error about a table's numbers."""
+    def blame(self, table: str, changes: Iterable[str] = ()) -> Iterator[None]:
+        """Put the file and the table in front of an error about a table's numbers, unless ``changes`` set them."""
         try:
             yield
         except ValueError as error:
+            if str(error).partition(" ")[0] in changes:
+                raise
             raise fault(self.path, f"[{table}] {error}") from None
         except (OverflowError, ZeroDivisionError):
             raise fault(self.path, f"[{table}] has a number too large or too small; check its units") from None

@@ -71,7 +71,7 @@ def target_values(
 
     It has mass and first frequency to scale to, nu without a material, damping, point masses and the source of modes.
     """
-    check.between("nu", nu, -1.0, 0.5)
+    check.between("nu", nu, LOWEST_NU, 0.5)
     scale = {"mass": (mass, "kg"), "first_frequency": (first_frequency, "Hz")}
     given = {name: check.positive(name, value, unit) for name, (value, unit) in scale.items() if value is not None}
     return {
@@ -127,6 +127,7 @@ def _along(name: str, values: Any) -> np.ndarray:
 
 
 BAR_MODES = 96  # [-] modes of a bar that strikes; each blow keeps as many of them as it needs
+LOWEST_NU = -0.99  # [-] closer to -1, the rigidity of a plate is beyond all numbers
 MOST_VALUES = 10**6  # [-] most values along one axis of a map
 SOURCES = ("auto", "fe", "analytic")
 # Functions that build each part of a scene; their arguments are the keys of its table.
@@ -174,8 +175,8 @@ def read_bytes(path: Path) -> bytes:
     """Contents of a scene or result file; if it does not exist, the ValueError suggests the nearest name."""
     if not path.is_file():  # refuses folders, and pipes that may never end
         folder = path.parent
-        near = [name.name for name in islice(folder.iterdir(), 1000)] if folder.is_dir() else []
-        raise fault(path, f"there is no such file{check.nearest(path.name, near)}")
+        near = [name.name for name in islice(folder.iterdir(), 1000)] if folder.is_dir() and not path.exists() else []
+        raise fault(path, check.absent(path) + check.nearest(path.name, near))
     with open(path, "rb") as file:
         raw = file.read(LARGEST_FILE + 1)
     if len(raw) > LARGEST_FILE:

@@ -220,12 +220,14 @@ def hammers(found: Sequence[Hammer], bandwidth: float, drop: float = 10.0) -> An
     """
     mass = 1e3 * np.array([hammer.mass for hammer in found])
     hardest = np.array([hammer.hardest or np.nan for hammer in found])
+    ended = np.array([hammer.limit for hammer in found])
     softest = np.array([hammer.softest or np.nan for hammer in found])
     wanted = accuracy.resonant_stiffness(mass / 1e3, bandwidth / half_sine_reach(drop))
     drawn = [
         Curve(mass, hardest, "hardest tip that hits once", VERMILION),
         Curve(mass, softest, "softest tip that reaches the bandwidth", BLUE),
         Curve(mass, wanted, "softest tip on a rigid wall", GREY, "--"),
+        Curve(mass, ended, "hardest tip that the model resolves", GREY, ":"),
     ]
     x, y = Axis("mass of the hammer", "g", log=True), Axis("stiffness of the tip", "N/m", log=True)
     title = f"Hammers for {bandwidth:g} Hz at -{drop:g} dB without a double hit"

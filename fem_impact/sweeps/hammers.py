@@ -1,6 +1,8 @@
 """Choosing a hammer: which mass and tip stiffness reach a required bandwidth without a double hit."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -16,27 +18,62 @@ from ..impact.striker import Striker
 from ..modes.modal import Modes
 from . import grid
 
-TOLERANCE = 1e-2  # [-] error limit of the blows that decide
-TIPS = np.geomspace(0.03, 10.0, 61)  # [-] stiffnesses tried, over that whose half sine has the bandwidth; 24 per decade
-ROUNDS = 7  # [-] bisections for the softest tip that reaches the bandwidth
+TOLERANCE = 1e-2  # [-] error limit of the blows that are looked at first
+DECIDED = 1e-4  # [-] error limit of the blows that decide where a range of tips ends
+WIDTH = 1e-3  # [-] relative width to which the ends of a range are found
+HARDEST = 10.0  # [-] hardest tip of `highest_frequency`, over that whose half sine has the bandwidth
+SOFTEST = 0.03  # [-] softest tip tried, over the one with the bandwidth and over the one tuned to the first mode
+PER_DECADE = 100, 12  # [-] tips per decade at which impacts are counted, and at which the bandwidth is found
+STIFFEST = 100.0  # [-] hardest tip tried, over the one for which the modes are complete
+ROUGHLY = 0.05  # [-] relative width to which the hardest tip that the modes resolve is found
 MASSES = (1e-6, 1e4)  # [kg] allowed: outside, a blow takes too long to compute or overflows
 BANDWIDTHS = (1e-3, 1e9)  # [Hz] allowed, for the same reason as the masses
 LOOKS = 400  # [-] frequencies at which the spectrum is evaluated to find where it falls
 
 
+Ranges = tuple[tuple[float, float], ...]  # [N/m] softest and hardest tip of each
+
+
 @dataclass(frozen=True)
 class Hammer:
-    """What one hammer can do on a body."""
+    """What one hammer can do on a body, with tips between the softest tried and the hardest that the modes resolve."""
 
     mass: float  # [kg]
-    softest: float | None  # [N/m] softest tip that reaches the bandwidth with a single hit; None: there is none
-    hardest: float | None  # [N/m] hardest tip in the widest range that hits once; None: every tip hits twice
-    reach: float | None  # [Hz] bandwidth with the hardest tip
+    single: Ranges  # tips that hit once; narrower gaps and ranges than 2 % may be missed
+    working: Ranges  # tips that hit once and reach the bandwidth
+    limit: float  # [N/m] hardest tip that the modes resolve: the model ends here
+    reach: float | None  # [Hz] bandwidth with the hardest tip; None: no tip hits once
+    error: float | None  # [-] estimated error of the blow with that tip
+    notes: tuple[str, ...] = ()  # what the body assumed, and numbers that are probably a slip of a unit
 
     @property
     def works(self) -> bool:
         """Whether some tip reaches the bandwidth and hits once."""
-        return self.softest is not None
+        return bool(self.working)
+
+    @property
+    def softest(self) -> float | None:
+        """Softest tip [N/m] of the widest range that reaches the bandwidth and hits once; None: there is none."""
+        return _widest(self.working)[0] if self.working else None
+
+    @property
+    def hardest(self) -> float | None:
+        """Hardest tip [N/m] of that range, or else of the widest that hits once; None: every tip hits twice."""
+        return _widest(self.working or self.single)[1] if self.single else None
+
+    @property
+    def unlimited(self) -> bool:
+        """Whether tips up to `limit`, where the model ends, hit once, so that no hardest tip was found."""
+        return self.hardest == self.limit
+
+    def data(self) -> dict[str, Any]:
+        """All numbers by name, in SI units."""
+        names = ("softest", "hardest", "unlimited")
+        return {**vars(self), **{name: getattr(self, name) for name in names}}
+
+
+def _widest(ranges: Ranges) -> tuple[float, float]:
+    return max(ranges, key=lambda ends: ends[1] / ends[0])
 
 
 def bandwidth_of(hit: Response, drop: float) -> float:
@@ -59,13 +96,20 @@ def bandwidth_of(hit: Response, drop: float) -> float:
     return float(frequencies[first - 1] + share * (frequencies[first] - frequencies[first - 1]))
 
 
+def _reaches(hit: Response, bandwidth: float, drop: float) -> bool:
+    """Whether the force spectrum stays within ``drop`` [dB] of its value at 0 Hz up to a bandwidth [Hz]."""
+    looks = int(np.clip(LOOKS / 4.0 * bandwidth * hit.contact_time, 16, LOOKS))
+    size = np.abs(hit.spectrum(np.linspace(0.0, bandwidth, looks)))
+    return bool(size.min() >= size[0] * 10.0 ** (-drop / 20.0))
+
+
 @check.typed
 def highest_frequency(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float = 10.0) -> float:
     """Frequency [Hz] up to which modes are needed to choose a hammer, estimated from the first few modes."""
     centre = _centre(bandwidth, drop)
     return max(
         accuracy.cutoff_frequency(
-            modes, at, contact=Contact.linear(TIPS[-1] * accuracy.resonant_stiffness(mass, centre)), mass=mass,
+            modes, at, contact=Contact.linear(HARDEST * accuracy.resonant_stiffness(mass, centre)), mass=mass,
             speed=1.0, tolerance=TOLERANCE,
         )
         for mass in _checked(masses)
@@ -87,12 +131,12 @@ def _centre(bandwidth: float, drop: float) -> float:
 
 @check.typed
 def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float = 10.0) -> tuple[Hammer, ...]:
-    """Find the tips that suit each rigid hammer, by striking with a series of linear tips from soft to hard.
+    """Find the tips that suit each rigid hammer, by striking with linear tips from soft to hard.
 
     Parameters
     ----------
     modes : Modes
-        Modes of the body under test, up to `highest_frequency`.
+        Modes of the body under test. The search ends with the hardest tip that they resolve (`Response.error`).
     at : strike point, (dimension,) [m]
     bandwidth : float [Hz]
         Frequency up to which the force spectrum must stay within ``drop`` of its value at 0 Hz.
@@ -102,12 +146,12 @@ def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float 
     Returns
     -------
     tuple of Hammer, in the order of the masses
+        The ends of each range are found to the relative width WIDTH and belong to it.
 
     Notes
     -----
     Computed blows decide, not the kinetic-energy criterion: multiple impacts happen well below its threshold. With
-    linear tips the answer is the same at any speed. If several ranges of tips hit once, the widest one is used: a heavy
-    hammer with a soft tip can graze the vibrating body a second time.
+    linear tips the answer is the same at any speed. Which tips hit once does not depend on the bandwidth.
 
     Examples
     --------
@@ -116,51 +160,91 @@ def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float 
     >>> light.works, heavy.works
     (True, False)
     """
-    masses = _checked(masses)
-    centre = _centre(bandwidth, drop)
+    masses, centre = _checked(masses), _centre(bandwidth, drop)
+    flexible = modes.frequencies[modes.omega > 0.0]
+    lowest = float(flexible[0]) if len(flexible) else centre
+    return tuple(_hammer(modes, at, mass, bandwidth, drop, (centre, lowest)) for mass in masses)
+
+
+def _hammer(modes: Modes, at: Any, mass: float, bandwidth: float, drop: float, tuned: tuple[float, float]) -> Hammer:
+    """What one hammer can do; ``tuned`` are frequencies [Hz] far above those of the contact with the softest tip."""
+    striker = Striker.rigid(mass)
+
+    @cache
+    def hit(tip: float, tolerance: float = DECIDED) -> Response:
+        return strike(modes, striker, Contact.linear(tip), at=at, speed=1.0, tolerance=tolerance)
+
+    def once(tip: float) -> bool:
+        return hit(tip).n_impacts == 1
+
+    def reaches(tip: float, tolerance: float = DECIDED) -> bool:
+        return _reaches(hit(tip, tolerance), bandwidth, drop)
+
+    low = SOFTEST * mass * (2.0 * np.pi * min(tuned)) ** 2
+    high = _last_resolved(modes, at, mass) if modes.omega.any() else STIFFEST * mass * (2.0 * np.pi * max(tuned)) ** 2
+    if high <= low:
+        return Hammer(float(mass), (), (), high, None, None, modes.notes)
+    tips = _series(low, high, PER_DECADE[0])
+    table = grid.sweep(
+        modes, striker, Contact.linear(1.0), at=at, speed=1.0, over={"stiffness": tips}, tolerance=TOLERANCE
+    )
+    single = _ranges(tips, table.n_impacts.values == 1, once)
+    working: Ranges = ()
+    for ends in single:
+        tips = _series(*ends, PER_DECADE[1])
+        working += _ranges(tips, np.array([reaches(float(tip), TOLERANCE) for tip in tips]), reaches)
+    last = _widest(working or single)[1] if single else None
+    reach, error = (bandwidth_of(hit(last), drop), hit(last).error.total) if last else (None, None)
+    return Hammer(float(mass), single, working, high, reach, error, modes.notes)
+
+
+def _last_resolved(modes: Modes, at: Any, mass: float) -> float:
+    """Hardest tip [N/m] for which the modes left out do not govern the contact, to the relative width ROUGHLY."""
+
+    def complete(log: float) -> float:
+        law = Contact.linear(float(np.exp(log)))
+        needed = accuracy.cutoff_frequency(modes, at, contact=law, mass=mass, speed=1.0, tolerance=TOLERANCE)
+        return needed - float(modes.frequencies[-1])
+
+    def resolved(tip: float) -> bool:
+        law = Contact.linear(tip)
+        return strike(
+            modes, Striker.rigid(mass), law, at=at, speed=1.0, tolerance=TOLERANCE, max_impacts=1
+        ).error.resolvable
+
+    centre = np.log(mass * float(modes.omega[-1]) ** 2)
+    first = float(np.exp(brentq(complete, centre - 40.0, centre + 40.0)))
+    return _end(resolved, first, STIFFEST * first, ROUGHLY)
+
+
+def _series(low: float, high: float, per_decade: int) -> np.ndarray:
+    """Tips from low to high, evenly spaced in the logarithm."""
+    return np.geomspace(low, high, 2 + int(per_decade * np.log10(high / low)))
+
+
+def _ranges(tips: np.ndarray, good: np.ndarray, suits: Callable[[float], bool]) -> Ranges:
+    """Ranges of tips that suit, from a series of tips known to be good or not; ends are found by bisection."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]])))
     found = []
-    for mass in masses:
-        striker = Striker.rigid(mass)
-        tips = accuracy.resonant_stiffness(mass, centre) * TIPS
-        table = grid.sweep(
-            modes, striker, Contact.linear(1.0), at=at, speed=1.0, over={"stiffness": tips}, tolerance=TOLERANCE
-        )
-        first, last = _longest_run(table.n_impacts.values == 1)
-        if first == last:
-            found.append(Hammer(float(mass), None, None, None))
+    for first, last in zip(ends[::2].tolist(), (ends[1::2] - 1).tolist()):
+        # the first look was less accurate: leave out tips at the ends that do not suit after all
+        first = next((i for i in range(first, last + 1) if suits(float(tips[i]))), None)
+        if first is None:
             continue
-
-        def reach(tip: float, striker: Striker = striker) -> float:
-            hit = strike(modes, striker, Contact.linear(tip), at=at, speed=1.0, tolerance=TOLERANCE)
-            return bandwidth_of(hit, drop)
-
-        best = reach(tips[last - 1])
-        softest = _softest(reach, tips[first], tips[last - 1], bandwidth) if best >= bandwidth else None
-        found.append(Hammer(float(mass), softest, float(tips[last - 1]), best))
+        last = next(i for i in range(last, first - 1, -1) if suits(float(tips[i])))
+        low, high = float(tips[first]), float(tips[last])
+        low = low if first == 0 else _end(suits, low, float(tips[first - 1]))
+        high = high if last == len(tips) - 1 else _end(suits, high, float(tips[last + 1]))
+        found.append((low, high))
     return tuple(found)
 
 
-def _longest_run(true: np.ndarray) -> tuple[int, int]:
-    """Start and stop (exclusive) of the longest run of true values; (0, 0) if there is none."""
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]])))
-    first, last = ends[::2], ends[1::2]
-    if len(first) == 0:
-        return 0, 0
-    longest = int(np.argmax(last - first))
-    return int(first[longest]), int(last[longest])
-
-
-def _softest(reach: Any, low: float, high: float, bandwidth: float) -> float:
-    """The softest tip between two that reaches the bandwidth; the harder of the two must reach it."""
-    if reach(low) >= bandwidth:
-        return float(low)
-    for _ in range(ROUNDS):
-        middle = float(np.sqrt(low * high))
-        if reach(middle) >= bandwidth:
-            high = middle
-        else:
-            low = middle
-    return float(high)
+def _end(suits: Callable[[float], bool], good: float, bad: float, width: float = WIDTH) -> float:
+    """The last tip that suits between a good one and a bad one, to a relative width."""
+    while abs(np.log(bad / good)) > width:
+        middle = float(np.sqrt(good * bad))
+        good, bad = (middle, bad) if suits(middle) else (good, middle)
+    return good
 
 
 def half_sine_reach(drop: float) -> float:

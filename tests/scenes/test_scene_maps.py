@@ -13,7 +13,7 @@ from fem_impact import cli
 from fem_impact.scenes import maps
 from fem_impact.scenes.scene import scene_of
 from fem_impact.show import plots
-from fem_impact.sweeps import grid, hammers
+from fem_impact.sweeps import grid
 
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 OVER = {"contact.stiffness": [2e4, 1e5, 4e5], "striker.mass": [0.02, 0.1]}
@@ -163,26 +163,8 @@ def test_a_map_that_needs_too_many_modes_says_what_to_leave_out():
         {**PIECES["plate"], "contact": {"kind": "linear", "stiffness": 1e5}}, Path("plate.toml"), folder=Path()
     )
     over = {"striker.mass": [1e-4, 0.1], "contact.stiffness": [1e3, 1e9]}
-    with pytest.raises(fi.SimulationError, match=r"needs about \d+ modes, at most 2000 are allowed; allow a larger"):
+    with pytest.raises(fi.SimulationError, match=r"needs about \d+ modes, at most 2000 are allowed; no tolerance is"):
         maps.map_scene(found, over=over, tolerance=1e-3)
-
-
-def test_a_chosen_hammer_does_what_was_asked():
-    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=200)
-    light, heavy = hammers.choose(plate, (0.465, 0.3), 500.0, [2e-3, 0.2])
-    assert light.works
-    assert not heavy.works
-    for tip in (light.softest, light.hardest):
-        hit = fi.strike(plate, fi.Striker.rigid(2e-3), fi.Contact.linear(tip), at=(0.465, 0.3), speed=1.0)
-        assert hit.n_impacts == 1
-        assert hammers.bandwidth_of(hit, 10.0) > 0.98 * 500.0  # blows behind the choice are good to a percent
-
-
-def test_on_an_unyielding_body_the_softest_tip_is_the_half_sines():
-    heavy = fi.analytic.rectangle(1.55, 1.0, mass=5e5, first_frequency=100.0, n_modes=30)
-    (hammer,) = hammers.choose(heavy, (0.465, 0.3), 500.0, [0.02])
-    centre = 500.0 / 2.039  # Hz; a half sine is 10 dB down at 2.039 times its frequency
-    assert_allclose(hammer.softest, 0.02 * (2.0 * np.pi * centre) ** 2, rtol=0.06)  # the last halving is 4 %
 
 
 def test_hammer_at_the_prompt(capsys):
@@ -207,20 +189,6 @@ def test_hammer_at_the_prompt(capsys):
 def test_hammers_of_no_sense_are_told(given, message, capsys):
     assert cli.main(["hammer", str(SCENES / "drumstick_map.toml"), *given]) == 2
     assert message in " ".join(capsys.readouterr().err.split())
-
-
-def test_one_grazing_blow_of_a_soft_tip_does_not_rule_out_the_harder_ones():
-    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
-    (hammer,) = hammers.choose(plate, (0.465, 0.3), 500.0, [1.0])
-    assert hammer.hardest > 2e6  # N/m; the second tip tried, 78 kN/m, hits twice at any tolerance, the next 38 once
-    hit = fi.strike(plate, fi.Striker.rigid(1.0), fi.Contact.linear(hammer.hardest), at=(0.465, 0.3), speed=1.0)
-    assert hit.n_impacts == 1
-
-
-def test_a_bandwidth_beyond_every_tip_has_no_hammer():
-    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=60)
-    (hammer,) = hammers.choose(plate, (0.465, 0.3), 1e6, [0.01])
-    assert not hammer.works
 
 
 @pytest.mark.parametrize(
