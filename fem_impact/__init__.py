@@ -5,7 +5,7 @@ from typing import Any
 
 # Public names and their modules, imported at first use so that the command line starts quickly.
 _NAMES = {
-    "_base.check": "SimulationError",
+    "_base.check": "SimulationError ToleranceWarning",
     "fe.section": "Material Plate Beam Elastic",
     "fe.assembly": "assemble",
     "modes.modal": "Modes find_modes rayleigh",

@@ -28,14 +28,17 @@ import fem_impact as fi
 
 from ._base.files import undo_all, undoable
 
-BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses, as Unix tools use them; 130 is 128 + SIGINT
+BAD_INPUT, FAILED, MISSED, INTERRUPTED = 2, 1, 3, 130  # exit statuses, as Unix tools use them; 130 is 128 + SIGINT
 WIDEST = 88  # [-] columns: printed text is never wider, and narrower on a narrow terminal
 MOTION_TIMES = 100  # [-] instants in motion.pvd: four seconds at 25 per second
 SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` writes any number
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run one command; the exit status is 0, 2 for bad input, 1 for a run that failed, 130 after Ctrl-C."""
+    """Run one command; the exit status is 0, or
+
+    2 for bad input, 1 for a run that failed, 3 for one that missed its tolerance, 130 after Ctrl-C.
+    """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a title may hold characters that this terminal lacks
@@ -43,7 +46,7 @@ def main(arguments: list[str] | None = None) -> int:
     plain = _prepare(os.environ, once=options.run in (_strike, _modes, _report))
     try:
         with _interruptible(options):
-            options.run(options)
+            missed = options.run(options)
             print(end="", flush=True)
     except ValueError as error:
         return _complain(error, BAD_INPUT)
@@ -64,7 +67,7 @@ def main(arguments: list[str] | None = None) -> int:
         return _complain(error, FAILED)
     except KeyboardInterrupt:
         return _complain(f"interrupted; {_kept(options)}", INTERRUPTED)
-    return 0
+    return MISSED if missed else 0
 
 
 @contextmanager
@@ -211,6 +214,7 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     add("--out", metavar="DIR", type=_place, help="output folder (default: out/NAME-OF-SCENE)")
     _add_choices(add)
+    add("--strict", action="store_true", help="fail if the tolerance is missed; otherwise the exit status is 3")
     add("--verify", action="store_true", help="strike again with a finer model and print the differences")
     add("--pictures", action="store_true", help="write 3-D pictures of the mode shapes and the wave, as PNG and GIF")
     add("--vtk", action="store_true", help="write motion.pvd, the motion for ParaView and pyvista")
@@ -303,7 +307,10 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def _strike(options: argparse.Namespace) -> None:
+def _strike(options: argparse.Namespace) -> bool:
+    """Strike and write; returns whether the tolerance was missed."""
+    from .impact import promise  # imported only when needed
+
     began = time.perf_counter()
     scene = fi.load_scene(options.scene)
     if options.listener is not None:
@@ -315,14 +322,17 @@ def _strike(options: argparse.Namespace) -> None:
         keep = place.parent / f"{place.name}.modes.npz"  # not in the folder: an interrupted run leaves that alone
         choices = {**needs, **_choices(options)}
         run = scene.run(_progress, before=_warn, verify=options.verify, keep=keep, **choices)
+        if options.strict:
+            promise.kept(run.response, strict=True)
         start = time.perf_counter()
         with _progress("files"):
             data = _write(staging, scene, run, options)
     keep.unlink(missing_ok=True)
     seconds = {**run.seconds, "files": time.perf_counter() - start, "total": time.perf_counter() - began}
+    missed = not run.response.tolerance_met
     if options.json:
         _print_json(data)
-        return
+        return missed
     _say(_title(scene), run.response.summary())
     if run.plan.target != "modal":
         _say(f"Model: {run.plan.reasons[0]}; no modes and no sound (use --target modal or --quantity sound=5000)")
@@ -336,6 +346,7 @@ def _strike(options: argparse.Namespace) -> None:
         _say(f"Listener: peak {heard['level']:.1f} dB re 20 µPa; 1.0 in radiated.wav is {heard['full_scale']:g} Pa")
     _say("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items()))
     _say(f"Files in {folder}{os.sep}: {', '.join(data['files'])}")
+    return missed
 
 
 def _warn(plan: Any) -> None:
@@ -461,7 +472,7 @@ def _hammer(options: argparse.Namespace) -> None:
         _say(f"Files: {options.out}")
 
 
-def _report(options: argparse.Namespace) -> None:
+def _report(options: argparse.Namespace) -> bool:
     scene = fi.report.read(options.scene)
     path = options.out if options.out is not None else Path("out") / options.scene.stem / "report.html"
     changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
@@ -470,6 +481,7 @@ def _report(options: argparse.Namespace) -> None:
         with _progress("page"):
             fi.report.write(staging / path.name, scene, run)
     _say(_title(scene), run.response.summary(), f"Files: {path}")
+    return not run.response.tolerance_met
 
 
 def _explore(options: argparse.Namespace) -> None:

@@ -42,6 +42,10 @@ class SimulationError(RuntimeError):
     """A run missed its accuracy or failed; the text says what went wrong and what to change."""
 
 
+class ToleranceWarning(UserWarning):
+    """A blow missed its tolerance; the text says by how much, why, and what would meet it."""
+
+
 def _suffix(unit: str) -> str:
     return f" {unit}" if unit else ""
 

@@ -106,6 +106,11 @@ def left_out_error(softness: Any, ratio: Any, exponent: Any, dimension: int) -> 
     return factor * (1.5 if dimension == 1 else 1.0) * softness * ratio ** (power - 1.0)
 
 
+def order_of(exponent: float, dimension: int) -> float:
+    """Power with which the error of leaving out modes falls with the highest frequency kept."""
+    return float(_order(exponent)[0]) + (0.5 if dimension == 1 else 0.0)
+
+
 def _order(exponent: Any) -> tuple[Any, Any]:
     """Power with which the error falls with the highest kept frequency, and the factor of the error."""
     return np.minimum(SMOOTH[0] + exponent, SMOOTH[1]), np.minimum(

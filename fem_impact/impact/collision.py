@@ -11,7 +11,7 @@ import numpy as np
 from .._base import check
 from .._base.check import SimulationError
 from ..modes.modal import Modes, left_out
-from . import accuracy, force_spectrum
+from . import accuracy, force_spectrum, promise
 from .compiled import build, record
 from .compiled.collocation import run_collocation
 from .compiled.energy import run_energy
@@ -198,6 +198,7 @@ def collide(
     scheme: str | None = None,
     dt: float | None = None,
     forces: Sequence[float] | None = None,
+    strict: bool = False,
 ) -> Response:
     """Collide any number of bodies at any number of contacts.
 
@@ -212,7 +213,7 @@ def collide(
         Initial modal displacements and velocities of each body; ``speeds`` adds to them.
     forces : sequence of float [N], (n_bodies,)
         Constant force at each body's first contact point, with the sign convention of the speeds.
-    tolerance, quantity, residual, duration, max_impacts, scheme, dt
+    tolerance, quantity, residual, duration, max_impacts, scheme, dt, strict
         As in `strike`.
 
     Returns
@@ -230,7 +231,7 @@ def collide(
     options = _Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
     bodies, contacts = check.several("bodies", bodies, Modes), check.several("contacts", contacts, Touch)
     parts, arriving = _parts(bodies, contacts, speeds, states, forces, residual)
-    return _follow(bodies, contacts, parts, arriving, options)
+    return promise.kept(_follow(bodies, contacts, parts, arriving, options), strict)
 
 
 def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> Response:
@@ -253,7 +254,9 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> R
     error = Error(step_error, truncation, mesh_error, resolvable, sensitivity=_sensitivity(coarse, history))
     laws = tuple(touch.law for touch in contacts)
     dips = tuple(_dip(part, system) for part in parts)
-    return Response(tuple(bodies), laws, history, speed, options.tolerance, ran, error, striker, at, dips)
+    return Response(
+        tuple(bodies), laws, history, speed, options.tolerance, ran, error, striker, at, dips, options.quantities
+    )
 
 
 def _check_way(system: _System, depth: float, tolerance: float) -> None:

@@ -36,6 +36,16 @@ def asked_for(quantity: Any) -> Mapping[str, float | None]:
     return MappingProxyType(found)
 
 
+NAMES = {"contact_time": "contact time", "force": "peak force", "n_impacts": "number of impacts"}
+
+
+def words(quantities: Mapping[str, float | None]) -> str:
+    """The quantities as a list in words, with their bands."""
+    known = [(NAMES.get(name, name), band) for name, band in quantities.items()]
+    said = [name if band is None else f"{name} to {band:g} Hz" for name, band in known]
+    return said[0] if len(said) == 1 else f"{', '.join(said[:-1])} and {said[-1]}"
+
+
 def _listed(quantity: Any) -> Sequence[Any]:
     if not isinstance(quantity, Sequence):
         raise ValueError(f"quantity must be names of {', '.join(QUANTITIES)}, got {check.shown(quantity)}")

@@ -1,6 +1,8 @@
 """The result of a blow: the force history, the scalars derived from it, and the motion of all bodies at any time."""
 
-from dataclasses import dataclass
+import html
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -9,9 +11,10 @@ import numpy as np
 from .._base import check, markup
 from ..fe import plausible
 from ..modes.modal import Modes, at_rest
-from . import force_spectrum
+from . import force_spectrum, promise
 from .compiled import law, propagation, record
 from .contact import Contact
+from .quantities import USUAL, words
 from .striker import Striker
 
 CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more than this factor
@@ -51,6 +54,17 @@ class Error:
     def total(self) -> float:
         """The sum [-]; infinite if the modes cannot resolve the contact."""
         return self.step + self.truncation + self.mesh + self.idealisation if self.resolvable else float("inf")
+
+    @property
+    def dominant(self) -> tuple[str, float]:
+        """The largest part, in words, and its size [-]."""
+        parts = {
+            "time steps": self.step,
+            "modes left out": self.truncation,
+            "the finite elements": self.mesh,
+            "the simplified target": self.idealisation,
+        }
+        return max(parts.items(), key=lambda part: part[1])
 
     def __float__(self) -> float:
         return self.total
@@ -241,6 +255,9 @@ class Response:
     striker: Striker | None = None
     at: np.ndarray | None = None  # (dimension,) [m] strike point
     dips: tuple[Dip | None, ...] = ()  # one per body; None if its modes are complete
+    quantities: Mapping[str, float | None] = field(
+        default_factory=lambda: USUAL
+    )  # that must meet the tolerance, each with its band [Hz]
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)
@@ -252,6 +269,16 @@ class Response:
         place = () if self.at is None else at_rest(self.target, self.at[None])
         speed = tuple(plausible.number("speed", abs(self.speed)))
         return plausible.together(*(modes.notes for modes in reversed(self.bodies)), striker, speed, place)
+
+    @property
+    def tolerance_met(self) -> bool:
+        """Whether the estimated error is at most the tolerance."""
+        return self.error.total <= self.tolerance
+
+    @property
+    def verdict(self) -> str:
+        """One sentence: whether the tolerance is met and, if not, why and what would meet it."""
+        return promise.verdict(self)
 
     @property
     def target(self) -> Modes:
@@ -511,19 +538,23 @@ class Response:
             ("contact time", f"{self.contact_time:.5g} s"),
             ("impulse", f"{self.impulse:.5g} N s"),
             ("restitution", f"{self.restitution:.5f}"),
-            ("estimated error", f"{self.error.total:.1e} of {self.tolerance:.0e} accepted"),
+            ("estimated error", f"{self.error.total:.1e} of {self.tolerance:g} accepted"),
         ]
         end = self.impacts[-1].end if self.impacts else np.inf
         shown = self.time <= end
         force = self.force if self.force.ndim == 1 else self.force.sum(axis=1)
         said = f"Contact force over time: {self.n_impacts} impacts, peak {self.peak_force:.4g} N"
-        return markup.side_by_side(
-            markup.curve(self.time[shown], force[shown], label="force", unit="N", title=said), markup.table(rows)
-        ) + markup.notes(self.notes)
+        return (
+            f"<p>{html.escape(self.verdict)}</p>"
+            + markup.side_by_side(
+                markup.curve(self.time[shown], force[shown], label="force", unit="N", title=said), markup.table(rows)
+            )
+            + markup.notes(self.notes)
+        )
 
     def summary(self) -> str:
         """The blow in a few readable lines."""
-        lines = [f"{self.n_impacts} impact{'s' if self.n_impacts != 1 else ''}, {self.outcome}"]
+        lines = [self.verdict, f"{self.n_impacts} impact{'s' if self.n_impacts != 1 else ''}, {self.outcome}"]
         lines += [
             f"  {impact.start * 1e3:9.4f} to {impact.end * 1e3:9.4f} ms: peak {impact.peak_force:.5g} N, "
             f"impulse {impact.impulse:.5g} N s"
@@ -539,16 +570,15 @@ class Response:
             f"impulse {self.impulse:.5g} N s",
             f"restitution {self.restitution:.5f} at {self.speed:g} m/s",
             f"energy {total:.5g} J: {shares}",
-            f"estimated error {error.total:.1e} (step {error.step:.1e}, truncation {error.truncation:.1e}, "
-            f"mesh {error.mesh:.1e}, idealisation {error.idealisation:.1e}); energy error {self.energy_error:.1e}",
+            f"estimated error {error.total:.1e} of {words(self.quantities)}: step {error.step:.1e}, truncation "
+            f"{error.truncation:.1e}, mesh {error.mesh:.1e}, idealisation {error.idealisation:.1e}; energy error "
+            f"{self.energy_error:.1e}",
         ]
         if error.sensitivity > CHAOTIC:
             lines.append(
                 f"chaotic: small differences grow {error.sensitivity:.0e}-fold from the first impact to the last; "
                 "trust the number of impacts and averages, not single values"
             )
-        if not error.resolvable:
-            lines.append("not resolvable: the left-out modes govern this contact; keep more modes")
         lines += [f"Note: {note}" for note in self.notes]
         return "\n".join(lines)
 

@@ -1,7 +1,8 @@
 """Choose the smallest model of a blow that meets its tolerance, and run it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from inspect import signature
 from types import MappingProxyType
 from typing import Any
@@ -11,10 +12,10 @@ import numpy as np
 from .._base import check, markup
 from ..fe import plausible, refinement
 from ..fe.assembly import System
-from ..impact import accuracy, collision
+from ..impact import accuracy, collision, promise
 from ..impact.collision import BAND_POINTS
 from ..impact.contact import Contact
-from ..impact.quantities import asked_for
+from ..impact.quantities import asked_for, words
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, FieldShapes, Modes, at_rest
@@ -22,8 +23,10 @@ from . import idealisation
 from .target import Stages, Target, Watch
 
 SHARE = 0.45  # [-] of the tolerance for left-out modes, as much for the time steps; the mesh gets the rest
-MARGINS = (1.0, 4.0, 16.0)  # [-] these divide the mode error limit in turn, until the left-out modes no longer matter
-NOTCH = 8.0  # [-] the verifying run divides the tolerance by this
+ATTEMPTS = 3  # [-] runs with ever more modes or finer meshes, until the tolerance is met
+NOTCH = 4.0  # [-] each attempt divides what the modes left out or the mesh may err by this
+MESH = 0.1  # [-] of the tolerance for the mesh, whose frequencies may err twice as much as the blow then does
+VERIFYING = 8.0  # [-] the verifying run divides the tolerance by this
 FINEST = 1e-10  # [-] lowest tolerance of a verifying run
 CAUTION = 2.0  # [-] safety factor on the mode error: costs a quarter more modes, but seldom needs a second run
 FIRST_LOOK = 20  # [-] modes found first: enough to scale the body and to predict the density of the others
@@ -101,6 +104,11 @@ class Plan:
         return float(sum(self.errors.values()))
 
     @property
+    def meets(self) -> bool:
+        """Whether the predicted error is at most the tolerance."""
+        return self.error <= self.tolerance
+
+    @property
     def costly(self) -> bool:
         """Whether the run takes more than COSTLY: ten seconds or two gigabytes."""
         return self.seconds > COSTLY[0] or self.memory > COSTLY[1]
@@ -116,12 +124,12 @@ class Plan:
         return self.blow.plan(**{**self.changes, **changes})
 
     def run(self, watch: Watch | None = None) -> "Run":
-        """Run the plan."""
+        """Run the plan; `Response.tolerance_met` says whether it kept its promise."""
         return self.blow.run(watch, plan=self)
 
-    def strike(self) -> Response:
-        """Run the plan and return the response only."""
-        return self.run().response
+    def strike(self, strict: bool = False) -> Response:
+        """Run the plan and return the response only; ``strict`` as in `fi.strike`."""
+        return promise.kept(self.run().response, strict)
 
     @property
     def cost(self) -> str:
@@ -137,8 +145,10 @@ class Plan:
         return {name: dict(value) if isinstance(value, Mapping) else value for name, value in found.items()}
 
     def __str__(self) -> str:
-        wanted = ", ".join(name if band is None else f"{name} to {band:g} Hz" for name, band in self.quantities.items())
-        lines = [f"Plan for {wanted} to {self.tolerance:g}:", *(f"  {line}" for line in self.reasons)]
+        wanted = words(self.quantities)
+        kept = "met" if self.meets else "MISSED"
+        first = f"tolerance {self.tolerance:g} of {wanted} will be {kept}: predicted error {self.error:.1e}"
+        lines = [first, *(f"  {line}" for line in self.reasons)]
         lines.append("Predicted errors:")
         errors = [*self.errors.items(), ("total", self.error)]
         lines += [f"  {line}" for line in markup.columns([(name, f"{error:.1e}") for name, error in errors])]
@@ -172,6 +182,7 @@ class _Asked:
     tolerance: float  # [-]
     quantities: Mapping[str, float | None]
     duration: float  # [s] contact time on a rigid wall
+    fineness: float = 1.0  # [-] divides the error of the frequencies
 
     @classmethod
     def checked(cls, blow: Blow, changes: Mapping[str, Any]) -> "_Asked":
@@ -207,8 +218,8 @@ class _Asked:
 
     def find(self, n_modes: int, max_frequency: float | None = None, **how: Any) -> Modes:
         """Modes of the target, see `Target.find`."""
-        size = self.pieces.get("size")
-        return self.blow.target.find(n_modes, max_frequency, tolerance=self.tolerance, size=size, **how)
+        size, limit = self.pieces.get("size"), 2.0 * MESH * self.tolerance / self.fineness
+        return self.blow.target.find(n_modes, max_frequency, tolerance=limit, size=size, **how)
 
 
 def plan_of(
@@ -245,26 +256,42 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
 
     ``keep`` is a file that stores the modes of a costly plan.
     """
-    blow, asked = plan.blow, _Asked.checked(plan.blow, plan.changes)
+    blow, asked, margin = plan.blow, _Asked.checked(plan.blow, plan.changes), 1.0
     fixed = {"n_modes", "max_frequency"} & set(asked.pieces) or not asked.values.get("residual", True)
-    arguments = {**asked.values, "tolerance": SHARE * asked.tolerance}
-    for margin in MARGINS:
-        if margin > 1.0:
-            plan = _modal(asked, stages, plan.first, margin)
+    given = blow.target.kind != "fe" or blow.target.size_stated or "size" in asked.pieces
+    idealised = plan.errors.get("rigid target", 0.0) + plan.errors.get("infinite plate", 0.0)
+    for attempt in range(ATTEMPTS):
         modes, striker = struck(plan, stages, keep), collision.shortened(blow.striker, plan.n_striker_modes)
         if plan.target == "modal":
             with blow.target.blame("observe"):
                 for point in blow.points:
                     modes.points("points", [point])
         with stages("strike"), blow.target.blame("strike"):
-            response = collision.strike(modes, striker, blow.contact, **arguments)
-        if plan.target != "modal" or fixed or response.error.truncation <= SHARE * asked.tolerance:
+            run = partial(collision.strike, modes, striker, blow.contact)
+            response = _within(run, asked.values, asked.tolerance, SHARE * asked.tolerance)
+        short = response.error.truncation > SHARE * asked.tolerance
+        coarse = not given and response.error.total > asked.tolerance and response.error.mesh > MESH * asked.tolerance
+        if plan.target != "modal" or fixed or not (short or coarse) or attempt == ATTEMPTS - 1:
             break
-    idealised = plan.errors.get("rigid target", 0.0) + plan.errors.get("infinite plate", 0.0)
+        margin *= NOTCH if short else 1.0
+        asked = replace(asked, fineness=asked.fineness * (NOTCH if coarse else 1.0))
+        try:
+            plan = _modal(asked, stages, None if coarse else plan.first, margin)
+        except check.SimulationError:  # too many modes or too fine a mesh: what there is has missed the tolerance
+            break
     error = replace(response.error, idealisation=idealised)
     response = replace(response, tolerance=asked.tolerance, error=error)
     plan = replace(plan, n_modes=modes.n_modes if plan.target == "modal" else 0)
     return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
+
+
+def _within(run: Callable[..., Response], values: Mapping[str, Any], tolerance: float, first: float) -> Response:
+    """The blow with time steps that leave room in the tolerance for the other errors; ``first`` is tried first."""
+    hit = run(**{**values, "tolerance": first})
+    left = tolerance - (hit.error.total - hit.error.step)
+    if hit.error.total > tolerance and left > 0.0 and not values.get("dt"):
+        hit = run(**{**values, "tolerance": max(FINEST, 0.9 * left)})
+    return replace(hit, tolerance=tolerance)
 
 
 def verify(run: Run, watch: Watch | None = None) -> Run:
@@ -274,7 +301,7 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
     takes too many.
     """
     plan = run.plan
-    finer: dict[str, Any] = {"tolerance": max(FINEST, plan.tolerance / NOTCH), "target": "modal"}
+    finer: dict[str, Any] = {"tolerance": max(FINEST, plan.tolerance / VERIFYING), "target": "modal"}
     if plan.size is not None:
         finer["size"] = plan.size / 1.5
     finer.update({name: None for name in ("n_modes", "max_frequency", "n_striker_modes", "dt") if name in plan.changes})
@@ -364,7 +391,7 @@ def _fewer(asked: _Asked, first: Modes, banded: bool) -> str:
     loss = accuracy.LOSSY if contact.loss else 1.0
 
     def fits(tolerance: float, contact: Contact = contact) -> bool:
-        allowed = SHARE * tolerance / (CAUTION * MARGINS[1] * loss)  # with room for a second, finer run
+        allowed = SHARE * tolerance / (CAUTION * NOTCH * loss)  # with room for a second, finer run
         law = {"contact": contact, "speed": asked.values["speed"], "mass": asked.mass}
         return accuracy.cutoff_frequency(first, asked.values["at"], tolerance=allowed, **law) <= reach
 
@@ -531,6 +558,7 @@ def strike(
     at: Any,
     speed: float,
     damping_ratio: Damping | None = None,
+    strict: bool = False,
     **options: Any,
 ) -> Response:
     """Strike a body at rest and follow both bodies until their final separation.
@@ -567,6 +595,8 @@ def strike(
         Constant forces at the contact points, positive along the blow; for example the weight of a falling ball.
     damping_ratio : float or function of frequency [Hz], optional
         Damping of a system, which has none of its own.
+    strict : bool
+        Whether a missed tolerance raises SimulationError; otherwise it warns (`ToleranceWarning`).
     target, size, n_modes, max_frequency, n_striker_modes : optional
         Parts of the model to fix by hand, as in `fi.plan`.
 
@@ -590,5 +620,7 @@ def strike(
     (1, 0.55, True)
     """
     if isinstance(body, Modes) and damping_ratio is None and not set(options) & set(PIECES):
-        return collision.strike(body, striker, contact, at=at, speed=speed, **options)
-    return plan_of(body, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options).strike()
+        tolerance = check.tolerance(options.get("tolerance", collision.TOLERANCE))
+        run = partial(collision.strike, body, striker, contact, at=at, speed=speed)
+        return promise.kept(_within(run, options, tolerance, tolerance), strict)
+    return plan_of(body, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options).strike(strict)

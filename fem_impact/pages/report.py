@@ -139,7 +139,6 @@ def _command(scene: Scene, response: Response) -> str:
 
 
 def _tiles(response: Response) -> list[tuple[str, str]]:
-    met = response.error.total <= response.tolerance
     total = power(response.error.total) if response.error.resolvable else "not resolvable"
     return [
         ("impacts", str(response.n_impacts)),
@@ -147,7 +146,7 @@ def _tiles(response: Response) -> list[tuple[str, str]]:
         ("time in contact", si(response.contact_time, "s")),
         ("impulse", si(response.impulse, "N s")),
         ("restitution", f"{response.restitution:.4f}"),
-        ("estimated error" if met else "estimated error, above tolerance", total),
+        ("estimated error" if response.tolerance_met else "estimated error, above tolerance", total),
     ]
 
 

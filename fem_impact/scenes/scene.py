@@ -13,7 +13,7 @@ import numpy as np
 from .._base import check, markup
 from ..fe.assembly import System, support_of_facets
 from ..fe.section import Beam, Material, Plate
-from ..impact import collision
+from ..impact import collision, promise
 from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
@@ -44,9 +44,12 @@ class Scene:
     observe: Part | None = None
     map: Part | None = None
 
-    def strike(self, **changes: Any) -> Response:
-        """Build everything and strike; ``changes`` as in `plan`. A ValueError names the wrong file, table and key."""
-        return self.run(**changes).response
+    def strike(self, *, strict: bool = False, **changes: Any) -> Response:
+        """Build everything and strike.
+
+        ``strict`` as in `fi.strike`, ``changes`` as in `plan`. A ValueError names the wrong file, table and key.
+        """
+        return promise.kept(self.run(**changes).response, strict)
 
     def modes(self, count: int | None = None) -> Modes:
         """Modes of the struck body: the first ``count``, or as many as the blow needs to meet its tolerance."""

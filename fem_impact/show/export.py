@@ -199,7 +199,7 @@ def write_json(path: str | Path, data: dict[str, Any]) -> None:
 
 SCALARS = (
     "n_impacts", "contact_time", "peak_force", "impulse", "restitution", "speed", "energies", "dissipated",
-    "energy_error", "momentum_error", "tolerance", "finished", "scheme",
+    "energy_error", "momentum_error", "tolerance", "tolerance_met", "verdict", "finished", "scheme",
 )  # fmt: skip
 ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "sensitivity", "total", "resolvable")
 IMPACT_PARTS = ("start", "end", "peak_force", "impulse")

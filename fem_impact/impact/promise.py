@@ -1,0 +1,112 @@
+"""Whether a blow met its tolerance: in words, with what dominates the error and what would meet it."""
+
+import warnings
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._base.check import SimulationError, ToleranceWarning
+from ..modes.modal import FieldShapes
+from . import accuracy
+from .quantities import words
+
+if TYPE_CHECKING:
+    from .response import Response
+
+SHARE = 0.4  # [-] of the tolerance that the advice leaves to one kind of error
+SPARE = 1.1  # [-] modes advised over modes estimated: Weyl's law counts them only on average
+CAUTION = 0.5, 0.05  # [-] of that share for the estimate from few modes: if they resolve the contact, and if not
+MOST_ADVISED = 20_000  # [-] advice of more modes than this is no help
+
+
+def verdict(hit: "Response") -> str:
+    """One sentence: whether the tolerance is met and, if not, why and what would meet it."""
+    error, what = hit.error, words(hit.quantities)
+    if hit.tolerance_met:
+        return f"tolerance {hit.tolerance:g} met: estimated error {error.total:.1e} of {what}"
+    if not error.resolvable:
+        why = f"the modes left out govern the contact itself, so that no error of {what} can be estimated"
+    else:
+        cause, size = error.dominant
+        why = f"estimated error {error.total:.1e} of {what}, mostly from {cause} ({size:.1e})"
+    return f"tolerance {hit.tolerance:g} MISSED: {why}; {remedy(hit)}"
+
+
+def remedy(hit: "Response") -> str:
+    """What would meet the tolerance."""
+    error = hit.error
+    allowed = SHARE * hit.tolerance
+    advice = []
+    if error.truncation > allowed or not error.resolvable:
+        advice += [
+            f"keep {needed} modes of {name} instead of {now}" if needed <= MOST_ADVISED else
+            f"{name} would have to keep some {needed:.1e} modes: take a larger tolerance or a softer contact"
+            for name, needed, now in _more_modes(hit)
+        ]  # fmt: skip
+    if error.idealisation > allowed:
+        advice.append("give target = 'modal'")
+    if error.mesh > allowed:
+        advice += [
+            f"find the modes of {name} with tolerance = {limit:.1g}, or on a finer mesh"
+            for name, limit in _finer_modes(hit)
+        ]
+    if error.step > allowed:
+        advice.append("leave dt and scheme to the program, or give a smaller dt")
+    return "; ".join(advice) or f"take a tolerance of {_above(error.total):g}"
+
+
+def kept(hit: "Response", strict: bool = False) -> "Response":
+    """The response; if it missed its tolerance, warn, or raise SimulationError if ``strict``."""
+    if not hit.tolerance_met:
+        if strict:
+            raise SimulationError(verdict(hit))
+        warnings.warn(verdict(hit), ToleranceWarning, stacklevel=4)
+    return hit
+
+
+def _above(error: float) -> float:
+    """A number just above an error, with two digits."""
+    return float(f"{1.06 * error:.1e}")
+
+
+def _names(hit: "Response") -> list[str]:
+    return ["the striker", "the target"] if len(hit.bodies) == 2 else [f"body {i}" for i in range(len(hit.bodies))]
+
+
+def _more_modes(hit: "Response") -> Iterator[tuple[str, int, int]]:
+    """Name, modes needed and modes kept of every body that keeps too few."""
+    h, allowed = hit.history, SHARE * hit.tolerance
+    for body, (name, modes, dip) in enumerate(zip(_names(hit), hit.bodies, hit.dips)):
+        if dip is None:
+            continue
+        own = np.zeros(len(h.omega), bool)
+        own[hit.body_slice(body)] = True
+        needed = 0.0
+        for point, (i, _) in zip(dip.points, dip.touched):
+            law = hit.contacts[i]
+            inverse = float((h.shape[i, (h.omega == 0.0) & ~own] ** 2).sum())  # of the mass that the body feels
+            speed = float(np.abs(h._column(1)[:, i]).max(initial=0.0))
+            if not inverse or not speed:
+                continue
+            share = allowed * CAUTION[not hit.error.resolvable] / (accuracy.LOSSY if law.loss else 1.0)
+            at: dict[str, Any] = {"contact": law, "mass": 1.0 / inverse, "speed": speed}
+            needed = max(needed, accuracy.cutoff_frequency(modes, point, tolerance=share, **at))
+            if hit.error.resolvable and hit.error.truncation > allowed:
+                power = accuracy.order_of(law.exponent, modes.dimension)
+                needed = max(needed, modes.frequencies[-1] * (hit.error.truncation / allowed) ** (1.0 / power))
+        number = SPARE * modes.n_modes * (needed / modes.frequencies[-1]) ** (0.5 * modes.dimension)
+        if number > modes.n_modes + 1:
+            yield name, int(np.ceil(number)), modes.n_modes
+
+
+def _finer_modes(hit: "Response") -> Iterator[tuple[str, float]]:
+    """Name and largest frequency error allowed of every body found on a mesh."""
+    for name, modes in zip(_names(hit), hit.bodies):
+        if modes.frequency_error is not None and modes.frequency_error.any() and _on_a_mesh(modes.shapes):
+            worst = float(modes.frequency_error.max())
+            yield name, max(1e-9, 0.5 * SHARE * hit.tolerance / hit.error.mesh * worst)
+
+
+def _on_a_mesh(shapes: object) -> bool:
+    return isinstance(getattr(shapes, "base", shapes), FieldShapes)

@@ -1,0 +1,115 @@
+"""A missed tolerance is loud everywhere, and what the message advises meets it."""
+
+import json
+import re
+import warnings
+
+import numpy as np
+import pytest
+from scenes import QUICK
+
+import fem_impact as fi
+from fem_impact.cli import main
+
+PLATE = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), 2e-3)
+SIZE = 0.26, 0.21  # [m] 295 g
+AT, HAMMER = (0.1, 0.07), fi.Striker.rigid(0.1)
+HARD, SOFT = fi.Contact.hertz(1e9), fi.Contact.linear(1e5)
+
+
+def plate(n_modes):
+    return fi.analytic.rectangle(*SIZE, section=PLATE, n_modes=n_modes)
+
+
+def quiet(*arguments, **options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fi.ToleranceWarning)
+        return fi.strike(*arguments, **options)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("law", [HARD, SOFT, fi.Contact.hertz(1e8, loss=0.2)])
+@pytest.mark.parametrize("n_modes", [10, 40])
+def test_the_modes_advised_meet_the_tolerance(n_modes, law, tolerance):
+    hit = quiet(plate(n_modes), HAMMER, law, at=AT, speed=1.0, tolerance=tolerance)
+    assert hit.tolerance_met == (hit.error.total <= tolerance)
+    if hit.tolerance_met:
+        assert hit.verdict.startswith(f"tolerance {tolerance:g} met: estimated error") and "restitution" in hit.verdict
+        return
+    assert hit.verdict.startswith(f"tolerance {tolerance:g} MISSED: ")
+    needed = int(re.search(rf"keep (\d+) modes of the target instead of {n_modes}", hit.verdict)[1])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert fi.strike(plate(needed), HAMMER, law, at=AT, speed=1.0, tolerance=tolerance).tolerance_met
+
+
+def test_a_miss_warns_and_strict_raises():
+    with pytest.warns(fi.ToleranceWarning, match="tolerance 1e-06 MISSED: .*; keep .* modes") as found:
+        hit = fi.strike(plate(10), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-6)
+    assert found[0].filename == __file__  # the warning names the user's line
+    assert hit.summary().splitlines()[0] == hit.verdict == str(found[0].message)
+    assert hit.verdict.split(";")[0] in hit._repr_html_() and not hit.tolerance_met
+    assert fi.export.numbers(hit)["response"]["tolerance_met"] is False
+    with pytest.raises(fi.SimulationError, match="MISSED"):
+        fi.strike(plate(10), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-6, strict=True)
+    assert issubclass(fi.ToleranceWarning, UserWarning)
+
+
+def test_collisions_warn_too():
+    bodies = [fi.Modes.rigid(0.1), plate(10)]
+    touch = [fi.Touch(SOFT, 0, 1, None, AT)]
+    with pytest.warns(fi.ToleranceWarning, match="modes of the target"):
+        fi.collide(bodies, touch, speeds=[1.0, 0.0], tolerance=1e-6)
+    with pytest.raises(fi.SimulationError, match="MISSED"):
+        fi.collide(bodies, touch, speeds=[1.0, 0.0], tolerance=1e-6, strict=True)
+
+
+def test_a_step_of_ones_own_is_blamed():
+    with pytest.warns(fi.ToleranceWarning, match=r"mostly from time steps .*leave dt"):
+        fi.strike(plate(300), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-6, dt=5e-5)
+
+
+def test_a_coarse_mesh_is_blamed_and_the_advice_works():
+    """A clamped plate: hinged, a few triangles are nearly exact."""
+    system = fi.assemble(fi.mesh.rectangle(*SIZE, size=0.06), PLATE, {"boundary": "clamped"})
+    coarse, soft = fi.find_modes(system, n_modes=30), fi.Contact.linear(2e4)
+    hit = quiet(coarse, HAMMER, soft, at=AT, speed=1.0, tolerance=1e-3)
+    assert hit.error.dominant[0] == "the finite elements"
+    limit = float(re.search(r"find the modes of the target with tolerance = ([\d.e-]+)", hit.verdict)[1])
+    free = fi.assemble(fi.mesh.rectangle(*SIZE), PLATE, {"boundary": "clamped"})
+    fine = fi.find_modes(free, n_modes=30, tolerance=limit)
+    assert fi.strike(fine, HAMMER, soft, at=AT, speed=1.0, tolerance=1e-3, strict=True).tolerance_met
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("law", [fi.Contact.hertz(1e8), SOFT])
+def test_a_planner_left_alone_meets_the_tolerance(tolerance, law):
+    system = fi.assemble(fi.mesh.rectangle(*SIZE), PLATE, {"left": "clamped", "right": "hinged"})
+    plan = fi.plan(system, HAMMER, law, at=AT, speed=1.0, tolerance=tolerance)
+    assert plan.meets and str(plan).startswith(f"tolerance {tolerance:g} of restitution, ")
+    assert plan.strike(strict=True).tolerance_met
+
+
+def test_a_plan_says_beforehand_that_it_will_miss():
+    plan = fi.plan(plate(300), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-4, n_modes=12)
+    assert not plan.meets and "will be MISSED: predicted error" in str(plan).splitlines()[0]
+    with pytest.raises(fi.SimulationError, match=r"keep .* modes of the target instead of 12"):
+        plan.strike(strict=True)
+
+
+def test_the_prompt_writes_everything_and_exits_with_3(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(QUICK)
+    command = ["strike", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out"), "--tolerance", "1e-6"]
+    assert main([*command, "--n-modes", "5"]) == 3
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "tolerance 1e-06 MISSED" in printed and "instead of 5" in printed
+    told = json.loads((tmp_path / "out" / "response.json").read_text())["response"]
+    assert told["tolerance_met"] is False and "MISSED" in told["verdict"]
+    assert main([*command, "--n-modes", "5", "--strict"]) == 1
+    assert "MISSED" in capsys.readouterr().err
+
+
+def test_what_is_met_is_said_with_what_it_is_an_error_of():
+    hit = fi.strike(plate(400), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-3, quantity={"spectrum": 2e3})
+    assert "estimated error" in hit.verdict and hit.verdict.endswith("of spectrum to 2000 Hz")
+    assert np.isfinite(hit.error.total)
