@@ -17,8 +17,8 @@ from .._base import check
 from .._base.check import SimulationError
 from ..fe import plausible
 from ..impact import accuracy
-from ..impact.collision import strike
-from ..impact.contact import Contact
+from ..impact.collision import RESOLVABLE, strike
+from ..impact.contact import Contact, wall_time
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..model.planner import COSTLY
@@ -144,6 +144,45 @@ class Grid:
             return np.full(len(self.layers), np.nan), str(error)
         return np.array(row, float), ""
 
+    def left_out(self) -> np.ndarray:
+        """Expected error [-] of leaving out modes, in the shape of the grid; infinite where they govern the contact."""
+        if not self.residual:
+            return np.zeros(self.shape)
+        base, places = self.base, self.axes.get("at", self.base.at[None])
+        law: dict[str, Any] = vars(base.contact)
+
+        def along(name: str, values: Any) -> np.ndarray:
+            """Values of an axis, or one that all cells share, shaped to broadcast over the grid."""
+            shape = [-1 if axis == name else 1 for axis in self.axes] if name in self.axes else [1]
+            return np.reshape(np.asarray(values, float), shape)
+
+        def value(name: str, shared: float) -> np.ndarray:
+            return along(name, self.axes.get(name, [shared]))
+
+        stiffness, exponent, loss, speed = (
+            value(name, shared) for name, shared in ({**law, "speed": base.speed}).items() if name != "gap"
+        )
+        weight = value("mass", base.striker.mass) / base.striker.mass
+        felt = base.striker.felt_mass * weight
+        omega = np.pi / wall_time(stiffness, exponent, 1.0 / felt, speed)
+        yielding = base.modes.dimension > 0
+        left = [base.modes.residual_compliance(place[None])[0, 0] if yielding else 0.0 for place in places]
+        sides = [
+            (base.modes, along("at", left), "target_mass", "target_frequency"),
+            (base.striker.modes, np.array(base.striker.left_out[0][0, 0]), "mass", "striker_frequency"),
+        ]
+        total, softness = np.zeros(self.shape), np.zeros(self.shape)
+        for modes, rest, mass, frequency in sides:
+            if not modes.dimension or not modes.omega.any():
+                continue
+            first = float(modes.frequencies[modes.omega > 0.0][0])
+            ratio = value(frequency, first) / first
+            soft = felt * omega**2 * np.maximum(rest, 0.0) * modes.mass / value(mass, modes.mass) / ratio**2
+            above = np.minimum(1.0, omega / (modes.omega[-1] * ratio))
+            total = total + accuracy.left_out_error(soft, above, exponent, modes.dimension)
+            softness = softness + soft
+        return np.where(softness <= RESOLVABLE, total * np.where(loss > 0.0, accuracy.LOSSY, 1.0), np.inf)
+
     def scene(self) -> dict[str, Any]:
         """The blow that all cells share, as plain numbers."""
         law = self.base.contact
@@ -235,8 +274,9 @@ def sweep(
     Returns
     -------
     xarray.Dataset
-        One dimension per axis, in the order given; variables as in `LAYERS` with their units, and ``failure``, the
-        error text of a cell that failed (its numbers are then NaN and its n_impacts is -1).
+        One dimension per axis, in the order given; variables as in `LAYERS` with their units; ``truncation``, the
+        expected error of modes left out; ``tolerance_met``; and ``failure``, the error text of a cell that failed (its
+        numbers are then NaN and its n_impacts is -1).
         ``attrs["scene"]`` holds the blow all cells share, as JSON; ``attrs["notes"]`` what was assumed, one note per
         line.
 
@@ -412,6 +452,11 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray) -> xarray.Da
         if name == "centroid":
             attributes["max_frequency"] = grid.band
         data[name] = (dims, values.reshape(grid.shape), attributes)
+    left_out = grid.left_out()
+    meaning = "expected error of leaving out modes; infinite where they govern the contact"
+    data["truncation"] = (dims, left_out, {"units": "1", "long_name": meaning})
+    met = data["error"][1] + left_out <= grid.tolerance
+    data["tolerance_met"] = (dims, met, {"units": "1", "long_name": "whether both errors together meet the tolerance"})
     data["failure"] = (dims, failures.reshape(grid.shape), {"long_name": "error text of a failed cell"})
     places: dict[str, Any] = {}
     for name, values in grid.axes.items():

@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
+from fem_impact.impact import collision
 from fem_impact.sweeps import grid
 
 AT = (0.465, 0.3)
@@ -254,3 +255,28 @@ def test_cells_on_finite_element_modes_are_single_strikes(body, exponent):
         apart.append(np.abs([float(cell.restitution) - hit.restitution, *relative]).max() / tolerance)
     assert max(apart) < 2.0  # each within one tolerance of the truth
     assert np.mean(np.array(apart) < 1.0) > 0.9  # two of 1300 cells were more than one apart, by 1.3
+
+
+def test_every_cell_says_whether_it_met_the_tolerance():
+    """The expected error of modes left out against that of single strikes, which find it by runs with fewer modes."""
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=100.0, n_modes=60)
+    stick, law = fi.Striker.stick(0.1, 2000.0), fi.Contact.hertz(695e3)
+    over = {
+        "mass": [0.03, 0.3], "stiffness": [1e5, 1e7, 1e9], "at": [(0.45, 0.3), (0.7, 0.5)],
+        "target_frequency": [50.0, 100.0],
+    }  # fmt: skip
+    table = fi.sweep(plate, stick, law, at=(0.45, 0.3), speed=1.0, over=over, tolerance=1e-3)
+    assert_allclose(table.tolerance_met, table.error + table.truncation <= 1e-3)
+    assert 0.0 < table.tolerance_met.mean() < 1.0
+    for i, j, k in np.ndindex(2, 3, 2):
+        cell = table.isel(mass=i, stiffness=j, at=k, target_frequency=1)
+        hit = collision.strike(
+            plate, fi.Striker.stick(over["mass"][i], 2000.0), fi.Contact.hertz(over["stiffness"][j]),
+            at=over["at"][k], speed=1.0, tolerance=1e-3,
+        )  # fmt: skip
+        assert np.isfinite(cell.truncation) == (hit.error.truncation < 0.1)  # those above are not resolvable, or nearly
+        if 1e-4 < hit.error.truncation < 0.1:
+            assert 0.3 < cell.truncation / hit.error.truncation < 3.0  # both are estimates
+        assert cell.tolerance_met == hit.tolerance_met
+    bare = fi.sweep(plate, stick, law, at=(0.45, 0.3), speed=1.0, over={"mass": [0.1]}, tolerance=1e-3, residual=False)
+    assert bare.tolerance_met.all() and not bare.truncation.any()
