@@ -371,8 +371,8 @@ def _strike(options: argparse.Namespace) -> None:
         print(_wrapped(f"Verified by a finer run{tested}: {differences}"))
     if "radiated" in data:
         heard = data["radiated"]
-        text = f"Listener: peak {heard['level']:.1f} dB re 20 µPa; 1.0 in radiated.wav is {heard['full_scale']:g} Pa"
-        print(_wrapped(text))
+        level = "silence" if heard["level"] is None else f"peak {heard['level']:.1f} dB re 20 µPa"
+        print(_wrapped(f"Listener: {level}; 1.0 in radiated.wav is {heard['full_scale']:g} Pa"))
     print(_wrapped("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())))
     print(_wrapped(f"Files in {folder}{os.sep}: {', '.join(data['files'])}"))
 

@@ -287,6 +287,12 @@ def nearest(word: Any, known: Iterable[str]) -> str:
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
+def settle(instance: Any, **values: Any) -> None:
+    """Set fields of a frozen dataclass to their checked values, which are floats whatever number the user passed."""
+    for name, value in values.items():
+        object.__setattr__(instance, name, value)
+
+
 def lock_arrays(instance: Any) -> None:
     """Make every array field of a frozen dataclass read-only; ``frozen=True`` alone does not protect the contents."""
     for value in vars(instance).values():

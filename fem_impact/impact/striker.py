@@ -36,7 +36,7 @@ class Striker:
         if self.material is not None:
             check.instance("material", self.material, Material)
         if self.radius is not None:
-            check.positive("radius", self.radius, "m")
+            check.settle(self, radius=check.positive("radius", self.radius, "m"))
         if self.modes.n_rigid == 0:
             raise ValueError(
                 f"striker must be able to move rigidly, but its lowest mode is at {self.modes.frequencies[0]:g} Hz; "

@@ -186,6 +186,15 @@ def _checked(scene: Any, changes: Mapping[str, Any]) -> _Blow:
     with scene.blame("strike", changes):
         tolerance = tolerance_of(scene, values)
         speed = check.positive("speed", values["speed"], "m/s")
+        for name in ("duration", "dt"):
+            if values.get(name) is not None:
+                values[name] = check.positive(name, values[name], "s")
+        if values.get("scheme") is not None:
+            check.one_of("scheme", values["scheme"], collision.SCHEMES)
+        if values.get("max_impacts") is not None:
+            check.count("max_impacts", values["max_impacts"])
+        for name in ("striker_force", "target_force"):
+            values[name] = check.number(name, values.get(name, 0.0), "N")
         quantities = asked_for(values.get("quantity"))
     striker, contact = scene.make_striker(), scene.make_contact()
     duration = accuracy.contact_duration(contact, striker.felt_mass, speed)

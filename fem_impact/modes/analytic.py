@@ -251,13 +251,21 @@ def _lattice(length: float, width: float, wavenumber_squared: float, most: int) 
     return m[keep], n[keep]
 
 
+def check_uniform(section: Plate | Beam) -> None:
+    """Raise ValueError unless closed forms cover a section."""
+    if isinstance(section, Beam):
+        if callable(section.width) or callable(section.height):
+            raise ValueError("section must be constant along the beam; else use find_modes")
+    elif callable(section.thickness) or section.material.E_across is not None or section.tension:
+        raise ValueError("section must be isotropic, of constant thickness and without tension; else use find_modes")
+
+
 def _plate_scale(section: Any, area: float) -> tuple[float, float] | None:
     """Mass [kg] and the factor that turns omega at unit mass and rigidity into omega of the section."""
     if section is None:
         return None
+    check_uniform(section)
     material, thickness = section.material, section.thickness
-    if callable(thickness) or material.E_across is not None or section.tension:
-        raise ValueError("section must be isotropic, of constant thickness and without tension; else use find_modes")
     mass = material.rho * thickness * area
     rigidity = material.E * thickness**3 / (12.0 * (1.0 - material.nu**2))
     return mass, float(np.sqrt(rigidity / mass))
@@ -468,8 +476,7 @@ def _beam_weights(ends: tuple[str, str], k: np.ndarray) -> np.ndarray:
 def _beam_scale(section: Any, length: float) -> tuple[float, float] | None:
     if section is None:
         return None
-    if callable(section.width) or callable(section.height):
-        raise ValueError("section must be constant along the beam; else use find_modes")
+    check_uniform(section)
     middle = np.array([[0.5 * length]])
     mass = float(section.inertia(middle)[0]) * length
     return mass, float(np.sqrt(section.stiffness(middle)[0] / (mass * length**3)))

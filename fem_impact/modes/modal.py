@@ -181,9 +181,7 @@ class Modes:
         damping = check.array("damping_ratio", self.damping_ratio, omega.shape)
         if (damping < 0.0).any():
             raise ValueError(f"damping_ratio must not be negative, got {damping.min():g}")
-        object.__setattr__(self, "omega", omega)
-        object.__setattr__(self, "damping_ratio", damping)
-        check.positive("mass", self.mass, "kg")
+        check.settle(self, omega=omega, damping_ratio=damping, mass=check.positive("mass", self.mass, "kg"))
         check.lock_arrays(self)
 
     @classmethod

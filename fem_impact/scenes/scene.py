@@ -283,6 +283,8 @@ class Scene:
                     f"not this {self.mesh.kind}; use source = 'fe'"
                 )
         section = self.make_section("beam" if self.mesh.kind == "line" else "plate")
+        with self.blame("section"):
+            analytic.check_uniform(section)
 
         def find(n_modes: int, max_frequency: float | None = None, first: Any = None, keep: Any = None) -> Modes:
             wanted = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}

@@ -153,6 +153,8 @@ def write_wav(
         heard = sound.synthesise(response, at, **options)
     else:
         heard = sound.radiate(response, listener, **options)
+    if np.abs(heard.samples).max(initial=0.0) > np.finfo(np.float32).max:
+        raise ValueError("path: the blow is louder than a WAV file can hold; check the units of its speed")
     with replacing(path) as temporary:
         wavfile.write(temporary, heard.rate, heard.samples.astype(np.float32))
     return heard

@@ -19,6 +19,7 @@ HIGHEST_RATE = 1_000_000  # [Hz] highest sample rate: far above what any device 
 MOST_SAMPLES = 10_000_000  # [-] most samples: three minutes at 48 kHz take about ten seconds to compute
 SHORTEST, LONGEST = 0.5, 5.0  # [s] limits of the default duration
 DECAY = np.log(1e3)  # [-] by default the sound ends when its slowest mode has lost 60 dB
+NEAREST = 1e-6  # [m] least distance of a listener from the plate
 BLOCK = 4096  # [-] samples computed from one modal state: limits the memory, does not change the result
 CRITICAL = 1e-6  # [-] damping ratios closer to 1 become 1 plus this: at 1 the two roots coincide; test_sound.py
 
@@ -149,8 +150,10 @@ def radiate(
 def beside(listener: Any) -> np.ndarray:
     """Check the coordinates (3,) [m] of a listener, which must lie off the plate's plane."""
     place = check.array("listener", listener, (3,), "m")
-    if not abs(place[2]) > 0.0:
-        raise ValueError("listener must lie off the plate's plane, got a third coordinate of 0 m; give a distance")
+    if not abs(place[2]) >= NEAREST:
+        raise ValueError(
+            f"listener must lie off the plate's plane, got a third coordinate of {place[2]:g} m; give a distance"
+        )
     return place
 
 
