@@ -31,6 +31,8 @@ class Striker:
     radius: float | None = None  # [m] of a sphere
     fixed: bool = True  # True: a blow keeps all modes; False: only those its tolerance needs
 
+    __repr__ = check.brief
+
     def __post_init__(self) -> None:
         check.instance("modes", self.modes, Modes)
         if self.material is not None:

@@ -44,6 +44,8 @@ class Mesh:
     size_stated: bool = True  # True if the user chose the size; otherwise find_modes may change it
     notes: tuple[str, ...] = ()  # what was repaired or assumed
 
+    __repr__ = check.brief
+
     def __post_init__(self) -> None:
         check.lock_arrays(self)
 

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from .._base import check, markup
+
 COSTLY = 10.0, 2e9  # [s], [byte] a plan that costs more warns the user
 
 
@@ -36,6 +38,8 @@ class Plan:
     mobility: float = 0.0  # [m/(N s)] of an infinite plate
     notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
     first: Any = field(default=None, repr=False, compare=False)  # the first modes of the target, if they were needed
+
+    __repr__ = check.brief
 
     @property
     def error(self) -> float:
@@ -77,6 +81,10 @@ class Plan:
         hidden = ("scene", "changes", "first")
         found = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in hidden}
         return {name: dict(value) if isinstance(value, Mapping) else value for name, value in found.items()}
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the plan in words."""
+        return markup.paragraphs(str(self).splitlines())
 
     def __str__(self) -> str:
         wanted = ", ".join(name if band is None else f"{name} to {band:g} Hz" for name, band in self.quantities.items())

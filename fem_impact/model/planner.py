@@ -52,6 +52,8 @@ class Run:
     verified: Mapping[str, float] | None = None  # [-] differences from a finer run, see `verify`
     finer: Plan | None = None  # plan of the finer run
 
+    __repr__ = check.brief
+
 
 class Stages:
     """Wall time of each stage; ``watch`` may display the stages."""

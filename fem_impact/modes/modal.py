@@ -58,6 +58,8 @@ class ScaledShapes:
     amplitude: float  # [-] new shape divided by old
     frequency: float  # [-] new frequency divided by old
 
+    __repr__ = check.brief
+
     @property
     def dimension(self) -> int:
         return self.base.dimension
@@ -122,6 +124,8 @@ class SampledShapes:
     values: np.ndarray  # (n_points, n_modes) [kg**-0.5]
     static: np.ndarray  # (n_points, n_points) [m/N] static compliance of the complete body
 
+    __repr__ = check.brief
+
     def __post_init__(self) -> None:
         check.lock_arrays(self)
 
@@ -175,6 +179,8 @@ class Modes:
     frequency_error: np.ndarray | None = None  # (n_modes,) [-] estimated relative error; find_modes always gives it
     bounds: np.ndarray | None = None  # (n_modes, 2) [Hz] guaranteed lower and upper bound of each frequency
     notes: tuple[str, ...] = field(default=(), repr=False)  # what was assumed, and probable slips of a unit
+
+    __repr__ = check.brief
 
     def __post_init__(self) -> None:
         omega = check.ascending("omega", self.omega, "rad/s")
@@ -470,6 +476,8 @@ class FieldShapes:
     flexibility: Flexibility
     _static: dict[bytes, point_load.Deflection] = field(default_factory=dict, repr=False)  # cache, by loads
     _single: dict[bytes, np.ndarray] = field(default_factory=dict, init=False, repr=False)  # cache, by point
+
+    __repr__ = check.brief
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)

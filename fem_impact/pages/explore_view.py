@@ -1,5 +1,6 @@
 """Lays out the live page: sliders, the body to click on, the plots that follow, and the sound."""
 
+import base64
 import html
 import math
 from concurrent.futures import ThreadPoolExecutor
@@ -12,11 +13,12 @@ import numpy as np
 from .._base.check import SimulationError
 from ..impact.contact import Contact
 from ..impact.response import Response
+from ..scenes.schema import written
 from ..scenes.sentences import RAISED, place, power, si
 from ..show import sound
 from ..sweeps.grid import Case
 from . import report
-from .explore_model import Bench, Picture, Settings, blow, limit_of, resonance_of, spectrum
+from .explore_model import TOLERANCE, Bench, Picture, Settings, blow, limit_of, resonance_of, spectrum
 
 BAND = (20.0, 20e3)  # [Hz] of the spectrum
 SPECTRUM_POINTS = 240  # [-] more points take time but show no more
@@ -36,7 +38,11 @@ LABELS = {
     "exponent": "Exponent",
     "speed": "Speed",
     "bending": "First bending mode",
+    "loss": "Loss of the contact",
+    "damping": "Damping ratio",
+    "thickness": "Thickness over the scene's",
 }
+LINEAR = {"exponent", "loss", "damping"}  # sliders that are not logarithmic
 STEPS = 200  # [-] per slider
 MOMENT = 8  # [ms] during which slider messages are collected before the next blow
 REST = 200  # [ms] without a change before the map is redrawn: a map takes as long as many blows
@@ -130,7 +136,7 @@ class Page:
             if value is None:
                 continue
             low, high = self.bench.range(name)
-            if name != "exponent":
+            if name not in LINEAR:
                 low, high, value = (math.log10(x) for x in (low, high, value))
             slider = Slider(
                 name=name, title=label, start=low, end=high, value=value, step=(high - low) / STEPS, show_value=False,
@@ -230,7 +236,7 @@ class Page:
         return plot
 
     def _turned(self, name: str, _attribute: str, _old: float, value: float) -> None:
-        self._change(**{name: float(value) if name == "exponent" else 10.0 ** float(value)})
+        self._change(**{name: float(value) if name in LINEAR else 10.0 ** float(value)})
 
     def _moved(self) -> None:
         """React to a strike-point slider."""
@@ -278,8 +284,15 @@ class Page:
             self.readout.text = f"<p>{html.escape(str(error))}</p>"
         else:
             self._draw(self.hit)
-            self.readout.text = _told(self.hit, resonance, limit, known)
+            self.readout.text = _told(self.hit, resonance, limit, known) + self._saving(settings)
         self._remap()
+
+    def _saving(self, settings: Settings) -> str:
+        """How many modes the page uses, and a link that saves the scene as it stands."""
+        text = base64.b64encode(written(self.bench.saved(settings)).encode()).decode("ascii")
+        link = f'<a download="scene.toml" href="data:application/toml;base64,{text}">Save this scene</a>'
+        count = self.bench.base.modes.n_modes
+        return f'<p style="font-size:13px;margin:6px 0 0">Shows blows on the first {count} modes. {link}</p>'
 
     def _put(self, name: str, **columns: list[float]) -> None:
         """Replace the data of a source, but only if they differ: each change makes the browser redraw."""
@@ -314,6 +327,9 @@ class Page:
             "exponent": f"{settings.exponent:.3g}",
             "speed": si(settings.speed, "m/s", 3),
             "bending": si(settings.bending or 0.0, "Hz", 3),
+            "loss": f"{settings.loss:.3g} s/m",
+            "damping": f"{settings.damping:.3g}",
+            "thickness": f"{settings.thickness:.3g}",
         }
         said |= {letter: si(value, "m", 3) for letter, value in zip("xy", settings.at)}
         shown = [name for name in said if name in self.sliders]
@@ -395,9 +411,11 @@ def _told(hit: Response, resonance: float, limit: float, exact: bool) -> str:
         ("contact resonance", f"{si(resonance, 'Hz', 3)}, {ratio}"),
         ("estimated error", error),
     ]
+    missed = exact and not hit.error.total <= TOLERANCE
+    bad = {"estimated error": "color:#c24e00"} if missed else {}
     items = "".join(
         f'<div style="min-width:4.5em"><div style="font-size:12px;opacity:.75">{name}</div>'
-        f'<div style="font-size:17px;font-weight:600">{html.escape(value)}</div></div>'
+        f'<div style="font-size:17px;font-weight:600;{bad.get(name, "")}">{html.escape(value)}</div></div>'
         for name, value in cells
     )
     return f'<div style="display:flex;flex-wrap:wrap;gap:4px 22px">{items}</div>'

@@ -48,6 +48,8 @@ class Scene:
     observe: Part | None = None
     map: Part | None = None
 
+    __repr__ = check.brief
+
     def strike(self, **changes: Any) -> Response:
         """Build everything and strike; ``changes`` as in `plan`. A ValueError names the wrong file, table and key."""
         return self.run(**changes).response
