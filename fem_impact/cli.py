@@ -222,6 +222,8 @@ def _parser() -> argparse.ArgumentParser:
         "--listener", metavar=("X", "Y", "Z"), nargs=3, type=float,
         help="write radiated.wav, the sound the plate radiates to this point [m]; Z is the height above the plate",
     )  # fmt: skip
+    add("--duration", metavar="S", type=float, help="length of the sounds [s] (default: by their decay)")
+    add("--normalise", action="store_true", help="scale each sound to a peak of 1.0")
     add("--json", action="store_true", help="print the contents of response.json instead of the summary")
 
     add = verb(_plan, "plan", "show the model, its reasons, expected errors and cost, without striking")
@@ -341,9 +343,11 @@ def _strike(options: argparse.Namespace) -> bool:
         tested = f" (which also treats the body as {run.finer.target}: it has too many modes)" if coarse else ""
         differences = ", ".join(f"{name} {value:.1e}" for name, value in run.verified.items())
         _say(f"Verified by a finer run{tested}: {differences}")
-    if "radiated" in data:
-        heard = data["radiated"]
-        _say(f"Listener: peak {heard['level']:.1f} dB re 20 µPa; 1.0 in radiated.wav is {heard['full_scale']:g} Pa")
+    for key, name, where in (("sound", "strike.wav", "Point"), ("radiated", "radiated.wav", "Listener")):
+        if key in data:
+            heard = data[key]
+            level = "silence" if heard["level"] is None else f"peak {heard['stated']}"
+            _say(f"{where}: {level}; 1.0 in {name} is {heard['full_scale']:.4g} {heard['unit']}")
     _say("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items()))
     _say(f"Files in {folder}{os.sep}: {', '.join(data['files'])}")
     return missed
@@ -366,7 +370,7 @@ def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> d
     fi.figures.save(folder / "force.png", fi.figures.force(response))
     if run.plan.target == "modal":
         fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=SHAPES_WRITTEN))
-        files += ["modes.pvd", *_write_sounds(folder, scene, response, extra)]
+        files += ["modes.pvd", *_write_sounds(folder, scene, response, extra, options)]
         if options.vtk:
             end = sampling.end_of(response)
             times = [end * i / (MOTION_TIMES - 1) for i in range(MOTION_TIMES)]
@@ -389,14 +393,19 @@ def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> d
     return data
 
 
-def _write_sounds(folder: Path, scene: Any, response: Any, extra: dict[str, Any]) -> list[str]:
+def _write_sounds(
+    folder: Path, scene: Any, response: Any, extra: dict[str, Any], options: argparse.Namespace
+) -> list[str]:
     """Write the motion of a point and the pressure at the listener as sound; record places and levels."""
     heard = {"sound": ("strike.wav", {"at": scene.points[0]})}
     if scene.listener is not None:
         heard["radiated"] = ("radiated.wav", {"listener": scene.listener})
     for key, (name, where) in heard.items():
-        wav = fi.export.write_wav(folder / name, response, **where)
+        wav = fi.export.write_wav(
+            folder / name, response, duration=options.duration, normalise=options.normalise, **where
+        )
         levels = {"full_scale": wav.full_scale, "unit": wav.unit, "peak_level": wav.peak_level, "level": wav.level}
+        levels["stated"] = wav.said
         extra[key] = {**where, **levels, "reference": fi.sound.REFERENCE[wav.unit][0]}
     return [name for name, _ in heard.values()]
 

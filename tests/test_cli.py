@@ -180,7 +180,7 @@ def test_typo_is_one_line_with_the_nearest_word(words, hint, capsys):
 def test_scene_may_not_be_a_pipe_that_never_ends(tmp_path, capsys):
     os.mkfifo(tmp_path / "scene.toml")
     assert cli.main(["strike", str(tmp_path / "scene.toml")]) == 2
-    assert "there is no such file" in capsys.readouterr().err
+    assert "it is not a regular file" in capsys.readouterr().err
 
 
 def test_a_billion_modes_are_refused(scene, capsys):

@@ -7,6 +7,7 @@ import inspect
 import math
 import os
 from collections.abc import Callable, Iterable
+from dataclasses import fields, is_dataclass
 from itertools import chain
 from pathlib import Path
 from types import NoneType, UnionType
@@ -15,6 +16,7 @@ from typing import Any, TypeVar, get_args, get_origin
 import numpy as np
 
 LONGEST = 500  # [-] characters quoted from a file or another library; longer text is cut
+FEW = 4  # [-] entries of an array that `brief` shows
 SHOWN = 80  # [-] characters quoted from a value the user passed; longer text is cut
 REACH = 1e75  # [-] largest number accepted; 1 / REACH is the smallest: the fourth power of both still fits a float
 MOST = 10**9  # [-] largest count accepted: more items would not fit into memory
@@ -283,6 +285,29 @@ def nearest(word: Any, known: Iterable[str]) -> str:
     """Return '; did you mean ...?' for a near miss, else an empty string."""
     close = difflib.get_close_matches(str(word), list(known), n=1, cutoff=0.6)
     return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def brief(instance: Any) -> str:
+    """``__repr__`` of a dataclass in at most 1000 characters: arrays by their shape, other objects by their class."""
+    parts = []
+    for each in fields(instance):
+        value = getattr(instance, each.name)
+        if not each.repr or value is None:
+            continue
+        if isinstance(value, np.ndarray) and value.size > FEW:
+            text = f"array of shape {value.shape}"
+        elif is_dataclass(value) or callable(value):
+            text = getattr(value, "__name__", type(value).__name__)
+        else:
+            text = " ".join(shown(value).split())
+        parts.append(f"{each.name}={text}")
+    return f"{type(instance).__name__}({', '.join(parts):.900})"
+
+
+def settle(instance: Any, **values: Any) -> None:
+    """Set fields of a frozen dataclass to their checked values, which are floats whatever number the user passed."""
+    for name, value in values.items():
+        object.__setattr__(instance, name, value)
 
 
 def lock_arrays(instance: Any) -> None:

@@ -20,6 +20,7 @@ from . import check
 
 PATIENCE = 8.0  # [s] time limit for a small file: a valid file of 1 MB takes less than a tenth of this
 RATE = 2e5  # [byte/s] adds file size / RATE to the time limit: a third of the slowest reader's speed
+MOST_PATIENCE = 30.0  # [s] time limit for the largest file
 HEAD = 4096  # [byte] files whose first HEAD bytes are all zero are refused: parsing 1 GB of zeros takes minutes
 MEMORY = 2 << 30  # [byte] limit on the reader's address space; Python and numpy alone use 0.2 GB
 EXTRAS = {"svgelements": "cad", "ezdxf": "cad", "pyuff": "uff", "h5py": "hdf5"}  # library -> extra
@@ -50,7 +51,7 @@ def read(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.nd
     with path.open("rb") as file:
         if not file.read(HEAD).strip(b"\0"):
             raise ValueError(f"{path.name} cannot be read as {kind} (it is empty or begins with zeros only)")
-    patience = PATIENCE + path.stat().st_size / RATE
+    patience = min(PATIENCE + path.stat().st_size / RATE, MOST_PATIENCE)
     try:
         status, out, said = run(path, reader, arguments, patience)
     except subprocess.TimeoutExpired:

@@ -1,5 +1,6 @@
 """Tables for the terminal and for notebooks, and small SVG pictures without a drawing library."""
 
+import base64
 import html
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -49,6 +50,17 @@ def columns(rows: Iterable[Sequence[Any]], head: Sequence[str] = ()) -> list[str
 def notes(lines: Iterable[str]) -> str:
     """Notes, each a paragraph; all text is escaped."""
     return "".join(f"<p>Note: {html.escape(line)}</p>" for line in lines)
+
+
+def paragraphs(lines: Iterable[str]) -> str:
+    """Lines of text as they are; all text is escaped."""
+    return f'<pre style="white-space:pre-wrap">{html.escape(chr(10).join(lines))}</pre>'
+
+
+def player(wav: bytes, words: str) -> str:
+    """A player for the bytes of a WAV file, and what is said about them."""
+    uri = f"data:audio/wav;base64,{base64.b64encode(wav).decode('ascii')}"
+    return f'<audio controls src="{uri}"></audio><p>{html.escape(words)}</p>'
 
 
 def side_by_side(*parts: str) -> str:

@@ -69,6 +69,8 @@ class Strain:
     stiffness: np.ndarray  # (n_cells, n_q, 3, 3) times the quadrature weights
     springs: csc_matrix  # (n_all, n_all) stiffness of elastic supports and tension
 
+    __repr__ = check.brief
+
     def energy(self, system: "System", vectors: np.ndarray) -> np.ndarray:
         """Twice the strain energy (n_modes,) of vectors (n_dofs, n_modes)."""
         return self._sum(system, vectors, "nqik,nqik->k")
@@ -113,6 +115,8 @@ class System:
     strain: Strain | None = field(default=None, repr=False)
     near: np.ndarray | None = None  # (n_points, 2) [m] points towards which the triangles shrink
     unresolved: float = 0.0  # [-] approximate relative error that singular corners leave on any mesh
+
+    __repr__ = check.brief
 
     @property
     def n_dofs(self) -> int:

@@ -252,7 +252,7 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         found = solve(reassemble(system, mesh.refined(step)), n_modes, max_frequency)
     mode = int(found.error.argmax())
     least = float(f"{1.1 * found.error[mode]:.1e}")
-    advice = f"a tolerance of {least:g} is met" if least <= LOOSEST else "leave out the tolerance"
+    advice = f"a tolerance of {least:g} is met" if least <= LOOSEST else "no tolerance is: check the units"
     raise check.SimulationError(
         f"tolerance = {tolerance:g} is not met: mode {mode + 1} is uncertain by {found.error[mode]:.1e} with "
         f"{found.system.n_dofs} unknowns; {advice}, or ask for fewer modes"

@@ -45,18 +45,23 @@ class Material:
     angle: float = 0.0
 
     def __post_init__(self) -> None:
-        check.positive("E", self.E, "Pa")
-        check.positive("rho", self.rho, "kg/m^3")
-        check.number("angle", self.angle, "rad")
         nu = check.number("nu", self.nu)
+        check.settle(
+            self,
+            E=check.positive("E", self.E, "Pa"),
+            nu=nu,
+            rho=check.positive("rho", self.rho, "kg/m^3"),
+            angle=check.number("angle", self.angle, "rad"),
+        )
         if (self.E_across is None) != (self.G is None):
             raise ValueError("E_across and G must be given together; use Material.orthotropic, or give neither")
         if self.E_across is None or self.G is None:
             if not -1.0 < nu < 0.5 and nu != 0.5:
                 raise ValueError(f"nu must be above -1 and at most 0.5, got {nu:g}")
             return
-        check.positive("E_across", self.E_across, "Pa")
-        check.positive("G", self.G, "Pa")
+        check.settle(
+            self, E_across=check.positive("E_across", self.E_across, "Pa"), G=check.positive("G", self.G, "Pa")
+        )
         if nu**2 * self.E_across >= self.E:
             raise ValueError(
                 f"nu must be below sqrt(E/E_across) = {(self.E / self.E_across) ** 0.5:g}, got {nu:g}: "
@@ -147,8 +152,8 @@ class Plate:
     def __post_init__(self) -> None:
         check.instance("material", self.material, Material)
         if not callable(self.thickness):
-            check.positive("thickness", self.thickness, "m")
-        check.non_negative("tension", self.tension, "N/m")
+            check.settle(self, thickness=check.positive("thickness", self.thickness, "m"))
+        check.settle(self, tension=check.non_negative("tension", self.tension, "N/m"))
 
     def stiffness(self, points: np.ndarray) -> np.ndarray:
         """Bending stiffness (n_points, 3, 3) [N m] on curvatures (xx, yy, 2 xy)."""
@@ -183,8 +188,11 @@ class Elastic:
     rotation: float = 0.0
 
     def __post_init__(self) -> None:
-        check.non_negative("stiffness", self.stiffness, "N/m^2")
-        check.non_negative("rotation", self.rotation, "N")
+        check.settle(
+            self,
+            stiffness=check.non_negative("stiffness", self.stiffness, "N/m^2"),
+            rotation=check.non_negative("rotation", self.rotation, "N"),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +220,7 @@ class Beam:
         check.flag("round", self.round)
         for name, value in (("width", self.width), ("height", self.height)):
             if not callable(value):
-                check.positive(name, value, "m")
+                check.settle(self, **{name: check.positive(name, value, "m")})
 
     @classmethod
     def rectangular(cls, material: Material, *, width: Varying, height: Varying) -> "Beam":

@@ -73,6 +73,8 @@ class Touch:
     first_at: Any = None  # point on the first body [m]
     second_at: Any = None  # point on the second body [m]
 
+    __repr__ = check.brief
+
     def __post_init__(self) -> None:
         check.instance("law", self.law, Contact)
         check.count("first", self.first, low=0)

@@ -11,6 +11,7 @@ from .._base import check
 
 LOWEST_EXPONENT, HIGHEST_EXPONENT = 0.5, 100.0  # [-] limits: below, no longer a spring; above, a wall
 
+MOST_LOSS = 1e12  # [s/m] far above that of a contact that swallows the slowest blow whole
 STIFFEST = 1e200  # [N/m**exponent] upper limit, 1/STIFFEST the lower: high exponents need huge stiffnesses
 
 
@@ -33,10 +34,13 @@ class Contact:
     gap: float = 0.0  # [m] distance the bodies travel before they touch
 
     def __post_init__(self) -> None:
-        check.positive("stiffness", self.stiffness, "N/m**exponent", reach=STIFFEST)
-        check.between("exponent", self.exponent, LOWEST_EXPONENT, HIGHEST_EXPONENT)
-        check.non_negative("loss", self.loss, "s/m")
-        check.number("gap", self.gap, "m")
+        check.settle(
+            self,
+            stiffness=check.positive("stiffness", self.stiffness, "N/m**exponent", reach=STIFFEST),
+            exponent=check.between("exponent", self.exponent, LOWEST_EXPONENT, HIGHEST_EXPONENT),
+            loss=check.between("loss", check.non_negative("loss", self.loss, "s/m"), 0.0, MOST_LOSS, "s/m"),
+            gap=check.number("gap", self.gap, "m"),
+        )
 
     @classmethod
     def linear(cls, stiffness: float, *, loss: float = 0.0, gap: float = 0.0) -> "Contact":

@@ -92,6 +92,8 @@ class History:
     n_fallback: int  # [-] steps in which scheme A4 fell back to A
     n_blind: int  # [-] steps that passed over contact events without locating them
 
+    __repr__ = check.brief
+
     def __post_init__(self) -> None:
         check.lock_arrays(self)
 
@@ -255,9 +257,9 @@ class Response:
     striker: Striker | None = None
     at: np.ndarray | None = None  # (dimension,) [m] strike point
     dips: tuple[Dip | None, ...] = ()  # one per body; None if its modes are complete
-    quantities: Mapping[str, float | None] = field(
-        default_factory=lambda: USUAL
-    )  # that must meet the tolerance, each with its band [Hz]
+    quantities: Mapping[str, float | None] = field(default_factory=lambda: USUAL)  # that must meet it; bands [Hz]
+
+    __repr__ = check.brief
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)
@@ -304,6 +306,23 @@ class Response:
     def contact_time(self) -> float:
         """Total time in contact [s]."""
         return float(sum(impact.duration for impact in self.impacts))
+
+    @property
+    def contact_times(self) -> tuple[float, ...]:
+        """Time in contact [s] of each contact; they add up to `contact_time`."""
+        return tuple(
+            sum(impact.duration for impact in self.impacts if impact.contact == i)
+            for i in range(self.history.n_contacts)
+        )
+
+    @property
+    def touching_time(self) -> float:
+        """Time [s] during which at least one contact is closed."""
+        total, until = 0.0, -np.inf
+        for impact in self.impacts:  # in order of their start
+            total += max(0.0, impact.end - max(impact.start, until))
+            until = max(until, impact.end)
+        return float(total)
 
     @property
     def impulse(self) -> float:
@@ -554,10 +573,11 @@ class Response:
 
     def summary(self) -> str:
         """The blow in a few readable lines."""
+        several = self.history.n_contacts > 1
         lines = [self.verdict, f"{self.n_impacts} impact{'s' if self.n_impacts != 1 else ''}, {self.outcome}"]
         lines += [
             f"  {impact.start * 1e3:9.4f} to {impact.end * 1e3:9.4f} ms: peak {impact.peak_force:.5g} N, "
-            f"impulse {impact.impulse:.5g} N s"
+            f"impulse {impact.impulse:.5g} N s" + (f", contact {impact.contact}" if several else "")
             for impact in self.impacts[:20]
         ]
         if self.n_impacts > 20:
@@ -574,6 +594,9 @@ class Response:
             f"{error.truncation:.1e}, mesh {error.mesh:.1e}, idealisation {error.idealisation:.1e}; energy error "
             f"{self.energy_error:.1e}",
         ]
+        if several:
+            each = ", ".join(f"contact {i} {1e3 * time:.5g} ms" for i, time in enumerate(self.contact_times))
+            lines.append(f"time in contact: {each}; any of them {1e3 * self.touching_time:.5g} ms")
         if error.sensitivity > CHAOTIC:
             lines.append(
                 f"chaotic: small differences grow {error.sensitivity:.0e}-fold from the first impact to the last; "

@@ -31,12 +31,14 @@ class Striker:
     radius: float | None = None  # [m] of a sphere
     fixed: bool = True  # True: a blow keeps all modes; False: only those its tolerance needs
 
+    __repr__ = check.brief
+
     def __post_init__(self) -> None:
         check.instance("modes", self.modes, Modes)
         if self.material is not None:
             check.instance("material", self.material, Material)
         if self.radius is not None:
-            check.positive("radius", self.radius, "m")
+            check.settle(self, radius=check.positive("radius", self.radius, "m"))
         if self.modes.n_rigid == 0:
             raise ValueError(
                 f"striker must be able to move rigidly, but its lowest mode is at {self.modes.frequencies[0]:g} Hz; "

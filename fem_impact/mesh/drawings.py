@@ -34,6 +34,9 @@ CLOSED = 1e-9  # [-] gaps below this fraction of the extent are rounding and cou
 BRIDGED = 1e-3  # [-] gaps below this fraction of the extent are closed and noted
 LONGEST_NAME = 100  # [-] characters kept of an edge name
 SHORT = 1e-7  # [-] pieces shorter than this fraction of the extent are dropped
+MOST_NUMBERS = 100 * MOST_PIECES  # [-] most digit groups in the shapes of a drawing; an arc of long decimals has 12
+SHAPES = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon"}
+LONGEST_COMMENT = 1_000_000  # [-] characters
 CORNER = 0.1  # [rad] in a drawing without names, a sharper turn than this starts a new edge
 
 
@@ -128,15 +131,31 @@ def svg_arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def _refuse_entities(path: Path) -> None:
-    """Raise ValueError if an XML file declares entities: they can expand to gigabytes or pull in other files."""
+    """Raise ValueError if an XML file declares entities, which can expand to gigabytes, or is huge in another way."""
 
     def refuse(*_: Any) -> None:
         raise ValueError("it declares XML entities; save it as plain SVG")
 
+    numbers = shapes = 0
+
+    def count(element: str, attributes: dict[str, str]) -> None:
+        nonlocal numbers, shapes
+        shapes += element.rpartition(":")[2] in SHAPES
+        if shapes > MOST_PIECES:
+            raise ValueError(f"it contains more than {MOST_PIECES} shapes; simplify the drawing")
+        for name in ("d", "points"):
+            numbers += len(re.findall(r"\d+", attributes.get(name, "")))
+        if numbers > MOST_NUMBERS:  # the drawing library would take minutes over them
+            raise ValueError(f"its shapes contain more than {MOST_NUMBERS} numbers; simplify them")
+
+    def comment(text: str) -> None:
+        if len(text) > LONGEST_COMMENT:
+            raise ValueError(f"it contains a comment of {len(text) / 1e6:.3g} million characters; remove it")
+
     parser = expat.ParserCreate()
-    parser.EntityDeclHandler = refuse
+    parser.EntityDeclHandler, parser.StartElementHandler, parser.CommentHandler = refuse, count, comment
     with open(path, "rb") as file:
-        parser.ParseFile(file)
+        parser.Parse(file.read(), True)  # ParseFile would read a huge comment again and again
 
 
 def _svg(path: Path, unit: str | None, notes: list[str]) -> list[Loop]:

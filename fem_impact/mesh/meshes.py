@@ -45,6 +45,8 @@ class Mesh:
     notes: tuple[str, ...] = ()  # what was repaired or assumed
     form: tuple = ()  # ("rectangle", length, width), ("disk", radius) or ("line", length) [m]; empty for any other body
 
+    __repr__ = check.brief
+
     def __post_init__(self) -> None:
         check.lock_arrays(self)
 

@@ -98,6 +98,8 @@ class Plan:
         default=None, repr=False, compare=False
     )  # the first modes of the target, if they were needed
 
+    __repr__ = check.brief
+
     @property
     def error(self) -> float:
         """Total predicted error [-]."""
@@ -144,6 +146,10 @@ class Plan:
         found = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in hidden}
         return {name: dict(value) if isinstance(value, Mapping) else value for name, value in found.items()}
 
+    def _repr_html_(self) -> str:
+        """For notebooks: the plan in words."""
+        return markup.paragraphs(str(self).splitlines())
+
     def __str__(self) -> str:
         wanted = words(self.quantities)
         kept = "met" if self.meets else "MISSED"
@@ -169,6 +175,8 @@ class Run:
     notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
     verified: Mapping[str, float] | None = None  # [-] differences from a finer run, see `verify`
     finer: Plan | None = None  # plan of the finer run
+
+    __repr__ = check.brief
 
 
 @dataclass(frozen=True)
@@ -202,6 +210,15 @@ class _Asked:
                     raise ValueError(f"{name} is not an argument of a blow{check.nearest(name, [*ARGUMENTS, *PIECES])}")
             tolerance = check.tolerance(values.get("tolerance", collision.TOLERANCE))
             speed = check.positive("speed", values["speed"], "m/s")
+            for name in ("duration", "dt"):
+                if values.get(name) is not None:
+                    values[name] = check.positive(name, values[name], "s")
+            if values.get("scheme") is not None:
+                check.one_of("scheme", values["scheme"], collision.SCHEMES)
+            if values.get("max_impacts") is not None:
+                check.count("max_impacts", values["max_impacts"])
+            for name in ("striker_force", "target_force"):
+                values[name] = check.number(name, values.get(name, 0.0), "N")
             quantities = asked_for(values.get("quantity"))
         duration = accuracy.contact_duration(blow.contact, blow.striker.felt_mass, speed)
         return cls(blow, changes, values, pieces, tolerance, quantities, duration)

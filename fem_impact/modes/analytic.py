@@ -143,6 +143,8 @@ class RectangleShapes(Shapes):
     numbers: np.ndarray  # (n_modes, 2) half waves along length and width
     dimension: int = 2
 
+    __repr__ = check.brief
+
     def at(self, points: np.ndarray) -> np.ndarray:
         phase = np.pi * points / (self.length, self.width)  # (n_points, 2)
         return (
@@ -326,6 +328,8 @@ class BeamShapes(Shapes):
     k: np.ndarray  # (n_modes,) wavenumber times length; 0 for rigid motions
     weights: np.ndarray  # (n_modes, 4)
     dimension: int = 1
+
+    __repr__ = check.brief
 
     def at(self, points: np.ndarray) -> np.ndarray:
         x = points[:, :1] / self.length  # (n_points, 1)
@@ -558,6 +562,8 @@ class DiskShapes(Shapes):
     phase: np.ndarray  # (n_modes,) 0 for cos, pi/2 for sin
     scale: np.ndarray  # (n_modes,)
     dimension: int = 2
+
+    __repr__ = check.brief
 
     def at(self, points: np.ndarray) -> np.ndarray:
         r = np.hypot(points[:, 0], points[:, 1])[:, None] / self.radius

@@ -61,6 +61,8 @@ class ScaledShapes(Shapes):
     amplitude: float  # [-] new shape divided by old
     frequency: float  # [-] new frequency divided by old
 
+    __repr__ = check.brief
+
     @property
     def dimension(self) -> int:
         return self.base.dimension
@@ -119,6 +121,8 @@ class SampledShapes(Shapes):
     values: np.ndarray  # (n_points, n_modes) [kg**-0.5]
     static: np.ndarray  # (n_points, n_points) [m/N] static compliance of the complete body
 
+    __repr__ = check.brief
+
     def __post_init__(self) -> None:
         check.lock_arrays(self)
 
@@ -167,14 +171,14 @@ class Modes:
     bounds: np.ndarray | None = None  # (n_modes, 2) [Hz] guaranteed lower and upper bound of each frequency
     notes: tuple[str, ...] = field(default=(), repr=False)  # what was assumed, and probable slips of a unit
 
+    __repr__ = check.brief
+
     def __post_init__(self) -> None:
         omega = check.ascending("omega", self.omega, "rad/s")
         damping = check.array("damping_ratio", self.damping_ratio, omega.shape)
         if (damping < 0.0).any():
             raise ValueError(f"damping_ratio must not be negative, got {damping.min():g}")
-        object.__setattr__(self, "omega", omega)
-        object.__setattr__(self, "damping_ratio", damping)
-        check.positive("mass", self.mass, "kg")
+        check.settle(self, omega=omega, damping_ratio=damping, mass=check.positive("mass", self.mass, "kg"))
         check.lock_arrays(self)
 
     @classmethod
@@ -472,6 +476,8 @@ class FieldShapes(Shapes):
     flexibility: Flexibility
     _under: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), repr=False)  # deflections, by loads
     _at: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), init=False, repr=False)  # shapes, by point
+
+    __repr__ = check.brief
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)

@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +18,7 @@ from ..model.target import Stages
 from ..modes.modal import Modes, SampledShapes
 from ..scenes import maps
 from ..scenes.scene import Scene
+from ..scenes.schema import PATHS
 from ..sweeps import grid
 
 TOLERANCE = 1e-3  # [-] of the blows shown: errors smaller than the plots can show
@@ -23,7 +26,10 @@ MAP_TOLERANCE = 1e-2  # [-] of the blows on the map, which only counts impacts
 FIRST_LOOK = 30  # [-] modes found first, to estimate the number needed
 MOST_MODES = 100  # [-] largest number; the residual compliance replaces the rest, and the page shows the error
 CELLS = {False: 24, True: 10}  # [-] along each axis of the map, without and with loss, where blows take longer
-SPANS = {"mass": 20.0, "stiffness": 1000.0, "speed": 10.0, "bending": 20.0}  # [-] slider end over the scene's value
+SPANS = {  # [-] slider end over the scene's value
+    "thickness": 2.0, "mass": 20.0, "stiffness": 1000.0, "speed": 10.0, "bending": 20.0
+}  # fmt: skip
+MOST_DAMPING = 0.1  # [-] end of the slider
 EXPONENTS = (1.0, 3.0)  # [-] from a linear spring to a felt-covered head
 
 
@@ -37,6 +43,9 @@ class Settings:
     speed: float  # [m/s]
     bending: float | None  # [Hz] first bending mode of a stick; None for other strikers
     at: tuple[float, ...]  # [m]
+    damping: float = 0.0  # [-] damping ratio of the struck body
+    loss: float = 0.0  # [s/m] of the contact
+    thickness: float = 1.0  # [-] of the struck body, over the scene's
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,12 +88,25 @@ class Bench:
         striker, law = self.base.striker, self.base.contact
         flexible = striker.modes.frequencies[striker.modes.omega > 0.0]
         bending = float(flexible[0]) if self.scene.striker.kind == "stick" else None
-        return Settings(striker.mass, 1.0, law.exponent, self.base.speed, bending, tuple(self.base.at.tolist()))
+        return Settings(
+            striker.mass,
+            1.0,
+            law.exponent,
+            self.base.speed,
+            bending,
+            tuple(self.base.at.tolist()),
+            float(np.median(self.base.modes.damping_ratio)),
+            law.loss,
+        )
 
     def range(self, name: str) -> tuple[float, float]:
         """Lowest and highest value of a slider."""
         if name == "exponent":
             return min(EXPONENTS[0], self.start.exponent), max(EXPONENTS[1], self.start.exponent)
+        if name == "damping":
+            return 0.0, max(MOST_DAMPING, 2.0 * self.start.damping)
+        if name == "loss":
+            return 0.0, max(1.0 / self.start.speed, 2.0 * self.start.loss)
         value = getattr(self.start, name)
         return value / SPANS[name], value * SPANS[name]
 
@@ -95,7 +117,7 @@ class Bench:
         wanted = accuracy.contact_duration(law, mass, start.speed)
         unit = accuracy.contact_duration(Contact(1.0, settings.exponent), mass, start.speed)
         same = (unit / wanted) ** (settings.exponent + 1.0)  # contact time ~ stiffness**(-1 / (exponent + 1))
-        return replace(law, stiffness=settings.stiffness * same, exponent=settings.exponent)
+        return replace(law, stiffness=settings.stiffness * same, exponent=settings.exponent, loss=settings.loss)
 
     def case(self, settings: Settings, rest: float | None = None) -> grid.Case:
         """The arguments of `strike`; raises ValueError if the strike point is not on the body.
@@ -108,6 +130,13 @@ class Bench:
             case = case.changed("striker_frequency", settings.bending)
         if rest is not None:
             case = replace(case, modes=self._sampled(settings.at, rest))
+        modes, ratio = case.modes, settings.thickness
+        if settings.damping != self.start.damping:
+            modes = modes.damped(settings.damping)
+        if ratio != 1.0:  # mass and all frequencies grow with the thickness
+            first = float(modes.frequencies[modes.n_rigid])
+            modes = modes.scaled(mass=ratio * modes.mass, first_frequency=ratio * first)
+        case = replace(case, modes=modes)
         return case.changed("speed", settings.speed).changed("at", settings.at)
 
     def _sampled(self, at: tuple[float, ...], rest: float) -> Modes:
@@ -135,6 +164,27 @@ class Bench:
         ratio[~((ratio > 0.0) & (ratio < math.inf))] = math.nan
         # contact resonance ~ stiffness**(1 / (exponent + 1))
         return Picture(mass, stiffness, np.asarray(table.n_impacts), found, ratio ** (settings.exponent + 1.0))
+
+    def saved(self, settings: Settings) -> dict[str, Any]:
+        """The tables of a scene file with these settings."""
+        tables = self.scene.data()
+        tables.pop("map", None)
+        tables["mesh"] |= {key: str(Path(tables["mesh"][key]).resolve()) for key in PATHS if key in tables["mesh"]}
+        law = self.law(settings)
+        tables["contact"] = {"kind": "power", "stiffness": law.stiffness, "exponent": law.exponent, "loss": law.loss}
+        tables["contact"]["gap"] = law.gap
+        stick = {"first_frequency": settings.bending} if settings.bending is not None else {}
+        tables["striker"] = {"kind": "stick" if stick else "rigid", "mass": settings.mass, **stick}
+        tables["strike"] |= {"at": list(settings.at), "speed": settings.speed}
+        target = tables.setdefault("target", {})
+        if settings.damping != self.start.damping:
+            target |= {"damping_ratio": settings.damping}
+        target |= {key: settings.thickness * target[key] for key in ("mass", "first_frequency") if key in target}
+        if "section" in tables:
+            for key in ("thickness", "height"):
+                if isinstance(tables["section"].get(key), float):
+                    tables["section"] = {**tables["section"], key: settings.thickness * tables["section"][key]}
+        return tables
 
     def place(self, x: float, y: float) -> tuple[float, ...] | None:
         """The strike point under a click; None if the click misses the body."""

@@ -1,5 +1,6 @@
 """Lays out the live page: sliders, the body to click on, the plots that follow, and the sound."""
 
+import base64
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -12,12 +13,13 @@ from .._base.check import SimulationError
 from ..impact import force_spectrum
 from ..impact.contact import Contact
 from ..impact.response import Response
+from ..scenes.schema import written
 from ..scenes.sentences import RAISED, place, power, si
 from ..show import sound
 from ..show.figures import SPECTRUM_DEPTH
 from ..sweeps.grid import Case
 from . import report
-from .explore_model import Bench, Picture, Settings, blow, limit_of
+from .explore_model import TOLERANCE, Bench, Picture, Settings, blow, limit_of
 
 BAND = (20.0, 20e3)  # [Hz] of the spectrum: the audible range
 SPECTRUM_POINTS = 240  # [-] more points take time but show no more
@@ -27,8 +29,10 @@ COLOURS = ("#9a958c", "#d6e4f0", "#f0c75e", "#e08a1e", "#a63d0c")  # colours of 
 HERE: dict[str, Any] = {"fill_color": "#d55e00", "line_color": "white", "line_width": 2}  # marker of the current blow
 NAMES = ("failed", "one impact", "two", "three", "more")
 LABELS = {
-    "mass": "Mass", "stiffness": "Stiffness", "exponent": "Exponent", "speed": "Speed", "bending": "First bending mode"
+    "mass": "Mass", "stiffness": "Stiffness", "exponent": "Exponent", "speed": "Speed", "bending": "First bending mode",
+    "loss": "Loss of the contact", "damping": "Damping ratio", "thickness": "Thickness over the scene's",
 }  # fmt: skip
+LINEAR = {"exponent", "loss", "damping"}  # sliders that are not logarithmic
 STEPS = 200  # [-] per slider: about one per pixel
 MOMENT = 8  # [ms] during which slider messages are collected before the next blow
 REST = 200  # [ms] without a change before the map is redrawn: a map takes as long as many blows
@@ -98,7 +102,7 @@ class Page:
             if value is None:
                 continue
             low, high = self.bench.range(name)
-            if name != "exponent":
+            if name not in LINEAR:
                 low, high, value = (math.log10(x) for x in (low, high, value))
             slider = Slider(
                 name=name, title=label, start=low, end=high, value=value, step=(high - low) / STEPS, show_value=False,
@@ -198,7 +202,7 @@ class Page:
         return plot
 
     def _turned(self, name: str, _attribute: str, _old: float, value: float) -> None:
-        self._change(**{name: float(value) if name == "exponent" else 10.0 ** float(value)})
+        self._change(**{name: float(value) if name in LINEAR else 10.0 ** float(value)})
 
     def _moved(self) -> None:
         """React to a strike-point slider."""
@@ -246,7 +250,13 @@ class Page:
             self.readout.text = self.numbers.render(failed=str(error))
         else:
             self._draw(self.hit)
-            self.readout.text = self.numbers.render(cells=_told(self.hit, resonance, limit, known))
+            text = base64.b64encode(written(self.bench.saved(settings)).encode()).decode("ascii")
+            self.readout.text = self.numbers.render(
+                cells=_told(self.hit, resonance, limit, known),
+                missed=known and not self.hit.error.total <= TOLERANCE,
+                n_modes=self.bench.base.modes.n_modes,
+                scene=f"data:application/toml;base64,{text}",
+            )
         self._remap()
 
     def _put(self, name: str, **columns: list[float]) -> None:
@@ -282,6 +292,9 @@ class Page:
             "exponent": f"{settings.exponent:.3g}",
             "speed": si(settings.speed, "m/s", 3),
             "bending": si(settings.bending or 0.0, "Hz", 3),
+            "loss": f"{settings.loss:.3g} s/m",
+            "damping": f"{settings.damping:.3g}",
+            "thickness": f"{settings.thickness:.3g}",
         }
         said |= {letter: si(value, "m", 3) for letter, value in zip("xy", settings.at)}
         shown = [name for name in said if name in self.sliders]

@@ -16,6 +16,7 @@ from scipy.io import wavfile
 
 from .._base import check, markup
 from .._base.files import replacing
+from ..impact import spectra
 from ..impact.response import Response
 from ..mesh.mesh_files import boundary
 from ..scenes.scene import Run, Scene, load_scene, scene_of
@@ -96,14 +97,14 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
         raise ValueError(f"run must have target 'modal' because a report shows motion, got {run.plan.target!r}")
     page = template("report.html").render(
         title=scene.title or scene.path.stem,
-        words=words(scene, response),
+        words=(*words(scene, response), *(f"Note: {note}" for note in run.notes)),
         picture=scene.picture(),
         observed=bool(scene.watched),
         tiles=_tiles(response),
         response=response,
         budget=_budget(response),
         modelled=_modelled(response, run),
-        reasons=map(tidy, (*run.plan.reasons, *(f"note: {note}" for note in run.notes))),
+        reasons=map(tidy, run.plan.reasons),
         energies=_shares(response),
         sounds=_sounds(scene, response),
         files=_downloads(scene, run),
@@ -135,6 +136,7 @@ def _command(scene: Scene, response: Response) -> str:
     path = shlex.quote(str(scene.path))
     if scene.path.suffix.lower() == ".json":
         return f"fem-impact report {path}"
+    path = shlex.quote(str(scene.path.resolve()))
     return f"fem-impact strike {path} --target modal --tolerance {response.tolerance:g}"
 
 
@@ -277,6 +279,10 @@ def _plots(response: Response) -> dict[str, Any]:
         "impacts": [[impact.start, impact.end] for impact in response.impacts],
         "spectrum": {"x": _short(frequencies), "y": _short(np.abs(response.spectrum(frequencies)))},
         "natural": _short(modes.frequencies[(modes.omega > 0.0) & (modes.frequencies < frequencies[-1])]),
+        "mobility": {
+            "x": _short(frequencies),
+            "y": _short(np.abs(spectra.mobility(modes, response.at, response.at, frequencies))),
+        },
         "energy": {
             "x": _short(times),
             "striker": _short(energy[0].sum(axis=1)),

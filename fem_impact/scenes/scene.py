@@ -44,6 +44,8 @@ class Scene:
     observe: Part | None = None
     map: Part | None = None
 
+    __repr__ = check.brief
+
     def strike(self, *, strict: bool = False, **changes: Any) -> Response:
         """Build everything and strike.
 

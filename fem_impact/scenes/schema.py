@@ -1,6 +1,7 @@
 """The format of a scene file: its tables, their keys, and the public functions they call."""
 
 import inspect
+import json
 import math
 import tomllib
 from collections.abc import Callable, Mapping
@@ -169,6 +170,24 @@ def read_tables(path: Path) -> dict[str, Any]:
         raise fault(path, "a scene must be UTF-8 text; save it in that encoding") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise fault(path, f"not valid TOML: {error}") from None
+
+
+def written(tables: Mapping[str, Any]) -> str:
+    """The text of a TOML file with these tables."""
+    lines = [f"{key} = {_toml(value)}" for key, value in tables.items() if not isinstance(value, Mapping)]
+    for name, table in tables.items():
+        if isinstance(table, Mapping):
+            lines += ["", f"[{name}]", *(f"{_toml(key)} = {_toml(value)}" for key, value in table.items())]
+    return "\n".join(lines).strip() + "\n"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_toml(key)} = {_toml(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    # the escapes of a JSON string are those of TOML
+    return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=True)
 
 
 def read_bytes(path: Path) -> bytes:

@@ -12,7 +12,6 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from scipy.io import wavfile
 
 from .._base import check
 from .._base.files import replacing, staged
@@ -148,7 +147,10 @@ def write_uff(path: str | Path, modes: Modes) -> None:
 def write_wav(
     path: str | Path, response: Response, at: Any = None, *, listener: Any = None, **options: Any
 ) -> sound.Sound:
-    """Write the sound of a blow as 32-bit float WAV and return it.
+    """Write the sound of a blow as 32-bit float WAV, with a fade at its end, and return it.
+
+    A sample of 1 means the power of ten [m/s] or [Pa] just above the peak, so that every blow can be heard; with
+    ``normalise=True`` it means the peak. The true level stays in the comment of the file and in `Sound.stated`.
 
     The sound is the velocity of the point ``at`` (see `sound.synthesise`) or, with a ``listener``, the pressure near a
     plate (see `sound.radiate`); ``options`` go to that function.
@@ -159,14 +161,16 @@ def write_wav(
     >>> hit = fi.strike(modes, fi.Striker.rigid(0.03), fi.Contact.linear(1e5), at=(0.13, 0.1), speed=1.0)
     >>> sound = fi.export.write_wav("strike.wav", hit, at=(0.2, 0.2))
     >>> sound.rate, sound.full_scale, sound.unit
-    (48000, 10.0, 'm/s')
+    (48000, 1.0, 'm/s')
     """
+    check.one_of("path ending", check.path("path", path).suffix.lower(), (".wav",))
     if listener is None:
         heard = sound.synthesise(response, at, **options)
     else:
         heard = sound.radiate(response, listener, **options)
+    heard = (heard if options.get("normalise") else heard.audible()).faded()
     with replacing(path) as temporary:
-        wavfile.write(temporary, heard.rate, heard.samples.astype(np.float32))
+        temporary.write_bytes(heard.wav())
     return heard
 
 

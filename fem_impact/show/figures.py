@@ -1,5 +1,6 @@
 """Plots of a blow in one style: safe for colour-blind readers, SI units on every axis, no screen needed."""
 
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -50,11 +51,24 @@ FLAT = 1e-9  # [-] a shape below this share of its largest deflection is zero up
 MARGIN = 0.1  # [-] time shown before and after the blow, over its duration
 
 
+class Picture(Figure):
+    """A figure that notebooks show as a picture, whatever their backend."""
+
+    def _repr_png_(self) -> bytes:
+        file = io.BytesIO()
+        with matplotlib.rc_context(STYLE):
+            self.savefig(file, format="png")
+        return file.getvalue()
+
+    def __repr__(self) -> str:
+        return f"<Picture of {len(self.axes)} axes; save it with fi.figures.save>"
+
+
 @contextmanager
 def styled(width: float, height: float) -> Iterator[Figure]:
     """A figure of a size [inch], drawn in `STYLE` inside the block."""
     with matplotlib.rc_context(STYLE):
-        yield Figure(figsize=(width, height), layout="constrained")
+        yield Picture(figsize=(width, height), layout="constrained")
 
 
 def _units(axes: Any, x: str, y: str = "") -> None:
@@ -110,7 +124,11 @@ def _draw_force(axes: Any, response: Response) -> None:
     if response.impacts:
         start, end = response.impacts[0].start, response.impacts[-1].end
     room = MARGIN * (end - start)
-    axes.plot(response.time, response.force)
+    several = response.force.ndim == 2
+    names = [f"contact {i}" for i in range(response.history.n_contacts)] if several else None
+    axes.plot(response.time, response.force, label=names)
+    if several and len(names or ()) <= MOST_NUMBERS:
+        axes.legend(loc="upper right")
     for number, impact in enumerate(response.impacts, 1):
         axes.axvspan(impact.start, impact.end, color=SKY, alpha=0.2, lw=0)
         if response.n_impacts <= MOST_NUMBERS:

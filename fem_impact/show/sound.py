@@ -1,11 +1,13 @@
 """The sound of a blow, as samples: the velocity of a point on the struck body, or the pressure a plate radiates."""
 
-from dataclasses import dataclass
+import io
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.io import wavfile
 
-from .._base import check
+from .._base import check, markup
 from ..impact.response import Response
 from . import sampling
 
@@ -19,6 +21,8 @@ HIGHEST_RATE = 1_000_000  # [Hz] highest sample rate: far above what any device 
 MOST_SAMPLES = 10_000_000  # [-] most samples: three minutes at 48 kHz take about ten seconds to compute
 SHORTEST, LONGEST = 0.5, 5.0  # [s] limits of the default duration: long enough to hear a pitch, short enough to compare
 DECAY = np.log(1e3)  # [-] by default the sound ends when its slowest mode has lost 60 dB
+FADE = 0.3  # [s] of a file or player at its end
+NEAREST = 1e-6  # [m] least distance of a listener from the plate
 BLOCK = 4096  # [-] samples computed from one modal state: limits the memory, does not change the result
 CRITICAL = 1e-6  # [-] damping ratios closer to 1 become 1 plus this: at 1 the two roots coincide; test_sound.py
 
@@ -31,6 +35,8 @@ class Sound:
     rate: int  # [Hz]
     full_scale: float  # [m/s] or [Pa], value of a sample of 1.0
     unit: str = "m/s"
+
+    __repr__ = check.brief
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)
@@ -45,6 +51,41 @@ class Sound:
     def level(self) -> float:
         """Largest sample in dB relative to ``REFERENCE``: 20 micropascals or 1 nm/s."""
         return self.peak_level + 20.0 * float(np.log10(self.full_scale / REFERENCE[self.unit][0]))
+
+    def audible(self) -> "Sound":
+        """The same sound with the smallest full scale that is a power of ten times the present one and holds it."""
+        peak = float(np.abs(self.samples).max(initial=0.0))
+        factor = 10.0 ** np.ceil(np.log10(peak) - 1e-12) if peak else 1.0
+        return replace(self, samples=self.samples / factor, full_scale=self.full_scale * float(factor))
+
+    def faded(self) -> "Sound":
+        """The same sound, ending in a fade of FADE seconds or of a quarter of its length, so that it does not click."""
+        count = min(round(FADE * self.rate), len(self.samples) // 4)
+        samples = self.samples.copy()
+        samples[len(samples) - count :] *= np.cos(0.5 * np.pi * np.arange(1, count + 1) / max(count, 1)) ** 2
+        return replace(self, samples=samples)
+
+    @property
+    def stated(self) -> str:
+        """Level and full scale in words, as written into files."""
+        return f"peak {self.said}; a sample of 1.0 is {self.full_scale:.6g} {self.unit}"
+
+    def wav(self) -> bytes:
+        """The samples as a 32-bit float WAV file, with `stated` as its comment."""
+        if np.abs(self.samples).max(initial=0.0) > np.finfo(np.float32).max:
+            raise ValueError("response is louder than a WAV file can hold; check the units of its speed")
+        file = io.BytesIO()
+        wavfile.write(file, self.rate, self.samples.astype(np.float32))
+        text = self.stated.replace("−", "-").replace("µ", "u").encode("ascii")
+        text += b"\0" * (2 - len(text) % 2)  # ends with a zero and has an even length
+        body = b"INFOICMT" + len(text).to_bytes(4, "little") + text
+        whole = file.getvalue() + b"LIST" + len(body).to_bytes(4, "little") + body
+        return whole[:4] + (len(whole) - 8).to_bytes(4, "little") + whole[8:]
+
+    def _repr_html_(self) -> str:
+        """For notebooks: a player."""
+        heard = self.audible().faded()
+        return markup.player(heard.wav(), heard.stated)
 
     @property
     def said(self) -> str:
@@ -165,8 +206,10 @@ def radiate(
 def beside(listener: Any) -> np.ndarray:
     """Check the coordinates (3,) [m] of a listener, which must lie off the plate's plane."""
     place = check.array("listener", listener, (3,), "m")
-    if not abs(place[2]) > 0.0:
-        raise ValueError("listener must lie off the plate's plane, got a third coordinate of 0 m; give a distance")
+    if not abs(place[2]) >= NEAREST:
+        raise ValueError(
+            f"listener must lie off the plate's plane, got a third coordinate of {place[2]:g} m; give a distance"
+        )
     return place
 
 

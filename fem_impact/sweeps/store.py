@@ -210,10 +210,13 @@ def _connected(make: Any, client: Any) -> Iterator[Any]:
         yield client
         return
     try:
-        with make(client, timeout=10) as made:
-            yield made
-    except OSError as error:
-        raise OSError(f"client: no cluster answers at {client} ({error}); start one or correct the address") from None
+        made = make(client, timeout=10)
+    except (OSError, TypeError) as error:  # TypeError: TLS without a certificate
+        raise OSError(
+            f"client: no cluster answers at {client} ({check.line(str(error))}); start one or correct the address"
+        ) from None
+    with made:
+        yield made
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from test_cli import TEXT
 import fem_impact as fi
 from fem_impact.impact import accuracy, force_spectrum
 from fem_impact.pages import explore_model
+from fem_impact.scenes.schema import written
 
 
 @pytest.fixture(scope="module")
@@ -71,3 +72,22 @@ def test_quick_spectrum_is_the_exact_one_to_the_eye(stand):
 def test_click_beside_the_body_is_none(stand):
     assert stand.place(0.1, 0.1) == (0.1, 0.1)
     assert stand.place(-0.1, 0.1) is None and stand.place(float("nan"), 0.1) is None
+
+
+def test_damping_loss_and_thickness_change_the_blow_as_a_new_body_would(stand):
+    thick, start = stand.case(replace(stand.start, thickness=1.5)).modes, stand.base.modes
+    assert thick.mass == pytest.approx(1.5 * start.mass)
+    np.testing.assert_allclose(thick.frequencies, 1.5 * start.frequencies, rtol=1e-12)
+    assert (stand.case(replace(stand.start, damping=0.07)).modes.damping_ratio == 0.07).all()
+    lossy = stand.case(replace(stand.start, loss=1.0))
+    assert lossy.contact.loss == 1.0
+    assert explore_model.blow(lossy).restitution != explore_model.blow(stand.case(stand.start)).restitution
+
+
+def test_a_saved_scene_strikes_as_the_page_does(stand, tmp_path):
+    settings = replace(stand.start, mass=1.2 * stand.start.mass, damping=0.02, thickness=1.1, exponent=1.3)
+    (tmp_path / "saved.toml").write_text(written(stand.saved(settings)))
+    saved = fi.load_scene(tmp_path / "saved.toml").strike(target="modal", tolerance=1e-3)
+    shown = explore_model.blow(stand.case(settings))
+    assert saved.n_impacts == shown.n_impacts
+    assert saved.impulse == pytest.approx(shown.impulse, rel=5e-3)  # both promise 1e-3

@@ -50,6 +50,10 @@
     type: "scatter", mode: "lines", x, y, name, line: { color: colour(paint), width: 1.8, simplify: false, dash }, hovertemplate: `${hover}<extra></extra>`,
   });
 
+  const legend = {
+    showlegend: true, legend: { orientation: "h", x: 0, y: -0.22, yanchor: "top", bgcolor: "rgba(0,0,0,0)" },
+    margin: { l: 60, r: 12, t: 34 * letter, b: 84 * letter },
+  };
   const flat = {
     "plot-force": () => {
       const t = linear("time", "s", data.force.x), f = linear("force", "N", data.force.y, { rangemode: "tozero" });
@@ -66,14 +70,19 @@
     "plot-spectrum": () => {
       const top = Math.log10(Math.max(...data.spectrum.y, 1e-300));
       return [
-        [line(data.spectrum.x, data.spectrum.y, "blue", "%{y:.4s}N s at %{x:.4s}Hz"), {
+        [line(data.spectrum.x, data.spectrum.y, "blue", "%{y:.4s}N s at %{x:.4s}Hz", "force"), {
+          name: "modes of the struck body",
           type: "scatter", mode: "markers", x: data.natural, y: data.natural.map(() => 10 ** (top - 3.95)),
           marker: { symbol: "line-ns-open", size: 10, color: colour("green"), line: { width: 1 } },
           hovertemplate: "mode of the struck body, %{x:.5s}Hz<extra></extra>",
         }],
-        layout("Spectrum of the force", decades("frequency", "Hz"), decades("magnitude", "N s", { range: [top - 4.1, top + 0.2] })),
+        layout("Spectrum of the force", decades("frequency", "Hz"), decades("magnitude", "N s", { range: [top - 4.1, top + 0.2] }), legend),
       ];
     },
+    "plot-mobility": () => [
+      [line(data.mobility.x, data.mobility.y, "blue", "%{y:.4s}m/(N s) at %{x:.4s}Hz")],
+      layout("Mobility at the strike point", decades("frequency", "Hz"), decades("velocity per force", "m/(N s)")),
+    ],
     "plot-energy": () => {
       const t = linear("time", "s", data.energy.x), e = linear("energy", "J", data.energy.striker.concat(data.energy.body));
       const parts = [["striker", "striker", "blue"], ["body", "struck body", "vermilion"], ["rest", "contact and losses", "orange", "dash"]];
@@ -81,10 +90,7 @@
       return [
         parts.map(([key, name, paint, dash]) =>
           line(x, e.of(data.energy[key]), paint, `${name}, %{y:.4g} ${e.name} at %{x:.4g} ${t.name}`, name, dash)),
-        layout("Energy during the blow", t.axis, e.axis, {
-          showlegend: true, legend: { orientation: "h", x: 0, y: -0.22, yanchor: "top", bgcolor: "rgba(0,0,0,0)" },
-          margin: { l: 60, r: 12, t: 34 * letter, b: 84 * letter },
-        }),
+        layout("Energy during the blow", t.axis, e.axis, legend),
       ];
     },
     "plot-modal": () => {

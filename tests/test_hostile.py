@@ -1,0 +1,151 @@
+"""Numbers, files and addresses that once ended in a traceback, a wait of minutes or a wrong message."""
+
+import re
+import time
+
+import pytest
+from scenes import QUICK, SMALL
+
+import fem_impact as fi
+from fem_impact import cli
+
+HUGE = ("9999999999999999999999999", "18446744073709551616")  # beyond 64 bits
+DISK = """
+[mesh]
+shape = "disk"
+radius = 0.2
+[material]
+E = 110e9
+nu = 0.34
+rho = 8800
+E_across = 5e9
+G = 1e9
+angle = 0.0
+[section]
+kind = "plate"
+thickness = 1.2e-3
+[supports]
+boundary = "clamped"
+[striker]
+kind = "rigid"
+mass = 0.05
+[contact]
+kind = "hertz"
+stiffness = 2e5
+loss = 0.0
+[strike]
+at = [0.05, 0.02]
+speed = 1.0
+tolerance = 1e-2
+"""
+TIN = "".join(line for line in DISK.splitlines(True) if not line.startswith(("E_across", "G ", "angle")))
+
+
+@pytest.fixture
+def told(tmp_path, capsys):
+    """Run a command on a scene; returns its status and what it said."""
+
+    def run(text, verb="strike", *words):
+        (tmp_path / "s.toml").write_text(text)
+        out = () if verb == "plan" else ("--out", str(tmp_path / "out"))
+        status = cli.main([verb, str(tmp_path / "s.toml"), *out, *words])
+        captured = capsys.readouterr()
+        return status, " ".join((captured.out + captured.err).split())
+
+    return run
+
+
+def edited(text, key, value):
+    assert re.search(rf"^{key} = ", text, re.M)
+    return re.sub(rf"^{key} = .*$", f"{key} = {value}", text, flags=re.M)
+
+
+@pytest.mark.parametrize("huge", HUGE)
+@pytest.mark.parametrize(
+    "text, key, status, words",
+    [
+        (QUICK, "stiffness", 1, "no tolerance is large enough; take a contact with stiffness"),
+        (DISK, "angle", 0, "turns; rad are expected"),
+        (TIN, "loss", 2, "[contact] loss must lie between 0 and 1e+12 s/m"),
+    ],
+)
+def test_whole_numbers_beyond_64_bits_are_numbers(told, huge, text, key, status, words):
+    found, said = told(edited(text, key, huge), "plan")
+    assert found == status and words in said
+
+
+def test_checked_numbers_are_floats_whatever_was_given():
+    made = fi.Material(10**20, 0, 10**19, 10**18, 10**17, 10**19), fi.Contact(10**20, 1, 10, -1), fi.Elastic(10**20)
+    for thing in made:
+        assert all(type(value) is float for value in vars(thing).values())
+    assert type(fi.Plate(made[0], 1).thickness) is float
+
+
+@pytest.mark.parametrize("value", ["[]", '["a"]', "{}", "[1.0, 2.0]", "[[1.0]]", "1979-05-27", "true", '"x"'])
+@pytest.mark.parametrize("key", ["duration", "dt", "striker_force"])
+def test_a_time_or_force_that_is_no_number_is_told_by_name(told, key, value):
+    status, said = told(QUICK.replace("tolerance = 1e-2", f"tolerance = 1e-2\n{key} = {value}"))
+    assert status == 2 and f"s.toml: [strike] {key} must be a number in " in said
+
+
+def test_an_orthotropic_disk_needs_no_word_on_its_source(told):
+    status, said = told(DISK, "plan")
+    assert status == 0 and "argyris elements" in said
+
+
+@pytest.mark.parametrize("key", ["E", "G"])
+@pytest.mark.parametrize("value", ["1e30", "1e74"])
+def test_an_absurd_stiffness_of_wood_is_a_sentence(told, key, value):
+    status, said = told(edited(DISK, key, value), "plan")
+    assert status == 1 and "no tolerance is: check the units" in said
+
+
+@pytest.mark.parametrize("value", ["1e12", "1e30", "1e74"])
+def test_absurd_damping_and_frequency_are_no_traceback(told, value):
+    assert told(edited(SMALL, "damping_ratio", value))[0] == 0
+    assert told(edited(QUICK, "first_frequency", value))[0] in (0, 2)
+
+
+def test_a_listener_out_of_reach_hears_silence_and_all_files_are_there(told, tmp_path):
+    pytest.importorskip("scipy")
+    status, said = told(QUICK, "strike", "--target", "modal", "--listener", "0.1", "0.1", "1e10")
+    assert status == 0 and "Listener: silence" in said
+    assert {"response.json", "force.csv", "radiated.wav"} <= {path.name for path in (tmp_path / "out").iterdir()}
+
+
+def test_a_listener_on_the_plate_is_refused_and_nothing_is_written(told, tmp_path):
+    status, said = told(QUICK, "strike", "--target", "modal", "--listener", "0", "0", "1e-300")
+    assert status == 2 and "listener must lie off the plate's plane" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_blow_too_loud_for_a_wav_is_told(tmp_path):
+    plate = fi.analytic.rectangle(0.3, 0.2, mass=0.2, first_frequency=100.0, n_modes=4)
+    hit = fi.strike(plate, fi.Striker.rigid(0.01), fi.Contact.linear(1e4), at=(0.1, 0.1), speed=1e50, tolerance=0.1)
+    with pytest.raises(ValueError, match="louder than a WAV file can hold"):
+        fi.sound.synthesise(hit).wav()
+    assert fi.export.write_wav(tmp_path / "a.wav", hit).full_scale > 1e30  # scaled until it fits
+
+
+def test_a_cluster_that_wants_a_certificate_is_a_sentence(told):
+    pytest.importorskip("distributed")
+    status, said = told(QUICK, "map", "--cluster", "tls://127.0.0.1:9")
+    assert status == 1 and "client: no cluster answers at tls://127.0.0.1:9" in said
+
+
+HEAD = '<svg xmlns="http://www.w3.org/2000/svg" width="465mm" height="300mm" viewBox="0 0 465 300">'
+DRAWINGS = {
+    "pieces": f'{HEAD}<path d="M0 0 {"l1.5 1.25 " * 10**6}z"/></svg>',
+    "comment": f'{HEAD}<!--{"x" * 20_000_000}--><rect width="465" height="300"/></svg>',
+    "shapes": HEAD + '<rect width="4" height="3"/>' * 10**5 + "</svg>",
+}
+
+
+@pytest.mark.parametrize("name, words", [("pieces", "numbers"), ("comment", "a comment"), ("shapes", "shapes")])
+def test_a_huge_drawing_is_refused_in_seconds(tmp_path, name, words):
+    pytest.importorskip("svgelements")
+    (tmp_path / "a.svg").write_text(DRAWINGS[name])
+    began = time.perf_counter()
+    with pytest.raises(ValueError, match=f"contains? .*{words}"):
+        fi.mesh.outline(tmp_path / "a.svg")
+    assert time.perf_counter() - began < 20.0  # 33 and 108 s once; 2 to 6 s on a busy machine
