@@ -34,7 +34,8 @@ def test_every_object_is_short_as_text(hit, cradle, tmp_path):
     modes, touch = fi.find_modes(system, n_modes=8), fi.Touch(fi.Contact.hertz(1e6), 0, 1, None, (0.1, 0.1))
     things = [
         hit, cradle, hit.history, hit.target, hit.target.shapes, hit.error, hit.impacts[0], hit.displacement,
-        run, run.plan, scene, outline, system, system.strain, plate, wood, fi.Striker.stick(0.1, 1e4), fi.Contact.hertz(1e6),
+        run, run.plan, scene, outline, system, system.strain, plate, wood,
+        fi.Striker.stick(0.1, 1e4), fi.Contact.hertz(1e6),
         fi.sound.synthesise(hit), fi.figures.force(hit), modes, modes.shapes,
         fi.hammers.choose(hit.target, (0.1, 0.1), 300.0, [0.01])[0], touch,
     ]  # fmt: skip
