@@ -52,7 +52,8 @@ INNER = {
     "figures.in_hertz", "sound.Sound",
     "hammers.Hammer", "hammers.bandwidth_of", "hammers.half_sine_reach",
     "report.Player", "report.audio", "explore.serve",  # serve ends at an interruption only, see test_explore
-    "Modes",
+    "Modes", "sound.Sound.audible", "sound.Sound.faded", "sound.Sound.wav", "analytic.check_uniform",
+    "hammers.Hammer.data",
 }  # fmt: skip
 
 
