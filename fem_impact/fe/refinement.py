@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from .._base import check
 from .._base.files import replacing
 from ..mesh import mesh_files
+from ..mesh.meshes import MOST_CELLS
 from . import residual
 from .assembly import System, assemble, reassemble
 from .eigenvalues import FIRST_SLICE, RESIDUAL, SPARE, STRICT, Flexibility, by_slices, count_below, lowest
@@ -150,10 +151,13 @@ def _counted(system: System, flexibility: Flexibility, n: int, limit: float | No
     n_rigid = flexibility.rigid.shape[1]
     available = system.n_dofs - n_rigid
     if n > available:
-        size = system.mesh.size * (max(1, available) / (ROOMY * n)) ** (1.0 / system.mesh.dimension)
+        shrink = (ROOMY * n / max(1, available)) ** (1.0 / system.mesh.dimension)
+        advice = f"elements of {system.mesh.size / shrink:.1g} m suffice"
+        if len(system.mesh.cells) * shrink**system.mesh.dimension > MOST_CELLS:
+            advice = "no mesh allowed has enough"
         raise ValueError(
             f"size must be smaller or n_modes lower: elements of {system.mesh.size:g} m have {system.n_dofs} unknowns "
-            f"for {n + n_rigid} modes; elements of {size:.1g} m suffice"
+            f"for {n + n_rigid} modes; {advice}"
         )
     more, residual = min(n + (SPARE if limit is None else 0), available), RESIDUAL
     for _ in range(SEARCHES):

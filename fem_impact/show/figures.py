@@ -51,7 +51,7 @@ FLAT = 1e-9  # [-] a shape below this share of its largest deflection is zero up
 MARGIN = 0.1  # [-] time shown before and after the blow, over its duration
 
 
-class Picture(Figure):
+class _Picture(Figure):
     """A figure that notebooks show as a picture, whatever their backend."""
 
     def _repr_png_(self) -> bytes:
@@ -68,7 +68,7 @@ class Picture(Figure):
 def styled(width: float, height: float) -> Iterator[Figure]:
     """A figure of a size [inch], drawn in `STYLE` inside the block."""
     with matplotlib.rc_context(STYLE):
-        yield Picture(figsize=(width, height), layout="constrained")
+        yield _Picture(figsize=(width, height), layout="constrained")
 
 
 def _units(axes: Any, x: str, y: str = "") -> None:

@@ -357,7 +357,7 @@ def test_strike_point_off_the_body_is_refused():
         ({"n_modes": 3, "max_frequency": 10.0}, "either n_modes or max_frequency"),
         ({"n_modes": 0}, "n_modes must be at least 1"),
         ({"max_frequency": 1e-3}, "max_frequency must reach the first mode"),
-        ({"n_modes": 10**6}, "n_modes must not exceed"),
+        ({"n_modes": 10**6}, "n_modes lower: .* no mesh allowed has enough"),
         ({"n_modes": 2, "tolerance": -1.0}, "tolerance must lie between"),
     ],
 )
