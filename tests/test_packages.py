@@ -3,7 +3,9 @@
 import ast
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.sparse import coo_matrix
 
 HOME = Path(__file__).parents[1] / "fem_impact"
 ORDER = [
@@ -70,3 +72,47 @@ def test_every_module_has_a_test_file_of_its_name():
         name = path.relative_to(HOME).as_posix()
         if path.name != "__init__.py" and name not in NOT_MIRRORED:
             assert (tests / path.parent.name.lstrip("_") / f"test_{path.name}").is_file(), name
+
+
+def classes():
+    """Package and attribute names of every class of ours."""
+    found = []
+    for path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ClassDef):
+                names = {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
+                names |= {item.target.id for item in node.body if isinstance(item, ast.AnnAssign)}
+                found.append((package(path), node.name, names))
+    return found
+
+
+def untyped(path):
+    """Function, parameter and the attributes used of every parameter without a type of its own."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if not isinstance(node, ast.FunctionDef):
+            continue
+        for each in [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]:
+            if each.arg in ("self", "cls") or (each.annotation and ast.unparse(each.annotation) != "Any"):
+                continue
+            used = {
+                item.attr
+                for item in ast.walk(node)
+                if isinstance(item, ast.Attribute) and isinstance(item.value, ast.Name) and item.value.id == each.arg
+            }
+            if used:
+                yield node.name, each.arg, used
+
+
+COMMON = set().union(*map(dir, (np.ndarray, dict, list, str, bytes, float, Path, coo_matrix)))
+CLASSES = classes()
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(HOME).as_posix())
+def test_no_untyped_parameter_stands_for_a_class_of_a_later_package(path):
+    if package(path) == "impact/compiled":
+        return  # numba finds the types of kernels, which take arrays and named tuples only
+    mine = ORDER.index(package(path))
+    for function, parameter, used in untyped(path):
+        homes = {home: name for home, name, names in CLASSES if used - COMMON and used - COMMON <= names}
+        later = {name for home, name in homes.items() if ORDER.index(home) > mine}
+        assert not later or len(later) < len(homes), f"{path.name}: {parameter} of {function} is a {sorted(later)}"

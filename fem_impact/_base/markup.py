@@ -2,7 +2,7 @@
 
 import base64
 import html
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,12 +10,6 @@ import numpy as np
 WIDTH, HEIGHT = 360.0, 210.0  # [px] size of a picture; narrow pages shrink it
 MARGIN = 16.0  # [px] empty border, so that markers on the edge are not cut off
 SAMPLES = 400  # [-] points kept of a curve: about one per pixel
-BAR = 0.03  # [-] drawn thickness of a beam over its length
-EDGES = {  # support -> line width [px] and dash pattern; free edges keep the thin outline
-    "clamped": (4.5, ""),
-    "hinged": (2.5, "7 4"),
-    "elastic": (2.5, "2 4"),
-}
 # Pages set these CSS variables for light and dark themes; notebooks fall back to the colour after the comma.
 INK, BODY, STROKE, STRIKE = (
     "var(--ink, #333333)",
@@ -81,110 +75,12 @@ def curve(x: np.ndarray, y: np.ndarray, *, label: str, unit: str, title: str) ->
     marks = _text(MARGIN, MARGIN, f"{label}, peak {top:.4g} {unit}") + _text(
         WIDTH - MARGIN, HEIGHT - 6, f"{span:.4g} s", "end"
     )
-    return _picture(
+    return picture(
         HEIGHT,
         title,
         f'<line x1="{MARGIN}" x2="{WIDTH - MARGIN}" y1="{foot}" y2="{foot}" stroke="{INK}" stroke-width="0.6"/>'
         f'<polyline points="{line}" fill="none" stroke="{STROKE}" stroke-width="1.6" stroke-linejoin="round"/>{marks}',
     )
-
-
-def body(mesh: Any, *, supports: Mapping[str, Any] | None = None, at: Any = None, points: Any = (), title: str) -> str:
-    """A plate from above or a beam from the side, with its supports, strike point and observation points.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    supports : mapping of edge name to "clamped", "hinged", "free" or an elastic support, optional
-    at : strike point, (dimension,) [m], optional
-    points : observation points, (n_points, dimension) [m]
-    title : str, description for screen readers
-    """
-    held = held_edges(mesh, supports or {})
-    plane = mesh.points if mesh.dimension == 2 else _bar(mesh.points[:, 0])
-    low, size = plane.min(axis=0), np.ptp(plane, axis=0)
-    scale = float(min((WIDTH - 2 * MARGIN) / size[0], 1.1 * WIDTH / size[1]))
-    height = scale * float(size[1]) + 2 * MARGIN
-
-    def place(point: Any) -> tuple[float, float]:
-        x, y = (*np.atleast_1d(point), plane[:, 1].max())[:2] if mesh.dimension == 1 else point
-        return MARGIN + scale * float(x - low[0]), height - MARGIN - scale * float(y - low[1])
-
-    if mesh.dimension == 2:
-        drawn = _outline(mesh, held, place)
-    else:
-        (x0, y0), (x1, y1) = place(low), place(low + size)
-        box = f'x="{x0:.1f}" y="{y1:.1f}" width="{x1 - x0:.1f}" height="{y0 - y1:.1f}"'
-        drawn = f'<rect {box} fill="{BODY}" stroke="{STROKE}"/>'
-        drawn += "".join(_end(corner, held.get(i, "free")) for i, corner in enumerate(((x0, y0), (x1, y0))))
-    drawn += "".join(
-        f'<circle cx="{a:.1f}" cy="{b:.1f}" r="5" fill="none" stroke="{INK}" stroke-width="1.6"/>'
-        for a, b in map(place, points)
-    )
-    if at is not None:
-        a, b = place(np.atleast_1d(at))
-        drawn += (
-            f'<circle cx="{a:.1f}" cy="{b:.1f}" r="6" fill="{STRIKE}"/>'
-            f'<circle cx="{a:.1f}" cy="{b:.1f}" r="10" fill="none" stroke="{STRIKE}" stroke-width="1.5"/>'
-        )
-    return _picture(height, title, drawn)
-
-
-def held_edges(mesh: Any, supports: Mapping[str, Any]) -> dict[int, str]:
-    """Facet number -> support; facets without a named support are left out and count as free."""
-    ordered = sorted(supports.items(), key=lambda item: item[0] != "boundary")  # a named edge overrides "boundary"
-    return {
-        int(i): kind if isinstance(kind, str) else "elastic"
-        for name, kind in ordered
-        if name in mesh.edges
-        for i in mesh.edges[name]
-    }
-
-
-def _outline(mesh: Any, held: Mapping[int, str], place: Any) -> str:
-    """The filled outline and its supported edges; each facet is a parabola through its middle."""
-    after = {int(a): (int(b), i) for i, (a, b) in enumerate(mesh.facets)}
-    arcs = {}
-    for i, (a, b) in enumerate(mesh.facets):
-        pull = 2.0 * mesh.middles[i] - 0.5 * (mesh.points[a] + mesh.points[b])
-        (px, py), (bx, by) = place(pull), place(mesh.points[b])
-        arcs[i] = f"Q{px:.1f} {py:.1f} {bx:.1f} {by:.1f}"
-    left, whole = set(after), ""
-    while left:
-        start = vertex = min(left)
-        whole += "M{:.1f} {:.1f}".format(*place(mesh.points[start]))
-        while vertex in left:
-            left.remove(vertex)
-            vertex, facet = after[vertex]
-            whole += arcs[facet]
-        whole += "Z"
-    drawn = f'<path d="{whole}" fill="{BODY}" fill-rule="evenodd" stroke="{STROKE}" stroke-width="1"/>'
-    for kind, (width, dashes) in EDGES.items():
-        parts, last = "", -1
-        for i in arcs:
-            if held.get(i) == kind:
-                start = int(mesh.facets[i, 0])
-                parts += ("" if start == last else "M{:.1f} {:.1f}".format(*place(mesh.points[start]))) + arcs[i]
-                last = int(mesh.facets[i, 1])
-        if parts:
-            style = f'stroke="{STROKE}" stroke-width="{width}" stroke-dasharray="{dashes}"'
-            drawn += f'<path d="{parts}" fill="none" {style}/>'
-    return drawn
-
-
-def _bar(x: np.ndarray) -> np.ndarray:
-    thick = 0.5 * BAR * float(np.ptp(x))
-    return np.array([[x.min(), -thick], [x.max(), thick]])
-
-
-def _end(place: tuple[float, float], kind: str) -> str:
-    """Support symbol at the end of a beam: a wall if clamped, a triangle if hinged."""
-    x, y = place
-    if kind == "clamped":
-        return f'<path d="M{x:.1f} {y - 26:.1f}v38" stroke="{STROKE}" stroke-width="4.5"/>'
-    if kind == "hinged":
-        return f'<path d="M{x:.1f} {y:.1f}l-7 12h14z" fill="{STROKE}"/>'
-    return ""
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -196,7 +92,7 @@ def _text(x: float, y: float, text: str, anchor: str = "start") -> str:
     return f'<text x="{x}" y="{y}" font-size="12" text-anchor="{anchor}" fill="{INK}">{html.escape(text)}</text>'
 
 
-def _picture(height: float, title: str, drawn: str) -> str:
+def picture(height: float, title: str, drawn: str) -> str:
     said = html.escape(title, quote=True)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:g} {height:.0f}" role="img" aria-label="{said}" '

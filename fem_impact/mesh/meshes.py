@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
-from . import drawings, mesh_files, smooth_edges
+from . import drawings, mesh_files, sketch, smooth_edges
 from .facets import Curves, divided
 from .loops import Bezier, Outline, circle, crossed, extent, polyline, signed_area, straight_loop
 from .triangulation import triangulate
@@ -82,7 +82,7 @@ class Mesh:
         edges = ", ".join(name for name in self.edges if name != "boundary")
         extent = " x ".join(f"{size:.4g} m" for size in np.ptp(self.points, axis=0))
         rows = [("extent", extent), ("points", len(self.points)), (kind, len(self.cells)), ("edges", edges)]
-        return markup.side_by_side(markup.body(self, title=f"Outline of a body of {extent}"), markup.table(rows))
+        return markup.side_by_side(sketch.body(self, title=f"Outline of a body of {extent}"), markup.table(rows))
 
     def refined(self, factor: float = 2.0) -> "Mesh":
         """The same body with elements smaller by ``factor``, fitted to the exact outline if it is known."""

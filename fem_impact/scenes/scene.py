@@ -17,6 +17,7 @@ from ..impact import collision, promise
 from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
+from ..mesh import sketch
 from ..mesh.meshes import Mesh
 from ..model import planner
 from ..model.planner import Blow, Plan, Run
@@ -152,7 +153,7 @@ class Scene:
         points = [np.atleast_1d(np.asarray(point, float)) for point in self.watched]
         title = f"Outline of the struck body, struck at ({', '.join(f'{x:.4g}' for x in at)}) m"
         title += f", observed at {len(points)} point{'s' * (len(points) > 1)}" if points else ""
-        return markup.body(self.body(), supports=self.supports.values, at=at, points=points, title=title)
+        return sketch.body(self.body(), supports=self.supports.values, at=at, points=points, title=title)
 
     def _repr_html_(self) -> str:
         """For notebooks: the picture and the contents of each table."""

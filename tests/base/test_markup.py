@@ -51,31 +51,6 @@ def test_modes_and_meshes_show_themselves():
     assert "3 x 2 m" in "".join(parsed(fi.mesh.rectangle(3.0, 2.0)._repr_html_()).itertext()).replace(" m x", " x")
 
 
-@pytest.mark.parametrize("mesh", [fi.mesh.disk(0.1, hole=0.02), fi.mesh.line(1.0), fi.mesh.rectangle(1.0, 2.0)])
-def test_every_edge_can_be_drawn_in_every_way(mesh):
-    for kind in ("clamped", "hinged", "free"):
-        picture = markup.body(mesh, supports={"boundary": kind}, title="a < b")
-        tree = parsed(picture)
-        assert tree[0].get("aria-label") == "a < b"
-        box = [float(x) for x in tree[0].get("viewBox").split()]
-        assert 0 < box[3] < 2.0 * markup.WIDTH
-
-
-def test_curved_outline_is_drawn_as_round_as_it_is():
-    disk = fi.mesh.disk(0.1)
-    path = next(parsed(markup.body(disk, title="disk")).iter(f"{SVG}path")).get("d")
-    assert path.count("Z") == 1
-    ring = fi.mesh.disk(0.1, hole=0.03)
-    assert next(parsed(markup.body(ring, title="ring")).iter(f"{SVG}path")).get("d").count("Z") == 2
-
-
-def test_named_edge_overrules_the_whole():
-    mesh = fi.mesh.rectangle(1.0, 1.0)
-    held = markup.held_edges(mesh, {"left": "clamped", "boundary": "hinged"})
-    assert {held[int(i)] for i in mesh.edges["left"]} == {"clamped"}
-    assert {held[int(i)] for i in mesh.edges["top"]} == {"hinged"}
-
-
 def test_flat_and_single_histories_are_drawn():
     for x, y in ((np.zeros(1), np.zeros(1)), (np.arange(3.0), np.zeros(3))):
         assert "NaN" not in markup.curve(x, y, label="force", unit="N", title="none") and "nan" not in markup.curve(

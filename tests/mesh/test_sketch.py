@@ -1,0 +1,41 @@
+"""Sketches of bodies are well-formed, round where the body is round, and say how each edge is held."""
+
+from xml.etree import ElementTree
+
+import pytest
+
+import fem_impact as fi
+from fem_impact._base import markup
+from fem_impact.mesh import sketch
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def parsed(html):
+    """HTML that is XML as well: whatever is not closed or escaped fails here."""
+    return ElementTree.fromstring(f"<div>{html}</div>")
+
+
+@pytest.mark.parametrize("mesh", [fi.mesh.disk(0.1, hole=0.02), fi.mesh.line(1.0), fi.mesh.rectangle(1.0, 2.0)])
+def test_every_edge_can_be_drawn_in_every_way(mesh):
+    for kind in ("clamped", "hinged", "free", fi.Elastic(1e4)):
+        picture = sketch.body(mesh, supports={"boundary": kind}, title="a < b")
+        tree = parsed(picture)
+        assert tree[0].get("aria-label") == "a < b"
+        box = [float(x) for x in tree[0].get("viewBox").split()]
+        assert 0 < box[3] < 2.0 * markup.WIDTH
+
+
+def test_curved_outline_is_drawn_as_round_as_it_is():
+    disk = fi.mesh.disk(0.1)
+    path = next(parsed(sketch.body(disk, title="disk")).iter(f"{SVG}path")).get("d")
+    assert path.count("Z") == 1
+    ring = fi.mesh.disk(0.1, hole=0.03)
+    assert next(parsed(sketch.body(ring, title="ring")).iter(f"{SVG}path")).get("d").count("Z") == 2
+
+
+def test_named_edge_overrules_the_whole():
+    mesh = fi.mesh.rectangle(1.0, 1.0)
+    held = sketch.held_edges(mesh, {"left": "clamped", "boundary": "hinged"})
+    assert {held[int(i)] for i in mesh.edges["left"]} == {"clamped"}
+    assert {held[int(i)] for i in mesh.edges["top"]} == {"hinged"}
