@@ -102,6 +102,7 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
         observed=bool(scene.watched),
         tiles=_tiles(response),
         response=response,
+        verdict=tidy(response.verdict),
         budget=_budget(response),
         modelled=_modelled(response, run),
         reasons=map(tidy, run.plan.reasons),

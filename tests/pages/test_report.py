@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 from conftest import Page
+from scenes import SMALL
 from test_cli import TEXT
 
 import fem_impact as fi
@@ -269,3 +270,12 @@ def test_pictures_have_a_text_for_those_who_cannot_see_them(desktop):
     assert tab.evaluate(f"{pictures}.length") > 5 and tab.evaluate(f"{pictures}.filter({bare}).length") == 0
     unnamed = "[...document.querySelectorAll('input, select')].filter(e => !e.labels.length).length"
     assert tab.evaluate(unnamed) == 0
+
+
+def test_a_report_begins_with_what_was_missed_and_what_would_meet_it(tmp_path):
+    (tmp_path / "scene.toml").write_text(SMALL)
+    scene = fi.load_scene(tmp_path / "scene.toml")
+    fi.report.write(tmp_path / "report.html", scene, scene.run(target="modal", n_modes=5, tolerance=1e-6))
+    page = (tmp_path / "report.html").read_text()
+    head = page[page.index("<header>") : page.index("</header>")]
+    assert 'class="badge bad"' in head and "MISSED" in head and "modes of the target instead of 5" in head
