@@ -17,7 +17,7 @@ import threading
 import time
 import webbrowser
 from collections.abc import Iterator, MutableMapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -427,10 +427,10 @@ def _map(options: argparse.Namespace) -> None:
     scene = fi.load_scene(options.scene)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:
-        with _counted("cells") as watch:
+        with _counted("cells") as (watch, stage):
             table = maps.map_scene(
                 scene, tolerance=options.tolerance, workers=options.workers, client=options.cluster,
-                store=options.store, watch=watch, max_cells=options.max_cells, tell=_tell,
+                store=options.store, watch=watch, max_cells=options.max_cells, tell=_tell, stage=stage,
             )  # fmt: skip
         with _progress("files"):
             names = maps.write(staging, table, options.format)
@@ -450,6 +450,7 @@ def _hammer(options: argparse.Namespace) -> None:
     with _progress("hammers"):
         hammers = maps.hammers_for(scene, options.bandwidth, masses, drop=options.drop)
         if options.out is not None:
+            options.out.parent.mkdir(parents=True, exist_ok=True)
             fi.figures.save(options.out, plots.hammers(hammers, options.bandwidth, options.drop))
     if options.json:
         data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [hammer.data() for hammer in hammers]}
@@ -625,7 +626,7 @@ def _counted(what: str) -> Iterator[Any]:
     name, rate = (bars.TextColumn(text) for text in ("{task.description}", "{task.fields[rate]}"))
     with _bar(name, bars.BarColumn(), bars.MofNCompleteColumn(), rate, bars.TimeRemainingColumn()) as bar:
         if bar is None:
-            yield None
+            yield None, None
             return
         task, began = bar.add_task(what, total=None, rate=""), time.perf_counter()
         known: list[int] = []
@@ -634,9 +635,14 @@ def _counted(what: str) -> Iterator[Any]:
             if not known:
                 known.append(done)
             speed = (done - known[0]) / max(1e-9, time.perf_counter() - began)
-            bar.update(task, completed=done, total=total, rate=f"{speed:.3g}/s" if speed else "")
+            rate = f"{speed:.3g}/s" if speed else ""
+            bar.update(task, description=what, completed=done, total=total, rate=rate)
 
-        yield watch
+        def stage(name: str) -> Any:
+            bar.update(task, description=name, completed=0, total=None, rate="")
+            return nullcontext()
+
+        yield watch, stage
 
 
 if __name__ == "__main__":

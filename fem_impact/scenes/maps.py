@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -57,7 +58,8 @@ def map_scene(
     tolerance : float [-], optional
         Replaces the tolerance of the scene.
     **wanted
-        ``workers``, ``client``, ``store``, ``watch``, ``max_cells`` and ``tell`` of `sweep`.
+        ``workers``, ``client``, ``store``, ``watch``, ``max_cells`` and ``tell`` of `sweep`; and ``stage``, called with
+        "modes" while modes are found, which returns a context manager. Beside a store, the modes are kept in a file.
 
     Returns
     -------
@@ -131,7 +133,12 @@ def _quick_map(
 ) -> xarray.Dataset:
     """A map whose axes do not need a new body."""
     law, striker, blow = scene.make_contact(), scene.make_striker(), scene.blow.values
-    case = grid.Case(scene.modes(FIRST_LOOK), striker, law, np.atleast_1d(np.asarray(blow["at"], float)), blow["speed"])
+    wanted = dict(wanted)
+    stage, store = wanted.pop("stage", None) or nullcontext, wanted.get("store")
+    keep = None if store is None else Path(store).with_name(f"{Path(store).name}.modes.npz")
+    with stage("modes"):
+        first = scene.modes(FIRST_LOOK)
+    case = grid.Case(first, striker, law, np.atleast_1d(np.asarray(blow["at"], float)), blow["speed"])
     axes = grid.checked_axes(case, over)
 
     def reach(tolerance: float) -> float:
@@ -151,7 +158,8 @@ def _quick_map(
                 f"{'no tolerance is large enough' if enough is None else f'tolerance = {enough:g} is affordable'}; or "
                 "leave out the stiffest contacts and the lightest strikers"
             )
-        modes = scene.modes(number)
+        with stage("modes"):
+            modes = scene.modes(number, keep=keep)
     case = replace(case, modes=modes)
     table = grid.sweep(
         modes, striker, law, at=blow["at"], speed=blow["speed"], over=over, tolerance=tolerance, max_frequency=band,

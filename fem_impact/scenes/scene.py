@@ -54,8 +54,11 @@ class Scene:
         """
         return promise.kept(self.run(**changes).response, strict)
 
-    def modes(self, count: int | None = None) -> Modes:
-        """Modes of the struck body: the first ``count``, or as many as the blow needs to meet its tolerance."""
+    def modes(self, count: int | None = None, *, keep: Path | None = None) -> Modes:
+        """Modes of the struck body: the first ``count``, or as many as the blow needs to meet its tolerance.
+
+        ``keep`` is an .npz file in which modes by finite elements are saved, and found by the same call later.
+        """
         if count is None:
             return planner.struck(self.plan(target="modal"), Stages())
         target = self.built.target
@@ -65,7 +68,10 @@ class Scene:
         tolerance = self.blow.values.get("tolerance", collision.TOLERANCE)
         with self.blame("strike"):
             check.tolerance(tolerance)
-        return target.finished(target.find(count, tolerance=tolerance))
+        first = None
+        if keep is not None and target.kind == "fe" and count > planner.FIRST_LOOK:
+            first = target.find(planner.FIRST_LOOK, tolerance=tolerance)  # what is kept starts from its mesh
+        return target.finished(target.find(count, tolerance=tolerance, first=first, keep=keep))
 
     @check.typed
     def plan(self, *, watch: Watch | None = None, **changes: Any) -> Plan:

@@ -206,7 +206,7 @@ SCALARS = (
     "energy_error", "momentum_error", "tolerance", "tolerance_met", "verdict", "finished", "scheme",
 )  # fmt: skip
 ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "sensitivity", "total", "resolvable")
-IMPACT_PARTS = ("start", "end", "peak_force", "impulse")
+IMPACT_PARTS = ("start", "end", "peak_force", "impulse", "contact")
 
 
 @check.typed

@@ -1,15 +1,18 @@
 """Maps of scenes, their pictures and files, the choice of a hammer, and both at the prompt."""
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 from numpy.testing import assert_allclose
+from scenes import QUICK
 
 import fem_impact as fi
 from fem_impact import cli
+from fem_impact.fe import refinement
 from fem_impact.scenes import maps
 from fem_impact.scenes.scene import scene_of
 from fem_impact.show import plots
@@ -245,3 +248,23 @@ def test_cells_of_finite_element_scenes_are_struck_scenes(body, exponent):
         assert_allclose(float(cell.restitution), hit.restitution, atol=2.0 * hit.tolerance)  # one each
         for layer in ("contact_time", "peak_force", "impulse"):
             assert_allclose(float(cell[layer]), getattr(hit, layer), rtol=2.0 * hit.tolerance)
+
+
+def test_a_map_with_a_store_keeps_its_modes_too(tmp_path, monkeypatch):
+    """The second call finds the modes in the file beside the store: it only takes the first look again."""
+    text = QUICK.replace('source = "analytic"', 'source = "fe"').replace("mass = [0.03, 0.05]", "mass = [0.001, 0.002]")
+    (tmp_path / "scene.toml").write_text(text.replace("stiffness = 1e4", "stiffness = 1e6"))
+    scene, solved, stages = fi.load_scene(tmp_path / "scene.toml"), [], []
+    solve = refinement.solve
+    monkeypatch.setattr(refinement, "solve", lambda *args: solved.append(args[1]) or solve(*args))
+
+    def stage(name):
+        stages.append(name)
+        return nullcontext()
+
+    first = maps.map_scene(scene, store=tmp_path / "store", stage=stage)
+    assert (tmp_path / "store.modes.npz").is_file() and set(stages) == {"modes"}
+    before = len(solved)
+    again = maps.map_scene(fi.load_scene(tmp_path / "scene.toml"), store=tmp_path / "store")
+    assert len(solved) - before < before
+    assert again.identical(first)
