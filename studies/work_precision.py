@@ -267,7 +267,7 @@ def whole_call(n_modes: int, mass: float, stiffness: float) -> tuple[fi.Response
     """A stick on the complete plate at 1e-6: response, best time of the call, that of its loops, number of loops."""
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=n_modes)
     stick, law = fi.Striker.stick(mass, 10e3), fi.Contact.linear(stiffness)
-    loop, taken = energy.run_energy, []
+    loop, taken = collision.run_energy, []
 
     def timed(*state: object) -> tuple:
         begin = time.perf_counter()
@@ -280,7 +280,7 @@ def whole_call(n_modes: int, mass: float, stiffness: float) -> tuple[fi.Response
 
     hit = once()
     best, loops = np.inf, np.inf
-    energy.run_energy = timed
+    collision.run_energy = timed
     try:
         for _ in range(CALLS):
             taken.clear()
@@ -288,7 +288,7 @@ def whole_call(n_modes: int, mass: float, stiffness: float) -> tuple[fi.Response
             once()
             best, loops = min(best, time.perf_counter() - begin), min(loops, sum(taken))
     finally:
-        energy.run_energy = loop
+        collision.run_energy = loop
     return hit, best, loops, len(taken)
 
 

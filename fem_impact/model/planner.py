@@ -1,6 +1,7 @@
 """Choose the smallest model of a blow that meets its tolerance, and run it."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from inspect import signature
@@ -307,7 +308,8 @@ def _within(run: Callable[..., Response], values: Mapping[str, Any], tolerance: 
     hit = run(**{**values, "tolerance": first})
     left = tolerance - (hit.error.total - hit.error.step)
     if hit.error.total > tolerance and left > 0.0 and not values.get("dt"):
-        hit = run(**{**values, "tolerance": max(FINEST, 0.9 * left)})
+        with suppress(check.SimulationError):  # steps so fine that nothing is gained: the tolerance is missed
+            hit = run(**{**values, "tolerance": max(FINEST, 0.9 * left)})
     return replace(hit, tolerance=tolerance)
 
 

@@ -1,0 +1,74 @@
+"""Free flight against closed forms: the time of the next onset, and the proof that there is none."""
+
+import numpy as np
+import pytest
+from numba import njit
+from numpy.testing import assert_allclose
+from scipy.optimize import brentq
+
+from fem_impact.impact.compiled import flight, propagation
+
+ONSET, NEVER, LATER = 0, 1, 2  # how a flight ends, see `flight.find_onset`
+
+
+@njit
+def find_onset(omega, zeta, shape, offset, bias, left, base, tables, known, q, p):
+    return flight.find_onset(
+        omega, zeta, shape, offset, bias, left, base, 1e-3 * base, 0.0, 0.0, tables, known, q, p
+    )  # fmt: skip
+
+
+def fly(omega, shape, q, p, *, offset=0.0, bias=None, left=np.inf, zeta=0.0, base=1e-4):
+    """Elapsed time, contact and end of a flight, and the state after it."""
+    omega, q, p = (np.array(x, float) for x in (omega, q, p))
+    n = len(omega)
+    bias = np.zeros(n) if bias is None else np.array(bias, float)
+    tables = np.empty((flight.GLIDES + 1, propagation.N_LANE, n))
+    known = np.zeros(flight.GLIDES + 1, bool)
+    shape, offset = np.atleast_2d(np.array(shape, float)), np.array([offset])
+    return *find_onset(omega, np.full(n, zeta), shape, offset, bias, left, base, tables, known, q, p), q, p
+
+
+@pytest.mark.parametrize("gap, speed, gravity", [(1e-3, 0.5, 0.0), (0.2, 0.0, 9.81), (0.05, -1.0, 9.81)])
+def test_a_rigid_body_falls(gap, speed, gravity):
+    elapsed, contact, found, _, p = fly([0.0], [1.0], [0.0], [speed], offset=-gap, bias=[gravity])
+    root = np.sqrt(speed * speed + 2.0 * gravity * gap)
+    assert (contact, found) == (0, ONSET)
+    assert_allclose(elapsed, gap / speed if gravity == 0.0 else (root - speed) / gravity, rtol=1e-13)
+    assert_allclose(p[0], root, rtol=1e-13)
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.02])
+def test_an_approaching_body_meets_a_swinging_one(zeta):
+    """A striker at constant speed and one mode: the first zero of d(t) by bracketing."""
+    w, speed, gap = 3e3, 0.3, 2e-3
+    damped = w * np.sqrt(1.0 - zeta * zeta)
+
+    def approach(t):
+        swing = 1e-3 * np.exp(-zeta * w * t) * (np.cos(damped * t) + zeta * w / damped * np.sin(damped * t))
+        return speed * t - gap - swing
+
+    t = np.linspace(0.0, 2.0 * gap / speed, 20001)
+    first = np.flatnonzero(approach(t) > 0.0)[0]
+    exact = brentq(approach, t[first - 1], t[first], xtol=1e-16)
+    elapsed, _, found, *_ = fly([0.0, w], [1.0, -1.0], [0.0, 1e-3], [speed, 0.0], offset=-gap, zeta=zeta)
+    assert found == ONSET
+    assert_allclose(elapsed, exact, rtol=1e-11)
+
+
+def test_a_receding_body_never_returns():
+    """The swing of 1 mm cannot reach a body that is 2 mm away and recedes; one that is 0.5 mm away it meets."""
+    motion = {"omega": [0.0, 3e3], "shape": [1.0, -1.0], "q": [0.0, 1e-3], "p": [-1e-3, 0.0]}
+    elapsed, _, found, q, p = fly(**motion, offset=-2e-3)
+    assert (elapsed, found) == (0.0, NEVER)
+    assert q.tolist() == motion["q"] and p.tolist() == motion["p"]
+    elapsed, _, found, *_ = fly(**motion, offset=-5e-4)
+    assert found == ONSET
+    exact = brentq(lambda t: -1e-3 * t - 5e-4 - 1e-3 * np.cos(3e3 * t), 0.5 / 3e3, 1.0 / 3e3 * np.pi)
+    assert_allclose(elapsed, exact, rtol=1e-11)
+
+
+def test_a_flight_ends_at_its_limit():
+    elapsed, contact, found, q, _ = fly([0.0], [1.0], [0.0], [0.5], offset=-1.0, left=0.25)
+    assert (elapsed, contact, found) == (0.25, -1, LATER)
+    assert_allclose(q[0], 0.125, rtol=1e-14)

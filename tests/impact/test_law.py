@@ -1,0 +1,82 @@
+"""The contact law: its force is the slope of its energy, and the average slopes hold for any two approaches."""
+
+import numpy as np
+import pytest
+from numba import njit
+from numpy.testing import assert_allclose
+
+from fem_impact.impact.compiled import law
+
+LAWS = [(1e5, 1.0, 0.0), (1e7, 1.5, 0.0), (3e6, 1.3, 0.0), (1e5, 1.0, 3e-6), (1e7, 1.5, 1e-7), (1e4, 0.7, 1e-5)]
+
+
+@njit
+def at(d, k, a, c):
+    return law.at(d, law.Spring(k, a, 0.0, c))
+
+
+@njit
+def slopes(d0, d1, k, a, c):
+    spring = law.Spring(k, a, 0.0, c)
+    return law.slopes(law.at(d0, spring), law.at(d1, spring), spring)
+
+
+@njit
+def smooth_force(x, v, k, a, loss):
+    return law.smooth_force(x, v, law.Spring(k, a, loss, 0.0))
+
+
+@pytest.mark.parametrize("k, a, c", LAWS)
+def test_energy_is_the_integral_of_the_force(k, a, c):
+    """Gauss's rule over the compression x, where the approach is x + c F."""
+    x, weight = np.polynomial.legendre.leggauss(60)
+    top = 1e-3
+    x, weight = 0.5 * top * (x + 1.0), 0.5 * top * weight
+    force = k * x**a
+    work = weight @ (force * (1.0 + c * a * force / x))
+    assert_allclose(at(top + c * k * top**a, k, a, c).energy, work, rtol=1e-6)  # x**0.7 is not smooth at zero
+
+
+@pytest.mark.parametrize("k, a, c", LAWS)
+def test_compression_and_series_spring_make_up_the_approach(k, a, c):
+    for d in (1e-12, 1e-6, 1e-3, 1.0):
+        point = at(d, k, a, c)
+        assert_allclose(point.force, k * point.compression**a, rtol=1e-14)
+        assert_allclose(point.compression + c * point.force, d, rtol=1e-14)
+    assert at(-1e-3, k, a, c)[2:] == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("k, a, c", LAWS)
+def test_average_slopes_are_the_differences_where_these_keep_digits(k, a, c):
+    for d0, d1 in ((1e-4, 3e-4), (3e-4, 1e-4), (-1e-4, 2e-4), (2e-4, -1e-4), (1e-7, 1e-3)):
+        one, two = at(d0, k, a, c), at(d1, k, a, c)
+        energy, force = slopes(d0, d1, k, a, c)
+        assert_allclose(energy, (two.energy - one.energy) / (d1 - d0), rtol=1e-13)
+        assert_allclose(force, (two.force - one.force) / (d1 - d0), rtol=1e-13)
+
+
+@pytest.mark.parametrize("k, a, c", LAWS)
+def test_average_slopes_of_close_approaches_are_force_and_tangent(k, a, c):
+    """The differences would lose all digits here; the slopes at the middle err by the square of the distance."""
+    d, step = 2e-4, 1e-12
+    energy, force = slopes(d - step, d + step, k, a, c)
+    point = at(d, k, a, c)
+    tangent = a * point.force / point.compression
+    assert_allclose(energy, point.force, rtol=1e-13)
+    assert_allclose(force, tangent / (1.0 + c * tangent), rtol=1e-13)
+
+
+@pytest.mark.parametrize("x, v", [(2e-4, 0.5), (2e-4, -1.5), (-1e-4, 0.2)])
+@pytest.mark.parametrize("k, a", [(1e5, 1.0), (1e7, 1.5), (3e6, 2.0)])
+def test_slopes_of_a_lossy_force_by_central_differences(x, v, k, a):
+    loss, step = 0.3, 1e-4
+    force, by_x, by_v = smooth_force(x, v, k, a, loss)
+    assert_allclose(force, np.sign(x) * k * abs(x) ** a * (1.0 + loss * v), rtol=1e-14)
+    ends = [smooth_force(x * (1.0 + sign * step), v, k, a, loss)[0] for sign in (-1.0, 1.0)]
+    assert_allclose(by_x, (ends[1] - ends[0]) / (2.0 * x * step), rtol=1e-8)  # of order step**2
+    ends = [smooth_force(x, v + sign * step, k, a, loss)[0] for sign in (-1.0, 1.0)]
+    assert_allclose(by_v, (ends[1] - ends[0]) / (2.0 * step), rtol=1e-10)  # straight in the rate
+
+
+def test_a_lossy_contact_never_pulls():
+    assert smooth_force(1e-4, -4.0, 1e5, 1.5, 0.3) == (0.0, 0.0, 0.0)
