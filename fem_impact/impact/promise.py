@@ -26,7 +26,7 @@ def verdict(hit: "Response") -> str:
     if hit.tolerance_met:
         return f"tolerance {hit.tolerance:g} met: estimated error {error.total:.1e} of {what}"
     if not error.resolvable:
-        why = f"the modes left out govern the contact itself, so that no error of {what} can be estimated"
+        why = f"not resolvable: the modes left out govern the contact itself, and no error of {what} can be estimated"
     else:
         cause, size = error.dominant
         why = f"estimated error {error.total:.1e} of {what}, mostly from {cause} ({size:.1e})"

@@ -570,7 +570,7 @@ def struck(plan: Plan, stages: Stages, keep: Any = None) -> Modes:
 
 @check.typed
 def strike(
-    body: Modes | System,
+    modes: Modes | System,
     striker: Striker,
     contact: Contact,
     *,
@@ -584,7 +584,7 @@ def strike(
 
     Parameters
     ----------
-    body : Modes or System
+    modes : Modes or System
         The struck body. Of an assembled system, the blow computes only what it needs: as many modes as the tolerance
         takes, or none if the body may count as rigid or infinite (see `fi.plan`). Modes are taken as they are; those
         left out act by their static compliance.
@@ -638,8 +638,8 @@ def strike(
     >>> hit.n_impacts, round(hit.restitution, 2), hit.error.total < 1e-3
     (1, 0.55, True)
     """
-    if isinstance(body, Modes) and damping_ratio is None and not set(options) & set(PIECES):
+    if isinstance(modes, Modes) and damping_ratio is None and not set(options) & set(PIECES):
         tolerance = check.tolerance(options.get("tolerance", collision.TOLERANCE))
-        run = partial(collision.strike, body, striker, contact, at=at, speed=speed)
+        run = partial(collision.strike, modes, striker, contact, at=at, speed=speed)
         return promise.kept(_within(run, options, tolerance, tolerance), strict)
-    return plan_of(body, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options).strike(strict)
+    return plan_of(modes, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options).strike(strict)

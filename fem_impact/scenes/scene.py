@@ -321,7 +321,7 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
 
 @check.typed
 def plan(
-    blow: Scene | str | Path | System | Modes,
+    scene: Scene | str | Path | System | Modes,
     striker: Striker | None = None,
     contact: Contact | None = None,
     *,
@@ -332,7 +332,7 @@ def plan(
 
     Parameters
     ----------
-    blow : Scene, path of a scene file, System or Modes
+    scene : Scene, path of a scene file, System or Modes
         A scene says everything. A body needs the arguments of `strike`, given here in the same way.
     striker, contact : Striker, Contact
         For a body only.
@@ -353,11 +353,11 @@ def plan(
     >>> print(fi.plan("studies/scenes/heavy_plate.toml", tolerance=1e-2).target)
     rigid
     """
-    if isinstance(blow, (System, Modes)):
-        return planner.plan_of(blow, striker, contact, watch, **changes)
+    if isinstance(scene, (System, Modes)):
+        return planner.plan_of(scene, striker, contact, watch, **changes)
     if striker is not None or contact is not None:
         raise ValueError("striker and contact must be left out for a scene, which has its own")
-    return (blow if isinstance(blow, Scene) else load_scene(blow)).plan(watch=watch, **changes)
+    return (scene if isinstance(scene, Scene) else load_scene(scene)).plan(watch=watch, **changes)
 
 
 def _check_whole(scene: Scene) -> None:

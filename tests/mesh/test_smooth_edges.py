@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fem_impact.mesh.smooth_edges import follow, smooth_runs
+from fem_impact.mesh.smooth_edges import _corners, follow, smooth_runs
 
 
 def loop_of(place):
@@ -12,12 +12,16 @@ def loop_of(place):
     return [np.column_stack([np.arange(n), (np.arange(n) + 1) % n])]
 
 
+def n_corners_of(place):
+    return np.count_nonzero(_corners(place))
+
+
 @pytest.mark.parametrize("turn", [1.0, -1.0])  # the rim of a disk, and that of a hole
 def test_points_of_a_circle_are_a_circle_wherever_they_lie(turn):
     angle = turn * np.sort(np.random.default_rng(2).uniform(0.0, 2.0 * np.pi, 60))
     place = np.array([5.0, -3.0]) + 2.0 * np.column_stack([np.cos(angle), np.sin(angle)])
     rim = follow(place, loop_of(place), {})
-    assert (rim.n_curved, rim.n_corners) == (60, 0)
+    assert (rim.n_curved, n_corners_of(place)) == (60, 0)
     assert_allclose(np.linalg.norm(rim.middles - [5.0, -3.0], axis=1), 2.0, rtol=1e-12)
     assert_allclose(rim.curvatures, turn / 2.0, rtol=1e-10)
     assert_allclose(rim.tangents[:, 0], turn * np.column_stack([-np.sin(angle), np.cos(angle)]), atol=1e-11)
@@ -37,7 +41,7 @@ def test_fit_to_an_ellipse_converges():
     for n in (40, 80):
         place, tangent, curvature = ellipse(n)
         rim = follow(place, loop_of(place), {})
-        assert (rim.n_curved, rim.n_corners) == (n, 0)
+        assert (rim.n_curved, n_corners_of(place)) == (n, 0)
         off = np.abs((rim.middles / [2.0, 1.0]) ** 2 @ [1.0, 1.0] - 1.0)
         bend = np.abs(rim.curvatures[:, 0] - curvature)
         errors.append([np.abs(rim.tangents[:, 0] - tangent).max(), bend.max(), off.max()])
@@ -67,7 +71,7 @@ def stadium(n):
 def test_half_circles_and_straight_sides_meet_smoothly():
     place = stadium(20)
     rim = follow(place, loop_of(place), {})
-    assert (rim.n_curved, rim.n_corners) == (40, 4)
+    assert (rim.n_curved, n_corners_of(place)) == (40, 4)
     curved = rim.curvatures[:, 0] > 0.0
     assert_allclose(rim.curvatures[curved], 1.0, rtol=1e-9)
     centre = np.where(rim.middles[curved, :1] > 0.0, 1.0, -1.0) * [1.0, 0.0]
@@ -83,7 +87,7 @@ def test_a_square_has_four_corners_and_no_curve():
     place = np.concatenate([np.column_stack(x) for x in ((side, 0 * side), (1 + 0 * side, side))])
     place = np.concatenate([place, 1.0 - place])
     rim = follow(place, loop_of(place), {})
-    assert (rim.n_curved, rim.n_corners) == (0, 4)
+    assert (rim.n_curved, n_corners_of(place)) == (0, 4)
     assert_allclose(rim.curvatures, 0.0, atol=0.0)
 
 
@@ -92,4 +96,4 @@ def test_a_polygon_of_few_sides_stays_one():
     for n, n_corners in ((8, 8), (24, 0)):
         angle = 2.0 * np.pi * np.arange(n) / n
         place = np.column_stack([np.cos(angle), np.sin(angle)])
-        assert follow(place, loop_of(place), {}).n_corners == n_corners
+        assert n_corners_of(place) == n_corners
