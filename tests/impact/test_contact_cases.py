@@ -41,6 +41,7 @@ def struck(n_modes=20, u_striker=10.0, u_plate=2.0):
 # --- case 24: a thousand bounces -------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exponent", [1.0, 1.5])
 def test_a_thousand_bounces_keep_their_height(exponent):
     steps, *_, status, _, _ = run(
@@ -57,6 +58,7 @@ def test_a_thousand_bounces_keep_their_height(exponent):
 # --- case 26: limits of mass and stiffness ---------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["A", "A4"])
 def test_rigid_contact_at_a_fixed_step_stays_bounded_and_converges(scheme):
     """k to infinity: one blow becomes an impulse of two steps, whatever the stiffness."""

@@ -149,6 +149,7 @@ def test_rest_stays_for_a_million_steps(stiffness):
     assert_allclose(r.force, weight, rtol=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exponent", [1.0, 1.5])
 def test_eight_nodes_and_ten_agree(exponent):
     omega, shape = plate(12, top=2e4)

@@ -341,6 +341,7 @@ def by_scipy(part, mass, law, speed, horizon):
     return reference.Outcome(0, -shape[0] * y[n] / speed, y[-1], time, peak, n_impacts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "mass", "zeta", "n_impacts"),
     [
