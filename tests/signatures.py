@@ -332,6 +332,7 @@ def judged(name: str, changes: Mapping[str, Any]) -> str:
     try:
         with limited(PATIENCE), warnings.catch_warnings():
             warnings.simplefilter("error")
+            warnings.simplefilter("ignore", fi.ToleranceWarning)  # it says what it is for
             result = call(name, **changes)
             broken = not_finite(result)
             return f"result holds {broken}" if broken and name.partition(" ")[0] not in INFINITE else ""

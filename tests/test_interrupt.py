@@ -22,7 +22,7 @@ COMMANDS = {  # words, and what is there when they are done
     "strike": ("strike scene.toml --out out", ["force.csv", "force.png", "modes", "modes.pvd", "response.json"]),
     "modes": ("modes scene.toml --vtk out/m.pvd", ["m", "m.pvd"]),
     "map": ("map scene.toml --out out --store store", ["map.csv", "map.nc"]),
-    "hammer": ("hammer scene.toml --bandwidth 300 --out out/h.png", ["h.png"]),
+    "hammer": ("hammer scene.toml --bandwidth 300 --masses 0.01 0.03 --out out/h.png", ["h.png"]),
     "report": ("report scene.toml --out out/r.html", ["r.html"]),
     "doctor": ("doctor", []),
     "plan": ("plan scene.toml", []),

@@ -409,7 +409,8 @@ class Response:
 
     def modal_energy(self, times: Any, *, body: int = -1) -> np.ndarray:
         """Energy [J] of each mode of the target at any times, (n_times, n_modes); parameters as in `modal_state`."""
-        return mode_energy(self.bodies[body].omega, *self.modal_state(times, body=body))
+        q, p = self.modal_state(times, body=body)
+        return mode_energy(self.bodies[body].omega, q, p)
 
     @check.typed
     def displacement(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:

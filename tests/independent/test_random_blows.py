@@ -414,8 +414,8 @@ def few(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def many(tmp_path_factory):
-    return judged_blows(SEED + 1, 225, ALL, (-5.0, -2.0), tmp_path_factory.mktemp("many"))
+def many(tmp_path_factory, all_cases):
+    return judged_blows(SEED + 1, 225 if all_cases else 100, ALL, (-5.0, -2.0), tmp_path_factory.mktemp("many"))
 
 
 def check_promises(judged, left):
@@ -431,19 +431,23 @@ def check_fairness(judged, left):
     assert np.mean((ratio >= FAIR[0]) & (ratio <= FAIR[1])) >= 0.9, table(judged, left)
 
 
+@pytest.mark.xdist_group("few blows")
 def test_promises_are_kept_or_their_miss_is_told(few):
     check_promises(*few)
 
 
+@pytest.mark.xdist_group("few blows")
 def test_claims_are_fair(few):
     check_fairness(*few)
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("many blows")
 def test_more_promises_are_kept_or_their_miss_is_told(many):
     check_promises(*many)
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("many blows")
 def test_more_claims_are_fair(many):
     check_fairness(*many)
