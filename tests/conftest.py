@@ -38,6 +38,7 @@ class Page:
     def tabbed_to(self, most=200):
         """Press Tab until the focus comes round; what it stopped at, and whether each could be seen to have it."""
         stops = []
+        self.tab.bring_to_front()
         for _ in range(most):
             self.tab.keyboard.press("Tab")
             stop = self.tab.evaluate(
@@ -50,9 +51,10 @@ class Page:
                     return [e.tagName, name, shown];
                 }"""
             )
-            if stop[0] == "BODY" or (stops and stop == stops[0]):
+            if stops and (stop[0] == "BODY" or stop == stops[0]):
                 break
-            stops.append(stop)
+            if stop[0] != "BODY":  # a page that has just come may not have the focus yet
+                stops.append(stop)
         return stops
 
 

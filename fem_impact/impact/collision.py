@@ -103,7 +103,7 @@ class _System:
 
 
 @dataclass(frozen=True)
-class _Options:
+class Options:
     """When to stop, how accurate to be, and which scheme to use."""
 
     tolerance: float
@@ -114,7 +114,7 @@ class _Options:
     quantities: Mapping[str, float | None]  # that must meet the tolerance, each with its band [Hz]
 
     @classmethod
-    def checked(cls, tolerance, duration, max_impacts, scheme, dt, quantity) -> "_Options":
+    def checked(cls, tolerance, duration, max_impacts, scheme, dt, quantity) -> "Options":
         return cls(
             check.tolerance(tolerance),
             np.inf if duration is None else check.positive("duration", duration, "s"),
@@ -166,7 +166,7 @@ def strike(
         check.number(name, x, "N") for name, x in (("striker_force", striker_force), ("target_force", target_force))
     ]
     point = modes.point("at", at)
-    options = _Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
+    options = Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
     rows = modes.shapes.at(point)
     rest = left_out(modes, point, rows) if residual and modes.dimension else None
     struck = _part(modes, ((0, -1.0),), point, rows, rest, forces[1])
@@ -230,7 +230,7 @@ def collide(
     >>> [round(float(hit.velocity(None, [0.01], body=i)[0, 0]), 3) for i in range(3)]  # m/s
     [0.0, 0.0, 1.0]
     """
-    options = _Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
+    options = Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
     bodies, contacts = check.several("bodies", bodies, Modes), check.several("contacts", contacts, Touch)
     parts, arriving = _parts(bodies, contacts, speeds, states, forces, residual)
     return promise.kept(_follow(bodies, contacts, parts, arriving, options), strict)

@@ -12,7 +12,7 @@ from ..fe.splitting import distance
 from ..impact import threshold
 from ..mesh.meshes import Mesh
 from ..modes.modal import Modes, SampledShapes, at_rest
-from .target import Target
+from .target import FIRST_LOOK, Target
 
 PULSE = 1.77  # [-] peak response of an oscillator to a half sine, over its static response
 SOFTEST = 10.2158  # [-] first eigenvalue (k r)**2 of a clamped disk; any body that contains the disk has a lower one
@@ -24,7 +24,6 @@ ECHO = 1.2  # [-] error of one straight edge over ratio / nearness**2; measured 
 FADED = 1e-12  # [-] fraction of its deflection that the infinite plate's mode loses during a contact
 LOOK = 20.0  # [-] closed-form modes up to this multiple of the contact frequency decide if a body counts as rigid
 MOST_LOOKED_AT = 5000  # [-] upper limit on the number of these modes
-FIRST_LOOK = 20  # [-] closed-form modes found first, which scale the body
 INSTANT = 1e9  # [-] relaxation rate of that mode times the contact time; the error is a third of the inverse
 
 

@@ -16,12 +16,12 @@ from ..fe.assembly import System
 from ..impact import accuracy, collision, promise
 from ..impact.collision import BAND_POINTS
 from ..impact.contact import Contact
-from ..impact.quantities import asked_for, words
+from ..impact.quantities import words
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, FieldShapes, Modes, at_rest
 from . import idealisation
-from .target import Stages, Target, Watch
+from .target import FIRST_LOOK, Stages, Target, Watch
 
 SHARE = 0.45  # [-] of the tolerance for left-out modes, as much for the time steps; the mesh gets the rest
 ATTEMPTS = 3  # [-] runs with ever more modes or finer meshes, until the tolerance is met
@@ -30,7 +30,6 @@ MESH = 0.1  # [-] of the tolerance for the mesh, whose frequencies may err twice
 VERIFYING = 8.0  # [-] the verifying run divides the tolerance by this
 FINEST = 1e-10  # [-] lowest tolerance of a verifying run
 CAUTION = 2.0  # [-] safety factor on the mode error: costs a quarter more modes, but seldom needs a second run
-FIRST_LOOK = 20  # [-] modes found first: enough to scale the body and to predict the density of the others
 MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by source: takes about 2 GB and some minutes
 SHORT_WAVES = {"argyris": 1e-5, "hermite": 1e-9}  # [-] frequency error for which `find_modes` chooses the mesh
 PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}  # that a user may set
@@ -39,8 +38,6 @@ TARGETS = ("rigid", "infinite", "modal")
 DOFS_PER_AREA = {"argyris": 10.4, "hermite": 2.0}  # [-] unknowns per square, or length, of the element size
 RATES = {"start": 0.02, "dofs": 6e-5, "pairs": 3.5e-7, "steps": 1e-8}  # [s] each, measured by studies/frontier.py
 BYTES = {"start": 2e8, "dofs": 6e3, "pairs": 40.0}  # [byte] each, measured likewise
-
-ELEMENTS = {"analytic": "closed form"}
 COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced
 
 
@@ -95,9 +92,7 @@ class Plan:
     mass: float = 0.0  # [kg] mass of the target
     mobility: float = 0.0  # [m/(N s)] of an infinite plate
     notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
-    first: Modes | None = field(
-        default=None, repr=False, compare=False
-    )  # the first modes of the target, if they were needed
+    first: Modes | None = field(default=None, repr=False, compare=False)  # first modes of the target, if needed
 
     __repr__ = check.brief
 
@@ -209,20 +204,14 @@ class _Asked:
             for name in values:
                 if name not in ARGUMENTS:
                     raise ValueError(f"{name} is not an argument of a blow{check.nearest(name, [*ARGUMENTS, *PIECES])}")
-            tolerance = check.tolerance(values.get("tolerance", collision.TOLERANCE))
+            wanted = (values.get(name) for name in ("duration", "max_impacts", "scheme", "dt", "quantity"))
+            options = collision.Options.checked(values.get("tolerance", collision.TOLERANCE), *wanted)
+            values |= {"dt": options.dt, "duration": options.horizon if np.isfinite(options.horizon) else None}
             speed = check.positive("speed", values["speed"], "m/s")
-            for name in ("duration", "dt"):
-                if values.get(name) is not None:
-                    values[name] = check.positive(name, values[name], "s")
-            if values.get("scheme") is not None:
-                check.one_of("scheme", values["scheme"], collision.SCHEMES)
-            if values.get("max_impacts") is not None:
-                check.count("max_impacts", values["max_impacts"])
             for name in ("striker_force", "target_force"):
                 values[name] = check.number(name, values.get(name, 0.0), "N")
-            quantities = asked_for(values.get("quantity"))
         duration = accuracy.contact_duration(blow.contact, blow.striker.felt_mass, speed)
-        return cls(blow, changes, values, pieces, tolerance, quantities, duration)
+        return cls(blow, changes, values, pieces, options.tolerance, options.quantities, duration)
 
     @property
     def law(self) -> dict[str, Any]:
@@ -286,7 +275,8 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
                     modes.points("points", [point])
         with stages("strike"), blow.target.blame("strike"):
             run = partial(collision.strike, modes, striker, blow.contact)
-            response = _within(run, asked.values, asked.tolerance, SHARE * asked.tolerance)
+            first = run(**{**asked.values, "tolerance": SHARE * asked.tolerance})
+            response = _within(asked.tolerance, first, run, asked.values)
         short = response.error.truncation > SHARE * asked.tolerance
         coarse = not given and response.error.total > asked.tolerance and response.error.mesh > MESH * asked.tolerance
         if plan.target != "modal" or fixed or not (short or coarse) or attempt == ATTEMPTS - 1:
@@ -303,14 +293,13 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
 
 
-def _within(run: Callable[..., Response], values: Mapping[str, Any], tolerance: float, first: float) -> Response:
-    """The blow with time steps that leave room in the tolerance for the other errors; ``first`` is tried first."""
-    hit = run(**{**values, "tolerance": first})
+def _within(tolerance: float, hit: Response, run: Callable[..., Response], values: Mapping[str, Any]) -> Response:
+    """The blow, or the same with time steps that leave room in the tolerance for the other errors."""
     left = tolerance - (hit.error.total - hit.error.step)
     if hit.error.total > tolerance and left > 0.0 and not values.get("dt"):
         with suppress(check.SimulationError):  # steps so fine that nothing is gained: the tolerance is missed
             hit = run(**{**values, "tolerance": max(FINEST, 0.9 * left)})
-    return replace(hit, tolerance=tolerance)
+    return hit if hit.tolerance == tolerance else replace(hit, tolerance=tolerance)
 
 
 def verify(run: Run, watch: Watch | None = None) -> Run:
@@ -458,7 +447,8 @@ def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: fl
         kept += f" ({band:g} Hz requested, {needed:.4g} Hz needed for the blow)"
     plan = _plan(
         asked, target="modal", errors={"target modes left out": left}, reasons=(why, kept), mass=modes.mass,
-        n_modes=number, max_frequency=limit, first=first, element=ELEMENTS.get(target.kind), margin=margin,
+        n_modes=number, max_frequency=limit, first=first, margin=margin,
+        element="closed form" if target.kind == "analytic" else None,
         notes=plausible.together(target.notes, modes.notes, at_rest(modes, modes.point("at", at))),
     )  # fmt: skip
     if isinstance(first.shapes, FieldShapes):
@@ -639,7 +629,7 @@ def strike(
     (1, 0.55, True)
     """
     if isinstance(modes, Modes) and damping_ratio is None and not set(options) & set(PIECES):
-        tolerance = check.tolerance(options.get("tolerance", collision.TOLERANCE))
         run = partial(collision.strike, modes, striker, contact, at=at, speed=speed)
-        return promise.kept(_within(run, options, tolerance, tolerance), strict)
+        first = run(**options)
+        return promise.kept(_within(first.tolerance, first, run, options), strict)
     return plan_of(modes, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options).strike(strict)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from time import perf_counter
 from typing import Any
 
@@ -16,6 +17,7 @@ from ..mesh.meshes import Mesh
 from ..modes import analytic, modal
 from ..modes.modal import Damping, FieldShapes, Modes
 
+FIRST_LOOK = 20  # [-] modes found first: enough to scale the body and to predict the density of the others
 WORST_FREQUENCY = 0.1  # [-] largest frequency error that `find_modes` accepts as a tolerance
 
 Watch = Callable[[str], AbstractContextManager[Any]]
@@ -74,7 +76,7 @@ class Target:
         held, masses = body.supports, body.point_masses
         return cls(body.mesh, body.section, held, masses, {}, damping_ratio, "fe", body)
 
-    @property
+    @cached_property
     def closed(self) -> Callable[..., Modes] | None:
         """Closed formulas for this body, see `analytic.closed_form`; None if there are none."""
         if self.mesh is None or self.section is None or self.point_masses:

@@ -21,7 +21,7 @@ from ..mesh import sketch
 from ..mesh.meshes import Mesh
 from ..model import planner
 from ..model.planner import Blow, Plan, Run
-from ..model.target import Stages, Target, Watch
+from ..model.target import FIRST_LOOK, Stages, Target, Watch
 from ..modes.modal import Modes
 from .schema import MAKERS, PATHS, REQUIRED, TABLES, Part, fault, read_part, read_tables, supports_of, target_values
 
@@ -69,8 +69,8 @@ class Scene:
         with self.blame("strike"):
             check.tolerance(tolerance)
         first = None
-        if keep is not None and target.kind == "fe" and count > planner.FIRST_LOOK:
-            first = target.find(planner.FIRST_LOOK, tolerance=tolerance)  # what is kept starts from its mesh
+        if keep is not None and target.kind == "fe" and count > FIRST_LOOK:
+            first = target.find(FIRST_LOOK, tolerance=tolerance)  # what is kept starts from its mesh
         return target.finished(target.find(count, tolerance=tolerance, first=first, keep=keep))
 
     @check.typed

@@ -149,7 +149,6 @@ class Grid:
         if not self.residual:
             return np.zeros(self.shape)
         base, places = self.base, self.axes.get("at", self.base.at[None])
-        law: dict[str, Any] = vars(base.contact)
 
         def along(name: str, values: Any) -> np.ndarray:
             """Values of an axis, or one that all cells share, shaped to broadcast over the grid."""
@@ -159,9 +158,10 @@ class Grid:
         def value(name: str, shared: float) -> np.ndarray:
             return along(name, self.axes.get(name, [shared]))
 
-        stiffness, exponent, loss, speed = (
-            value(name, shared) for name, shared in ({**law, "speed": base.speed}).items() if name != "gap"
+        stiffness, exponent, loss = (
+            value(name, getattr(base.contact, name)) for name in ("stiffness", "exponent", "loss")
         )
+        speed = value("speed", base.speed)
         weight = value("mass", base.striker.mass) / base.striker.mass
         felt = base.striker.felt_mass * weight
         omega = np.pi / wall_time(stiffness, exponent, 1.0 / felt, speed)

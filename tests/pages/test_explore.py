@@ -193,6 +193,7 @@ def test_page_fits_a_phone(opened, scheme):
 
 def test_keyboard_turns_every_slider(opened):
     shown = opened()
+    shown.tab.locator(".noUi-handle").nth(6).wait_for()
     stops = shown.tabbed_to()
     names = [name for _, name, _ in stops]
     for name in ("Mass", "Stiffness", "Exponent", "Speed", "First bending mode", "Strike point x", "Strike point y"):
