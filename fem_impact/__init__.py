@@ -9,6 +9,7 @@ _NAMES = {
     "fe.section": "Material Plate Beam Elastic",
     "fe.assembly": "assemble",
     "modes.modal": "Modes find_modes rayleigh",
+    "modes.ritz": "ritz_modes",
     "impact.contact": "Contact",
     "impact.striker": "Striker",
     "impact.response": "Response Impact",

@@ -319,11 +319,10 @@ def _strike(options: argparse.Namespace) -> bool:
         scene = scene.heard_from(options.listener)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:
-        needs = {"target": "modal"} if options.pictures or options.vtk else {}  # only a modal body shows motion
         place = folder.resolve()  # "." has no name of its own
         keep = place.parent / f"{place.name}.modes.npz"  # not in the folder: an interrupted run leaves that alone
-        choices = {**needs, **_choices(options)}
-        run = scene.run(_progress, before=_warn, verify=options.verify, keep=keep, **choices)
+        motion = options.pictures or options.vtk
+        run = scene.run(_progress, before=_warn, verify=options.verify, motion=motion, keep=keep, **_choices(options))
         if options.strict:
             promise.kept(run.response, strict=True)
         start = time.perf_counter()
@@ -336,10 +335,10 @@ def _strike(options: argparse.Namespace) -> bool:
         _print_json(data)
         return missed
     _say(_title(scene), run.response.summary())
-    if run.plan.target != "modal":
+    if not run.rings:
         _say(f"Model: {run.plan.reasons[0]}; no modes and no sound (use --target modal or --quantity sound=5000)")
     if run.verified is not None:
-        coarse = run.finer.target != "modal"
+        coarse = run.finer.target in ("rigid", "infinite")
         tested = f" (which also treats the body as {run.finer.target}: it has too many modes)" if coarse else ""
         differences = ", ".join(f"{name} {value:.1e}" for name, value in run.verified.items())
         _say(f"Verified by a finer run{tested}: {differences}")
@@ -368,7 +367,7 @@ def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> d
     extra: dict[str, Any] = {}
     fi.export.write_force(folder / "force.csv", response)
     fi.figures.save(folder / "force.png", fi.figures.force(response))
-    if run.plan.target == "modal":
+    if run.rings:
         fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=SHAPES_WRITTEN))
         files += ["modes.pvd", *_write_sounds(folder, scene, response, extra, options)]
         if options.vtk:
@@ -487,7 +486,7 @@ def _report(options: argparse.Namespace) -> bool:
     path = options.out if options.out is not None else Path("out") / options.scene.stem / "report.html"
     changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
     with fi.export.staged(path.parent) as staging:
-        run = scene.run(_progress, before=_warn, target="modal", **changes)
+        run = scene.run(_progress, before=_warn, motion=True, **changes)
         with _progress("page"):
             fi.report.write(staging / path.name, scene, run)
     _say(_title(scene), run.response.summary(), f"Files: {path}")

@@ -213,10 +213,17 @@ def size_for(system: System, n_modes: int | None, max_frequency: float | None, t
     elif system.element == "argyris":  # a few modes cost little, so find them more accurately
         affordable = (2.3 * system.mesh.area / CHEAP_CELLS) ** 0.5
         size = min(size, max(affordable, FINE_WAVE / wave))
-    if isinstance(system.section, Plate) and system.section.tension:  # resolve the narrow bending layer at the edge
-        layer = (system.frame.stiffness / system.section.tension) ** 0.5
-        size = min(size, max(LAYERS * layer, system.frame.length / FINEST_LAYER))
+    if isinstance(system.section, Plate) and system.section.tension:
+        size = min(size, layer_size(system.frame.stiffness, system.section.tension, system.frame.length))
     return size
+
+
+def layer_size(stiffness: float, tension: float, extent: float) -> float:
+    """Size [m] of elements that resolve the narrow bending layer at the edge of a stretched plate.
+
+    ``stiffness`` [N m], ``tension`` [N/m], ``extent`` [m] of the body.
+    """
+    return max(LAYERS * (stiffness / tension) ** 0.5, extent / FINEST_LAYER)
 
 
 def _wave_per_element(error: float) -> float:

@@ -63,6 +63,18 @@ def cutoff_frequency(modes: Modes, at: Any, *, contact: Contact, mass: float, sp
     return float(max(BAND * omega_0, by_error, by_share)) / (2.0 * np.pi)
 
 
+def tail_cutoff(
+    modes: Modes, point: np.ndarray, *, contact: Contact, mass: float, speed: float, tolerance: float
+) -> float:
+    """As `cutoff_frequency`, for modes that hold the whole compliance at a point (1, dimension) [m] themselves."""
+    omega_0 = 2.0 * np.pi * contact_resonance(contact, mass, speed)
+    omega, rows = modes.omega[modes.n_rigid :], modes.shapes.at(point)[0, modes.n_rigid :]
+    softness = mass * omega_0**2 * np.append(np.cumsum(((rows / omega) ** 2)[::-1])[::-1], 0.0)[1:]  # of those above
+    error = left_out_error(softness, omega_0 / omega, contact.exponent, modes.dimension)
+    enough = (error <= tolerance) & (softness <= SERIES_SHARE) & (omega >= BAND * omega_0)
+    return float(omega[np.argmax(enough) if enough.any() else -1]) / (2.0 * np.pi)
+
+
 @check.typed
 def truncation_error(
     modes: Modes, at: Any, max_frequency: float, *, contact: Contact, mass: float, speed: float

@@ -60,6 +60,7 @@ NOISE = 1e-16  # [-] an approach below this times duration times speed is roundi
 STILL = 1e-12  # [-] a rigid approach slower than this times the speed is rounding: no contact follows
 ROUNDING = 1e-13  # [-] smaller differences of two runs are rounding
 NEGLIGIBLE = 1e-4  # [-] mesh errors below this fraction of the tolerance need no extra run
+LOOKS = 16.0, 20_000  # [-] times per contact at which two motions are compared, and their largest number
 LARGEST_ERROR = 0.5  # [-] frequency errors are capped at this in that run
 
 
@@ -253,6 +254,15 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> R
     )
     truncation, resolvable = _truncation(parts, contacts, system, coarse, ran, size, differ, pace, *last)
     mesh_error = _mesh_error(bodies, parts, contacts, system, coarse, ran, size, differ, options.tolerance, pace, last)
+    for i, body in enumerate(bodies):
+        for cause, other in body.poorer.items():
+            poorer = [*parts[:i], _poorer(parts[i], other), *parts[i + 1 :]]
+            less = _run(_joined(poorer, contacts), ran, size, pace, *last)
+            change = max(differ(less, coarse), float(_may_touch(coarse, less, pace[0])))
+            truncation, mesh_error = (
+                truncation + change * (cause == "truncation"),
+                mesh_error + change * (cause == "mesh"),
+            )
     error = Error(step_error, truncation, mesh_error, resolvable, sensitivity=_sensitivity(coarse, history))
     laws = tuple(touch.law for touch in contacts)
     dips = tuple(_dip(part, system) for part in parts)
@@ -377,6 +387,43 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
         lists = [[*one, np.array(more)] for one, more in zip(lists, added)]
     omega, zeta, bias, q, p = (np.concatenate(one) for one in lists)
     return _System(omega, zeta, shape, offset, bias, law, q, p)
+
+
+def _poorer(part: _Part, modes: Modes) -> _Part:
+    """The same body in the same motion, described by other modes."""
+    rows, still = modes.shapes.at(part.points), np.zeros(modes.n_modes)
+    moving = part.omega == 0.0
+    if part.q.any() or part.p[~moving].any():
+        raise ValueError("states must be zero for a body of Ritz vectors; find its modes with find_modes")
+    velocity = still
+    if part.p.any():
+        velocity = float(part.rows[0] @ part.p) * modes.rigid_motion(part.points[:1])
+    return _part(modes, part.touched, part.points, rows, left_out(modes, part.points, rows), part.force, velocity)
+
+
+def _may_touch(history: History, other: History, duration: float) -> bool:
+    """Whether two descriptions of a blow differ so much in some flight that one more impact cannot be ruled out.
+
+    Wherever the open contacts of the first come nearest, the gap must exceed the largest difference of the two motions
+    so far. Looks ahead until all modes together cannot bridge the gap. ``duration`` [s] is that of one contact.
+    """
+    if history.bias.any() or not history.status == other.status == record.FINISHED:
+        return False
+    rigid, shape = history.omega == 0.0, history.shape
+    size = np.hypot(history.end_q, history.end_p / np.where(rigid, 1.0, history.omega))
+    gap = -history.offset - shape[:, rigid] @ history.end_q[rigid]
+    apart = -shape[:, rigid] @ history.end_p[rigid]  # [m/s]
+    ahead = (np.abs(shape[:, ~rigid]) @ size[~rigid] - gap)[apart > 0.0] / apart[apart > 0.0]
+    end = history.end_time + max(0.0, float(ahead.max(initial=0.0)))
+    times = np.linspace(0.0, end, int(min(LOOKS[1], LOOKS[0] * end / duration)) + 2)
+    approach, doubt = history.motion(times), np.zeros((len(times), 1))
+    doubt[:, 0] = np.maximum.accumulate(np.abs(approach - other.motion(times)).max(axis=1))
+    row = np.searchsorted(history.steps[:, 0], times, side="right") - 1
+    closed = history.pressed[row] & (times < history.end_time)[:, None]
+    nearest = np.zeros(approach.shape, bool)
+    nearest[1:-1] = (approach[1:-1] >= approach[:-2]) & (approach[1:-1] >= approach[2:])
+    nearest &= ~closed & (times > history.contacts[:, 1].min(initial=np.inf))[:, None]
+    return bool((nearest & (approach > -doubt)).any())
 
 
 def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[float, float]:

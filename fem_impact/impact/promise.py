@@ -78,7 +78,7 @@ def _more_modes(hit: "Response") -> Iterator[tuple[str, int, int]]:
     """Name, modes needed and modes kept of every body that keeps too few."""
     h, allowed = hit.history, SHARE * hit.tolerance
     for body, (name, modes, dip) in enumerate(zip(_names(hit), hit.bodies, hit.dips)):
-        if dip is None:
+        if dip is None or modes.poorer:  # the number of Ritz vectors has been raised already
             continue
         own = np.zeros(len(h.omega), bool)
         own[hit.body_slice(body)] = True

@@ -1,8 +1,8 @@
 """The result of a blow: the force history, the scalars derived from it, and the motion of all bodies at any time."""
 
 import html
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -178,6 +178,19 @@ class History:
         acts = self.pressed[rows, contact] & (force > 0.0) & (times <= self.end_time)
         return np.where(acts, force, 0.0), np.where(acts, rate, 0.0)
 
+    def states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Modal displacements and velocities (n_times, n_modes) at ascending times; free motion after the end."""
+        q, p = np.empty((len(times), len(self.omega))), np.empty((len(times), len(self.omega)))
+        propagation.replay(
+            self.omega, self.zeta, self.shape, self.bias, self.start_q, self.start_p, self.steps, self.n_coefficients,
+            times, q, p,
+        )  # fmt: skip
+        return q, p
+
+    def motion(self, times: np.ndarray) -> np.ndarray:
+        """Approach [m] of the modes at ascending times, (n_times, n_contacts), without the dip of those left out."""
+        return self.offset + self.states(times)[0] @ self.shape.T
+
     @cached_property
     def contacts(self) -> np.ndarray:
         """All impacts, (n_impacts, 5): start, end, peak force, impulse, contact index; sorted by contact."""
@@ -258,17 +271,45 @@ class Response:
     at: np.ndarray | None = None  # (dimension,) [m] strike point
     dips: tuple[Dip | None, ...] = ()  # one per body; None if its modes are complete
     quantities: Mapping[str, float | None] = field(default_factory=lambda: USUAL)  # that must meet it; bands [Hz]
+    ringing: Modes | None = None  # modes of the target driven by the force, see `on`
+    rings: Callable[["Response"], Modes] | None = field(default=None, repr=False)  # finds them when they are needed
 
     __repr__ = check.brief
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)
 
+    @check.typed
+    def on(self, modes: Modes) -> "Response":
+        """The same blow with the motion of the target, and its sound, from these modes, driven by the force found.
+
+        Errors, energies and every number of the blow stay as they are.
+
+        Parameters
+        ----------
+        modes : Modes of the target, at its own mass and scale
+
+        Examples
+        --------
+        >>> plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), thickness=3e-3)
+        >>> system = fi.assemble(fi.mesh.rectangle(0.465, 0.3), plate, {"boundary": "hinged"})
+        >>> hit = fi.strike(system, fi.Striker.rigid(0.03), fi.Contact.hertz(1e7), at=(0.1, 0.1), speed=1.0)
+        >>> hit = hit.on(fi.find_modes(system, max_frequency=2000.0, damping_ratio=0.01))
+        >>> hit.displacement([(0.2, 0.2)], [0.5]).shape  # half a second later
+        (1, 1)
+        """
+        if self.at is None or self.history.bias[self.body_slice(len(self.bodies) - 1)].any():
+            raise ValueError("on needs a blow of `strike` without a target_force; strike the modes instead")
+        modes.point("at", self.at)
+        if not np.isclose(modes.mass, self.bodies[-1].mass, rtol=1e-3):
+            raise ValueError(f"modes must be of the body struck, {self.bodies[-1].mass:g} kg, got {modes.mass:g} kg")
+        return replace(self, ringing=modes)
+
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """What the bodies assumed, and numbers that are allowed but probably a slip of a unit, in plain words."""
         striker = () if self.striker is None else self.striker.notes
-        place = () if self.at is None else at_rest(self.target, self.at[None])
+        place = () if self.at is None else at_rest(self.bodies[-1], self.at[None])
         speed = tuple(plausible.number("speed", abs(self.speed)))
         return plausible.together(*(modes.notes for modes in reversed(self.bodies)), striker, speed, place)
 
@@ -284,8 +325,31 @@ class Response:
 
     @property
     def target(self) -> Modes:
-        """The struck body; in `collide` the last one."""
-        return self.bodies[-1]
+        """The struck body; in `collide` the last one.
+
+        After a blow by Ritz vectors (see `strike`) these are its modes as far as the force found makes them ring; they
+        are found when they are first needed.
+        """
+        return self._ringing or self.bodies[-1]
+
+    @cached_property
+    def _ringing(self) -> Modes | None:
+        return self.rings(self) if self.ringing is None and self.rings is not None else self.ringing
+
+    def _moved(self, body: int) -> Modes:
+        """The modes whose motion is that of a body."""
+        return self.target if body in (-1, len(self.bodies) - 1) else self.bodies[body]
+
+    @cached_property
+    def _rung(self) -> History:
+        """The history of the modes that ring, under the same force."""
+        modes = self._ringing
+        assert modes is not None and self.at is not None
+        still = np.zeros(modes.n_modes)
+        shape = -modes.shape_at(self.at[None])
+        rest = {"start_q": still, "start_p": still, "end_q": still, "end_p": still, "bias": still}
+        driven: dict[str, Any] = {"omega": modes.omega, "zeta": modes.damping_ratio, "shape": shape, **rest}
+        return replace(self.history, **driven)
 
     @property
     def contact(self) -> Contact:
@@ -395,14 +459,12 @@ class Response:
         if times.size and times.min() < 0.0:
             raise ValueError(f"times must not be before the blow at 0 s, got {times.min():g} s")
         order = np.argsort(times, kind="stable")
-        h = self.history
-        q = np.empty((len(times), len(h.omega)))
-        p = np.empty_like(q)
-        propagation.replay(
-            h.omega, h.zeta, h.shape, h.bias, h.start_q, h.start_p, h.steps, h.n_coefficients, times[order], q, p
-        )  # fmt: skip
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
+        if self._ringing is not None and self._moved(body) is self._ringing:
+            q, p = self._rung.states(times[order])
+            return q[back], p[back]
+        q, p = self.history.states(times[order])
         part = self.body_slice(body % len(self.bodies))
         n_modes = self.bodies[body].n_modes
         return q[back, part][:, :n_modes], p[back, part][:, :n_modes]
@@ -410,7 +472,7 @@ class Response:
     def modal_energy(self, times: Any, *, body: int = -1) -> np.ndarray:
         """Energy [J] of each mode of the target at any times, (n_times, n_modes); parameters as in `modal_state`."""
         q, p = self.modal_state(times, body=body)
-        return mode_energy(self.bodies[body].omega, q, p)
+        return mode_energy(self._moved(body).omega, q, p)
 
     @check.typed
     def displacement(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
@@ -428,22 +490,24 @@ class Response:
             point.
         """
         q, _ = self.modal_state(times, body=body)
-        motion = q @ self.bodies[body].shape_at(points).T  # (n_times, n_modes) @ (n_modes, n_points)
+        motion = q @ self._moved(body).shape_at(points).T  # (n_times, n_modes) @ (n_modes, n_points)
         return motion + self._dip(points, times, body)[0] if residual else motion
 
     @check.typed
     def velocity(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
         """Velocity [m/s] of the target, (n_times, n_points); parameters as in `displacement`."""
         _, p = self.modal_state(times, body=body)
-        motion = p @ self.bodies[body].shape_at(points).T
+        motion = p @ self._moved(body).shape_at(points).T
         return motion + self._dip(points, times, body)[1] if residual else motion
 
     def _dip(self, points: Any, times: Any, body: int) -> tuple[Any, Any]:
         """Static deflection [m] of the left-out modes and its rate [m/s], (n_times, n_points); 0 if there are none."""
         dip = self.dips[body] if self.dips else None
+        if self._moved(body) is self._ringing and self.at is not None:
+            dip = Dip(self.at[None], ((0, -1.0),), 0.0)
         if dip is None:
             return 0.0, 0.0
-        modes, n_ends = self.bodies[body], len(dip.points)
+        modes, n_ends = self._moved(body), len(dip.points)
         times = check.array("times", times, (None,), "s", lift=True)
         found = [self.history.force_at(times, i) for i, _ in dip.touched]
         sign = np.array([sign for _, sign in dip.touched])

@@ -20,13 +20,17 @@ from ..impact.quantities import words
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, FieldShapes, Modes, at_rest
-from . import idealisation
+from . import idealisation, vectors
 from .target import FIRST_LOOK, Stages, Target, Watch
 
 SHARE = 0.45  # [-] of the tolerance for left-out modes, as much for the time steps; the mesh gets the rest
+STEPS = 0.3  # [-] of the tolerance for the time steps of a blow by Ritz vectors: finer steps cost nothing there
 ATTEMPTS = 3  # [-] runs with ever more modes or finer meshes, until the tolerance is met
 NOTCH = 4.0  # [-] each attempt divides what the modes left out or the mesh may err by this
 MESH = 0.1  # [-] of the tolerance for the mesh, whose frequencies may err twice as much as the blow then does
+AUDIBLE, AUDIBLE_POINTS = 20e3, 2001  # [Hz], [-] no mode above is asked for unless a band of the sound is
+FAINT = 1e-3  # [-] modes ring up to the last frequency where the force has this fraction (-60 dB) of its impulse
+MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: some seconds
 VERIFYING = 8.0  # [-] the verifying run divides the tolerance by this
 FINEST = 1e-10  # [-] lowest tolerance of a verifying run
 CAUTION = 2.0  # [-] safety factor on the mode error: costs a quarter more modes, but seldom needs a second run
@@ -34,8 +38,9 @@ MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by s
 SHORT_WAVES = {"argyris": 1e-5, "hermite": 1e-9}  # [-] frequency error for which `find_modes` chooses the mesh
 PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}  # that a user may set
 ARGUMENTS = tuple(signature(collision.strike).parameters)[3:]  # after modes, striker and contact
-TARGETS = ("rigid", "infinite", "modal")
+TARGETS = ("rigid", "infinite", "vectors", "modal")
 DOFS_PER_AREA = {"argyris": 10.4, "hermite": 2.0}  # [-] unknowns per square, or length, of the element size
+DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow
 RATES = {"start": 0.02, "dofs": 6e-5, "pairs": 3.5e-7, "steps": 1e-8}  # [s] each, measured by studies/frontier.py
 BYTES = {"start": 2e8, "dofs": 6e3, "pairs": 40.0}  # [byte] each, measured likewise
 COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced
@@ -174,6 +179,11 @@ class Run:
 
     __repr__ = check.brief
 
+    @property
+    def rings(self) -> bool:
+        """Whether the motion of the target is known, not only the numbers of the blow."""
+        return self.plan.target in ("modal", "vectors")
+
 
 @dataclass(frozen=True)
 class _Asked:
@@ -212,6 +222,16 @@ class _Asked:
                 values[name] = check.number(name, values.get(name, 0.0), "N")
         duration = accuracy.contact_duration(blow.contact, blow.striker.felt_mass, speed)
         return cls(blow, changes, values, pieces, options.tolerance, options.quantities, duration)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the target's motion or sound is wanted, besides the numbers of the blow."""
+        return "sound" in self.quantities or self.blow.moving
+
+    @property
+    def left_out(self) -> float:
+        """Error [-] allowed for the modes left out."""
+        return SHARE * self.tolerance / CAUTION / (accuracy.LOSSY if self.blow.contact.loss else 1.0)
 
     @property
     def law(self) -> dict[str, Any]:
@@ -254,8 +274,8 @@ def make(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
     target = asked.pieces.get("target")
     if target is None and (blow.target.modes is not None or {"size", "n_modes", "max_frequency"} & set(asked.pieces)):
         target = "modal"
-    plan = None if target == "modal" else _idealised(asked, target, stages)
-    return plan or _modal(asked, stages)
+    plan = None if target in ("modal", "vectors") else _idealised(asked, target, stages)
+    return plan or _by_vectors(asked, target, stages) or _modal(asked, stages)
 
 
 def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
@@ -264,6 +284,8 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     ``keep`` is a file that stores the modes of a costly plan.
     """
     blow, asked, margin = plan.blow, _Asked.checked(plan.blow, plan.changes), 1.0
+    if plan.target == "vectors":
+        return _carry_out_by_vectors(plan, asked, stages, keep)
     fixed = {"n_modes", "max_frequency"} & set(asked.pieces) or not asked.values.get("residual", True)
     given = blow.target.kind != "fe" or blow.target.size_stated or "size" in asked.pieces
     idealised = plan.errors.get("rigid target", 0.0) + plan.errors.get("infinite plate", 0.0)
@@ -293,6 +315,54 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
 
 
+def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) -> Run:
+    """Strike with more vectors or on finer meshes until the tolerance is met; then find the modes that ring."""
+    blow, values = plan.blow, asked.values
+    assert plan.size is not None
+    resonance = 0.5 / asked.duration
+    fixed = blow.target.size_stated or "size" in asked.pieces
+    seen = vectors.Seen(blow.target, values["at"], resonance, asked.tolerance, plan.size, fixed, stages)
+    if seen.at_rest:
+        return carry_out(_modal(asked, stages), stages, keep)
+    striker = collision.shortened(blow.striker, plan.n_striker_modes)
+
+    def cutoff(modes: Modes, margin: float) -> float:
+        allowed = asked.left_out / margin
+        return accuracy.tail_cutoff(modes, seen.at, mass=asked.mass, tolerance=allowed, **asked.law)
+
+    while True:
+        modes = seen.modes(cutoff)
+        with stages("strike"), blow.target.blame("strike"):
+            run = partial(collision.strike, modes, striker, blow.contact)
+            response = run(**{**values, "tolerance": STEPS * asked.tolerance})
+        if not seen.improved(response.error, asked.tolerance - response.error.step):
+            break
+    response = _within(asked.tolerance, response, run, values)
+    if not response.tolerance_met and "target" not in asked.pieces:
+        other = _last_resort(asked, stages)
+        if other is not None and other.error < response.error.total:
+            return carry_out(other, stages)
+    plan = replace(plan, n_modes=seen.count, size=seen.size, n_dofs=seen.fine.system.n_dofs)
+    response = replace(response, rings=partial(_ringing, asked, keep))
+    if asked.moving:
+        with stages("modes"):
+            plan = replace(plan, max_frequency=float(response.target.frequencies[-1]))
+    return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
+
+
+def _ringing(asked: _Asked, keep: Any, response: Response) -> Modes:
+    """The modes that the force found makes ring: up to the band asked for, or as far as the force reaches."""
+    target, band = asked.blow.target, asked.quantities.get("sound")
+    frequencies = np.linspace(0.0, AUDIBLE, AUDIBLE_POINTS)
+    force = np.abs(response.spectrum(frequencies))
+    limit = band or float(frequencies[np.flatnonzero(force >= FAINT * force[0])[-1]])
+    first = asked.find(FIRST_LOOK)
+    number = round(FIRST_LOOK * target.growth(target.finished(first).frequencies[-1], limit))
+    most = MOST_MODES["fe"] if band else MOST_RINGING
+    modes = first if number <= FIRST_LOOK else asked.find(min(number, most), first=first, keep=keep)
+    return target.finished(modes)
+
+
 def _within(tolerance: float, hit: Response, run: Callable[..., Response], values: Mapping[str, Any]) -> Response:
     """The blow, or the same with time steps that leave room in the tolerance for the other errors."""
     left = tolerance - (hit.error.total - hit.error.step)
@@ -309,14 +379,15 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
     takes too many.
     """
     plan = run.plan
-    finer: dict[str, Any] = {"tolerance": max(FINEST, plan.tolerance / VERIFYING), "target": "modal"}
+    target = "vectors" if plan.target == "vectors" else "modal"
+    finer: dict[str, Any] = {"tolerance": max(FINEST, plan.tolerance / VERIFYING), "target": target}
     if plan.size is not None:
         finer["size"] = plan.size / 1.5
     finer.update({name: None for name in ("n_modes", "max_frequency", "n_striker_modes", "dt") if name in plan.changes})
     try:
         other = plan.blow.run(watch, **{**plan.changes, **finer})
     except check.SimulationError:
-        if plan.target == "modal":
+        if plan.target == target:
             raise
         other = plan.blow.run(watch, **{**plan.changes, **finer, "target": plan.target})
     one, two = run.response, other.response
@@ -338,8 +409,7 @@ def _idealised(asked: _Asked, target: str | None, stages: Stages) -> Plan | None
     """The plan with a rigid or infinite target, if that is accurate enough or the user asks for it; else None."""
     blow, values = asked.blow, asked.values
     pressed = values.get("striker_force") or values.get("target_force") or blow.contact.gap < 0.0
-    moving = "sound" in asked.quantities or blow.moving
-    if target is None and (pressed or moving or not values.get("residual", True)):
+    if target is None and (pressed or asked.moving or not values.get("residual", True)):
         return None
     with stages("modes"):
         seen = idealisation.from_outside(blow.target, values["at"], asked.mass, asked.duration)
@@ -370,6 +440,15 @@ def _idealised(asked: _Asked, target: str | None, stages: Stages) -> Plan | None
         mobility=seen.mobility if target == "infinite" else 0.0,
         notes=plausible.together(blow.target.notes, seen.notes),
     )  # fmt: skip
+
+
+def _last_resort(asked: _Asked, stages: Stages) -> Plan | None:
+    """The plan with an infinite plate, whatever its error, for a blow that no mesh resolves; None if it is unknown."""
+    if asked.moving or asked.values.get("striker_force") or asked.values.get("target_force"):
+        return None
+    with suppress(ValueError):
+        return _idealised(asked, "infinite", stages)
+    return None
 
 
 def _unfit(asked: _Asked) -> str:
@@ -413,6 +492,40 @@ def _fewer(asked: _Asked, first: Modes, banded: bool) -> str:
     return f"{first_word}; {word} a contact with stiffness = {contact.stiffness * softer:.2g}"
 
 
+def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | None:
+    """The plan with a target of Ritz vectors, if these can describe it and only the blow is asked for."""
+    blow, values = asked.blow, asked.values
+    if target == "modal":
+        return None
+    fits = vectors.usable(blow.target, values["at"]) and values.get("residual", True)
+    if not fits:
+        if target == "vectors":
+            raise ValueError(f"{blow.name}target = 'vectors' needs a plate by elements; use target = 'modal'")
+        return None
+    with stages("modes"):
+        size = asked.pieces.get("size") or vectors.size_for(blow.target, 0.5 / asked.duration, asked.tolerance)
+    mesh = blow.target.mesh
+    assert mesh is not None
+    smallest = (DOFS_PER_AREA["argyris"] * mesh.area / refinement.MOST_UNKNOWNS) ** 0.5
+    if size < smallest and "size" not in asked.pieces and not blow.target.size_stated:
+        plan = _last_resort(asked, stages) if target is None else None
+        if plan is not None:
+            return plan
+        size = smallest
+    n_dofs = round(DOFS_PER_AREA["argyris"] * mesh.area / size**2) + DOFS_AT_BLOW
+    count = vectors.first_count(asked.tolerance)
+    kept = f"the target is described by some {count} Ritz vectors started from the blow, more if their error shows"
+    reason = f"argyris elements of {size:.3g} m, smaller towards the blow, with some {n_dofs} unknowns"
+    if asked.moving:
+        reason += "; motion and sound come from modes driven by the force that the blow finds"
+    shares = dict.fromkeys(("Ritz vectors", "mesh"), 0.5 * (1.0 - STEPS) * asked.tolerance)
+    why = f"the contact lasts about {asked.duration:.3g} s"
+    return _plan(
+        asked, target="vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
+        element="argyris", steps=STEPS, notes=blow.target.notes,
+    )  # fmt: skip
+
+
 def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: float = 1.0) -> Plan:
     """The plan with a modal target; finds its first modes, because they tell how many are needed."""
     target, at, mass = asked.blow.target, asked.values["at"], asked.mass
@@ -421,8 +534,7 @@ def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: fl
     modes = target.finished(first)
     with target.blame("strike"):
         modes.point("at", at)
-    allowed = SHARE * asked.tolerance / (CAUTION * margin) / (accuracy.LOSSY if asked.blow.contact.loss else 1.0)
-    needed = accuracy.cutoff_frequency(modes, at, mass=mass, tolerance=allowed, **asked.law)
+    needed = accuracy.cutoff_frequency(modes, at, mass=mass, tolerance=asked.left_out / margin, **asked.law)
     band = max((band for band in asked.quantities.values() if band), default=0.0)
     limit, number = max(needed, band), asked.pieces.get("n_modes")
     if number is None:
@@ -481,6 +593,7 @@ def _plan(
     notes: tuple,
     n_modes: int = 0,
     margin: float = 1.0,
+    steps: float = SHARE,
     **chosen: Any,
 ) -> Plan:
     """The plan for any target: adds striker modes and time steps, with their errors and cost."""
@@ -493,9 +606,9 @@ def _plan(
         reasons = (*reasons, f"the striker {stiff}")
     fixed = asked.values.get("scheme"), asked.values.get("dt")
     scheme, dt = collision.steps_for(
-        asked.blow.contact, asked.duration, SHARE * asked.tolerance, asked.quantities, *fixed
+        asked.blow.contact, asked.duration, steps * asked.tolerance, asked.quantities, *fixed
     )
-    until = "fixed by dt" if fixed[1] else f"halved until two runs agree to {SHARE * asked.tolerance:.1e}"
+    until = "fixed by dt" if fixed[1] else f"halved until two runs agree to {steps * asked.tolerance:.1e}"
     lasts = asked.values.get("duration")
     end = "until the final separation" if lasts is None else f"for {lasts:g} s"
     count = asked.duration / dt
@@ -511,7 +624,7 @@ def _plan(
         scheme=scheme,
         dt=dt,
         duration=asked.duration,
-        errors=MappingProxyType({**errors, "steps": SHARE * asked.tolerance}),
+        errors=MappingProxyType({**errors, "steps": steps * asked.tolerance}),
         reasons=reasons,
         seconds=RATES["start"] + RATES["steps"] * 10.0 * count * (n_modes + kept),
         memory=BYTES["start"],

@@ -18,6 +18,8 @@ from ..modes import analytic, modal
 from ..modes.modal import Damping, FieldShapes, Modes
 
 FIRST_LOOK = 20  # [-] modes found first: enough to scale the body and to predict the density of the others
+FIRST_FLEXIBLE = 4  # [-] modes that hold a flexible one: a plate has at most three rigid motions
+CLOSE = 1e-8  # [-] error of the first frequency to which a body is scaled: far below that of any blow
 WORST_FREQUENCY = 0.1  # [-] largest frequency error that `find_modes` accepts as a tolerance
 
 Watch = Callable[[str], AbstractContextManager[Any]]
@@ -110,6 +112,47 @@ class Target:
         """The modes as struck: scaled and damped."""
         modes = modes.scaled(**self.scale) if self.scale else modes
         return modes if self.damping_ratio is None else modes.damped(self.damping_ratio)
+
+    @cached_property
+    def stretch(self) -> float:
+        """Factor [-] by which scaling raises every frequency; found from the first mode."""
+        if "first_frequency" not in self.scale:
+            return 1.0
+        if self.closed is not None and self.source != "fe":
+            modes = self.closed(n_modes=FIRST_LOOK)
+        else:
+            modes = self.find(FIRST_FLEXIBLE, tolerance=CLOSE)
+        return float(self.finished(modes).frequencies[-1] / modes.frequencies[-1])
+
+    def finished_vectors(self, vectors: Modes) -> Modes:
+        """Ritz vectors as struck: scaled and damped like modes, although their first is no mode."""
+        mass = self.scale.get("mass", vectors.mass) / vectors.mass
+        scaled = vectors.stretched(mass, self.stretch)
+        return scaled if self.damping_ratio is None else scaled.damped(self.damping_ratio)
+
+    def wave(self, frequency: float) -> float:
+        """Largest wavenumber [rad/m] of the plate's own waves, before scaling, at a frequency [Hz]."""
+        section, mesh = self.section, self.mesh
+        assert isinstance(section, Plate) and mesh is not None
+        middle = mesh.points[mesh.cells].mean(axis=1)
+        stiffness, inertia = section.stiffness(middle), section.inertia(middle)
+        bending, tension = np.minimum(stiffness[:, 0, 0], stiffness[:, 1, 1]), section.tension or 0.0
+        # omega**2 inertia = bending k**4 + tension k**2
+        root = np.sqrt(tension**2 + 4.0 * bending * inertia * (2.0 * np.pi * frequency) ** 2)
+        return float(np.sqrt(2.0 * (2.0 * np.pi * frequency) ** 2 * inertia / (root + tension)).max())
+
+    def near(self, at: np.ndarray, size: float, stages: Stages) -> System:
+        """The body assembled with elements of a size [m] that shrink towards points (n_points, 2) [m]."""
+        assert self.mesh is not None and self.section is not None
+        mesh = self.mesh
+        if not np.isclose(size, mesh.size, rtol=1e-9):
+            with stages("mesh"), self.blame("mesh"):
+                mesh = mesh.refined(mesh.size / size)
+        graded = self.system is None or self.system.graded
+        with stages("assembly"), self.blame("supports"), np.errstate(all="ignore"):
+            return assemble(
+                mesh, self.section, dict(self.supports), point_masses=self.point_masses, near=at, graded=graded
+            )
 
     def find(
         self,

@@ -1,6 +1,6 @@
 """Modes: the description of a structure that every later stage works on, whether computed or measured."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -170,6 +170,8 @@ class Modes:
     frequency_error: np.ndarray | None = None  # (n_modes,) [-] estimated relative error; find_modes always gives it
     bounds: np.ndarray | None = None  # (n_modes, 2) [Hz] guaranteed lower and upper bound of each frequency
     notes: tuple[str, ...] = field(default=(), repr=False)  # what was assumed, and probable slips of a unit
+    # The same body described less well, by the part of `Error` that a blow with it tells: "truncation", "mesh"
+    poorer: Mapping[str, "Modes"] = field(default_factory=dict, repr=False)
 
     __repr__ = check.brief
 
@@ -356,9 +358,15 @@ class Modes:
                 raise ValueError(
                     f"first_frequency must keep the last frequency below {HIGHEST:g} Hz, got {first_frequency:g} Hz"
                 )
-        shapes = ScaledShapes(self.shapes, float(self.mass**0.5 / mass**0.5), float(ratio))
-        bounds = None if self.bounds is None else self.bounds * ratio
-        return replace(self, omega=self.omega * ratio, shapes=shapes, mass=mass, bounds=bounds)
+        return self.stretched(mass / self.mass, float(ratio))
+
+    def stretched(self, mass: float, frequency: float) -> "Modes":
+        """The same body with its mass and all frequencies multiplied by these factors [-]."""
+        shapes = ScaledShapes(self.shapes, float(mass**-0.5), frequency)
+        bounds = None if self.bounds is None else self.bounds * frequency
+        poorer = {cause: modes.stretched(mass, frequency) for cause, modes in self.poorer.items()}
+        whole = self.mass * mass
+        return replace(self, omega=self.omega * frequency, shapes=shapes, mass=whole, bounds=bounds, poorer=poorer)
 
     def truncated(self, *, max_frequency: float | None = None, n_modes: int | None = None) -> "Modes":
         """The lowest modes only, up to a frequency [Hz] or a number; the residual compliance replaces the others."""
@@ -372,14 +380,17 @@ class Modes:
             raise ValueError(f"max_frequency must reach the first mode at {self.frequencies[0]:g} Hz")
         fields = {name: getattr(self, name) for name in ("omega", "damping_ratio", "frequency_error", "bounds")}
         kept: dict[str, Any] = {name: x if x is None else x[:keep].copy() for name, x in fields.items()}
-        return replace(self, shapes=self.shapes.take(keep), **kept)
+        poorer = {cause: modes.truncated(max_frequency=max_frequency) for cause, modes in self.poorer.items()}
+        return replace(self, shapes=self.shapes.take(keep), poorer=poorer, **kept)
 
     def damped(self, damping_ratio: Damping) -> "Modes":
         """The same modes with other damping ratios: a number, an array (n_modes,) or a function of frequency [Hz]."""
         ratios = damping_ratios(damping_ratio, self.omega)
         before = damping_notes(self.damping_ratio, self.omega)
         others = [note for note in self.notes if note not in before]
-        return replace(self, damping_ratio=ratios, notes=plausible.together(others, damping_notes(ratios, self.omega)))
+        notes = plausible.together(others, damping_notes(ratios, self.omega))
+        poorer = {cause: modes.damped(damping_ratio) for cause, modes in self.poorer.items()}
+        return replace(self, damping_ratio=ratios, notes=notes, poorer=poorer)
 
 
 def at_rest(modes: "Modes", point: np.ndarray) -> tuple[str, ...]:

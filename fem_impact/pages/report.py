@@ -84,7 +84,7 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
         The HTML file to write.
     scene : Scene
     run : Run
-        From `Scene.run` with ``target="modal"``: the page shows the motion of the body.
+        From `Scene.run` with ``motion=True``: the page shows the motion of the body.
 
     Raises
     ------
@@ -93,8 +93,8 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
     """
     _, plotly = _tools()
     response = run.response
-    if run.plan.target != "modal":
-        raise ValueError(f"run must have target 'modal' because a report shows motion, got {run.plan.target!r}")
+    if not run.rings:
+        raise ValueError("run must have modes, because a report shows motion; strike with motion=True")
     page = template("report.html").render(
         title=scene.title or scene.path.stem,
         words=(*words(scene, response), *(f"Note: {note}" for note in run.notes)),

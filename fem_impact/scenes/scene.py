@@ -102,6 +102,7 @@ class Scene:
         plan: Plan | None = None,
         before: Callable[[Plan], object] | None = None,
         verify: bool = False,
+        motion: bool = False,
         keep: str | Path | None = None,
         **changes: Any,
     ) -> Run:
@@ -116,6 +117,8 @@ class Scene:
             Called with the plan before it is carried out.
         verify : bool
             Whether to strike again with every setting one step finer and report the true differences.
+        motion : bool
+            Whether the motion of the target is wanted besides the numbers of the blow, as if points were observed.
         keep : path of an .npz file, optional
             Saves the modes of a costly plan there, so that an interrupted run can resume from them.
         **changes : as in `plan`
@@ -125,7 +128,9 @@ class Scene:
         Run
         """
         stages = Stages(watch)
-        plan = planner.make(self._staged(stages), changes, stages) if plan is None else plan
+        if plan is None:
+            blow = self._staged(stages)
+            plan = planner.make(replace(blow, moving=True) if motion else blow, changes, stages)
         if before is not None:
             before(plan)
         run = planner.carry_out(plan, stages, keep)

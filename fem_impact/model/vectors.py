@@ -1,0 +1,116 @@
+"""A struck plate described by Ritz vectors started from the blow itself, on a mesh and in a number that the blow needs.
+
+No mode is found. The tolerance sets the shift of the vectors and the first mesh; blows with fewer vectors and on a
+coarser mesh (`Modes.poorer`) tell what either costs, and `Seen.improved` answers the larger of the two.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..fe import point_load, refinement
+from ..fe.section import Plate
+from ..impact.response import Error
+from ..modes.modal import Modes
+from ..modes.ritz import Krylov
+from .target import Stages, Target
+
+# [-] value at a tolerance of 1e-2, and power of 1e-2 / tolerance with which it grows
+WAVES = 1.2, 0.35  # highest frequency that the first mesh resolves, over that of the contact
+SHIFT = 6.0, 1.0 / 6.0  # shift over the angular frequency of the contact
+FIRST = 84, 0.22  # vectors tried first: they resolve one undisturbed contact
+MORE = 1.4  # [-] factor on the number of vectors as long as they are too few
+COARSER = 1.5  # [-] element size of the comparison over that of the blow
+MOST_VECTORS = 1500  # [-] limit on their number: dense matrices of this size take a second
+
+
+def usable(target: Target, at: Any) -> bool:
+    """Whether vectors can describe the target struck at a point (2,) [m]: a plate that can be meshed again."""
+    if target.kind != "fe" or target.mesh is None or target.mesh.dimension != 2 or target.mesh.recipe is None:
+        return False
+    ratio = target.damping_ratio
+    by_mode = not callable(ratio) and np.ndim(ratio if ratio is not None else 0.0) > 0
+    return not by_mode and (target.system is None or target.system.element == "argyris")
+
+
+def first_count(tolerance: float) -> int:
+    """Number of vectors tried first."""
+    return round(FIRST[0] * (1e-2 / tolerance) ** FIRST[1])
+
+
+def size_for(target: Target, resonance: float, tolerance: float) -> float:
+    """Element size [m] of the first mesh for a contact with this resonance [Hz]; that of the user's mesh if stated."""
+    mesh, section = target.mesh, target.section
+    assert mesh is not None and isinstance(section, Plate)
+    if target.size_stated:
+        return mesh.size
+    highest = resonance * WAVES[0] * (1e-2 / tolerance) ** WAVES[1] / target.stretch
+    size = min(mesh.size, refinement.WAVE_PER_ELEMENT["argyris"] / target.wave(highest))
+    if section.tension:
+        stiffness = float(section.stiffness(mesh.points[mesh.cells].mean(axis=1))[:, 0, 0].max())
+        size = min(size, refinement.layer_size(stiffness, section.tension, float(np.ptp(mesh.points, axis=0).max())))
+    return size
+
+
+class Seen:
+    """A target as a blow at one point sees it.
+
+    Parameters
+    ----------
+    target : Target
+    at : strike point, (2,) [m]
+    resonance : float [Hz]
+        One over twice the duration of the contact on a rigid wall.
+    tolerance : float [-]
+    size : float [m]
+        Element size to begin with.
+    fixed : bool
+        Whether the user insists on this size.
+    """
+
+    def __init__(
+        self, target: Target, at: Any, resonance: float, tolerance: float, size: float, fixed: bool, stages: Stages
+    ) -> None:
+        self.target, self.at, self.size, self.fixed, self.stages = target, np.atleast_2d(at), size, fixed, stages
+        ease = 1e-2 / tolerance
+        self.shift = 2.0 * np.pi * resonance * SHIFT[0] * ease ** SHIFT[1] / target.stretch
+        self.count, self.margin = first_count(tolerance), 1.0
+        self.fine = self._krylov(size)
+        self.coarse: Krylov | None = None
+
+    def _krylov(self, size: float) -> Krylov:
+        system = self.target.near(self.at, size, self.stages)
+        with self.stages("vectors"):
+            return Krylov(system, self.at, self.shift)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the point struck lies on a support, where no vector can start."""
+        return bool((self.fine.compliance.diagonal() <= point_load.RESTS).any())
+
+    def modes(self, cutoff: Callable[[Modes, float], float]) -> Modes:
+        """The target as struck; Ritz pairs above ``cutoff`` [Hz], of them and a safety factor, act as a spring."""
+        with self.stages("vectors"):
+            found = self.fine.modes(self.count)
+            if self.coarse is not None:
+                other = replace(self.coarse.modes(self.count), poorer={})
+                found = replace(found, poorer={**found.poorer, "mesh": other})
+        found = self.target.finished_vectors(found)
+        return found.truncated(max_frequency=cutoff(found, self.margin) * (1.0 + 1e-9))
+
+    def improved(self, error: Error, allowed: float) -> bool:
+        """Take more vectors or a finer mesh, whichever the error of a blow calls for; False if neither is possible."""
+        if error.truncation > 0.5 * allowed and not self.fine.full and self.count < MOST_VECTORS:
+            self.count, self.margin = min(MOST_VECTORS, round(MORE * self.count)), MORE * self.margin
+            return True
+        if self.coarse is None:
+            self.coarse = self._krylov(self.size * COARSER)
+            return True
+        finer = self.fine.system.n_dofs * COARSER**2
+        if error.mesh <= 0.5 * allowed or self.fixed or finer > refinement.MOST_UNKNOWNS:
+            return False
+        self.size /= COARSER
+        self.coarse, self.fine = self.fine, self._krylov(self.size)
+        return True
