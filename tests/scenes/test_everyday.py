@@ -83,8 +83,13 @@ def test_quick_half_runs_at_its_tolerance(name):
     assert_allclose(hit.restitution, restitution, rtol=0, atol=1e-2 + 1e-3)  # the tolerance and the snapshot's
 
 
+COSTLY = pytest.mark.xfail(run=False, reason="its modes take more than 4 GB or some minutes")
+SLOW = [name for name in NAMES if name not in QUICK]
+MOST = ("guitar_fingernail", "guitar_plectrum_celluloid", "timpano_felt")
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in QUICK])
+@pytest.mark.parametrize("name", [pytest.param(name, marks=COSTLY if name in MOST else ()) for name in SLOW])
 def test_slow_half_runs_or_says_what_would(name):
     try:
         hit = scene.load_scene(FOLDER / f"{name}.toml").strike()
