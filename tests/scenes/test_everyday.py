@@ -85,7 +85,7 @@ def test_quick_half_runs_at_its_tolerance(name):
 
 COSTLY = pytest.mark.xfail(run=False, reason="its modes take more than 4 GB or some minutes")
 SLOW = [name for name in NAMES if name not in QUICK]
-MOST = ("guitar_fingernail", "guitar_plectrum_celluloid", "timpano_felt")
+MOST = ("cymbal_ride_20_oak", "guitar_fingernail", "guitar_plectrum_celluloid", "timpano_felt")
 
 
 @pytest.mark.slow
