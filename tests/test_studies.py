@@ -72,3 +72,30 @@ def test_the_tolerance_walks_along_the_edge_of_what_is_possible(tmp_path, monkey
         assert frontier.difference(dial.run.response, reference) <= dial.tolerance
     assert [dial.run.plan.n_modes for dial in found] == sorted(dial.run.plan.n_modes for dial in found)
     assert frontier.table(found).count("\n") == 4
+
+
+@pytest.mark.slow
+def test_a_scene_is_measured_within_limits_and_stopped_beyond_them(tmp_path, monkeypatch, capsys):
+    speed = study("scene_speed")
+    path = speed.HERE / "scenes" / "everyday" / "marimba_yarn.toml"
+    assert speed.measured(path, 1e-2, {}, (0.01, 4.0)) == {"verdict": "over time", "seconds": 0.01}
+    assert speed.measured(path, 1e-2, {}, (120.0, 1e-6))["verdict"] == "over memory"
+    monkeypatch.setattr("sys.argv", ["", "--only", "marimba_yarn", "--ratio", "--out", str(tmp_path / "speed.csv")])
+    speed.main()
+    row = dict(zip(*[line.split(",") for line in (tmp_path / "speed.csv").read_text().splitlines()]))
+    assert row["verdict"] == "met" and row["target"] == "modal" and float(row["ratio"]) > 0.0
+    assert float(row["error"]) <= 1e-2 and 0.0 < float(row["restitution"]) < 1.0
+    assert row["restitution"][:5] in capsys.readouterr().out
+
+
+def test_a_scene_that_is_refused_says_so_in_its_row(tmp_path):
+    speed = study("scene_speed")
+    path = tmp_path / "scene.toml"
+    path.write_text(speed.NAMED["bronze_disk"][0])
+    row = speed.strike(path, 1e-2, {"n_modes": 5000})
+    assert row["verdict"].startswith("refused: this blow needs about 5e+03 modes") and "error" not in row
+
+
+def test_the_blows_of_the_study_are_the_everyday_scenes_and_five_more():
+    names = study("scene_speed").cases()
+    assert len(names) == 25 and "marimba_yarn" in names and "bronze_disk 0.0001" in names

@@ -1,13 +1,14 @@
 """Two simple targets, a rigid body and an infinite plate, and the errors of using them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.special import ellipkm1
 
 from .._base import check
 from ..fe.assembly import support_of_facets
-from ..fe.section import Plate
+from ..fe.section import Material, Plate
 from ..fe.splitting import distance
 from ..impact import threshold
 from ..mesh.meshes import Mesh
@@ -24,6 +25,7 @@ ECHO = 1.2  # [-] error of one straight edge over ratio / nearness**2; measured 
 FADED = 1e-12  # [-] fraction of its deflection that the infinite plate's mode loses during a contact
 LOOK = 20.0  # [-] closed-form modes up to this multiple of the contact frequency decide if a body counts as rigid
 MOST_LOOKED_AT = 5000  # [-] upper limit on the number of these modes
+DIRECTIONS = 1001  # [-] in an eighth of a turn, among which the fastest wave of an orthotropic plate is sought
 INSTANT = 1e9  # [-] relaxation rate of that mode times the contact time; the error is a third of the inverse
 
 
@@ -38,6 +40,63 @@ class Outside:
     notes: tuple[str, ...] = ()  # on the strike point
 
 
+@dataclass(frozen=True, eq=False)
+class Waves:
+    """Bending waves of a plate of constant thickness: ``omega = rate(direction) k**2``, rates in m**2/s.
+
+    An orthotropic plate is seen in a plane that is shrunk along the stiff direction and stretched by as much across it.
+    There both directions are equally stiff, and a round ripple stays nearly round.
+    """
+
+    stretch: np.ndarray  # (2, 2) [-] from the plate to that plane; it keeps areas
+    rate: float  # harmonic mean over all directions: the isotropic plate of this rate has the same mobility
+    fastest: float  # of a group of waves in the stretched plane
+    slowest: float  # in the stretched plane
+    least: float  # in the plate itself
+
+    @classmethod
+    def of(cls, material: Material, thickness: float) -> "Waves":
+        """Waves in a material, in a plate of a thickness [m].
+
+        Notes
+        -----
+        Along and across the grain the rigidities per mass are ``A`` and ``B``, in the direction of a wave at an angle
+        with sine s and cosine c ``A c**4 + 2 H c**2 s**2 + B s**4``, H = D12 + 2 D66 per mass. Stretching the plane by
+        ``(A / B)**(1/8)`` makes this ``sqrt(A B) (1 - (1 - beta) / 2 sin(2 angle)**2)``, ``beta = H / sqrt(A B)``.
+        """
+        along = replace(material, angle=0.0).plane_stress * (thickness**2 / (12.0 * material.rho))
+        a, b, h = along[0, 0], along[1, 1], along[0, 1] + 2.0 * along[2, 2]
+        middle = a**0.25 * b**0.25
+        inner = 0.5 * (1.0 + h / np.sqrt(a) / np.sqrt(b))  # above zero, as the rigidities are positive definite
+        turn = np.linspace(0.0, 0.25 * np.pi, DIRECTIONS)
+        squared = 1.0 - (1.0 - inner) * np.sin(2.0 * turn) ** 2  # of the rate, relative to the middle one
+        slope = -2.0 * (1.0 - inner) * np.sin(4.0 * turn)
+        # the phase of the group that arrives from a distance d after t is d**2 / (4 t rate (1 + (rate' / rate)**2 / 4))
+        fastest = np.sqrt(squared) * (1.0 + (slope / squared) ** 2 / 16.0)
+        cosine, sine = np.cos(material.angle), np.sin(material.angle)
+        narrow = (b / a) ** 0.125
+        crossing = (b - h) / (a + b - 2.0 * h) if a + b != 2.0 * h else 0.0  # c**2 of the least rate
+        least = a * crossing**2 + 2.0 * h * crossing * (1.0 - crossing) + b * (1.0 - crossing) ** 2
+        return cls(
+            np.array([[narrow * cosine, narrow * sine], [-sine / narrow, cosine / narrow]]),
+            rate=float(0.5 * np.pi * middle / ellipkm1(inner)),
+            fastest=float(middle * fastest.max()),
+            slowest=float(middle * np.sqrt(squared.min())),
+            least=float(np.sqrt(min(a, b, least) if 0.0 < crossing < 1.0 else min(a, b))),
+        )
+
+    def mobility(self, per_area: float) -> float:
+        """Mobility [m/(N s)] of the infinite plate at any point, for a mass per area [kg/m**2].
+
+        Notes
+        -----
+        ``1 / (8 rate per_area)``: the integral of ``1 / (16 pi sqrt(D(angle) per_area))`` over all directions, a
+        complete elliptic integral. A unit impulse starts waves of all wave vectors; the integral over their lengths
+        gives a step, which is summed over their directions.
+        """
+        return 1.0 / (8.0 * self.rate * per_area)
+
+
 @dataclass(frozen=True)
 class Surroundings:
     """A plate as seen from the strike point."""
@@ -48,8 +107,11 @@ class Surroundings:
     edges: np.ndarray  # (n, 2) distance [m] and length [m] of every piece of the edge
 
     @classmethod
-    def seen(cls, mesh: Mesh, at: np.ndarray) -> "Surroundings | None":
-        """The view from a point (2,) [m]; None if the point is not clearly on the body."""
+    def seen(cls, mesh: Mesh, at: np.ndarray, stretch: np.ndarray | None = None) -> "Surroundings | None":
+        """The view from a point (2,) [m]; None if the point is not clearly on the body.
+
+        ``stretch`` (2, 2) maps the plate to the plane of `Waves`; it keeps areas.
+        """
         corners = mesh.points[mesh.cells]
         sides = np.roll(corners, -1, axis=1) - corners
         off = at - corners
@@ -57,6 +119,8 @@ class Surroundings:
         if not inside.all(axis=1).any():
             return None
         ends = np.stack([mesh.points[mesh.facets[:, 0]], mesh.middles, mesh.points[mesh.facets[:, 1]]], axis=1)
+        if stretch is not None:
+            ends, at = ends @ stretch.T, stretch @ at
         start, along = ends[:, :-1].reshape(-1, 2), np.diff(ends, axis=1).reshape(-1, 2)
         length = np.linalg.norm(along, axis=1)
         away = distance(at, start, start + along)
@@ -89,7 +153,8 @@ def endless(point: np.ndarray, mass: float, mobility: float, duration: float) ->
     Notes
     -----
     One strongly overdamped mode, which follows the force at once and does not spring back. The displacement of an
-    infinite Kirchhoff plate after a unit impulse is a step of 1 / (8 sqrt(rigidity mass-per-area)), the mobility.
+    infinite Kirchhoff plate after a unit impulse is a step, the mobility: 1 / (8 sqrt(rigidity mass-per-area)), or
+    `Waves.mobility` if orthotropic.
 
     References
     ----------
@@ -138,7 +203,7 @@ def rigid_bound(view: Surroundings, body_mass: float, rate: float, free: bool, m
     view : Surroundings
     body_mass : float [kg]
     rate : float [m**2/s]
-        sqrt(rigidity / mass per area), or less.
+        sqrt(rigidity / mass per area), in the softest direction, or less.
     free : bool
         Whether some edge is free.
     mass, duration : as in `rigid_error`
@@ -165,7 +230,9 @@ def slowest_rate(view: Surroundings, first_frequency: float) -> float:
     return 2.0 * np.pi * first_frequency * (view.area / view.perimeter) ** 2 / SOFTEST
 
 
-def endless_error(view: Surroundings, mobility: float, rate: float, mass: float, duration: float) -> float:
+def endless_error(
+    view: Surroundings, mobility: float, rate: float, mass: float, duration: float, *, slowest: float | None = None
+) -> float:
     """Error [-] of treating a plate as infinite; inf if the echo may reach the striker.
 
     Parameters
@@ -174,8 +241,10 @@ def endless_error(view: Surroundings, mobility: float, rate: float, mass: float,
     mobility : float [m/(N s)]
         Mobility of the infinite plate.
     rate : float [m**2/s]
-        sqrt(rigidity / mass per area).
+        sqrt(rigidity / mass per area); of an orthotropic plate `Waves.fastest`, with the view in its stretched plane.
     mass, duration : as in `rigid_error`
+    slowest : float [m**2/s], optional
+        `Waves.slowest` of an orthotropic plate.
 
     Notes
     -----
@@ -191,7 +260,7 @@ def endless_error(view: Surroundings, mobility: float, rate: float, mass: float,
     if nearness < NEAREST:
         return float("inf")
     restitution = np.exp(-np.pi * ratio / np.sqrt(1.0 - ratio**2))
-    first = 15.5 * rate / view.area  # [rad/s] hinged disk of this area; other supported plates are higher
+    first = 15.5 * (slowest or rate) / view.area  # [rad/s] hinged disk of this area; other supported plates are higher
     lift = mobility * (1.0 + 8.0 / np.pi * np.log(max(1.0, 3.0 * np.pi / (duration * first))))
     echo = view.clearance**2 / rate
     if restitution * (echo - contact) < (1.0 + restitution) * mass * lift:
@@ -236,17 +305,16 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
     view = Surroundings.seen(mesh, at)
     if view is None:
         return None
-    material = section.material
-    rate = stretch * section.thickness * float(np.sqrt(material.E / 12.0 / (1.0 - material.nu**2) / material.rho))
-    whole = target.scale.get("mass", section.thickness * material.rho * view.area)
+    waves = Waves.of(section.material, section.thickness)
+    whole = target.scale.get("mass", section.thickness * section.material.rho * view.area)
     if find is None:
-        if "first_frequency" in target.scale:
-            low = slowest_rate(view, target.scale["first_frequency"])
-        else:
-            low = rate * float(np.sqrt(min(material.E, material.E_across or np.inf) / material.E))
+        first_frequency = target.scale.get("first_frequency")
+        low = waves.least if first_frequency is None else slowest_rate(view, first_frequency)
         rigid = rigid_bound(view, whole, low, free, mass, duration)
-        if "first_frequency" in target.scale or material.E_across is not None or section.tension:
+        if first_frequency is not None or section.tension:
             return Outside(whole, rigid, np.inf, np.inf, notes)
-    mobility = view.area / (8.0 * rate * whole)
-    far = endless_error(view, mobility, rate, mass, duration)
+    mobility = waves.mobility(stretch * whole / view.area)
+    round_view = Surroundings.seen(mesh, at, waves.stretch)
+    assert round_view is not None
+    far = endless_error(round_view, mobility, stretch * waves.fastest, mass, duration, slowest=stretch * waves.slowest)
     return Outside(whole, rigid, far, mobility, notes)

@@ -1,16 +1,22 @@
 """A body that does not yield and a plate without edges, against the same bodies with all their modes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from fem_impact import mesh
+from fem_impact.fe.assembly import assemble
+from fem_impact.fe.section import Material, Plate
 from fem_impact.impact import collision
 from fem_impact.impact.contact import Contact
 from fem_impact.impact.striker import Striker
-from fem_impact.model import idealisation
-from fem_impact.model.idealisation import Surroundings
+from fem_impact.model import idealisation, planner
+from fem_impact.model.idealisation import Surroundings, Waves
+from fem_impact.model.target import Target
 from fem_impact.modes import analytic
+from fem_impact.modes.modal import Modes, SampledShapes
 
 MASS, DURATION = 1.0, 1e-3  # [kg], [s] of every blow here, at 1 m/s
 HERTZ = MASS * (3.2180654597 / DURATION) ** 2.5  # [N/m**1.5], from T = 3.218 (m**2 / (k**2 v))**(1/5)
@@ -120,3 +126,138 @@ def test_centre_of_a_disk_sees_more_mirrors_than_a_point_near_one_edge():
     assert Surroundings.seen(body, np.zeros(2)).mirrors(9.0) > 3.0 * Surroundings.seen(
         body, np.array([0.7, 0.0])
     ).mirrors(9.0)
+
+
+STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
+SPRUCE = Material.orthotropic(E_along=10.9e9, E_across=0.85e9, nu=0.372, G=0.7e9, rho=450.0, angle=0.4)
+SOFT_IN_SHEAR = Material.orthotropic(E_along=1e9, E_across=0.9e9, nu=0.3, G=1e7, rho=500.0)
+STIFF_IN_SHEAR = Material.orthotropic(E_along=17e9, E_across=15e9, nu=0.6, G=30e9, rho=1600.0, angle=1.0)
+THICKNESS = 3e-3  # [m]
+
+
+def rigidities(material, n_directions=4000):
+    """Rigidity [N m] for waves in equally spaced directions, from the stiffness in the axes of the plate."""
+    angle = 2.0 * np.pi * np.arange(n_directions) / n_directions
+    cosine, sine = np.cos(angle), np.sin(angle)
+    curvature = np.stack([cosine**2, sine**2, 2.0 * cosine * sine])
+    return np.einsum("in,ij,jn->n", curvature, material.plane_stress * THICKNESS**3 / 12.0, curvature)
+
+
+@pytest.mark.parametrize("material", [STEEL, SPRUCE, SOFT_IN_SHEAR, STIFF_IN_SHEAR])
+def test_mobility_of_an_endless_plate_is_an_integral_over_the_directions_of_its_waves(material):
+    per_area = material.rho * THICKNESS
+    integral = np.mean(2.0 * np.pi / np.sqrt(rigidities(material) * per_area)) / (16.0 * np.pi)
+    found = Waves.of(material, THICKNESS).mobility(per_area)
+    assert_allclose(found, integral, rtol=1e-13)  # the trapezoidal rule on a smooth periodic function; rounding
+
+
+@pytest.mark.parametrize("material", [STEEL, SPRUCE, SOFT_IN_SHEAR, STIFF_IN_SHEAR])
+def test_slowest_wave_of_a_plate_is_that_of_its_softest_direction(material):
+    softest = np.sqrt(rigidities(material).min() / (material.rho * THICKNESS))
+    assert_allclose(Waves.of(material, THICKNESS).least, softest, rtol=1e-6)  # 4000 directions about a minimum
+
+
+def test_orthotropic_plate_without_a_direction_is_the_isotropic_one():
+    same = Material.orthotropic(E_along=210e9, E_across=210e9, nu=0.3, G=210e9 / 2.6, rho=7850.0, angle=0.7)
+    one, two = Waves.of(STEEL, THICKNESS), Waves.of(same, THICKNESS)
+    rigidity, per_area = 210e9 * THICKNESS**3 / 12.0 / 0.91, 7850.0 * THICKNESS
+    for waves in (one, two):
+        assert_allclose(waves.mobility(per_area), 1.0 / (8.0 * np.sqrt(rigidity * per_area)), rtol=1e-14)
+        rates = [waves.rate, waves.fastest, waves.slowest, waves.least]
+        assert_allclose(rates, np.sqrt(rigidity / per_area), rtol=1e-13)
+        assert_allclose(waves.stretch @ waves.stretch.T, np.eye(2), atol=1e-14)
+
+
+def test_clearance_counts_for_less_along_the_grain():
+    wood = Material.orthotropic(E_along=16e9, E_across=1e9, nu=0.0, G=1e9, rho=500.0)
+    body, at = mesh.rectangle(2.0, 1.0), np.array([0.9, 0.6])
+    view = Surroundings.seen(body, at, Waves.of(wood, THICKNESS).stretch)
+    root = 16.0**0.125  # the plane is this much shorter along the grain
+    assert_allclose(view.clearance, min(0.9 / root, 0.4 * root), rtol=1e-12)
+    assert_allclose([view.area, view.perimeter], [2.0, 4.0 / root + 2.0 * root], rtol=1e-12)
+
+
+def grained(material, at, ratio, nearness):
+    """A hinged orthotropic plate, 1.5 m by 1 m, its grain along its length, in closed form, and what is stated of it.
+
+    Its rigidity and mass are such that it damps the contact by a ratio and its edges are as near as stated. Returns its
+    modes, its mobility [m/(N s)] and the stated error.
+    """
+    waves, at = Waves.of(material, THICKNESS), np.asarray(at)
+    view = Surroundings.seen(mesh.rectangle(1.5, 1.0), at, waves.stretch)
+    faster = view.clearance**2 / (nearness * DURATION * (1.0 + ratio)) / waves.fastest
+    mobility = 2.0 * ratio * DURATION / (MASS * np.pi)
+    per_area = 1.0 / (8.0 * mobility * waves.rate * faster)
+    stiff = material.plane_stress * THICKNESS**2 / 12.0 / material.rho * faster**2  # [m**4/s**2]
+    m, n = (np.arange(1, 1000) * np.pi / side for side in (1.5, 1.0))
+    along, across = m[:, None] ** 2, n[None] ** 2
+    squared = (
+        stiff[0, 0] * along**2 + 2.0 * (stiff[0, 1] + 2.0 * stiff[2, 2]) * along * across + stiff[1, 1] * across**2
+    )
+    shape = 2.0 / np.sqrt(1.5 * per_area) * np.sin(m * at[0])[:, None] * np.sin(n * at[1])[None]
+    static = np.sum(shape**2 / squared)
+    kept = np.flatnonzero(squared < (2.0 * np.pi * 10.0 / DURATION) ** 2)
+    kept = kept[np.argsort(squared.ravel()[kept])]
+    shapes = SampledShapes(at[None], shape.ravel()[None, kept], np.array([[static]]))
+    modes = Modes(np.sqrt(squared.ravel()[kept]), np.zeros(len(kept)), shapes, 1.5 * per_area)
+    rate, slowest = waves.fastest * faster, waves.slowest * faster
+    return modes, mobility, idealisation.endless_error(view, mobility, rate, MASS, DURATION, slowest=slowest)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    ("material", "at", "ratio", "nearness"),
+    [
+        (replace(SPRUCE, angle=0.0), (0.7, 0.5), 0.15, 3.5),  # the ends along the grain answer first
+        (replace(SPRUCE, angle=0.0), (0.75, 0.15), 0.1, 6.0),  # the near side across it
+        (SOFT_IN_SHEAR, (0.6, 0.45), 0.05, 3.0),
+        (replace(STIFF_IN_SHEAR, angle=0.0), (0.5, 0.4), 0.05, 3.0),
+    ],
+)
+def test_error_of_an_endless_orthotropic_plate_is_bounded_and_not_by_far(material, at, ratio, nearness, law):
+    modes, mobility, stated = grained(material, at, ratio, nearness)
+    true = difference(
+        struck(idealisation.endless(np.array(at), 1.0, mobility, DURATION), law, at), struck(modes, law, at)
+    )
+    assert true <= stated <= 10.0 * true  # 3.0 to 5.1 times measured
+
+
+def test_error_of_random_endless_orthotropic_plates_is_bounded():
+    """Moduli up to 30 to 1, shear from very soft to very stiff, grain along the length."""
+    rng, found = np.random.default_rng(4), []
+    while len(found) < 30:
+        across = 1e10 / 30.0 ** rng.uniform()
+        G = 0.5 * (10.0 ** rng.uniform(-1.0, 0.7) * np.sqrt(1e10 * across) - 0.2 * across)
+        if G <= 0.0:
+            continue
+        wood = Material.orthotropic(E_along=1e10, E_across=across, nu=0.2, G=G, rho=500.0)
+        at, ratio = rng.uniform([0.2, 0.2], [1.3, 0.8]), rng.uniform(0.01, 0.28)
+        modes, mobility, stated = grained(wood, at, ratio, 2.05 * 5.0 ** rng.uniform())
+        if np.isfinite(stated) and modes.n_modes < 3000:
+            body = idealisation.endless(at, 1.0, mobility, DURATION)
+            law = str(rng.choice(list(LAWS)))
+            found.append(stated / difference(struck(body, law, at), struck(modes, law, at)))
+    assert min(found) >= 1.0
+    assert np.median(found) <= 20.0  # single ones are larger: the echoes of several edges can cancel
+
+
+def test_a_spruce_top_counts_as_endless_and_is_struck_as_by_its_modes():
+    """Elements, a grain at an angle and clamped edges: the contact is over before the echo returns."""
+    body, at = mesh.rectangle(0.4, 0.3), (0.2, 0.15)
+    system = assemble(body, Plate(SPRUCE, THICKNESS), {"boundary": "clamped"})
+    mass, duration = 2e-3, 1.2e-3
+    law = Contact.hertz(mass * (3.2180654597 / duration) ** 2.5)
+    blow = {"at": at, "speed": 1.0, "tolerance": 0.1}
+    plan = planner.plan_of(system, Striker.rigid(mass), law, **blow)
+    assert plan.target == "infinite"
+    assert_allclose(plan.mobility, Waves.of(SPRUCE, THICKNESS).mobility(SPRUCE.rho * THICKNESS), rtol=1e-12)
+    seen = idealisation.from_outside(Target.of(system), at, mass, duration)
+    by_modes = planner.plan_of(system, Striker.rigid(mass), law, **{**blow, "tolerance": 2e-3}, target="modal").strike()
+    true = difference(plan.strike(), by_modes)
+    assert true <= seen.endless <= 60.0 * true  # as above
+
+
+def test_what_an_orthotropic_plate_under_tension_answers_is_not_known():
+    plate = Plate(SPRUCE, THICKNESS, tension=100.0)
+    target = Target(mesh.rectangle(0.4, 0.3), plate, {"boundary": "clamped"})
+    assert idealisation.from_outside(target, (0.2, 0.15), 1e-3, 1e-4).mobility == np.inf
