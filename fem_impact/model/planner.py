@@ -80,11 +80,11 @@ class Plan:
     changes: Mapping[str, Any]  # overridden arguments of the blow and pieces of the plan
     tolerance: float  # [-]
     quantities: Mapping[str, float | None]  # each with its band [Hz]
-    target: str  # "rigid", "infinite" or "modal"
+    target: str  # "rigid", "infinite", "vectors" (Ritz vectors started from the blow) or "modal"
     element: str | None  # "argyris", "hermite" or "closed form"; None for an idealised target
     size: float | None  # [m] element size
     n_dofs: int  # [-] approximate number of unknowns
-    n_modes: int  # [-] approximate number of target modes
+    n_modes: int  # [-] approximate number of target modes or vectors
     max_frequency: float | None  # [Hz] highest kept target mode; those above act as a spring
     n_striker_modes: int  # [-] striker modes, including its rigid motions
     scheme: str
@@ -324,7 +324,6 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
     seen = vectors.Seen(blow.target, values["at"], resonance, asked.tolerance, plan.size, fixed, stages)
     if seen.at_rest:
         return carry_out(_modal(asked, stages), stages, keep)
-    striker = collision.shortened(blow.striker, plan.n_striker_modes)
 
     def cutoff(modes: Modes, margin: float) -> float:
         allowed = asked.left_out / margin
@@ -332,6 +331,7 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
 
     while True:
         modes = seen.modes(cutoff)
+        striker = collision.shortened(blow.striker, _striker_modes(asked, seen.margin)[0])
         with stages("strike"), blow.target.blame("strike"):
             run = partial(collision.strike, modes, striker, blow.contact)
             response = run(**{**values, "tolerance": STEPS * asked.tolerance})
@@ -688,9 +688,9 @@ def strike(
     Parameters
     ----------
     modes : Modes or System
-        The struck body. Of an assembled system, the blow computes only what it needs: as many modes as the tolerance
-        takes, or none if the body may count as rigid or infinite (see `fi.plan`). Modes are taken as they are; those
-        left out act by their static compliance.
+        The struck body. Of an assembled system, the blow computes only what it needs: Ritz vectors for a plate, as
+        many modes as the tolerance takes for a beam, neither if the body may count as rigid or infinite (see `fi.plan`).
+        Modes are taken as they are; those left out act by their static compliance.
     striker : Striker
         Arrives in rigid motion.
     contact : Contact

@@ -22,6 +22,8 @@ WAVES = 1.2, 0.35  # highest frequency that the first mesh resolves, over that o
 SHIFT = 6.0, 1.0 / 6.0  # shift over the angular frequency of the contact
 FIRST = 84, 0.22  # vectors tried first: they resolve one undisturbed contact
 MORE = 1.4  # [-] factor on the number of vectors as long as they are too few
+NOTCH = 4.0  # [-] divides what the highest Ritz pairs, which act as a spring, may err, each time
+PATIENCE, LEAST_GAIN = 3, 0.7  # [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7
 COARSER = 1.5  # [-] element size of the comparison over that of the blow
 MOST_VECTORS = 1500  # [-] limit on their number: dense matrices of this size take a second
 
@@ -76,9 +78,15 @@ class Seen:
         self.target, self.at, self.size, self.fixed, self.stages = target, np.atleast_2d(at), size, fixed, stages
         ease = 1e-2 / tolerance
         self.shift = 2.0 * np.pi * resonance * SHIFT[0] * ease ** SHIFT[1] / target.stretch
-        self.count, self.margin = first_count(tolerance), 1.0
+        self.count, self.margin = first_count(tolerance), NOTCH
+        self.tried: list[float] = []  # [-] truncation errors of the blows so far
         self.fine = self._krylov(size)
         self.coarse: Krylov | None = None
+
+    def _stuck(self, truncation: float) -> bool:
+        """Whether the last PATIENCE steps towards more vectors gained nothing."""
+        self.tried.append(truncation)
+        return len(self.tried) > PATIENCE and min(self.tried[-PATIENCE:]) > LEAST_GAIN * min(self.tried[:-PATIENCE])
 
     def _krylov(self, size: float) -> Krylov:
         system = self.target.near(self.at, size, self.stages)
@@ -102,8 +110,8 @@ class Seen:
 
     def improved(self, error: Error, allowed: float) -> bool:
         """Take more vectors or a finer mesh, whichever the error of a blow calls for; False if neither is possible."""
-        if error.truncation > 0.5 * allowed and not self.fine.full and self.count < MOST_VECTORS:
-            self.count, self.margin = min(MOST_VECTORS, round(MORE * self.count)), MORE * self.margin
+        if error.truncation > 0.5 * allowed and self.count < MOST_VECTORS and not self._stuck(error.truncation):
+            self.count, self.margin = min(MOST_VECTORS, round(MORE * self.count)), NOTCH * self.margin
             return True
         if self.coarse is None:
             self.coarse = self._krylov(self.size * COARSER)
