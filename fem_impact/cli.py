@@ -18,15 +18,14 @@ import time
 import webbrowser
 from collections.abc import Iterator, MutableMapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rich import progress as bars
-from rich.console import Console
-
 import fem_impact as fi
 
-from ._base.files import undo_all, undoable
+from ._base.files import undo_all
+from .display import Display
 
 BAD_INPUT, FAILED, MISSED, INTERRUPTED = 2, 1, 3, 130  # exit statuses, as Unix tools use them; 130 is 128 + SIGINT
 WIDEST = 88  # [-] columns: printed text is never wider, and narrower on a narrow terminal
@@ -312,24 +311,27 @@ class _Version(argparse.Action):
 def _strike(options: argparse.Namespace) -> bool:
     """Strike and write; returns whether the tolerance was missed."""
     from .impact import promise  # imported only when needed
+    from .model.target import Stages
+    from .show.painter import Painter
 
     began = time.perf_counter()
     scene = fi.load_scene(options.scene)
     if options.listener is not None:
         scene = scene.heard_from(options.listener)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
-    with fi.export.staged(folder) as staging:
+    display = Display()
+    with fi.export.staged(folder) as staging, Painter() if options.pictures else nullcontext() as painter:
         place = folder.resolve()  # "." has no name of its own
         keep = place.parent / f"{place.name}.modes.npz"  # not in the folder: an interrupted run leaves that alone
-        motion = options.pictures or options.vtk
-        run = scene.run(_progress, before=_warn, verify=options.verify, motion=motion, keep=keep, **_choices(options))
+        motion, before = options.pictures or options.vtk, partial(_announce, display, options.verify)
+        run = scene.run(display, before=before, verify=options.verify, motion=motion, keep=keep, **_choices(options))
+        display.predict(None)
         if options.strict:
             promise.kept(run.response, strict=True)
-        start = time.perf_counter()
-        with _progress("files"):
-            data = _write(staging, scene, run, options)
+        stages = Stages(display)
+        data = _write(staging, scene, run, options, stages, painter)
     keep.unlink(missing_ok=True)
-    seconds = {**run.seconds, "files": time.perf_counter() - start, "total": time.perf_counter() - began}
+    seconds = {**run.seconds, **stages.seconds, "total": time.perf_counter() - began}
     missed = not run.response.tolerance_met
     if options.json:
         _print_json(data)
@@ -352,36 +354,49 @@ def _strike(options: argparse.Namespace) -> bool:
     return missed
 
 
-def _warn(plan: Any) -> None:
-    """Warn of a long run before it starts."""
+def _announce(display: Display, verify: bool, plan: Any) -> None:
+    """Warn of a long run before it starts, and let its prediction tell the time left."""
+    display.predict(None if verify else plan.seconds)  # the plan of the second, finer run is not known yet
     if plan.costly:
         text = f"{plan.cost}; Ctrl-C stops it, and the same command later reuses the modes already found"
         _tell(f"{text} (`fem-impact plan` explains why)")
 
 
-def _write(folder: Path, scene: Any, run: Any, options: argparse.Namespace) -> dict[str, Any]:
+def _write(
+    folder: Path, scene: Any, run: Any, options: argparse.Namespace, stages: Any, painter: Any
+) -> dict[str, Any]:
     """Write every file of a strike; return the contents of response.json."""
     from .show import sampling  # imported only when needed
+    from .show.painter import NAMES
 
     response, files = run.response, ["response.json", "force.csv", "force.png"]
     extra: dict[str, Any] = {}
-    fi.export.write_force(folder / "force.csv", response)
-    fi.figures.save(folder / "force.png", fi.figures.force(response))
+    if run.plan.target == "vectors" and response.ringing is None:
+        with stages("modes"):
+            response = response.on(response.target)
+    drawn = painter is not None and run.rings
+    if drawn:
+        painter.begin(folder, response)
+    with stages("files"):
+        fi.export.write_force(folder / "force.csv", response)
+        fi.figures.save(folder / "force.png", fi.figures.force(response))
     if run.rings:
-        fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=SHAPES_WRITTEN))
-        files += ["modes.pvd", *_write_sounds(folder, scene, response, extra, options)]
+        with stages("files"):
+            fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=SHAPES_WRITTEN))
+        with stages("sound"):
+            files += ["modes.pvd", *_write_sounds(folder, scene, response, extra, options)]
         if options.vtk:
             end = sampling.end_of(response)
             times = [end * i / (MOTION_TIMES - 1) for i in range(MOTION_TIMES)]
-            fi.export.write_vtk(folder / "motion.pvd", response.target, response, times)
+            with stages("motion"):
+                fi.export.write_vtk(folder / "motion.pvd", response.target, response, times)
             files.append("motion.pvd")
-        if options.pictures:
-            fi.pictures.animation(folder / "wave.gif", response)
-            fi.pictures.wave(folder / "wave.png", response)
-            missing = fi.pictures.mode_shapes(folder / "modes.png", response.target)
+        if drawn:
+            with stages("pictures"):
+                missing = painter.finish()
             if missing:
                 _tell(f"pictures are drawn in two dimensions; {missing}")
-            files += ["modes.png", "wave.png", "wave.gif"]
+            files += NAMES
     if run.verified is not None:
         extra["verified"] = run.verified
     changes = {name: value for name, value in run.plan.changes.items() if name in ("tolerance", "quantity")}
@@ -411,7 +426,7 @@ def _write_sounds(
 
 def _plan(options: argparse.Namespace) -> None:
     scene = fi.load_scene(options.scene)
-    plan = scene.plan(watch=_progress, **_choices(options))
+    plan = scene.plan(watch=Display(), **_choices(options))
     if options.json:
         _print_json({**plan.data(), "versions": fi.export.versions()})
         return
@@ -426,12 +441,14 @@ def _map(options: argparse.Namespace) -> None:
     scene = fi.load_scene(options.scene)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:
-        with _counted("cells") as (watch, stage):
+        display = Display()
+        with display("cells"):
             table = maps.map_scene(
                 scene, tolerance=options.tolerance, workers=options.workers, client=options.cluster,
-                store=options.store, watch=watch, max_cells=options.max_cells, tell=_tell, stage=stage,
+                store=options.store, watch=partial(display.report, "cells"), max_cells=options.max_cells, tell=_tell,
+                stage=display,
             )  # fmt: skip
-        with _progress("files"):
+        with display("files"):
             names = maps.write(staging, table, options.format)
     axes = ", ".join(f"{name} ({size})" for name, size in table.sizes.items())
     single, failed = int((table.n_impacts == 1).sum()), int((table.n_impacts < 0).sum())
@@ -446,7 +463,7 @@ def _hammer(options: argparse.Namespace) -> None:
 
     scene = fi.load_scene(options.scene)
     masses = options.masses or [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]
-    with _progress("hammers"):
+    with Display(_tell)("hammers"):
         hammers = maps.hammers_for(scene, options.bandwidth, masses, drop=options.drop)
         if options.out is not None:
             options.out.parent.mkdir(parents=True, exist_ok=True)
@@ -486,8 +503,10 @@ def _report(options: argparse.Namespace) -> bool:
     path = options.out if options.out is not None else Path("out") / options.scene.stem / "report.html"
     changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
     with fi.export.staged(path.parent) as staging:
-        run = scene.run(_progress, before=_warn, motion=True, **changes)
-        with _progress("page"):
+        display = Display()
+        run = scene.run(display, before=partial(_announce, display, False), motion=True, **changes)
+        display.predict(None)
+        with display("page"):
             fi.report.write(staging / path.name, scene, run)
     _say(_title(scene), run.response.summary(), f"Files: {path}")
     return not run.response.tolerance_met
@@ -501,18 +520,18 @@ def _explore(options: argparse.Namespace) -> None:
         if not options.no_open:
             webbrowser.open(address)
 
-    fi.explore.serve(scene, port=options.port, ready=ready, watch=_progress)
+    fi.explore.serve(scene, port=options.port, ready=ready, watch=Display())
 
 
 def _modes(options: argparse.Namespace) -> None:
     scene = fi.load_scene(options.scene)
     if options.vtk is None:
-        with _progress("modes"):
+        with Display()("modes"):
             modes = scene.modes(options.count)
     else:
         fi.export.vtk_ending(options.vtk)
         with fi.export.staged(options.vtk.parent) as staging:  # a bad folder fails before the work, not after it
-            with _progress("modes"):
+            with Display()("modes"):
                 modes = scene.modes(options.count)
             fi.export.write_vtk(staging / options.vtk.name, modes)
     if options.json:
@@ -534,7 +553,7 @@ def _doctor(options: argparse.Namespace) -> None:
     from . import doctor  # imported only when needed
 
     _print_table(list(fi.export.versions().items()))
-    with _progress("checking, and compiling if not yet done"):
+    with Display()("checking, and compiling if not yet done"):
         findings = doctor.examine()
     for finding in findings:
         state = "works" if finding.works else "fails" if finding.vital else "missing"
@@ -592,56 +611,6 @@ def _wrapped(text: str) -> str:
     filled = textwrap.TextWrapper(width, subsequent_indent="    ", break_on_hyphens=False)  # keeps paths whole
     lines = (filled.wrap(line) or [""] for line in text.splitlines())
     return "\n".join(line for wrapped in lines for line in wrapped)
-
-
-def _show_cursor() -> None:
-    """Clear the progress line and show the cursor again."""
-    os.write(2, b"\r\x1b[2K\x1b[?25h")
-
-
-@contextmanager
-def _bar(*columns: Any) -> Iterator[bars.Progress | None]:
-    """A line that shows progress on a terminal; None if there is no terminal."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield None
-        return
-    with undoable(_show_cursor), bars.Progress(*columns, console=console, transient=True) as bar:
-        yield bar
-
-
-@contextmanager
-def _progress(stage: str) -> Iterator[None]:
-    """On a terminal, show which stage is running and for how long."""
-    with _bar(bars.SpinnerColumn(), bars.TextColumn("{task.description}"), bars.TimeElapsedColumn()) as bar:
-        if bar is not None:
-            bar.add_task(stage, total=None)
-        yield
-
-
-@contextmanager
-def _counted(what: str) -> Iterator[Any]:
-    """On a terminal, show the number done, the rate and the time left."""
-    name, rate = (bars.TextColumn(text) for text in ("{task.description}", "{task.fields[rate]}"))
-    with _bar(name, bars.BarColumn(), bars.MofNCompleteColumn(), rate, bars.TimeRemainingColumn()) as bar:
-        if bar is None:
-            yield None, None
-            return
-        task, began = bar.add_task(what, total=None, rate=""), time.perf_counter()
-        known: list[int] = []
-
-        def watch(done: int, total: int) -> None:
-            if not known:
-                known.append(done)
-            speed = (done - known[0]) / max(1e-9, time.perf_counter() - began)
-            rate = f"{speed:.3g}/s" if speed else ""
-            bar.update(task, description=what, completed=done, total=total, rate=rate)
-
-        def stage(name: str) -> Any:
-            bar.update(task, description=name, completed=0, total=None, rate="")
-            return nullcontext()
-
-        yield watch, stage
 
 
 if __name__ == "__main__":

@@ -4,10 +4,12 @@ import importlib.util
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from . import mesh
+from ._base import progress
 from ._base.files import scratch
 from .fe.assembly import assemble
 from .fe.section import Material, Plate
@@ -44,14 +46,18 @@ class Finding:
 
 def examine() -> list[Finding]:
     """Check everything a strike needs, and the optional 3-D rendering and extras; takes a few seconds."""
-    return [
-        _tried("finite elements", _finite_elements, "reinstall scikit-fem: it fails or gives wrong numbers"),
-        _tried("compiled kernels", _kernels, "reinstall numba; NUMBA_DISABLE_JIT=1 runs without it, slowly"),
-        _tried("pictures", _picture, "reinstall matplotlib"),
-        _tried("mode shapes as files", _vtk, "make the folder for temporary files writable"),
-        _tried("3-D rendering", pictures.can_render, pictures.REMEDY, vital=False),
-        *(_extra(name, purpose, modules) for name, (purpose, *modules) in EXTRAS.items()),
+    checks: list[Callable[[], Finding]] = [
+        partial(_tried, "finite elements", _finite_elements, "reinstall scikit-fem: it fails or gives wrong numbers"),
+        partial(_tried, "compiled kernels", _kernels, "reinstall numba; NUMBA_DISABLE_JIT=1 runs without it, slowly"),
+        partial(_tried, "pictures", _picture, "reinstall matplotlib"),
+        partial(_tried, "mode shapes as files", _vtk, "make the folder for temporary files writable"),
+        partial(_tried, "3-D rendering", pictures.can_render, pictures.REMEDY, vital=False),
     ]
+    found: list[Finding] = []
+    for each in checks:
+        progress.report("checks", len(found), len(checks))
+        found.append(each())
+    return found + [_extra(name, purpose, modules) for name, (purpose, *modules) in EXTRAS.items()]
 
 
 def _tried(name: str, check: Callable[[], bool], remedy: str, vital: bool = True) -> Finding:

@@ -1,4 +1,4 @@
-"""Measures how long a user waits: wall time of a strike and of `--help`, each in a new process."""
+"""Measures how long a user waits: `--help`, a strike, and one with pictures, each in a new process."""
 
 import argparse
 import os
@@ -23,6 +23,13 @@ def wall_times(command: list[str], repeats: int) -> list[float]:
     return times
 
 
+def share_of_pictures(scene: str, folder: str, repeats: int) -> float:
+    """Least wall time of a strike with pictures over that of one without; the two take turns."""
+    plain = [str(PROGRAM), "strike", scene, "--out", folder]
+    without, drawn = zip(*(wall_times(plain, 1) + wall_times([*plain, "--pictures"], 1) for _ in range(repeats)))
+    return min(drawn) / min(without)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=5)
@@ -34,6 +41,7 @@ def main() -> None:
         for name, arguments in jobs.items():
             times = wall_times([str(PROGRAM), *arguments], repeats)
             print(f"{name:>22}: first {times[0]:6.2f} s, median {statistics.median(times):6.2f} s")
+        print(f"{'strike --pictures':>22}: {share_of_pictures(scene, folder, repeats):.2f} times as long as without")
 
 
 if __name__ == "__main__":

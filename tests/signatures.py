@@ -124,6 +124,9 @@ def table() -> dict[str, dict[str, Any]]:
     t = things()
     at, body = (0.13, 0.1), {"mass": 0.2, "first_frequency": 100.0, "n_modes": 5}
     blow = {"modes": t["modes"], "striker": t["striker"], "contact": t["law"], "at": at, "speed": 1.0}
+    told = {
+        "striker": t["striker"], "contact": t["law"], "at": at, "speed": 1.0, "tolerance": 1e-1, "damping_ratio": 0.01,
+    }  # fmt: skip
     hit = {"response": t["hit"]}
     written = {"modes": t["modes"], "response": t["hit"], "times": [0.0, 1e-3]}
     folder = t["folder"]
@@ -207,6 +210,8 @@ def table() -> dict[str, dict[str, Any]]:
         "spectra.half_sine_spectrum": {"frequencies": [50.0, 60.0], "contact_frequency": 100.0},
         "threshold_frequency": {"modes": t["modes"], "at": at, "mass": 0.03},
         "threshold.required_energy": {"modes": t["modes"], "at": at, "contact_frequency": 500.0},
+        "strike system": {"modes": t["system"], **told, "size": 0.08, "n_modes": 12, "strict": False},
+        "strike system band": {"modes": t["system"], **told, "target": "modal", "max_frequency": 2e3},
         "strike": {
             **blow, "tolerance": 1e-2, "quantity": "restitution", "residual": True, "duration": 0.1, "max_impacts": 3,
             "scheme": "A4", "dt": 1e-5, "striker_force": 0.0, "target_force": 0.0,
@@ -223,6 +228,8 @@ def table() -> dict[str, dict[str, Any]]:
         "Scene.strike": {"self": t["scene"], "tolerance": 1e-1, "speed": 1.0, "at": at},
         "load_scene": {"path": t["path"]},
         "plan": {"scene": t["scene"], "tolerance": 1e-1},
+        "plan system": {"scene": t["system"], **told, "target": "modal", "n_striker_modes": 1, "watch": None},
+        "plan modes": {"scene": t["modes"], **told, "n_modes": 10},
         "Plan.but": {"self": t["plan"], "tolerance": 1e-1, "target": "modal", "n_modes": 10},
         "sweep": {
             **blow, "over": {"mass": [0.02, 0.03]}, "tolerance": 1e-1, "max_frequency": 1e3, "layers": None,

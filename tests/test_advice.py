@@ -7,6 +7,7 @@ from scenes import QUICK, SMALL
 
 import fem_impact as fi
 from fem_impact import cli
+from fem_impact.impact import collision
 from fem_impact.model import planner
 from fem_impact.scenes import maps
 
@@ -194,3 +195,169 @@ def test_an_incompressible_material_is_allowed_as_documented(tmp_path):
     assert loaded(tmp_path, SMALL.replace("mass = 0.2", "mass = 0.2\nnu = 0.5")).modes(2).n_modes == 2
     with pytest.raises(ValueError, match=r"\[target\] nu must lie between -0.99 and 0.5"):
         loaded(tmp_path, SMALL.replace("mass = 0.2", "mass = 0.2\nnu = -1"))
+
+
+PLATE = fi.Plate(STEEL, 1e-3)
+BEAM = fi.Beam.rectangular(STEEL, width=0.02, height=0.01)
+SQUARE = fi.mesh.rectangle(0.4, 0.3, size=0.2)
+DISK = fi.mesh.disk(0.2, size=0.1)
+CLOSED = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=20)
+SOFT = {"at": (0.13, 0.1), "speed": 1.0, "tolerance": 1e-2}
+HELD = {"boundary": "clamped"}
+
+
+def struck(law=None, **changes):
+    law = fi.Contact.linear(1e4) if law is None else law
+    return fi.strike(CLOSED, fi.Striker.rigid(0.03), law, **{**SOFT, **changes})
+
+
+def collided():
+    return fi.collide([fi.Modes.rigid(1.0)] * 2, [fi.Touch(fi.Contact.linear(1e5), 0, 1)], speeds=[1.0, 0.0])
+
+
+def bar(at):
+    modes = fi.analytic.beam(0.3, ends=("hinged", "free"), mass=0.1, first_frequency=1e3, n_modes=4)
+    return fi.Striker.flexible(modes, at=at)
+
+
+def swept(**changes):
+    over = {"mass": [0.02, 0.03, 0.04]}
+    return fi.sweep(
+        CLOSED, fi.Striker.rigid(0.03), fi.Contact.linear(1e4), **{**SOFT, "over": over, "max_cells": 2, **changes}
+    )
+
+
+def mapped(folder, table):
+    return maps.map_scene(loaded(folder, SMALL + table), tolerance=1e-1)
+
+
+ADVICE = {  # what fails, the message, and what it advises
+    "closed form": (
+        lambda tmp: loaded(tmp, SMALL.replace('"hinged"', '"clamped"')).plan(),
+        "use source = 'fe'",
+        lambda tmp: loaded(tmp, SMALL.replace('"hinged"', '"clamped"').replace('"analytic"', '"fe"')).plan(),
+    ),
+    "hinge": (lambda _: bar(0.0), "move it off the hinge", lambda _: bar(0.05)),
+    "collocation": (
+        lambda _: struck(fi.Contact.power(1e3, 0.8), scheme="collocation"),
+        "use A4",
+        lambda _: struck(fi.Contact.power(1e3, 0.8), scheme="A4"),
+    ),
+    "cells": (lambda _: swept(), "raise max_cells, now 2$", lambda _: swept(max_cells=3)),
+    "fewer values": (lambda _: swept(), "give fewer values", lambda _: swept(over={"mass": [0.02, 0.03]})),
+    "sound of a beam": (
+        lambda _: fi.sound.radiate(of_a_beam(), (0.0, 0.0, 1.0)),
+        "use synthesise",
+        lambda _: fi.sound.synthesise(of_a_beam(), 0.1),
+    ),
+    "listener": (
+        lambda _: fi.sound.radiate(struck(), (0.1, 0.1, 0.0), duration=0.01),
+        "give a distance",
+        lambda _: fi.sound.radiate(struck(), (0.1, 0.1, 0.5), duration=0.01),
+    ),
+    "gap of a collision": (
+        lambda tmp: fi.pictures.wave(tmp / "a.png", collided()),
+        "use the response of strike",
+        lambda tmp: fi.figures.save(tmp / "a.png", fi.figures.force(struck())),
+    ),
+    "wood": (
+        lambda _: fi.Material(E=1e10, nu=0.3, rho=450.0, E_across=1e9),
+        "give neither",
+        lambda _: fi.Material(E=1e10, nu=0.3, rho=450.0),
+    ),
+    "tension": (
+        lambda _: fi.assemble(SQUARE, fi.Plate(STEEL, 1e-3, tension=10.0), {"left": "hinged"}),
+        "add supports",
+        lambda _: fi.assemble(SQUARE, fi.Plate(STEEL, 1e-3, tension=10.0), {"boundary": "hinged"}),
+    ),
+    "Morley on a disk": (
+        lambda _: fi.assemble(DISK, PLATE, HELD, element="morley"),
+        "use 'argyris', or a polygon",
+        lambda _: (fi.assemble(DISK, PLATE, HELD), fi.assemble(SQUARE, PLATE, HELD, element="morley")),
+    ),
+    "modes of closed forms": (
+        lambda _: fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, max_frequency=1e9),
+        "lower it",
+        lambda _: fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, max_frequency=1e4),
+    ),
+    "map": (
+        lambda tmp: mapped(tmp, ""),
+        r'over = \{ "striker.mass" = \[0.01, 0.1\] \}',
+        lambda tmp: mapped(tmp, '[map]\nover = { "striker.mass" = [0.01, 0.1] }\n'),
+    ),
+    "too many modes": (
+        lambda tmp: loaded(tmp, SMALL).modes(10**6), "ask for fewer", lambda tmp: loaded(tmp, SMALL).modes(10),
+    ),
+    "nothing to observe": (
+        lambda tmp: loaded(tmp, SMALL + "[observe]\n"), "leave out the table", lambda tmp: loaded(tmp, SMALL),
+    ),
+    "rigid motion": (
+        lambda tmp: fi.export.write_animation(tmp / "a.pvd", fi.Modes.rigid(1.0), 1, frames=2),
+        "a rigid motion",
+        lambda tmp: fi.export.write_animation(tmp / "a.pvd", CLOSED, 2, frames=2),
+    ),
+}  # fmt: skip
+
+
+def of_a_beam():
+    modes = fi.analytic.beam(0.3, ends=("hinged", "hinged"), mass=0.1, first_frequency=100.0, n_modes=9)
+    return fi.strike(modes, fi.Striker.rigid(0.01), fi.Contact.linear(1e4), at=0.1, speed=1.0, tolerance=1e-1)
+
+
+@pytest.mark.parametrize("name", ADVICE)
+def test_following_the_advice_works(tmp_path, name):
+    wrong, words, right = ADVICE[name]
+    with pytest.raises(ValueError, match=words):
+        wrong(tmp_path)
+    right(tmp_path)
+
+
+def test_a_step_error_that_stays_too_large_is_met_by_the_tolerance_it_tells_to_raise(monkeypatch):
+    monkeypatch.setattr(collision, "DOUBLINGS", 1)
+    law = fi.Contact.power(1e3, 0.8)  # collocation, which would take over, needs an exponent of 1
+    with pytest.raises(fi.SimulationError, match=r"; raise tolerance$"):
+        struck(law, tolerance=1e-12, residual=False)
+    assert struck(law, tolerance=1e-3, residual=False).error.step <= 1e-3
+
+
+def test_a_run_without_end_is_ended_by_each_of_what_is_told(monkeypatch):
+    monkeypatch.setattr(collision, "_most_steps", lambda _: 400)
+    blow = {"residual": False, "scheme": "A"}
+    with pytest.raises(fi.SimulationError, match="raise tolerance or dt, or give duration or max_impacts"):
+        struck(**blow, tolerance=1e-12)
+    assert struck(**blow, tolerance=1e-2).error.step <= 1e-2
+    with pytest.raises(fi.SimulationError, match="raise tolerance or dt, or give duration or max_impacts"):
+        struck(**blow, dt=1e-6)
+    for way in ({"dt": 1e-4}, {"dt": 1e-6, "duration": 1e-4}):
+        assert struck(**blow, **way).error.step < 1.0
+
+
+def test_too_little_memory_points_to_the_plan_which_says_what_needs_it(tmp_path, capsys, monkeypatch):
+    loaded(tmp_path, SMALL)
+
+    def full(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr(fi.Scene, "run", full)
+    name = str(tmp_path / "scene.toml")
+    assert cli.main(["strike", name, "--out", str(tmp_path / "o")]) == 1
+    assert capsys.readouterr().err == "fem-impact: not enough memory; `fem-impact plan SCENE` shows what needs it\n"
+    assert cli.main(["plan", name]) == 0
+    assert re.search(r"Cost: about .* and \d+ MB predicted", capsys.readouterr().out)
+
+
+def test_a_store_of_another_map_asks_for_a_new_folder(tmp_path):
+    pytest.importorskip("zarr", reason="stores are an extra: fem-impact[cluster]")
+    swept(max_cells=3, store=tmp_path / "a")
+    with pytest.raises(ValueError, match=r"store holds another map .*; name a new folder"):
+        swept(max_cells=3, store=tmp_path / "a", tolerance=2e-2)
+    swept(max_cells=3, store=tmp_path / "b", tolerance=2e-2)
+
+
+def test_a_heavy_hammer_advises_lighter_ones(tmp_path, capsys):
+    loaded(tmp_path, SMALL)
+    name = str(tmp_path / "scene.toml")
+    assert cli.main(["hammer", name, "--bandwidth", "600", "--masses", "2.0"]) == 0
+    assert "try lighter hammers" in " ".join(capsys.readouterr().out.split())
+    assert cli.main(["hammer", name, "--bandwidth", "600", "--masses", "0.001"]) == 0
+    assert "try lighter hammers" not in " ".join(capsys.readouterr().out.split())

@@ -1,14 +1,18 @@
 """Write a file completely or not at all: write it under a temporary name, then rename it."""
 
 import os
+import platform
+import re
 import secrets
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-PARTIAL = ".partial-"  # prefix of every temporary name: marks what a killed run left behind
+PARTIAL = ".partial-"  # prefix of every temporary name, which goes on with machine, process and a random number
+MACHINE = re.sub(r"[^A-Za-z0-9.]", "_", platform.node())
+OURS: set[str] = set()  # temporary names in use by this process
 
 UNDONE: list[Callable[[], object]] = []  # functions that remove unfinished work, called newest first
 FINISHING: list[Path] = []  # folders that are receiving their finished files: too late to undo
@@ -42,8 +46,9 @@ def replacing(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path beside ``path`` (same suffix); rename it if the block succeeds, otherwise delete it."""
     path = Path(path)
     _placed(path)
-    temporary = path.with_name(f"{PARTIAL}{secrets.token_hex(4)}-{path.name}")
-    with undoable(lambda: temporary.unlink(missing_ok=True)):
+    _tidy(path.parent)
+    with _named() as name, undoable(lambda: temporary.unlink(missing_ok=True)):
+        temporary = path.with_name(f"{name}-{path.name}")
         try:
             yield temporary
             os.replace(temporary, path)
@@ -60,7 +65,6 @@ def staged(folder: str | Path) -> Iterator[Path]:
     """
     folder = Path(folder)
     new = [path for path in (folder, *folder.parents) if not path.exists()]
-    staging = folder / f"{PARTIAL}{secrets.token_hex(4)}"
 
     def undo() -> None:
         shutil.rmtree(staging, ignore_errors=True)
@@ -68,9 +72,11 @@ def staged(folder: str | Path) -> Iterator[Path]:
             if path.is_dir() and not any(path.iterdir()):
                 path.rmdir()
 
-    with undoable(undo):
+    with _named() as name, undoable(undo):
+        staging = folder / name
         try:
             folder.mkdir(parents=True, exist_ok=True)
+            _tidy(folder)
             staging.mkdir()
             yield staging
             FINISHING.append(folder)
@@ -89,6 +95,45 @@ def scratch() -> Iterator[Path]:
     """Yield a temporary folder and delete it when the block ends."""
     with tempfile.TemporaryDirectory() as name, undoable(lambda: shutil.rmtree(name, ignore_errors=True)):
         yield Path(name)
+
+
+@contextmanager
+def _named() -> Iterator[str]:
+    """A temporary name that says whose it is."""
+    name = f"{PARTIAL}{MACHINE}-{os.getpid()}-{secrets.token_hex(4)}"
+    OURS.add(name)
+    try:
+        yield name
+    finally:
+        OURS.remove(name)
+
+
+def _tidy(folder: Path) -> None:
+    """Remove what a process that was killed left in a folder; other machines' files are left alone."""
+    with suppress(OSError):  # the folder does not exist or cannot be read, which its user will notice
+        for path in [Path(entry.path) for entry in os.scandir(folder) if entry.name.startswith(PARTIAL)]:
+            owner = re.match(rf"{re.escape(PARTIAL + MACHINE)}-(\d+)-[0-9a-f]{{8}}", path.name)
+            if owner is None or owner[0] in OURS or _runs(int(owner[1])):
+                continue
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
+
+
+def _runs(process: int) -> bool:
+    """Whether another process of this number runs, or may run."""
+    if os.name != "posix":  # elsewhere, to ask would end it
+        return True
+    if process == os.getpid():  # what is ours now is known; this is from a namesake of the past
+        return False
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # it belongs to someone else, or is no number of a process
+        return True
+    return True
 
 
 def _placed(path: Path) -> None:

@@ -11,7 +11,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController
 
-from .._base import check
+from .._base import check, progress
 
 DENSE = 300  # [-] up to this many unknowns a dense solver is faster
 BLOCK = 8  # [-] vectors per Lanczos step: 4 and 16 were 10 % slower for 200 modes of a plate
@@ -146,7 +146,8 @@ def by_slices(flexibility: Flexibility, n: int) -> tuple[np.ndarray, np.ndarray]
             continue
         shift = 0.5 * (low + high)
         lu = factorise(K - shift * M)
-        found = _ritz(K, M, _krylov(lu.solve, M, inside, K.shape[0], RESIDUAL, NARROW))
+        with progress.heard(None):  # this counts modes, not the vectors of a slice
+            found = _ritz(K, M, _krylov(lu.solve, M, inside, K.shape[0], RESIDUAL, NARROW))
         kept = (found[0] > low) & (found[0] < high)
         if np.count_nonzero(kept) != inside:
             raise check.SimulationError(
@@ -155,6 +156,7 @@ def by_slices(flexibility: Flexibility, n: int) -> tuple[np.ndarray, np.ndarray]
             )
         values, stretch = np.concatenate([values, found[0][kept]]), 1.0
         pieces.append(found[1][:, kept])
+        progress.report("modes", len(values), n)
     return values[:n], np.hstack(pieces)[:, :n]
 
 
@@ -191,6 +193,7 @@ def _krylov(solve: Any, M: csc_matrix, n: int, available: int, allowed: float, w
         older, (new, carried, again) = carried, _normal(new, heavy)
         factor = again @ factor
         full = done + width > most
+        progress.report("vectors", done, max(done, next_look))
         if done >= next_look or full:
             values, turn = eigh(0.5 * (small[:done, :done] + small[:done, :done].T))
             nearest = np.argsort(-np.abs(values), kind="stable")[:n]

@@ -126,7 +126,8 @@ class Triangles:
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cell that holds each point (n, 2), or else the nearest one, and whether the point lies in it."""
-        near = self.tree.query(points, k=min(CANDIDATES, len(self.origin)))[1].reshape(len(points), -1)
+        count = min(CANDIDATES, len(self.origin))
+        near = self.tree.query(points, k=count)[1].reshape(len(points), count)
         cell, depth = self._deepest(points, near)
         margin = np.full(len(self.origin), -ON_BODY)
         if self.curved.any():

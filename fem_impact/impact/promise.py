@@ -1,7 +1,10 @@
 """Whether a blow met its tolerance: in words, with what dominates the error and what would meet it."""
 
+import os
+import sys
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +17,7 @@ from .quantities import words
 if TYPE_CHECKING:
     from .response import Response
 
+PACKAGE = str(Path(__file__).parents[1]) + os.sep  # where our own lines are
 SHARE = 0.4  # [-] of the tolerance that the advice leaves to one kind of error
 SPARE = 1.1  # [-] modes advised over modes estimated: Weyl's law counts them only on average
 CAUTION = 0.5, 0.05  # [-] of that share for the estimate from few modes: if they resolve the contact, and if not
@@ -61,8 +65,16 @@ def kept(hit: "Response", strict: bool = False) -> "Response":
     if not hit.tolerance_met:
         if strict:
             raise SimulationError(verdict(hit))
-        warnings.warn(verdict(hit), ToleranceWarning, stacklevel=4)
+        warnings.warn(verdict(hit), ToleranceWarning, stacklevel=_callers_level())
     return hit
+
+
+def _callers_level() -> int:
+    """The ``stacklevel`` for which a warning of the calling function names the line of the user, not one of ours."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 def _above(error: float) -> float:

@@ -303,7 +303,7 @@ class Response:
         modes.point("at", self.at)
         if not np.isclose(modes.mass, self.bodies[-1].mass, rtol=1e-3):
             raise ValueError(f"modes must be of the body struck, {self.bodies[-1].mass:g} kg, got {modes.mass:g} kg")
-        return replace(self, ringing=modes)
+        return replace(self, ringing=modes, rings=None)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:

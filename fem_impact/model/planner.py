@@ -346,7 +346,8 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
     response = replace(response, rings=partial(_ringing, asked, keep))
     if asked.moving:
         with stages("modes"):
-            plan = replace(plan, max_frequency=float(response.target.frequencies[-1]))
+            response = response.on(response.target)
+        plan = replace(plan, max_frequency=float(response.target.frequencies[-1]))
     return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
 
 
@@ -689,7 +690,7 @@ def strike(
     ----------
     modes : Modes or System
         The struck body. Of an assembled system, the blow computes only what it needs: Ritz vectors for a plate, as
-        many modes as the tolerance takes for a beam, neither if the body may count as rigid or infinite (see `fi.plan`).
+        many modes as the tolerance takes for a beam, neither if the body may count as rigid or infinite; see `fi.plan`.
         Modes are taken as they are; those left out act by their static compliance.
     striker : Striker
         Arrives in rigid motion.

@@ -21,6 +21,7 @@ FIRST_LOOK = 20  # [-] modes found first: enough to scale the body and to predic
 FIRST_FLEXIBLE = 4  # [-] modes that hold a flexible one: a plate has at most three rigid motions
 CLOSE = 1e-8  # [-] error of the first frequency to which a body is scaled: far below that of any blow
 WORST_FREQUENCY = 0.1  # [-] largest frequency error that `find_modes` accepts as a tolerance
+COARSEST = 1e-30  # [-] own element size over a stated one: beyond, the mesh of an outline does not change
 
 Watch = Callable[[str], AbstractContextManager[Any]]
 # Says where an error comes from; takes "mesh", "supports" or another part of a scene, and the names of what was changed
@@ -221,7 +222,7 @@ class Target:
         mesh = self.mesh
         if size is not None:
             with stages("mesh"), self.blame("mesh"):
-                mesh = mesh.refined(mesh.size / check.positive("size", size, "m"))
+                mesh = mesh.refined(max(COARSEST, mesh.size / check.positive("size", size, "m")))
         if self.system is not None:
             return self.system if size is None else reassemble(self.system, mesh)
         with stages("assembly"), self.blame("supports"), np.errstate(all="ignore"):

@@ -30,12 +30,13 @@ HERE: dict[str, Any] = {"fill_color": "#d55e00", "line_color": "white", "line_wi
 NAMES = ("failed", "one impact", "two", "three", "more")
 LABELS = {
     "mass": "Mass", "stiffness": "Stiffness", "exponent": "Exponent", "speed": "Speed", "bending": "First bending mode",
-    "loss": "Loss of the contact", "damping": "Damping ratio", "thickness": "Thickness over the scene's",
+    "loss": "Loss of the contact", "damping": "Damping ratio", "thickness": "Thickness / the scene's",
 }  # fmt: skip
 LINEAR = {"exponent", "loss", "damping"}  # sliders that are not logarithmic
 STEPS = 200  # [-] per slider: about one per pixel
 MOMENT = 8  # [ms] during which slider messages are collected before the next blow
 REST = 200  # [ms] without a change before the map is redrawn: a map takes as long as many blows
+TICKS_WANTED = 3  # [-] labels of a linear axis: more would touch each other on a phone
 TICKS = """
     if (unit === "kg" && Math.abs(tick) < 1) { tick *= 1000; unit = "g" }
     const power = tick ? Math.max(-5, Math.min(4, Math.floor(Math.log10(Math.abs(tick)) / 3 + 1e-9))) : 0
@@ -139,7 +140,7 @@ class Page:
         from bokeh.models import CustomJSTickFormatter
 
         if hasattr(axis.ticker, "desired_num_ticks"):
-            axis.ticker.desired_num_ticks = 4
+            axis.ticker.desired_num_ticks = TICKS_WANTED
         axis.formatter = CustomJSTickFormatter(args={"unit": unit}, code=TICKS)
 
     def _body(self) -> Any:

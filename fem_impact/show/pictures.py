@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from .._base import check
+from .._base import check, progress
 from .._base.files import replacing
 from ..impact.response import Response
+from ..mesh.mesh_files import boundary
 from ..modes.modal import Modes
 from . import figures, sampling
 
@@ -25,20 +26,26 @@ PROBE = (
     "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=(16, 16)); p.add_mesh(pyvista.Sphere()); "
     "assert p.screenshot(None).std() > 0"
 )
+EXPENDABLE = "FEM_IMPACT_EXPENDABLE"  # environment variable of a process that may die from the rendering test
 WINDOW = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
 SIZE = (720, 480)  # [px] size of a frame: a GIF stays below a few megabytes
+FINER = 2  # [-] a frame is drawn with so many pixels for one in each direction, which makes its lines smooth
 TILE = (320, 250)  # [px] size of one mode shape: four side by side on a screen
 FRAMES = 48  # [-] default length of an animation: four seconds
 RATE = 12  # [1/s] frames per second: enough for a wave, half the size of a film
 HEIGHT = 0.12  # [-] largest drawn deflection over the body's extent
 LIFT = 0.0015  # [-] height of lines above the surface, over their extent
 BALL = 0.03  # [-] drawn radius of the striker over the body's extent
+RIM = "#666666"  # colour of the body's edge
 VIEW = (-0.55, -1.0, 0.75)  # direction to the camera: from the front left, above the plate
 
 
 @cache
 def can_render() -> bool:
-    """Whether pyvista can render here; tested once, in another process."""
+    """Whether pyvista can render here; tested once, in another process unless this one is expendable."""
+    if EXPENDABLE in os.environ:
+        exec(PROBE, {})
+        return True
     command = [sys.executable, "-c", PROBE]
     try:
         run = subprocess.run(command, env={**os.environ, **WINDOW}, capture_output=True, timeout=PATIENCE, check=False)
@@ -74,7 +81,9 @@ def mode_shapes(path: str | Path, modes: Modes, *, count: int = 12, columns: int
     for i in range(shapes.shape[1]):
         plotter.subplot(*divmod(i, columns))
         mesh = _mesh(plane, cells, HEIGHT * _extent(plane) * shapes[:, i], shapes[:, i])
-        _add(plotter, mesh, 1.0)
+        _add_surface(plotter, mesh)
+        rim = mesh.extract_feature_edges(feature_edges=False, manifold_edges=False, non_manifold_edges=False)
+        _add_line(plotter, rim, RIM)
         _add_line(plotter, mesh.contour([0.0]), "black")
         plotter.add_text(f"{i + 1}   {figures.in_hertz(modes.frequencies[i])}", font_size=9, position="upper_left")
         _look(plotter, plane, zoom=1.15)
@@ -130,7 +139,10 @@ def animation(path: str | Path, response: Response, *, frames: int = FRAMES) -> 
         with replacing(path) as temporary:
             _encode(encoder, temporary, _frames(response, times))
         return "" if can_render() else REMEDY
-    pictures = list(_frames(response, times))
+    pictures = []
+    for picture in _frames(response, times):
+        pictures.append(picture)
+        progress.report("frames", len(pictures), len(times))
     colours = _mosaic(pictures[:: max(1, len(pictures) // 8)]).quantize(255)  # one palette avoids flicker
     first, *rest = (picture.quantize(palette=colours, dither=Image.Dither.NONE) for picture in pictures)
     with replacing(path) as temporary:
@@ -170,33 +182,60 @@ def _frames(response: Response, times: np.ndarray) -> Iterator[Image.Image]:
     whole = response.modal_state(np.linspace(0.0, sampling.end_of(response), FRAMES))[0] @ rows.T
     largest = float(max(np.abs(motion).max(), np.abs(whole).max())) or 1.0
     gap = sampling.gap(response, times)
-    for deflection, distance, time in zip(motion, gap, times):
-        title = f"{1e3 * time:.3f} ms, deflection up to {1e3 * largest:.3g} mm"
-        if can_render():
-            yield _in_space(response, plane, cells, deflection / largest, distance / largest, title)
-        else:
+    titles = [f"{1e3 * time:.3f} ms, deflection up to {1e3 * largest:.3g} mm" for time in times]
+    if not can_render():
+        for deflection, title in zip(motion, titles):
             yield _in_plane(response, plane, cells, -deflection / largest, title)
+        return
+    space = _Space(plane, cells, np.append(np.atleast_1d(np.asarray(response.at)), [0.0])[:2])
+    try:
+        for deflection, distance, title in zip(motion / largest, gap / largest, titles):
+            yield space.picture(deflection, distance, title)
+    finally:
+        space.plotter.close()
 
 
-def _in_space(response: Response, plane: Any, cells: Any, deflection: Any, distance: float, title: str) -> Image.Image:
-    import pyvista
+class _Space:
+    """A window with body, striker and title, which move from frame to frame: a new window takes 0.2 s each."""
 
-    extent = _extent(plane)
-    plotter = _plotter(SIZE)
-    _add(plotter, _mesh(plane, cells, -HEIGHT * extent * deflection, -deflection), 1.0)
-    at = np.append(np.atleast_1d(np.asarray(response.at)), [0.0])[:2]
-    below = deflection[np.argmin(((plane - at) ** 2).sum(axis=1))]
-    height = extent * (BALL - HEIGHT * below + min(HEIGHT * distance, 2.0 * HEIGHT))
-    plotter.add_mesh(
-        pyvista.Sphere(radius=BALL * extent, center=(at[0], at[1], height)),
-        color=figures.VERMILION,
-        smooth_shading=True,
-    )
-    plotter.add_text(title, font_size=10, position="upper_left")
-    _look(plotter, plane)
-    picture = plotter.screenshot(None)
-    plotter.close()
-    return Image.fromarray(picture)
+    def __init__(self, plane: np.ndarray, cells: np.ndarray, at: np.ndarray) -> None:
+        import pyvista
+
+        self.plane, self.cells, self.at, self.extent = plane, cells, at, _extent(plane)
+        self.under = int(np.argmin(((plane - at) ** 2).sum(axis=1)))  # the striker
+        self.plotter = _plotter((FINER * SIZE[0], FINER * SIZE[1]))
+        self.plotter.disable_anti_aliasing()  # several pixels become one, in half the time
+        self.mesh = _mesh(plane, cells, np.zeros(len(plane)), np.zeros(len(plane)))
+        self.mesh.point_data["Normals"] = _normals(self.mesh.points, cells)
+        _add_surface(self.plotter, self.mesh)
+        sides = boundary(cells)
+        self.rim = pyvista.PolyData(self.mesh.points, lines=np.column_stack([np.full(len(sides), 2), sides]).ravel())
+        self.plotter.add_mesh(self.rim, color=RIM, line_width=2 * FINER, render=False)
+        ball = pyvista.Sphere(radius=BALL * self.extent)
+        self.ball = self.plotter.add_mesh(ball, color=figures.VERMILION, smooth_shading=True, render=False)
+        _look(self.plotter, plane)
+
+    def picture(self, deflection: np.ndarray, distance: float, title: str) -> Image.Image:
+        """One frame; deflection (n_points,) and distance of the striker in units of the largest deflection."""
+        height = -HEIGHT * self.extent * deflection
+        points = np.column_stack([self.plane, height])
+        self.mesh.points, self.mesh["deflection"] = points, -deflection
+        self.mesh.point_data["Normals"] = _normals(points, self.cells)
+        self.rim.points = points + np.array([0.0, 0.0, LIFT * self.mesh.length])
+        above = self.extent * (BALL + min(HEIGHT * distance, 2.0 * HEIGHT))
+        self.ball.position = (*self.at, height[self.under] + above)
+        self.plotter.add_text(title, font_size=10 * FINER, position="upper_left", name="title", render=False)
+        self.plotter.reset_camera_clipping_range()  # the striker may lie outside the bounds
+        self.plotter.render()
+        return Image.fromarray(self.plotter.screenshot(None)).reduce(FINER)
+
+
+def _normals(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Unit normals (n_points, 3) of a surface of triangles: means over the triangles at each point, by area."""
+    a, b, c = points[cells.T]
+    across = np.cross(b - a, c - a)
+    total = np.column_stack([np.bincount(cells.T.ravel(), np.tile(one, 3), len(points)) for one in across.T])
+    return total / np.linalg.norm(total, axis=1, keepdims=True)
 
 
 def _in_plane(response: Response, plane: Any, cells: Any, deflection: Any, title: str) -> Image.Image:
@@ -226,19 +265,18 @@ def _mesh(plane: np.ndarray, cells: np.ndarray, height: np.ndarray, value: np.nd
     return mesh
 
 
-def _add(plotter: Any, mesh: Any, limit: float) -> None:
+def _add_surface(plotter: Any, mesh: Any) -> None:
     plotter.add_mesh(
-        mesh, scalars="deflection", cmap=figures.COLOURS, clim=(-limit, limit), smooth_shading=True,
-        show_scalar_bar=False, ambient=0.4, diffuse=0.6, specular=0.0,
+        mesh, scalars="deflection", cmap=figures.COLOURS, clim=(-1.0, 1.0), smooth_shading=True,
+        show_scalar_bar=False, ambient=0.4, diffuse=0.6, specular=0.0, render=False,
     )  # fmt: skip
-    rim = mesh.extract_feature_edges(feature_edges=False, manifold_edges=False, non_manifold_edges=False)
-    _add_line(plotter, rim, "#666666")
 
 
 def _add_line(plotter: Any, line: Any, colour: str) -> None:
     """Draw a line on the surface, raised a little so that the surface does not hide it."""
     if line.n_points:
-        plotter.add_mesh(line.translate((0.0, 0.0, LIFT * line.length)), color=colour, line_width=2)
+        raised = line.translate((0.0, 0.0, LIFT * line.length))
+        plotter.add_mesh(raised, color=colour, line_width=2, render=False)
 
 
 def _look(plotter: Any, plane: np.ndarray, zoom: float = 1.35) -> None:
@@ -246,9 +284,8 @@ def _look(plotter: Any, plane: np.ndarray, zoom: float = 1.35) -> None:
     low, high = plane.min(axis=0), plane.max(axis=0)
     rise = HEIGHT * _extent(plane)
     plotter.camera_position = [tuple(VIEW), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
-    plotter.reset_camera(bounds=(low[0], high[0], low[1], high[1], -rise, rise))
+    plotter.reset_camera(render=False, bounds=(low[0], high[0], low[1], high[1], -rise, rise))
     plotter.camera.zoom(zoom)
-    plotter.reset_camera_clipping_range()  # the striker may lie outside the bounds
 
 
 def _extent(plane: np.ndarray) -> float:

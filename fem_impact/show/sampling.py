@@ -4,6 +4,7 @@ import numpy as np
 
 from .._base import check
 from ..impact.response import Response
+from ..impact.striker import Striker
 from ..mesh.mesh_files import quartered
 from ..modes.modal import Modes
 
@@ -60,11 +61,16 @@ def gallery(modes: Modes, points: np.ndarray, count: int, columns: int) -> tuple
 
 def gap(response: Response, times: np.ndarray) -> np.ndarray:
     """Distance between striker and struck surface [m], (n_times,); zero during contact."""
-    striker = response.striker
-    if striker is None or response.at is None:
-        raise ValueError("response must have a striker, got one of collide; use the response of strike")
+    striker, at = _struck(response)
     tip = response.displacement(striker.at[None], times, body=0)
-    return np.maximum(response.displacement(response.at[None], times) - tip, 0.0)[:, 0]
+    return np.maximum(response.displacement(at[None], times) - tip, 0.0)[:, 0]
+
+
+def _struck(response: Response) -> tuple[Striker, np.ndarray]:
+    """Striker and strike point of a blow."""
+    if response.striker is None or response.at is None:
+        raise ValueError("response must have a striker, got one of collide; use the response of strike")
+    return response.striker, response.at
 
 
 def end_of(response: Response) -> float:
@@ -74,6 +80,5 @@ def end_of(response: Response) -> float:
 
 def telling(response: Response, times: np.ndarray) -> int:
     """Index of the time [s] that shows the wave best: the first with half the largest deflection under the striker."""
-    assert response.at is not None
-    deflection = np.abs(response.displacement(response.at[None], times)[:, 0])
+    deflection = np.abs(response.displacement(_struck(response)[1][None], times)[:, 0])
     return int(np.argmax(deflection >= 0.5 * deflection.max()))

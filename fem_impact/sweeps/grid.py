@@ -24,7 +24,7 @@ from ..impact.striker import Striker
 from ..model.planner import COSTLY
 from ..modes.modal import Modes, SampledShapes
 from . import batches
-from .store import LARGEST_BLOCK, Texts, by_cluster, by_store
+from .store import LARGEST_BLOCK, Texts, block_size, by_cluster, by_store
 
 TOLERANCE = 1e-3  # [-] default error limit of a map
 AXES = {  # name: unit, what it is, its name in a scene file
@@ -333,8 +333,9 @@ def _solve_all(
         return by_store(grid, store, partial(solve, workers=workers), watch)
     numbers = np.empty((len(grid.layers), grid.n_cases))
     texts: Texts = {}
-    for start in range(0, grid.n_cases, LARGEST_BLOCK):
-        stop = min(start + LARGEST_BLOCK, grid.n_cases)
+    size = block_size(grid.n_cases) if grid.lossy or grid.extra else LARGEST_BLOCK  # slow cells are counted more often
+    for start in range(0, grid.n_cases, size):
+        stop = min(start + size, grid.n_cases)
         numbers[:, start:stop], new = solve(grid, start, stop, workers=workers)
         texts |= new
         if watch is not None:

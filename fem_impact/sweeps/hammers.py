@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from .._base import check
+from .._base import check, progress
 from ..impact import accuracy
 from ..impact.collision import strike
 from ..impact.contact import Contact
@@ -163,7 +163,12 @@ def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float 
     masses, centre = _checked(masses), _centre(bandwidth, drop)
     flexible = modes.frequencies[modes.omega > 0.0]
     lowest = float(flexible[0]) if len(flexible) else centre
-    return tuple(_hammer(modes, at, mass, bandwidth, drop, (centre, lowest)) for mass in masses)
+    found: list[Hammer] = []
+    for mass in masses:
+        progress.report("hammers", len(found), len(masses))
+        found.append(_hammer(modes, at, mass, bandwidth, drop, (centre, lowest)))
+    progress.report("hammers", len(found), len(masses))
+    return tuple(found)
 
 
 def _hammer(modes: Modes, at: Any, mass: float, bandwidth: float, drop: float, tuned: tuple[float, float]) -> Hammer:

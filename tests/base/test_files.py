@@ -1,10 +1,15 @@
 """Files are complete or absent, whatever goes wrong while they are written."""
 
 import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
-from fem_impact._base.files import PARTIAL, replacing, staged
+import fem_impact
+from fem_impact._base.files import MACHINE, PARTIAL, replacing, staged
 
 
 def names(folder):
@@ -71,3 +76,49 @@ def test_anything_but_a_regular_file_is_not_replaced(tmp_path):
         (staging / "pipe").write_text("new")
     assert names(tmp_path) == ["pipe"]
     assert (tmp_path / "pipe").is_fifo()
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from fem_impact._base.files import replacing, staged
+with staged(sys.argv[1]) as staging, replacing(Path(sys.argv[1]) / "a.txt") as temporary:
+    (staging / "modes").mkdir()
+    (staging / "modes" / "b.txt").write_text("half")
+    temporary.write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("again", ["staged", "replacing"])
+def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path, again):
+    environment = {**os.environ, "PYTHONPATH": str(Path(fem_impact.__file__).parents[1])}
+    done = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path)], env=environment, check=False)
+    assert done.returncode == -signal.SIGKILL and len(list(tmp_path.glob(f"{PARTIAL}*"))) == 2
+    if again == "staged":
+        with staged(tmp_path) as staging:
+            assert names(tmp_path) == [staging.name]
+    else:
+        with replacing(tmp_path / "b.txt") as temporary:
+            temporary.write_text("whole")
+        assert names(tmp_path) == ["b.txt"]
+
+
+def test_what_others_are_writing_is_left_alone(tmp_path):
+    """Of a running process, of another machine, of this process, and what only looks alike."""
+    theirs = [f"{PARTIAL}{MACHINE}-{os.getppid()}-0123abcd", f"{PARTIAL}elsewhere-1-0123abcd", f"{PARTIAL}notes"]
+    for name in theirs:
+        (tmp_path / name).write_text("busy")
+    with staged(tmp_path) as outer, replacing(tmp_path / "a.txt") as temporary, staged(tmp_path):
+        assert outer.is_dir()
+        temporary.write_text("a")
+    assert names(tmp_path) == sorted([*theirs, "a.txt"])
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_a_namesake_of_the_past_is_not_taken_for_this_process(tmp_path):
+    (tmp_path / f"{PARTIAL}{MACHINE}-{os.getpid()}-0123abcd").mkdir()
+    with staged(tmp_path):
+        pass
+    assert names(tmp_path) == []

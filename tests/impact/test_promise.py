@@ -55,6 +55,36 @@ def test_a_miss_warns_and_strict_raises():
     assert issubclass(fi.ToleranceWarning, UserWarning)
 
 
+def missed_by_a_scene(tmp_path):
+    (tmp_path / "scene.toml").write_text(QUICK)
+    return fi.load_scene(tmp_path / "scene.toml")
+
+
+BLOW = {"at": AT, "speed": 1.0, "tolerance": 1e-6}
+WAYS = {  # every way to strike; each lambda is the user's line
+    "strike modes": lambda _: fi.strike(plate(10), HAMMER, SOFT, **BLOW),
+    "strike with a piece of the plan": lambda _: fi.strike(plate(100), HAMMER, SOFT, n_modes=10, **BLOW),
+    "strike a system": lambda _: fi.strike(
+        fi.assemble(fi.mesh.rectangle(*SIZE), PLATE, {"boundary": "hinged"}), HAMMER, SOFT, n_modes=10, **BLOW
+    ),
+    "plan": lambda _: fi.plan(plate(10), HAMMER, SOFT, **BLOW).strike(),
+    "scene": lambda folder: missed_by_a_scene(folder).strike(tolerance=1e-6, n_modes=5),
+    "plan of a scene": lambda folder: fi.plan(missed_by_a_scene(folder), tolerance=1e-6, n_modes=5).strike(),
+    "collide": lambda _: fi.collide(
+        [fi.Modes.rigid(0.1), plate(10)], [fi.Touch(SOFT, 0, 1, None, AT)], speeds=[1.0, 0.0], tolerance=1e-6
+    ),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_the_warning_names_the_users_line(way, tmp_path):
+    with pytest.warns(fi.ToleranceWarning, match="MISSED") as found:
+        WAYS[way](tmp_path)
+    code = WAYS[way].__code__
+    (line,) = [each.lineno for each in found if each.filename == __file__]
+    assert line in {number for _, _, number in code.co_lines()}
+
+
 def test_collisions_warn_too():
     bodies = [fi.Modes.rigid(0.1), plate(10)]
     touch = [fi.Touch(SOFT, 0, 1, None, AT)]

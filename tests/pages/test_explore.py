@@ -180,13 +180,14 @@ def test_button_plays_the_sound(opened):
     shown.tab.get_by_role("button", name="Strike and listen").click()
     shown.until("document.getElementById('player').readyState >= 1")
     assert shown.tab.evaluate("document.getElementById('player').duration") == pytest.approx(2.0, abs=0.01)
-    assert "Full scale is 10 m/s" in shown.tab.locator("#heard").inner_text()
+    shown.until("document.getElementById('heard').innerText.includes('Full scale is 10 m/s')")
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_page_fits_a_phone(opened, scheme):
     shown = opened(width=375, height=700, color_scheme=scheme)
     assert shown.tab.evaluate("document.documentElement.scrollWidth") == 375
+    shown.until("document.querySelectorAll('figure').length === 4")
     canvases = shown.tab.locator("figure").evaluate_all("all => all.map(f => f.getBoundingClientRect().right)")
     assert len(canvases) == 4 and max(canvases) <= 375
 

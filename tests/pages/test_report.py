@@ -175,18 +175,20 @@ def test_nothing_fails_and_nothing_is_asked_for(desktop):
 
 
 def test_slider_and_list_change_the_picture(opened):
-    tab = opened().tab
+    shown = opened()
+    tab = shown.tab
     depth = "Math.min(...document.getElementById('plot-wave').data[0].z)"
     before, picture = tab.evaluate(depth), tab.locator("#plot-wave").screenshot()
     tab.locator("#wave-time").focus()
     for _ in range(10):
         tab.keyboard.press("ArrowRight")
-    assert tab.evaluate(depth) != before and "s" in tab.locator("#wave-out").inner_text()
+    shown.until(f"{depth} !== {before}")
+    assert "s" in tab.locator("#wave-out").inner_text()
     assert tab.locator("#plot-wave").screenshot() != picture
     shape = "Array.from(document.getElementById('plot-mode').data[0].z).slice(0, 400).join()"
     before = tab.evaluate(shape)
     tab.select_option("#mode-pick", index=3)
-    assert tab.evaluate(shape) != before
+    shown.until(f"{shape} !== '{before}'")
 
 
 def test_view_turns_with_the_keyboard_and_plays_when_asked(opened):
@@ -196,7 +198,7 @@ def test_view_turns_with_the_keyboard_and_plays_when_asked(opened):
     before = tab.evaluate(eye)
     tab.locator("#plot-wave").focus()
     tab.keyboard.press("ArrowLeft")
-    assert tab.evaluate(eye) != before
+    shown.until(f"{eye} !== '{before}'")
     still = tab.locator("#wave-time").input_value()
     tab.wait_for_timeout(200)
     assert tab.locator("#wave-time").input_value() == still  # nothing moves by itself
@@ -238,6 +240,8 @@ def test_sounds_load(desktop):
 def test_page_fits_a_phone(opened, scheme):
     shown = opened(width=375, height=700, color_scheme=scheme, reduced_motion="reduce")
     assert shown.tab.evaluate("document.documentElement.scrollWidth") == 375
+    cut = "[...document.querySelectorAll('.scroll, pre, nav ul')].filter(e => e.scrollWidth > e.clientWidth).length"
+    assert shown.tab.evaluate(cut) == 0  # nothing has to be pushed aside to be read
     small = "[...document.querySelectorAll('button, select')].filter(e => e.getBoundingClientRect().height < 40).length"
     assert shown.tab.evaluate(small) == 0  # 40 px: a finger's width
     ink, paper = shown.tab.evaluate(

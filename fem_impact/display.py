@@ -1,0 +1,154 @@
+"""Shows on a terminal which stage is running, how far it is and how long it still takes."""
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich import progress as bars
+from rich.console import Console
+from rich.table import Column
+from rich.text import Text
+
+from ._base.files import undoable
+from ._base.progress import heard
+
+WIDE = 60  # [-] columns: a narrower terminal gets no bar
+SOON = 2.0  # [s] time left is not said before a stage has taken this long: the first counts are no guide
+LONG = 10.0  # [s] time left that is announced even if nobody sees the line
+LEAST = 0.02  # [-] share of a count that must be done before the rest is estimated from it
+
+
+class Count:
+    """How many of something are done, since when."""
+
+    def __init__(self, what: str, done: int, total: int) -> None:
+        self.what, self.first, self.began = what, done, time.monotonic()
+        self.update(done, total)
+
+    def update(self, done: int, total: int) -> None:
+        self.done, self.total, self.now = done, total, time.monotonic()
+
+    @property
+    def rate(self) -> float:
+        """Number per second [1/s]; 0 if not yet known."""
+        seconds = self.now - self.began
+        return (self.done - self.first) / seconds if seconds > 0.0 else 0.0
+
+    def left(self) -> float | None:
+        """Seconds left, judged by the progress so far."""
+        if not self.rate or self.done - self.first < LEAST * (self.total - self.first):
+            return None
+        return max(0.0, (self.total - self.done) / self.rate - (time.monotonic() - self.now))
+
+
+class Display:
+    """One line on the terminal, shown while a stage runs; without a terminal nothing is written.
+
+    A stage may run within another. Counts come from `_base.progress`, times from them or from a prediction. ``tell``
+    is called once with a sentence if a stage that counts itself turns out to take long, with or without a terminal.
+    """
+
+    def __init__(self, tell: Callable[[str], object] | None = None) -> None:
+        self.console, self.tell = Console(stderr=True), tell
+        self.running: list[tuple[str, float]] = []  # name and start [s] of each stage, the innermost last
+        self.count: Count | None = None
+        self.end: float | None = None  # [s] predicted end of the command, on the monotonic clock
+        self.bar: bars.Progress | None = None
+
+    def predict(self, seconds: float | None) -> None:
+        """Say how long the following stages take together; None if that is not known."""
+        self.end = None if seconds is None else time.monotonic() + seconds
+
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[None]:
+        """Show a stage while the block runs."""
+        outer, self.count = self.count, None
+        self.running.append((name, time.monotonic()))
+        try:
+            with heard(self.report):
+                if self.bar is None and self.console.is_terminal:
+                    with undoable(_show_cursor), self._opened():
+                        yield
+                else:
+                    self._draw()
+                    yield
+        finally:
+            self.running.pop()
+            self.count = outer
+            if self.running:
+                self._draw()
+
+    def report(self, what: str, done: int, total: int) -> None:
+        """Note how many of something are done."""
+        count = self.count
+        if count is None or count.what != what or done < count.done:
+            self.count = Count(what, done, total)
+        else:
+            count.update(done, total)
+            left = count.left()
+            if self.tell is not None and what == self.running[-1][0] and left is not None and left > LONG:
+                self.tell(f"{total} {what}: about {left:.0f} s more; Ctrl-C stops it")
+                self.tell = None
+        self._draw()
+
+    def said(self) -> str:
+        """Count, rate, time so far and time left of the running stage; on a narrow terminal its name and less."""
+        if not self.running:
+            return ""
+        name, began = self.running[-1]
+        spent, count, parts = time.monotonic() - began, self.count, []
+        left = count.left() if count is not None else None if self.end is None else self.end - time.monotonic()
+        ends = [] if left is None or spent <= SOON else [f"{_clock(left)} left" if left > 0.0 else "soon done"]
+        if count is not None:
+            what = "" if count.what == name else f" {count.what}"
+            parts.append(f"{count.done}/{count.total}{what}")
+            parts += [f"{count.rate:.3g}/s"] if count.rate >= 1.0 else []
+        if not self.wide:
+            return f"{name} {ends[0] if ends else _clock(spent)}, {', '.join(parts[:1])}".rstrip(", ")
+        return ", ".join([*parts, _clock(spent), *ends])
+
+    @property
+    def wide(self) -> bool:
+        """Whether there is room for a bar."""
+        return self.console.width >= WIDE
+
+    @contextmanager
+    def _opened(self) -> Iterator[None]:
+        """The line while the outermost stage runs."""
+        columns: list[bars.ProgressColumn] = [bars.SpinnerColumn(), _Text(self.said)]
+        if self.wide:
+            columns[1:1] = [_Text(lambda: self.running[-1][0]), bars.BarColumn(bar_width=20)]
+        with bars.Progress(*columns, console=self.console, transient=True) as self.bar:
+            self.task = self.bar.add_task("", total=None)
+            try:
+                yield
+            finally:
+                self.bar = None
+
+    def _draw(self) -> None:
+        if self.bar is not None:
+            done, total = (0, None) if self.count is None else (self.count.done, self.count.total)
+            self.bar.update(self.task, completed=done, total=total)
+
+
+class _Text(bars.ProgressColumn):
+    """Text that is written anew at every refresh, and cut where the terminal ends."""
+
+    def __init__(self, text: Callable[[], str]) -> None:
+        super().__init__(table_column=Column(no_wrap=True, overflow="ellipsis"))
+        self.text = text
+
+    def render(self, task: bars.Task) -> Text:
+        return Text(self.text())
+
+
+def _clock(seconds: float) -> str:
+    """Minutes and seconds."""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes // 60}:{minutes % 60:02}:{rest:02}" if minutes >= 60 else f"{minutes}:{rest:02}"
+
+
+def _show_cursor() -> None:
+    """Clear the progress line and show the cursor again."""
+    os.write(2, b"\r\x1b[2K\x1b[?25h")

@@ -1,0 +1,108 @@
+"""Draws the pictures of a blow in a process of its own: it loads its libraries while the blow is computed.
+
+with Painter() as painter:
+    ...                              # compute the response
+    painter.begin(folder, response)
+    ...                              # write other files
+    missing = painter.finish()
+"""
+
+import copyreg
+import os
+import pickle
+import subprocess
+import sys
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from types import MappingProxyType
+from typing import IO, Any
+
+from .._base import progress
+from .._base.files import undoable
+from ..impact.response import Response
+from . import pictures
+
+NAMES = ("modes.png", "wave.png", "wave.gif")
+
+
+def draw(folder: Path, response: Response) -> str:
+    """Draw all pictures of a blow into a folder; empty, or what to install for pictures in 3D."""
+    pictures.animation(folder / "wave.gif", response)
+    pictures.wave(folder / "wave.png", response)
+    return pictures.mode_shapes(folder / "modes.png", response.target)
+
+
+class Painter:
+    """The other process; it ends with the block."""
+
+    def __init__(self) -> None:
+        self.task: tuple[Path, Response] | None = None
+        self.stack = ExitStack()
+
+    def __enter__(self) -> "Painter":
+        environment = {
+            **os.environ,
+            **pictures.WINDOW,
+            pictures.EXPENDABLE: "1",
+            "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+        }
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", __name__], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        self.stack.enter_context(undoable(self.process.kill))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        for pipe in (self.process.stdin, self.process.stdout):
+            assert pipe is not None
+            with suppress(OSError):  # what could not be sent is no longer needed
+                pipe.close()
+        self.process.wait()
+        self.stack.close()
+
+    def begin(self, folder: Path, response: Response) -> None:
+        """Start drawing the pictures of a blow into a folder."""
+        self.task = folder, response
+        assert self.process.stdin is not None
+        with suppress(BrokenPipeError):  # the process is gone, which `finish` deals with
+            _send((folder, response), self.process.stdin)
+            self.process.stdin.close()
+
+    def finish(self) -> str:
+        """Wait for the pictures; the answer is that of `draw`. If the process fails, this one draws them."""
+        assert self.task is not None and self.process.stdout is not None
+        last = ""
+        for line in self.process.stdout:
+            last = line.decode("utf-8", "replace").rstrip("\n")
+            done, _, total = last.partition("/")
+            if total:
+                progress.report("frames", int(done), int(total))
+        if self.process.wait():
+            return draw(*self.task)
+        return last
+
+
+def _send(data: Any, file: IO[bytes]) -> None:
+    """Pickle something that contains read-only mappings."""
+    pickler = pickle.Pickler(file, protocol=pickle.HIGHEST_PROTOCOL)
+    pickler.dispatch_table = {**copyreg.dispatch_table, MappingProxyType: lambda mapping: (_locked, (dict(mapping),))}
+    pickler.dump(data)
+
+
+def _locked(mapping: dict) -> MappingProxyType:
+    return MappingProxyType(mapping)
+
+
+def main() -> None:
+    """The process itself: reads folder and response, writes the pictures, and prints the progress and the answer."""
+    pictures.can_render()  # takes seconds, during which the response is computed; dies here if it cannot
+    folder, response = pickle.load(sys.stdin.buffer)
+    with progress.heard(lambda _, done, total: print(f"{done}/{total}", flush=True)):
+        missing = draw(folder, response)
+    print(missing)
+
+
+if __name__ == "__main__":
+    main()

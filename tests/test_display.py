@@ -1,0 +1,138 @@
+"""The line on the terminal: name, progress and time left of what runs; clean where it is narrow or not a terminal."""
+
+import io
+import re
+
+import pytest
+from rich.console import Console
+from scenes import SMALL
+
+import fem_impact as fi
+from fem_impact import cli, display
+from fem_impact._base.progress import heard, report
+from fem_impact.display import Display
+
+
+class Clock:
+    """A clock that is set by hand."""
+
+    now = 100.0
+
+    def monotonic(self):
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(display, "time", clock)
+    return clock
+
+
+def on_terminal(width, **options):
+    shown = Display(**options)
+    shown.console = Console(file=io.StringIO(), force_terminal=True, width=width, legacy_windows=False)
+    return shown
+
+
+def lines(shown):
+    """What was written, line by line, without the codes that move the cursor."""
+    return re.split(r"[\r\n]+", re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.console.file.getvalue()))
+
+
+def test_the_time_left_is_judged_by_the_progress_so_far(clock):
+    shown = on_terminal(100)
+    with shown("modes"):
+        report("vectors", 0, 100)
+        assert shown.said() == "0/100 vectors, 0:00"
+        clock.now += 10.0
+        report("vectors", 20, 100)  # 80 more at 2 per second
+        assert shown.said() == "20/100 vectors, 2/s, 0:10, 0:40 left"
+        clock.now += 5.0
+        assert shown.said().endswith("0:15, 0:35 left")
+        report("vectors", 3, 400)  # another search begins
+        assert "left" not in shown.said()
+
+
+def test_cells_found_in_a_store_do_not_count_as_done_just_now(clock):
+    shown = on_terminal(100)
+    with shown("cells"):
+        report("cells", 900, 1000)
+        clock.now += 10.0
+        report("cells", 950, 1000)
+        assert shown.said() == "950/1000, 5/s, 0:10, 0:10 left"
+
+
+def test_without_a_count_the_prediction_tells(clock):
+    shown = on_terminal(100)
+    shown.predict(3600.0 + 65.0)
+    with shown("strike"):
+        assert shown.said() == "0:00"
+        clock.now += 5.0
+        assert shown.said() == "0:05, 1:01:00 left"
+        clock.now += 4000.0
+        assert shown.said() == "1:06:45, soon done"
+        shown.predict(None)
+        assert shown.said() == "1:06:45"
+
+
+def test_a_stage_within_a_stage_has_its_own_name_and_the_outer_one_comes_back(clock):
+    shown = on_terminal(100)
+    with shown("modes"):
+        report("vectors", 5, 100)
+        with shown("mesh"):
+            assert shown.running[-1][0] == "mesh" and shown.said() == "0:00"
+        assert shown.said() == "5/100 vectors, 0:00" and shown.running[-1][0] == "modes"
+    assert shown.said() == "" and shown.bar is None
+
+
+@pytest.mark.parametrize("width", [20, 40, 59, 60, 100])
+def test_a_line_is_never_wider_than_the_terminal_and_is_wiped_at_the_end(width):
+    shown = on_terminal(width)
+    shown.predict(1000.0)
+    with shown("modes"):
+        for i in range(3):
+            report("vectors", 1000 * i, 100_000)
+            shown.bar.refresh()
+    said = lines(shown)
+    assert max(map(len, said)) <= width and any("modes" in line for line in said) and said[-1].strip() == ""
+    assert shown.console.file.getvalue().count("\n") <= 1  # one line, written over and over
+
+
+def test_what_takes_long_is_announced_once_with_or_without_a_terminal(clock):
+    said = []
+    shown = Display(said.append)
+    assert not shown.console.is_terminal
+    with shown("hammers"):
+        report("vectors", 1, 100)
+        clock.now += 5.0
+        report("vectors", 2, 100)  # not the hammers themselves
+        for i in range(10):
+            report("hammers", i, 10)
+            clock.now += 4.0
+    assert said == ["10 hammers: about 36 s more; Ctrl-C stops it"]
+
+
+def test_nothing_is_written_where_stderr_is_not_a_terminal(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(SMALL)
+    name = str(tmp_path / "scene.toml")
+    assert cli.main(["strike", name, "--out", str(tmp_path / "o"), "--tolerance", "0.1"]) == 0
+    assert cli.main(["hammer", name, "--bandwidth", "300", "--masses", "0.01"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_modes_hammers_and_maps_report_their_counts(tmp_path):
+    told = []
+    plate = fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=60)
+    section = fi.Plate(fi.Material(70e9, 0.3, 2700.0), 2e-3)
+    system = fi.assemble(fi.mesh.rectangle(0.465, 0.3), section, supports={"boundary": "hinged"})
+    beam = fi.assemble(fi.mesh.line(0.5), fi.Beam.rectangular(section.material, width=0.02, height=0.01), {})
+    with heard(lambda *each: told.append(each)):
+        fi.find_modes(system, n_modes=40)
+        fi.find_modes(beam, n_modes=100)
+        fi.hammers.choose(plate, (0.1, 0.1), 300.0, masses=[0.01, 0.02])
+    counted = {what: [each for each in told if each[0] == what] for what in ("vectors", "modes", "hammers")}
+    assert all(0 <= done <= total for _, done, total in told)
+    assert counted["vectors"][0][1] < counted["vectors"][-1][1]
+    assert [done for _, done, _ in counted["modes"]] == sorted({done for _, done, _ in counted["modes"]})
+    assert [done for _, done, _ in counted["hammers"]] == [0, 1, 2]
