@@ -352,7 +352,7 @@ class Response:
     def spectrum(self, frequencies: Any) -> np.ndarray:
         """Fourier transform of the force, integral of F exp(-i omega t) [N s], (n_frequencies,), complex.
 
-        Exact for a force that is linear between the samples.
+        Exact to rounding for a force that is linear between the samples.
         """
         asked = check.array("frequencies", frequencies, (None,), "Hz", lift=True)
         return force_spectrum.of_pieces(force_spectrum.pieces(*self._samples), asked)
@@ -367,7 +367,7 @@ class Response:
             most = force_spectrum.MOST_PERIODS / span
             raise ValueError(f"max_frequency must be at most {most:.4g} Hz for a blow of {span:.4g} s")
         frequencies = np.linspace(0.0, limit, int(np.clip(32.0 * limit * span, 512, 65536)))
-        size = np.abs(force_spectrum.evenly(force_spectrum.pieces(*self._samples), frequencies))
+        size = np.abs(self.spectrum(frequencies))
         return float(np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies))
 
     def body_slice(self, body: int) -> slice:
