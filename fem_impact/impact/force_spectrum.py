@@ -5,7 +5,6 @@ equal time cells, so short that exp(-i omega t) is a power series of few terms w
 the cells then sums each term at all frequencies.
 """
 
-from collections.abc import Callable
 from math import factorial
 
 import numpy as np
@@ -20,10 +19,11 @@ WINDOW = 8  # [-] half width of the window that interpolates from a transform of
 BETA = 1.5 * np.pi * WINDOW  # [-] shape of the window, that of Kaiser and Bessel
 EVEN = 1e-15  # [-] of the highest frequency: rounding of frequencies that are evenly spaced from zero on
 SERIES = 0.5  # [rad] half the phase over a piece below which the first spherical Bessel function takes its series
-# For n Gauss nodes, half the phase [rad] over a piece at which they err by 1e-15 of its force, by their error term
+# Gauss rules, and half the phase [rad] over a piece at which they err by 1e-15 of its force, by their error term
+RULES = {n: np.polynomial.legendre.leggauss(n) for n in range(2, 12)}
 REACH = {
     n: (1e-15 * (2 * n + 1) * factorial(2 * n) ** 3 / (n * 2 ** (2 * n + 1) * factorial(n) ** 4)) ** (1 / (2 * n - 1))
-    for n in range(2, 12)
+    for n in RULES
 }
 
 Pieces = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -45,20 +45,27 @@ def pieces(time: np.ndarray, force: np.ndarray) -> Pieces:
 def of_pieces(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
     """Integral of F exp(-i omega t) [N s] at frequencies (n_frequencies,) [Hz], complex.
 
-    Errs by rounding: of the phases, and 1e-14 of the integral of the force's magnitude.
+    Errs by rounding: that of the phases, and 2e-14 of the integral of the force's magnitude.
     """
     t, h, _, _ = pieces
-    n_terms = len(t) * len(frequencies)
+    n, n_terms = len(frequencies), len(t) * len(frequencies)
     if n_terms <= FEW:
         return directly(pieces, frequencies)
-    top = 2.0 * np.pi * float(np.abs(frequencies).max())
-    phase = 0.5 * top * h
-    count = min(REACH, key=lambda n: n * np.ceil(phase / REACH[n]).sum())
-    parts = np.ceil(phase / REACH[count])  # into which a long piece is cut
-    size = max(count * parts.sum(), top * (t[-1] + h[-1]))  # the number of nodes or of cells
-    if not 0.0 < size <= min(n_terms, MOST_NODES):
+    step = frequencies[1] if n > 1 else 0.0
+    evenly = step > 0.0 and np.abs(frequencies - step * np.arange(n)).max() <= EVEN * frequencies[-1]
+    span = t[-1] + h[-1]
+    if not evenly:
+        step = 0.5 / span
+    count = n if evenly else np.floor(np.abs(frequencies).max() / step) + WINDOW + 1.0
+    half_phase = np.pi * step * (count - 1.0) * h
+    rule = min(REACH, key=lambda n: n * np.ceil(half_phase / REACH[n]).sum())
+    parts = np.maximum(np.ceil(half_phase / REACH[rule]), 1.0)  # into which a long piece is cut
+    if not max(rule * parts.sum(), 2.0 * np.pi * count) <= min(n_terms, MOST_NODES):
         return directly(pieces, frequencies)
-    return _transform(*_impulses(pieces, count, parts.astype(int)), frequencies)
+    time, impulse = _impulses(pieces, rule, parts.astype(int))
+    if evenly:
+        return _transform(time, impulse, step, n)
+    return _interpolated(time, impulse, step, int(count), 0.5 * span, frequencies)
 
 
 def directly(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
@@ -82,52 +89,49 @@ def directly(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
     return total
 
 
-def _impulses(pieces: Pieces, count: int, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times [s] and impulses [N s] at ``count`` Gauss nodes in every part of every piece, ascending."""
-    t, h, f0, f1 = (np.repeat(x, parts)[:, None] for x in pieces)
+def _impulses(pieces: Pieces, rule: int, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and impulses [N s] at Gauss nodes in every part of every piece, ascending."""
+    t, h, f0, f1 = (np.repeat(x, parts) for x in pieces)
     number = np.arange(len(t)) - np.repeat(np.cumsum(parts) - parts, parts)  # of a part within its piece
-    n_parts = np.repeat(parts, parts)[:, None]
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    share = (number[:, None] + 0.5 * (nodes + 1.0)) / n_parts  # (n_parts, count)
-    return (t + h * share).ravel(), (h / n_parts * (0.5 * weights) * (f0 + (f1 - f0) * share)).ravel()
+    n_parts = np.repeat(parts, parts)
+    nodes, weights = RULES[rule]
+    share = (number + 0.5 * (nodes[:, None] + 1.0)) / n_parts
+    impulse = (h / n_parts * (0.5 * weights[:, None])) * (f0 + (f1 - f0) * share)  # (rule, n_parts)
+    return (t + h * share).T.ravel(), impulse.T.ravel()
 
 
-def _transform(time: np.ndarray, impulse: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
-    """Sum of impulse exp(-i omega time) at frequencies (n_frequencies,), by cells of at most a radian."""
-    n = len(frequencies)
-    step = frequencies[1] if n > 1 else 0.0
-    evenly = step > 0.0 and np.abs(frequencies - step * np.arange(n)).max() <= EVEN * frequencies[-1]
-    if evenly:
-        # the transform's own frequencies; it repeats itself over the cells, so that they may be folded
-        n_cells = fft.next_fast_len(int(np.ceil(2.0 * np.pi * (n - 1))), real=True)
-        rate, turn = step * n_cells, 2.0 * np.pi / n_cells * np.arange(n)
-    else:
-        rate = 2.0 * np.pi * np.abs(frequencies).max()
-        n_cells, turn = int(np.rint(time[-1] * rate)) + 1, 2.0 * np.pi * frequencies / rate
-    near = np.rint(time * rate)
-    cell, beside = near.astype(int) % n_cells, time * rate - near
-    over_cells = (lambda sums: fft.rfft(sums)[:n]) if evenly else _interpolation(n_cells, turn)
-    factor, total = np.ones(n, complex), np.zeros(n, complex)
+def _transform(time: np.ndarray, impulse: np.ndarray, step: float, count: int) -> np.ndarray:
+    """Sum of impulse exp(-i omega time) at frequencies 0, step, 2 step, ... [Hz], (count,), by cells of a radian."""
+    # a fast transform of this length repeats itself over the cells, so that later ones may be folded into it
+    n_cells = fft.next_fast_len(max(1, int(np.ceil(2.0 * np.pi * (count - 1)))), real=True)
+    place = time * (step * n_cells)
+    near = np.rint(place)
+    first = np.append(0, np.flatnonzero(near[1:] != near[:-1]) + 1)  # node of every cell
+    cell, beside = near[first].astype(int) % n_cells, place - near
+    turn = 2.0 * np.pi / n_cells * np.arange(count)
+    factor, total = np.ones(count, complex), np.zeros(count, complex)
     for k in range(TERMS):
-        total += factor * over_cells(np.bincount(cell, impulse, n_cells))
+        total += factor * fft.rfft(np.bincount(cell, np.add.reduceat(impulse, first), n_cells))[:count]
         impulse, factor = impulse * beside, factor * turn * (-1j / (k + 1.0))
     return total
 
 
-def _interpolation(n_cells: int, turn: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """The function that sums numbers times exp(-i turn cell) over all cells, at turns (n_turns,) of at most a radian.
+def _interpolated(
+    time: np.ndarray, impulse: np.ndarray, step: float, count: int, middle: float, frequencies: np.ndarray
+) -> np.ndarray:
+    """The same at any frequencies, from twice as many even ones as the time up to 2 ``middle`` [s] needs.
 
-    A Kaiser-Bessel window interpolates from the frequencies of a fast transform of twice the length.
+    The impulses are divided by the transform of a Kaiser-Bessel window about the middle, which then interpolates.
     """
-    middle, length = 0.5 * (n_cells - 1), fft.next_fast_len(2 * n_cells + 4 * WINDOW)
-    root = np.sqrt(BETA**2 - (2.0 * np.pi * WINDOW / length * (np.arange(n_cells) - middle)) ** 2)
-    window = root / (2.0 * WINDOW * np.sinh(root))
-    place = turn * length / (2.0 * np.pi)
-    near = np.floor(place).astype(int)[:, None] + np.arange(1 - WINDOW, WINDOW + 1)  # (n_turns, 2 WINDOW)
+    root = np.sqrt(BETA**2 - (2.0 * np.pi * WINDOW * step * (time - middle)) ** 2)
+    even = _transform(time, impulse * root / (2.0 * WINDOW * np.sinh(root)), step, count)
+    place = frequencies / step
+    near = np.floor(place).astype(int)[:, None] + np.arange(1 - WINDOW, WINDOW + 1)  # (n_frequencies, 2 WINDOW)
     weight = special.i0(BETA * np.sqrt(np.clip(1.0 - ((place[:, None] - near) / WINDOW) ** 2, 0.0, None)))
-    weight = weight * np.exp(1j * middle * (2.0 * np.pi / length * near - turn[:, None]))
-    near %= length
-    return lambda sums: np.einsum("tk,tk->t", weight, fft.fft(sums * window, length)[near])
+    value = even[np.abs(near)]
+    value.imag[near < 0] *= -1.0
+    value *= np.exp(2j * np.pi * middle * (step * near - frequencies[:, None]))
+    return (weight * value).sum(axis=1)
 
 
 def magnitude(time: np.ndarray, force: np.ndarray, frequencies: np.ndarray) -> np.ndarray:

@@ -401,11 +401,10 @@ class Response:
         propagation.replay(
             h.omega, h.zeta, h.shape, h.bias, h.start_q, h.start_p, h.steps, h.n_coefficients, times[order], q, p
         )  # fmt: skip
+        part = self.body_slice(body % n)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
-        part = self.body_slice(body % len(self.bodies))
-        n_modes = self.bodies[body].n_modes
-        return q[back, part][:, :n_modes], p[back, part][:, :n_modes]
+        return q[:, part][back], p[:, part][back]
 
     def modal_energy(self, times: Any, *, body: int = -1) -> np.ndarray:
         """Energy [J] of each mode of the target at any times, (n_times, n_modes); parameters as in `modal_state`."""

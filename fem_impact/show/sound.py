@@ -24,7 +24,7 @@ DECAY = np.log(1e3)  # [-] by default the sound ends when its slowest mode has l
 FADE = 0.3  # [s] of a file or player at its end
 NEAREST = 1e-6  # [m] least distance of a listener from the plate
 BLOCK = 4096  # [-] samples computed at a time as the first waves arrive: limits the memory, does not change the result
-RING = 256, 64  # [-] samples in a block, and blocks computed at a time: does not change the result
+RING = 128, 128  # [-] samples in a block, and blocks computed at a time: does not change the result
 CRITICAL = 1e-6  # [-] damping ratios closer to 1 become 1 plus this: at 1 the two roots coincide; test_sound.py
 
 
@@ -281,12 +281,15 @@ def _ring(response: Response, times: np.ndarray, state: tuple, heard: np.ndarray
     block, n_blocks = RING
     step = (times[-1] - times[0]) / max(1, len(times) - 1)
     table = np.hstack(_powers(roots, step * np.arange(block))).T  # (2 n_roots, block)
-    starts, found = times[::block] - times[0], np.empty((-(-len(times) // block), block))
-    for i in range(0, len(starts), n_blocks):
-        real, imag = _powers(roots, starts[i : i + n_blocks])  # (n_blocks, n_roots)
-        x, y = parts.real, parts.imag
-        found[i : i + n_blocks] = np.hstack([x * real - y * imag, -x * imag - y * real]) @ table
-    return found.reshape(-1)[: len(times)]
+    real, imag = _powers(roots, step * block * np.arange(n_blocks))  # (n_blocks, n_roots)
+    found = []
+    for begin in range(0, len(times), block * n_blocks):
+        size, turn = _powers(roots, np.array([step * begin]))
+        now = parts * (size[0] + 1j * turn[0])
+        rows = slice(-(-(len(times) - begin) // block))
+        x, y, c, s = now.real, now.imag, real[rows], imag[rows]
+        found.append((np.hstack([x * c - y * s, -x * s - y * c]) @ table).ravel())
+    return np.concatenate(found)[: len(times)]
 
 
 def _powers(roots: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -70,8 +70,8 @@ def test_the_transform_is_exact_to_rounding(highest, which, monkeypatch):
     monkeypatch.setattr(force_spectrum, "directly", None)
     found = force_spectrum.of_pieces(pieces, frequencies)[::13]
     exact = np.array([with_eighty_digits(pieces, frequency) for frequency in frequencies[::13]])
-    # in parts of the force's integral: what nodes, series and window leave, and the rounding of the greatest phase
-    allowed = 1e-14 + np.finfo(float).eps * 2.0 * np.pi * highest * (pieces[0][-1] + pieces[1][-1])
+    # in parts of the force's integral: a window of exp(38) keeps 38 eps twice over; then the greatest phase's rounding
+    allowed = 2e-14 + np.finfo(float).eps * 2.0 * np.pi * highest * (pieces[0][-1] + pieces[1][-1])
     assert_allclose(found, exact, rtol=0.0, atol=allowed * whole)
 
 
@@ -89,7 +89,7 @@ def test_many_pieces_and_frequencies_too_high_for_the_transform_agree(n_pieces):
     pieces, whole = rough(n_pieces, seed=3)
     for highest in (1e4, 1e9):
         frequencies = np.array([-1.0, -0.11, 0.0, 1e-9, 0.003, 0.5, 1.0]) * highest
-        allowed = 1e-14 + np.finfo(float).eps * 2.0 * np.pi * highest * (pieces[0][-1] + pieces[1][-1])
+        allowed = 2e-14 + np.finfo(float).eps * 2.0 * np.pi * highest * (pieces[0][-1] + pieces[1][-1])
         found = force_spectrum.of_pieces(pieces, frequencies)
         assert_allclose(found, force_spectrum.directly(pieces, frequencies), rtol=0.0, atol=allowed * whole)
 
@@ -100,7 +100,7 @@ def test_one_frequency_zeros_and_no_pieces_have_a_spectrum():
     assert_allclose(force_spectrum.of_pieces(pieces, np.zeros(7)), np.full(7, impulse), rtol=0.0, atol=1e-15 * whole)
     alone = force_spectrum.of_pieces(pieces, np.array([123.4]))
     beside = force_spectrum.of_pieces(pieces, np.array([123.4, -123.4, 60.0]))
-    assert_allclose([alone[0], alone[0].conj()], beside[:2], rtol=0.0, atol=1e-14 * whole)
+    assert_allclose([alone[0], alone[0].conj()], beside[:2], rtol=0.0, atol=2e-14 * whole)
     nothing = force_spectrum.pieces(TIME, np.zeros((6, 1)))
     assert not force_spectrum.of_pieces(nothing, FREQUENCIES).any()
 

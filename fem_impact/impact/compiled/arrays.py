@@ -1,6 +1,7 @@
 """What plain Python runs in place of the loops over modes: the same on whole arrays, ten to a hundred times as fast.
 
-Each function has the name and the arguments of the kernel that it stands for, which see.
+Each function has the name and the arguments of the kernel that it stands for, which see. They serve only where nothing
+is compiled: plain Python cannot call the compiled kernels of heavily damped modes.
 """
 
 import numpy as np
