@@ -402,6 +402,8 @@ class Response:
             h.omega, h.zeta, h.shape, h.bias, h.start_q, h.start_p, h.steps, h.n_coefficients, times[order], q, p
         )  # fmt: skip
         part = self.body_slice(body % n)
+        if np.all(order[:-1] < order[1:]):
+            return q[:, part], p[:, part]
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
         return q[:, part][back], p[:, part][back]

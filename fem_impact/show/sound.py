@@ -138,12 +138,12 @@ def synthesise(
     alone = np.ones(len(times), bool)  # samples whose states are asked for: all but those within the flights
     for first, last in flights:
         alone[first + 1 : last] = False
-    q, p = (state[:, heard] for state in response.modal_state(times[alone]))  # (n_alone, n_heard)
+    q, p = response.modal_state(times[alone])  # (n_alone, n_modes)
     velocity = np.empty(len(times))
-    velocity[alone] = p @ shape[heard]
+    velocity[alone] = p @ np.where(heard, shape, 0.0)
     row = np.cumsum(alone) - 1
     for first, last in flights:
-        state = q[row[first]], p[row[first]]
+        state = q[row[first], heard], p[row[first], heard]
         velocity[first:last] = _ring(response, times[first:last], state, heard, shape[None, heard] + 0j, 1)
     return _scaled(velocity, rate, FULL_SCALE, "m/s", normalise)
 
