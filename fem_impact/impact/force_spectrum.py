@@ -15,7 +15,7 @@ FEW = 2**12  # [-] pieces times frequencies up to which the direct sum is faster
 MOST_PERIODS = 2.0**18  # [-] periods of the highest frequency in a blow whose centroid is sought: takes half a second
 MOST_NODES = 2**24  # [-] nodes or cells of a transform: they take two gigabytes; above it, the direct sum
 TERMS = 14  # [-] of the series: for phases up to a half, that of a cell's end, they leave 0.5**14 / 14! = 7e-16
-WINDOW = 8  # [-] half width of the window that interpolates from a transform of twice the length: errs by 4e-16
+WINDOW = 8  # [-] half width of the window that interpolates from twice as many even frequencies: errs by 4e-16
 BETA = 1.5 * np.pi * WINDOW  # [-] shape of the window, that of Kaiser and Bessel
 EVEN = 1e-15  # [-] of the highest frequency: rounding of frequencies that are evenly spaced from zero on
 SERIES = 0.5  # [rad] half the phase over a piece below which the first spherical Bessel function takes its series
@@ -65,7 +65,7 @@ def of_pieces(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
     time, impulse = _impulses(pieces, rule, parts.astype(int))
     if evenly:
         return _transform(time, impulse, step, n)
-    return _interpolated(time, impulse, step, int(count), 0.5 * span, frequencies)
+    return _interpolated(time, impulse, span, int(count), frequencies)
 
 
 def directly(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
@@ -117,21 +117,24 @@ def _transform(time: np.ndarray, impulse: np.ndarray, step: float, count: int) -
 
 
 def _interpolated(
-    time: np.ndarray, impulse: np.ndarray, step: float, count: int, middle: float, frequencies: np.ndarray
+    time: np.ndarray, impulse: np.ndarray, span: float, count: int, frequencies: np.ndarray
 ) -> np.ndarray:
-    """The same at any frequencies, from twice as many even ones as the time up to 2 ``middle`` [s] needs.
+    """The same at any frequencies, from ``count`` even ones, twice as many as the time up to ``span`` [s] needs.
 
     The impulses are divided by the transform of a Kaiser-Bessel window about the middle, which then interpolates.
     """
+    step, middle = 0.5 / span, 0.5 * span
     root = np.sqrt(BETA**2 - (2.0 * np.pi * WINDOW * step * (time - middle)) ** 2)
-    even = _transform(time, impulse * root / (2.0 * WINDOW * np.sinh(root)), step, count)
+    even = _transform(
+        time, impulse * root * np.exp(-root) / WINDOW, step, count
+    )  # 2 sinh is exp to rounding: root > 33
     place = frequencies / step
     near = np.floor(place).astype(int)[:, None] + np.arange(1 - WINDOW, WINDOW + 1)  # (n_frequencies, 2 WINDOW)
     weight = special.i0(BETA * np.sqrt(np.clip(1.0 - ((place[:, None] - near) / WINDOW) ** 2, 0.0, None)))
     value = even[np.abs(near)]
     value.imag[near < 0] *= -1.0
-    value *= np.exp(2j * np.pi * middle * (step * near - frequencies[:, None]))
-    return (weight * value).sum(axis=1)
+    quarter = np.array([1.0, 1j, -1.0, -1j])[near % 4]  # exp(2 pi i middle step near)
+    return (weight * quarter * value).sum(axis=1) * np.exp(-2j * np.pi * middle * frequencies)
 
 
 def magnitude(time: np.ndarray, force: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
