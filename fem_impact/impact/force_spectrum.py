@@ -1,15 +1,30 @@
-"""The Fourier transform of a force history that is linear between its samples."""
+"""The Fourier transform of a force history that is linear between its samples.
+
+Gauss nodes replace the pieces by impulses, exactly enough for the frequencies asked for. The impulses are collected in
+equal time cells, so short that exp(-i omega t) is a power series of few terms within a cell. One fast transform over
+the cells then sums each term at all frequencies.
+"""
+
+from math import factorial
 
 import numpy as np
 from scipy import fft, special
 
-from .compiled import build, many_blows
-
 LEAST_SAMPLES = 800.0  # [-] per impact: its spectrum errs by less than 1e-3 up to the thirtieth lobe
-MOST_TERMS = 2 * 10**7  # [-] pieces times frequencies of a spectrum summed directly: takes three seconds; above it, FFT
-MOST_PERIODS = 2.0**18  # [-] periods of the highest frequency in a blow: the FFT then takes half a gigabyte
-GRID = 8  # [-] time cells per half period of the highest frequency, in the FFT of a long blow
-WINDOW, BETA = 6, 28.1  # [-] half width and shape of the window for an FFT of twice the length: errs by 1e-11
+FEW = 2**12  # [-] pieces times frequencies up to which the direct sum is faster
+MOST_PERIODS = 2.0**18  # [-] periods of the highest frequency in a blow whose centroid is sought: takes half a second
+MOST_NODES = 2**24  # [-] nodes or cells of a transform: they take two gigabytes; above it, the direct sum
+TERMS = 14  # [-] of the series: for phases up to a half, that of a cell's end, they leave 0.5**14 / 14! = 7e-16
+WINDOW = 8  # [-] half width of the window that interpolates from twice as many even frequencies: errs by 4e-16
+BETA = 1.5 * np.pi * WINDOW  # [-] shape of the window, that of Kaiser and Bessel
+EVEN = 1e-15  # [-] of the highest frequency: rounding of frequencies that are evenly spaced from zero on
+SERIES = 0.5  # [rad] half the phase over a piece below which the first spherical Bessel function takes its series
+# Gauss rules, and half the phase [rad] over a piece at which they err by 1e-15 of its force, by their error term
+RULES = {n: np.polynomial.legendre.leggauss(n) for n in range(2, 12)}
+REACH = {
+    n: (1e-15 * (2 * n + 1) * factorial(2 * n) ** 3 / (n * 2 ** (2 * n + 1) * factorial(n) ** 4)) ** (1 / (2 * n - 1))
+    for n in RULES
+}
 
 Pieces = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
@@ -28,65 +43,100 @@ def pieces(time: np.ndarray, force: np.ndarray) -> Pieces:
 
 
 def of_pieces(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
-    """Integral of F exp(-i omega t) [N s] at frequencies (n_frequencies,) [Hz], complex."""
+    """Integral of F exp(-i omega t) [N s] at frequencies (n_frequencies,) [Hz], complex.
+
+    Errs by rounding: that of the phases, and 2e-14 of the integral of the force's magnitude.
+    """
+    t, h, _, _ = pieces
+    n, n_terms = len(frequencies), len(t) * len(frequencies)
+    if n_terms <= FEW:
+        return directly(pieces, frequencies)
+    step = frequencies[1] if n > 1 else 0.0
+    evenly = step > 0.0 and np.abs(frequencies - step * np.arange(n)).max() <= EVEN * frequencies[-1]
+    span = t[-1] + h[-1]
+    if not evenly:
+        step = 0.5 / span
+    count = n if evenly else np.floor(np.abs(frequencies).max() / step) + WINDOW + 1.0
+    half_phase = np.pi * step * (count - 1.0) * h
+    rule = min(REACH, key=lambda n: n * np.ceil(half_phase / REACH[n]).sum())
+    parts = np.maximum(np.ceil(half_phase / REACH[rule]), 1.0)  # into which a long piece is cut
+    if not max(rule * parts.sum(), 2.0 * np.pi * count) <= min(n_terms, MOST_NODES):
+        return directly(pieces, frequencies)
+    time, impulse = _impulses(pieces, rule, parts.astype(int))
+    if evenly:
+        return _transform(time, impulse, step, n)
+    return _interpolated(time, impulse, span, int(count), frequencies)
+
+
+def directly(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
+    """The same, summed over the closed forms of all pieces: for few of them, and for very high frequencies.
+
+    About its middle a piece has the mean force times sinc and half its rise times the first spherical Bessel function.
+    """
     t, h, f0, f1 = pieces
-    if len(t) * len(frequencies) > MOST_TERMS and 0.0 < np.abs(frequencies).max() * (t[-1] + h[-1]) < MOST_PERIODS:
-        return _by_transform(pieces, frequencies)
     omega = 2.0 * np.pi * frequencies
     total = np.zeros(len(omega), complex)
     for block in np.array_split(np.arange(len(omega)), max(1, len(omega) * len(h) // 2**20)):
-        x = omega[block, None] * h  # (n_block, n_pieces)
-        small = np.abs(x) < 1e-2
-        safe = np.where(small, 1.0, x)
-        edge = np.exp(-1j * safe)
-        mean = np.where(small, 1.0 - 0.5j * x - x**2 / 6.0 + 1j * x**3 / 24.0, (1.0 - edge) / (1j * safe))
-        ramp = np.where(
-            small, 0.5 - 1j * x / 3.0 - x**2 / 8.0 + 1j * x**3 / 30.0, (edge * (1.0 + 1j * safe) - 1.0) / safe**2
-        )
-        start = np.exp(-1j * omega[block, None] * t)
-        total[block] = (start * h * (f0 * mean + (f1 - f0) * ramp)).sum(axis=1)
+        y = omega[block, None] * (0.5 * h)  # (n_block, n_pieces)
+        square = y * y
+        near = np.ones_like(y)
+        for k in range(6, 0, -1):
+            near = 1.0 - square / (2 * k * (2 * k + 3)) * near
+        safe = np.where(np.abs(y) < SERIES, 1.0, y)
+        bessel = np.where(np.abs(y) < SERIES, y / 3.0 * near, (np.sin(safe) / safe - np.cos(safe)) / safe)
+        whole = 0.5 * h * ((f0 + f1) * np.sinc(y / np.pi) - 1j * (f1 - f0) * bessel)
+        total[block] = (np.exp(-1j * omega[block, None] * (t + 0.5 * h)) * whole).sum(axis=1)
     return total
 
 
-def evenly(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
-    """The same at evenly spaced frequencies from zero on, by the compiled sum unless the transform is faster."""
-    if not build.COMPILED or len(pieces[0]) * len(frequencies) > MOST_TERMS:
-        return of_pieces(pieces, frequencies)
-    total = np.zeros(len(frequencies), complex)
-    many_blows.straight_spectrum(2.0 * np.pi * frequencies[1], *pieces, total)
+def _impulses(pieces: Pieces, rule: int, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and impulses [N s] at Gauss nodes in every part of every piece, ascending."""
+    t, h, f0, f1 = (np.repeat(x, parts) for x in pieces)
+    number = np.arange(len(t)) - np.repeat(np.cumsum(parts) - parts, parts)  # of a part within its piece
+    n_parts = np.repeat(parts, parts)
+    nodes, weights = RULES[rule]
+    share = (number + 0.5 * (nodes[:, None] + 1.0)) / n_parts
+    impulse = (h / n_parts * (0.5 * weights[:, None])) * (f0 + (f1 - f0) * share)  # (rule, n_parts)
+    return (t + h * share).T.ravel(), impulse.T.ravel()
+
+
+def _transform(time: np.ndarray, impulse: np.ndarray, step: float, count: int) -> np.ndarray:
+    """Sum of impulse exp(-i omega time) at frequencies 0, step, 2 step, ... [Hz], (count,), by cells of a radian."""
+    # a fast transform of this length repeats itself over the cells, so that later ones may be folded into it
+    n_cells = fft.next_fast_len(max(1, int(np.ceil(2.0 * np.pi * (count - 1)))), real=True)
+    place = time * (step * n_cells)
+    near = np.rint(place)
+    first = np.append(0, np.flatnonzero(near[1:] != near[:-1]) + 1)  # node of every cell
+    cell, beside = near[first].astype(int) % n_cells, place - near
+    turn = 2.0 * np.pi / n_cells * np.arange(count)
+    factor, total = np.ones(count, complex), np.zeros(count, complex)
+    for k in range(TERMS):
+        total += factor * fft.rfft(np.bincount(cell, np.add.reduceat(impulse, first), n_cells))[:count]
+        impulse, factor = impulse * beside, factor * turn * (-1j / (k + 1.0))
     return total
 
 
-def _by_transform(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
-    """The spectrum by FFT, (n_frequencies,), for a blow of so many pieces that the direct sum would take minutes.
+def _interpolated(
+    time: np.ndarray, impulse: np.ndarray, span: float, count: int, frequencies: np.ndarray
+) -> np.ndarray:
+    """The same at any frequencies, from ``count`` even ones, twice as many as the time up to ``span`` [s] needs.
 
-    The force is replaced by its exact impulses in equal time cells; aliasing is small because the band ends far
-    below the cell rate. A Kaiser-Bessel window interpolates from the FFT frequencies to the requested ones.
+    The impulses are divided by the transform of a Kaiser-Bessel window about the middle, which then interpolates.
     """
-    t, h, f0, f1 = pieces
-    span = t[-1] + h[-1]
-    before = np.concatenate([[0.0], np.cumsum(0.5 * h * (f0 + f1))])
-    step = min(0.5 / (GRID * np.abs(frequencies).max()), span / LEAST_SAMPLES)
-    edges = step * np.arange(int(span / step) + 2)
-    row = np.clip(np.searchsorted(t, edges, side="right") - 1, 0, None)
-    part = np.clip((edges - t[row]) / h[row], 0.0, 1.0)
-    impulse = np.diff(before[row] + h[row] * part * (f0[row] + 0.5 * (f1 - f0)[row] * part))
-    middle, length = 0.5 * (len(impulse) - 1), fft.next_fast_len(2 * len(impulse))
-    root = np.sqrt(BETA**2 - (2.0 * np.pi * WINDOW / length * (np.arange(len(impulse)) - middle)) ** 2)
-    even = fft.fft(impulse * root / (2.0 * WINDOW * np.sinh(root)), length)
-    place = frequencies * step * length
+    step, middle = 0.5 / span, 0.5 * span
+    root = np.sqrt(BETA**2 - (2.0 * np.pi * WINDOW * step * (time - middle)) ** 2)
+    even = _transform(
+        time, impulse * root * np.exp(-root) / WINDOW, step, count
+    )  # 2 sinh is exp to rounding: root > 33
+    place = frequencies / step
     near = np.floor(place).astype(int)[:, None] + np.arange(1 - WINDOW, WINDOW + 1)  # (n_frequencies, 2 WINDOW)
     weight = special.i0(BETA * np.sqrt(np.clip(1.0 - ((place[:, None] - near) / WINDOW) ** 2, 0.0, None)))
-    turn = np.exp(2j * np.pi * middle / length * near)
-    found = (weight * turn * even[near % length]).sum(axis=1)
-    return found * np.exp(-2j * np.pi * frequencies * step * (middle + 0.5)) / np.sinc(frequencies * step)
+    value = even[np.abs(near)]
+    value.imag[near < 0] *= -1.0
+    quarter = np.array([1.0, 1j, -1.0, -1j])[near % 4]  # exp(2 pi i middle step near)
+    return (weight * quarter * value).sum(axis=1) * np.exp(-2j * np.pi * middle * frequencies)
 
 
 def magnitude(time: np.ndarray, force: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
-    """Magnitude of the spectrum [N s] by the trapezoidal rule: three times as fast, for the live page."""
-    weights = np.zeros(len(time))
-    weights[1:] = 0.5 * np.diff(time)
-    weights[:-1] += 0.5 * np.diff(time)
-    used = force > 0.0
-    turns = np.exp(-2j * np.pi * np.outer(frequencies, time[used]))  # (n_frequencies, n_times)
-    return np.abs(turns @ (weights * force)[used])
+    """Magnitude of the spectrum [N s] of one force (n_times,) [N]."""
+    return np.abs(of_pieces(pieces(time, force[:, None]), frequencies))

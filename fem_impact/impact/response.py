@@ -416,7 +416,7 @@ class Response:
     def spectrum(self, frequencies: Any) -> np.ndarray:
         """Fourier transform of the force, integral of F exp(-i omega t) [N s], (n_frequencies,), complex.
 
-        Exact for a force that is linear between the samples.
+        Exact to rounding for a force that is linear between the samples.
         """
         asked = check.array("frequencies", frequencies, (None,), "Hz", lift=True)
         return force_spectrum.of_pieces(force_spectrum.pieces(*self._samples), asked)
@@ -431,13 +431,20 @@ class Response:
             most = force_spectrum.MOST_PERIODS / span
             raise ValueError(f"max_frequency must be at most {most:.4g} Hz for a blow of {span:.4g} s")
         frequencies = np.linspace(0.0, limit, int(np.clip(32.0 * limit * span, 512, 65536)))
-        size = np.abs(force_spectrum.evenly(force_spectrum.pieces(*self._samples), frequencies))
+        size = np.abs(self.spectrum(frequencies))
         return float(np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies))
 
     def body_slice(self, body: int) -> slice:
         """The columns of a body's modes in the history's arrays."""
         start = sum(modes.n_modes for modes in self.bodies[:body])
         return slice(start, start + self.bodies[body].n_modes)
+
+    @property
+    def constant_forces(self) -> np.ndarray:
+        """Constant modal forces on the target, (n_modes,) [N kg**-0.5]."""
+        if self._ringing is not None:  # see `on`: there are none
+            return np.zeros(self._ringing.n_modes)
+        return self.history.bias[self.body_slice(len(self.bodies) - 1)]
 
     def modal_state(self, times: Any, *, body: int = -1) -> tuple[np.ndarray, np.ndarray]:
         """Modal displacements and velocities of the target at any times, in any order.
@@ -459,15 +466,14 @@ class Response:
         if times.size and times.min() < 0.0:
             raise ValueError(f"times must not be before the blow at 0 s, got {times.min():g} s")
         order = np.argsort(times, kind="stable")
+        rung = self._ringing is not None and self._moved(body) is self._ringing
+        q, p = (self._rung if rung else self.history).states(times[order])
+        part = slice(None) if rung else self.body_slice(body % n)
+        if np.all(order[:-1] < order[1:]):
+            return q[:, part], p[:, part]
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
-        if self._ringing is not None and self._moved(body) is self._ringing:
-            q, p = self._rung.states(times[order])
-            return q[back], p[back]
-        q, p = self.history.states(times[order])
-        part = self.body_slice(body % len(self.bodies))
-        n_modes = self.bodies[body].n_modes
-        return q[back, part][:, :n_modes], p[back, part][:, :n_modes]
+        return q[:, part][back], p[:, part][back]
 
     def modal_energy(self, times: Any, *, body: int = -1) -> np.ndarray:
         """Energy [J] of each mode of the target at any times, (n_times, n_modes); parameters as in `modal_state`."""

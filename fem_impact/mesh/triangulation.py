@@ -4,8 +4,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from netgen.geom2d import SplineGeometry
-from netgen.meshing import NgException
 
 from .._base import check
 from .loops import Outline, Piece, crossing, curvature, divide, extent, is_straight, tangent
@@ -31,6 +29,9 @@ def triangulate(outline: Outline, size: float) -> dict[str, Any]:
     dict
         The fields of a `Mesh`: points, cells, facets, edges, middles, tangents, curvatures.
     """
+    from netgen.geom2d import SplineGeometry  # imported here because it takes 0.1 s and rectangles do not need it
+    from netgen.meshing import NgException
+
     span = extent(outline.outer)
     centre = outline.outer[0].at(np.zeros(1))[0]
     geometry = SplineGeometry()

@@ -23,7 +23,8 @@ SHORTEST, LONGEST = 0.5, 5.0  # [s] limits of the default duration: long enough 
 DECAY = np.log(1e3)  # [-] by default the sound ends when its slowest mode has lost 60 dB
 FADE = 0.3  # [s] of a file or player at its end
 NEAREST = 1e-6  # [m] least distance of a listener from the plate
-BLOCK = 4096  # [-] samples computed from one modal state: limits the memory, does not change the result
+BLOCK = 4096  # [-] samples computed at a time as the first waves arrive: limits the memory, does not change the result
+RING = 128, 128  # [-] samples in a block, and blocks computed at a time: does not change the result
 CRITICAL = 1e-6  # [-] damping ratios closer to 1 become 1 plus this: at 1 the two roots coincide; test_sound.py
 
 
@@ -133,10 +134,18 @@ def synthesise(
     rate, heard = _audible(response, rate)
     times = response.time[0] + np.arange(_length(response, heard, duration, rate)) / rate
     shape = modes.shape_at(point)[0]  # (n_modes,)
-    n_blow = int(np.searchsorted(times, response.time[-1], side="right"))
-    blow = response.modal_state(times[:n_blow])[1][:, heard] @ shape[heard]
-    free = _ring(response, times[n_blow:], heard, shape[None, heard] + 0j, 1) if n_blow < len(times) else np.zeros(0)
-    return _scaled(np.concatenate([blow, free]), rate, FULL_SCALE, "m/s", normalise)
+    flights = _flights(response, times)
+    alone = np.ones(len(times), bool)  # samples whose states are asked for: all but those within the flights
+    for first, last in flights:
+        alone[first + 1 : last] = False
+    q, p = response.modal_state(times[alone])  # (n_alone, n_modes)
+    velocity = np.empty(len(times))
+    velocity[alone] = p @ np.where(heard, shape, 0.0)
+    row = np.cumsum(alone) - 1
+    for first, last in flights:
+        state = q[row[first], heard], p[row[first], heard]
+        velocity[first:last] = _ring(response, times[first:last], state, heard, shape[None, heard] + 0j, 1)
+    return _scaled(velocity, rate, FULL_SCALE, "m/s", normalise)
 
 
 @check.typed
@@ -199,8 +208,10 @@ def radiate(
     delayed = np.stack(
         [np.einsum("km,km->m", shapes, np.exp(-np.outer(way / speed, r))) for r in _roots(response, heard)]
     )
-    ring = _ring(response, times[n_first:], heard, delayed, 2) if n_first < len(times) else np.zeros(0)
-    return _scaled(np.concatenate([first, ring]), rate, LOUDEST, "Pa", normalise)
+    if n_first < len(times):
+        q, p = (state[0, heard] for state in response.modal_state(times[n_first : n_first + 1]))
+        first = np.append(first, _ring(response, times[n_first:], (q, p), heard, delayed, 2))
+    return _scaled(first, rate, LOUDEST, "Pa", normalise)
 
 
 def beside(listener: Any) -> np.ndarray:
@@ -240,20 +251,51 @@ def _roots(response: Response, heard: np.ndarray) -> np.ndarray:
     return np.stack([-zeta * omega + split, -zeta * omega - split])
 
 
-def _ring(response: Response, times: np.ndarray, heard: np.ndarray, weights: np.ndarray, order: int) -> np.ndarray:
-    """Weighted sum of the modes' time derivatives at equally spaced times after the last contact, (n_times,).
+def _flights(response: Response, times: np.ndarray) -> list[tuple[int, int]]:
+    """First sample of every long free flight and of what follows it; the last flight begins when the blow is over."""
+    history = response.history
+    busy = np.flatnonzero(history.pressed.any(axis=1))
+    first = np.searchsorted(times, np.append(0.0, (history.steps[:, 0] + history.steps[:, 1])[busy]))
+    after = np.append(np.searchsorted(times, history.steps[busy, 0]), len(times))
+    long = after - first >= RING[0]
+    long[-1] = after[-1] > first[-1]
+    return list(zip(first[long].tolist(), after[long].tolist()))
 
-    Without contact ``q = a exp(r t) + b exp(s t)``; all blocks of samples share one table of exponentials. Weights are
-    (1, n_heard), or (2, n_heard) with one for each root; ``order`` is that of the derivative.
+
+def _ring(response: Response, times: np.ndarray, state: tuple, heard: np.ndarray, weights: np.ndarray, order: int):
+    """Weighted sum of the modes' time derivatives at equally spaced times of one free flight, (n_times,).
+
+    About its rest a mode moves as ``a exp(r t) + b exp(s t)``, or twice the real part of one of the two. An exponential
+    of a sample's time is one of the start of its block times one of the time since: the sum over the modes is a matrix
+    product. ``state`` is (q, p) of the modes heard at the first time; weights are (1, n_heard), or (2, n_heard) with
+    one for each root; ``order`` is that of the derivative.
     """
-    roots = _roots(response, heard)
-    step = times[1] - times[0] if len(times) > 1 else 0.0
-    table = np.exp(roots[:, None, :] * (step * np.arange(min(BLOCK, len(times))))[None, :, None])
-    q, p = (state[:, heard] for state in response.modal_state(times[::BLOCK]))  # (n_blocks, n_heard)
+    roots, (q, p) = _roots(response, heard), state
+    bias = response.constant_forces
+    q = q - bias[heard] / response.target.omega[heard] ** 2
     first = (p - roots[1] * q) / (roots[0] - roots[1])
-    parts = np.stack([first, q - first]) * (weights * roots**order)[:, None, :]  # (2, n_blocks, n_heard)
-    blocks = np.einsum("rbm,rtm->bt", parts, table, optimize=True).real  # (n_blocks, BLOCK)
-    return blocks.reshape(-1)[: len(times)]
+    parts = np.stack([first, q - first]) * weights * roots**order  # (2, n_heard)
+    swings = roots[0].imag != 0.0
+    parts = np.concatenate([np.where(swings, 2.0, 1.0) * parts[0], parts[1, ~swings]])
+    roots = np.concatenate([roots[0], roots[1, ~swings]])
+    block, n_blocks = RING
+    step = (times[-1] - times[0]) / max(1, len(times) - 1)
+    table = np.hstack(_powers(roots, step * np.arange(block))).T  # (2 n_roots, block)
+    real, imag = _powers(roots, step * block * np.arange(n_blocks))  # (n_blocks, n_roots)
+    found = []
+    for begin in range(0, len(times), block * n_blocks):
+        size, turn = _powers(roots, np.array([step * begin]))
+        now = parts * (size[0] + 1j * turn[0])
+        rows = slice(-(-(len(times) - begin) // block))
+        x, y, c, s = now.real, now.imag, real[rows], imag[rows]
+        found.append((np.hstack([x * c - y * s, -x * s - y * c]) @ table).ravel())
+    return np.concatenate(found)[: len(times)]
+
+
+def _powers(roots: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Real and imaginary part of exp(roots times), (n_times, n_roots) each; faster than the complex exponential."""
+    size, angle = np.exp(np.outer(times, roots.real)), np.outer(times, roots.imag)
+    return size * np.cos(angle), size * np.sin(angle)
 
 
 def _areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
-"""The spectrum of straight pieces: against closed forms, and each of its four ways against the others."""
+"""The spectrum of straight pieces: against closed forms, and both of its ways against 80 digits."""
 
+import mpmath
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -20,7 +21,8 @@ def triangles(frequencies):
 @pytest.mark.parametrize("scale", [1.0, 1e-6])  # the second takes the series for short pieces
 def test_triangles_have_their_closed_form(scale):
     found = force_spectrum.of_pieces(force_spectrum.pieces(scale * TIME, FORCE), FREQUENCIES)
-    assert_allclose(found, scale * triangles(scale * FREQUENCIES), atol=1e-14 * scale)
+    # 1e-15 of the integral of the force, 3e-3 N s, and the rounding of phases of up to 180 rad
+    assert_allclose(found, scale * triangles(scale * FREQUENCIES), rtol=0.0, atol=1e-16 * scale)
 
 
 def test_pieces_without_force_are_left_out_and_forces_of_all_contacts_add():
@@ -30,23 +32,79 @@ def test_pieces_without_force_are_left_out_and_forces_of_all_contacts_add():
     assert_allclose(first + last, [6.0, 6.0, 3.0, 3.0])
 
 
-def test_the_compiled_sum_equals_the_direct_one():
-    pieces = force_spectrum.pieces(TIME, FORCE)
-    assert_allclose(force_spectrum.evenly(pieces, FREQUENCIES), triangles(FREQUENCIES), atol=1e-13)
+def rough(n_pieces, seed):
+    """Pieces of very unequal length whose force jumps about, with a gap, and the integral of its magnitude."""
+    rng = np.random.default_rng(seed)
+    time = 3e-3 + np.cumsum(10.0 ** rng.uniform(-9.0, -5.0, n_pieces + 1))
+    force = rng.uniform(-1.0, 3.0, (n_pieces + 1, 1))
+    force[n_pieces // 3 : n_pieces // 2] = 0.0
+    found = force_spectrum.pieces(time, force)
+    return found, float(np.abs(found[1] * (found[2] + found[3])).sum() / 2.0)
 
 
-def test_the_transform_of_a_long_blow_equals_the_direct_sum(monkeypatch):
-    pieces = force_spectrum.pieces(TIME, FORCE)
-    asked = np.array([-700.0, 0.0, 12.3, 999.9, 4e3])
-    monkeypatch.setattr(force_spectrum, "MOST_TERMS", 0)
-    # cells of an eighth of the shortest half period alias by up to 2e-7 of the whole impulse, 3e-3 N s
-    assert_allclose(force_spectrum.of_pieces(pieces, asked), triangles(asked), rtol=0.0, atol=2e-7 * 3e-3)
+def with_eighty_digits(pieces, frequency):
+    """The spectrum by the closed form of every piece as it stands; a phase of 1e-19 costs 38 of the digits."""
+    with mpmath.workdps(80):
+        omega, total = 2 * mpmath.pi * mpmath.mpf(float(frequency)), mpmath.mpc(0)
+        for t, h, f0, f1 in zip(*(map(mpmath.mpf, map(float, x)) for x in pieces)):
+            if omega == 0:
+                total += h * (f0 + f1) / 2
+                continue
+            turn, slope = mpmath.expj(-omega * h), (f1 - f0) / h
+            part = (f0 - f1 * turn) / (1j * omega) + slope * (turn - 1) / omega**2
+            total += mpmath.expj(-omega * t) * part
+        return complex(total)
 
 
-def test_the_trapezoidal_rule_converges_to_it():
-    time = np.linspace(0.0, 7e-3, 20_001)
-    force = np.interp(time, TIME, FORCE[:, 0])
-    found = force_spectrum.magnitude(time, force, FREQUENCIES[:10])
-    step = time[1]
-    allowed = (2.0 * np.pi * FREQUENCIES[9] * step) ** 2 / 12.0 * 3e-3  # its error, times the whole impulse
-    assert_allclose(found, np.abs(triangles(FREQUENCIES[:10])), atol=allowed + 1e-9)
+def spread(highest):
+    """Frequencies [Hz]: evenly from zero, which folds the time; from below zero; over seven decades."""
+    evenly = np.linspace(0.0, highest, 64)
+    return evenly, np.append(np.linspace(-highest, 0.7 * highest, 40), 0.0), np.geomspace(1e-7 * highest, highest, 60)
+
+
+@pytest.mark.parametrize("which", range(3))
+@pytest.mark.parametrize("highest", [1e-3, 1e3, 1e5])  # Hz: phases over the whole blow of 2e-5, 20 and 2 000 rad
+def test_the_transform_is_exact_to_rounding(highest, which, monkeypatch):
+    pieces, whole = rough(300, seed=1)
+    frequencies = spread(highest)[which]
+    monkeypatch.setattr(force_spectrum, "directly", None)
+    found = force_spectrum.of_pieces(pieces, frequencies)[::13]
+    exact = np.array([with_eighty_digits(pieces, frequency) for frequency in frequencies[::13]])
+    # in parts of the force's integral: a window of exp(38) keeps 38 eps twice over; then the greatest phase's rounding
+    allowed = 2e-14 + np.finfo(float).eps * 2.0 * np.pi * highest * (pieces[0][-1] + pieces[1][-1])
+    assert_allclose(found, exact, rtol=0.0, atol=allowed * whole)
+
+
+@pytest.mark.parametrize("highest", [0.0, 1e-3, 1e3, 1e5, 1e7, 1e9, 1e12])  # Hz: over a piece from 0 to 6e7 rad
+def test_the_direct_sum_is_exact_to_rounding(highest):
+    pieces, whole = rough(300, seed=2)
+    frequencies = np.array([highest, -0.3 * highest])
+    exact = np.array([with_eighty_digits(pieces, frequency) for frequency in frequencies])
+    allowed = 1e-15 + np.finfo(float).eps * 2.0 * np.pi * highest * (pieces[0][-1] + pieces[1][-1])
+    assert_allclose(force_spectrum.of_pieces(pieces, frequencies), exact, rtol=0.0, atol=allowed * whole)
+
+
+@pytest.mark.parametrize("n_pieces", [5_000, 20_000])
+def test_many_pieces_and_frequencies_too_high_for_the_transform_agree(n_pieces):
+    pieces, whole = rough(n_pieces, seed=3)
+    for highest in (1e4, 1e9):
+        frequencies = np.array([-1.0, -0.11, 0.0, 1e-9, 0.003, 0.5, 1.0]) * highest
+        allowed = 2e-14 + np.finfo(float).eps * 2.0 * np.pi * highest * (pieces[0][-1] + pieces[1][-1])
+        found = force_spectrum.of_pieces(pieces, frequencies)
+        assert_allclose(found, force_spectrum.directly(pieces, frequencies), rtol=0.0, atol=allowed * whole)
+
+
+def test_one_frequency_zeros_and_no_pieces_have_a_spectrum():
+    pieces, whole = rough(5_000, seed=4)
+    impulse = float((pieces[1] * (pieces[2] + pieces[3])).sum() / 2.0)
+    assert_allclose(force_spectrum.of_pieces(pieces, np.zeros(7)), np.full(7, impulse), rtol=0.0, atol=1e-15 * whole)
+    alone = force_spectrum.of_pieces(pieces, np.array([123.4]))
+    beside = force_spectrum.of_pieces(pieces, np.array([123.4, -123.4, 60.0]))
+    assert_allclose([alone[0], alone[0].conj()], beside[:2], rtol=0.0, atol=2e-14 * whole)
+    nothing = force_spectrum.pieces(TIME, np.zeros((6, 1)))
+    assert not force_spectrum.of_pieces(nothing, FREQUENCIES).any()
+
+
+def test_magnitude_is_that_of_the_spectrum():
+    found = force_spectrum.magnitude(TIME, FORCE[:, 0], FREQUENCIES)
+    assert_allclose(found, np.abs(triangles(FREQUENCIES)), rtol=0.0, atol=1e-16)

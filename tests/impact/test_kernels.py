@@ -17,7 +17,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from fem_impact.impact.collision import _gauss
-from fem_impact.impact.compiled import build, collocation, energy, propagation, record, schemes
+from fem_impact.impact.compiled import arrays, build, collocation, energy, propagation, record, schemes
 from fem_impact.impact.compiled import law as laws
 
 EPS = np.finfo(float).eps
@@ -154,6 +154,21 @@ def test_fast_lanes_agree_with_the_single_mode(zeta, h):
         assert_allclose(table[4, n] / h**2, moments[1], rtol=slack, atol=slack / max(1.0, w * h) ** 2)
         assert_allclose(table[10, n] / h**2, moments[2], rtol=slack)
         assert_allclose(table[11, n] / h**2, moments[3] - 0.5 * moments[2], rtol=slack, atol=4.0 * EPS)
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.01, 0.5, 0.9])
+@pytest.mark.parametrize("h", [1e-9, 1e-6, 2e-5, 1e-4, 1e-2])
+def test_tables_by_arrays_agree_with_the_fast_lanes(zeta, h):
+    omega = np.append(0.0, np.geomspace(1.0, 1.2e5, 60))
+    damping = np.append(0.0, np.full(60, zeta))
+    table, lanes = np.empty((propagation.N_TABLE, 61)), np.empty((propagation.N_LANE, 61))
+    propagation.step_table(omega, damping, h, table)
+    arrays.lane_table(omega, damping, h, True, lanes)
+    slack = 8.0 * EPS * (1.0 + omega * h)  # rounding of the phase
+    one, far = np.ones_like(omega), np.maximum(1.0, omega * h)  # the moments fall with the square of the phase
+    size = np.stack([one, h / far, far / h, one, h / far, h / far, h / far])
+    wanted = np.stack([*table[:4], table[9], table[10] / h, table[11] / h])
+    assert np.all(np.abs(lanes - wanted) <= slack * size)
 
 
 def test_waves_and_decays_are_within_two_units_in_the_last_place():
@@ -652,22 +667,41 @@ def test_many_scenes_keep_the_invariants(scene):
     check_invariants(scene)
 
 
+PLAIN = """
+import json
+import numpy as np
+from fem_impact.impact.collision import _gauss
+from fem_impact.impact.compiled.collocation import run_collocation
+from fem_impact.impact.compiled.energy import run_energy
+from fem_impact.impact.compiled.propagation import replay
+
+def after(run, n_coefficients):
+    times = np.linspace(0.0, 2e-3, 9)
+    q, p = np.empty((9, 3)), np.empty((9, 3))
+    replay(w, zeta, u, bias, z, start, run[0], n_coefficients, times, q, p)
+    return [len(run[0]), *run[2], *(1e3 * q).ravel(), *p.ravel()]
+
+w, z = np.array([0.0, 4e3, 9e3]), np.zeros(3)
+start = np.array([0.1, 0.0, 0.0])
+shapes = np.array([[10.0, -2.0, 1.0], [10.0, 1.0, -2.0]])
+law = np.array([[1e6, 1.5, 0.0, 1e-9], [1e6, 1.2, 0.1, 0.0]])
+found = []
+for m, zeta, bias in (
+    (1, z, z), (1, np.array([0.0, 0.95, 1.3]), z), (2, np.array([0.0, 0.01, 0.2]), np.array([0.1, 1.0, -2.0]))
+):
+    u, laws, offset = shapes[:m].copy(), law[:m].copy(), np.array([-1e-5, -3e-5])[:m].copy()
+    found += after(run_energy(w, zeta, u, offset, bias, laws, z, start, 1, 5e-5, 0.0, 0.0, 3e-3, 0, 500), 2)
+    gauss = *_gauss(4), 2e-4, 1.0, 1e-4
+    found += after(run_collocation(w, zeta, u, offset, bias, laws, z, start, *gauss, 0.0, 0.0, 3e-3, 0, 500), 4)
+print(json.dumps(list(map(float, found))))
+"""
+
+
 def test_plain_python_form_agrees():
-    """The same kernels without compilation, in a process of its own."""
-    code = (
-        "import numpy as np, json\n"
-        "from fem_impact.impact.compiled.collocation import run_collocation\n"
-        "from fem_impact.impact.compiled.energy import run_energy\n"
-        "from fem_impact.impact.collision import _gauss\n"
-        "w = np.array([0.0, 4e3, 9e3]); u = np.array([[10.0, -2.0, 1.0]]); z = np.zeros(3)\n"
-        "law = np.array([[1e6, 1.5, 0.0, 1e-9]]); p = np.array([0.1, 0.0, 0.0]); o = np.zeros(1)\n"
-        "one = run_energy(w, z, u, o, z, law, z, p, 1, 5e-5, 0.0, 0.0, np.inf, 0, 500)\n"
-        "two = run_collocation(w, z, u, o, z, law, z, p, *_gauss(4), 2e-4, 1.0, 1e-4, 0.0, 0.0, np.inf, 0, 500)\n"
-        "print(json.dumps([list(map(float, r[2])) for r in (one, two)]))\n"
-    )
+    """The same kernels, or their array forms, without compilation, in a process of its own."""
     answers = [
         subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=600,
+            [sys.executable, "-c", PLAIN], capture_output=True, text=True, check=True, timeout=600,
             env={**os.environ, "NUMBA_DISABLE_JIT": flag},
         ).stdout
         for flag in ("0", "1")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fem_impact.impact.collision import strike
+from fem_impact.impact.collision import Touch, collide, strike
 from fem_impact.impact.contact import Contact
 from fem_impact.impact.striker import Striker
 from fem_impact.modes import analytic
@@ -33,6 +33,36 @@ def test_samples_are_the_velocity_of_the_audible_modes(hit):
     # 1e-9: phases of some 1e3 rad carry rounding of 1e-13, and the two ways must agree to far less than one bit of 24
     assert_allclose(heard.samples[index] * sound.FULL_SCALE, p @ SHAPES[1, 1:4], rtol=0, atol=1e-9)
     assert len(heard.samples) == 14400 and heard.rate == 48_000
+
+
+@pytest.mark.parametrize("damping_ratio", [0.0, 1e-4, 0.5, 2.0])
+@pytest.mark.parametrize("rate", [8_000, 44_100, 1_000_000])  # Hz: slow modes turn by 6e-6 rad in a sample of the last
+def test_every_sample_of_many_modes_is_that_of_a_direct_sum(rate, damping_ratio):
+    frequencies = np.geomspace(1.0, 20e3, 60)  # Hz
+    shapes = np.random.default_rng(5).normal(size=(2, 60))
+    modes = Modes.from_arrays(frequencies, shapes, points=POINTS, mass=0.4, damping_ratio=damping_ratio)
+    hit = strike(modes, Striker.rigid(0.02), Contact.hertz(5e7), at=POINTS[0], speed=1.5, tolerance=1e-3)
+    duration = 30_000 / rate
+    heard = sound.synthesise(hit, POINTS[1], duration=duration, rate=rate)
+    some = np.unique(np.append(np.arange(2_000), np.random.default_rng(6).integers(0, 30_000, 300)))
+    low = frequencies < 0.5 * rate
+    direct = hit.modal_state(hit.time[0] + some / rate)[1][:, low] @ shapes[1, low]
+    # parts of the loudest: the rounding of phases, which reach 2e5 rad, and 1e-13 for the sum over the modes
+    allowed = 1e-13 + 2.0 * np.finfo(float).eps * 2.0 * np.pi * frequencies[low].max() * duration
+    assert_allclose(heard.samples[some] * sound.FULL_SCALE, direct, rtol=0.0, atol=allowed * np.abs(direct).max())
+
+
+def test_flights_between_touches_sound_like_a_direct_sum():
+    modes = Modes.from_arrays(FREQUENCIES[1:], SHAPES[:, 1:], points=POINTS, mass=0.4, damping_ratio=0.004)
+    touch = Touch(Contact.hertz(5e8), 0, 1, None, POINTS[0])
+    pull = {"speeds": [0.5, 0.0], "forces": [1.0, 3.0]}  # N: the ball falls back in 20 ms; a load bends the body
+    hit = collide([Modes.rigid(0.02), modes], [touch], duration=0.1, tolerance=1e-3, **pull)
+    heard = sound.synthesise(hit, POINTS[1], duration=0.2)
+    gaps = [after.start - before.end for before, after in zip(hit.impacts, hit.impacts[1:])]
+    assert max(gaps) * sound.RATE > 2 * sound.RING[0]
+    direct = hit.modal_state(hit.time[0] + np.arange(9_600) / sound.RATE)[1][:, :3] @ SHAPES[1, 1:4]
+    # of the loudest: 1e-12 covers the rounding of phases of up to 2 000 rad
+    assert_allclose(heard.samples * sound.FULL_SCALE, direct, rtol=0.0, atol=1e-12 * np.abs(direct).max())
 
 
 def test_spectrum_peaks_at_the_modes_and_nowhere_else(hit):

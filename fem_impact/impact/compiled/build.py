@@ -5,15 +5,19 @@ edit in another file that they call into. Here every one carries a stamp of the 
 """
 
 import hashlib
+import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import config, njit
-from numba.core.options import DefaultOptions
 
-COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # else a hundred times slower, as plain Python
-UNCOUNTED = hasattr(DefaultOptions, "_nrt")  # whether the compiler can leave out the counting of references
+COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"  # else as plain Python, without the import of numba
+if COMPILED:
+    from numba import config, njit
+    from numba.core.options import DefaultOptions
+
+    COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # a file may say so too
+    UNCOUNTED = hasattr(DefaultOptions, "_nrt")  # whether the compiler can leave out the counting of references
 LOOSE = {"reassoc", "contract"}  # sums may be reordered to run in parallel lanes; NaN and infinity keep their meaning
 ZERO, WHOLE = np.int64(0), np.bool_(True)  # no literals: what is called with one is compiled for it and then again
 
@@ -29,24 +33,29 @@ STAMP = _stamp()
 
 def outer(**options: Any) -> Any:
     """Compile for use from Python; other threads run meanwhile."""
+    if not COMPILED:
+        return lambda function: function
     if UNCOUNTED:
         options["_nrt"] = True
     wrapped: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
 
     def compiled(function: Any) -> Any:
         kernel = njit(**wrapped, **options)(function)
-        if COMPILED:  # numba has no public way to say so; test_build.py edits a callee in a fresh process
-            kernel._cache._cache_file._source_stamp = STAMP
+        # numba has no public way to say so; test_build.py edits a callee in a fresh process
+        kernel._cache._cache_file._source_stamp = STAMP
         return kernel
 
     return compiled
 
 
-def inner(allocates: bool = False, **options: Any) -> Any:
+def inner(allocates: bool = False, arrays: Any = None, **options: Any) -> Any:
     """Compile for use by other kernels only; part of them when they are cached, and cheaper to compile.
 
-    What allocates no array needs no count of references, half of the time of a step with few modes.
+    What allocates no array needs no count of references, half of the time of a step with few modes. Where nothing is
+    compiled, ``arrays`` takes the place of the kernel: the same on whole arrays.
     """
+    if not COMPILED:
+        return lambda function: arrays or function
     bare: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     if UNCOUNTED:
         bare["_nrt"] = allocates  # said in both cases, as it is inherited from the caller

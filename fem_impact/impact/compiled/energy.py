@@ -7,6 +7,7 @@ fixed length, shortened to end at onsets and releases; in flight there are no st
 
 import numpy as np
 
+from . import arrays
 from .build import LOOSE, WHOLE, ZERO, inner, outer
 from .events import (
     EVENT_LIMIT,
@@ -21,16 +22,16 @@ from .events import (
     narrow,
     settle,
 )
-from .flight import GLIDES, any_of, find_onset
+from .flight import GLIDES, find_onset
 from .law import at, spring_of
-from .propagation import N_LANE, lane_table
+from .propagation import N_LANE, any_of, commit, lane_table
 from .record import EXHAUSTED, FAILED, FINISHED, HORIZON, IMPACTS, SETTLED, resized, total_energy
 from .schemes import Free, Own, linear_guess, point_of, solve_constants, solve_ramp, solve_ramps
 
 LEVELS = 40  # [-] halvings of the step that may be cached
 
 
-@inner(fastmath=LOOSE)
+@inner(arrays=arrays.contact_sums, fastmath=LOOSE)
 def contact_sums(shape, lanes, h, out_sums):
     """Sums over the modes of u_i u_j times b1, c1, B0, B1, b2, c2: (6, n_contacts, n_contacts)."""
     n_contacts, n_modes = shape.shape
@@ -56,7 +57,7 @@ def contact_sums(shape, lanes, h, out_sums):
                 out_sums[r, j, i] = out_sums[r, i, j]
 
 
-@inner(fastmath=LOOSE)
+@inner(arrays=arrays.predict, fastmath=LOOSE)
 def predict(shape, tables, slot, h, twice, offset, bias, q, p, out_q, out_p, out_end):
     """Free motion over one step: the new state and, per contact, end approach, mean approach and end rate (3, m).
 
@@ -83,25 +84,7 @@ def predict(shape, tables, slot, h, twice, offset, bias, q, p, out_q, out_p, out
         out_end[2, i] = rate
 
 
-@inner(fastmath=LOOSE)
-def commit(shape, tables, slot, h, force, slope, free_q, free_p, out_q, out_p):
-    """Add the motion the step's forces (mean, slope) cause to the free motion."""
-    n_contacts, n_modes = shape.shape
-    lanes = tables[slot]
-    for n in range(n_modes):
-        out_q[n] = free_q[n]
-        out_p[n] = free_p[n]
-    for i in range(n_contacts):
-        f = force[i] - 0.5 * slope[i]
-        s = slope[i]
-        if force[i] != 0.0 or s != 0.0:
-            for n in range(n_modes):
-                u = shape[i, n]
-                out_q[n] -= u * h * (f * lanes[4, n] + s * lanes[5, n])
-                out_p[n] -= u * (f * lanes[1, n] + s * lanes[4, n])
-
-
-@inner(fastmath=LOOSE)
+@inner(arrays=arrays.advance, fastmath=LOOSE)
 def advance(shape, tables, slot, h, twice, offset, bias, force, slope, q, p, free_q, free_p, out_end):
     """`commit` into q and p, then `predict` the next step of the same length, for one contact in one pass."""
     lanes = tables[slot]
@@ -388,7 +371,7 @@ def run_energy(
             advance(shape, tables, slot, h, twice, offset, bias, f, s, q, p, free_q, free_p, end)
             ready = slot
         else:
-            commit(shape, tables, slot, h, f, s, free_q, free_p, q, p)
+            commit(shape, tables[slot], h, f, s, free_q, free_p, q, p)
         if time - reset > base:
             reset = time
             events = 0

@@ -9,8 +9,9 @@ separation is final, and this is the proof.
 
 import numpy as np
 
+from . import arrays
 from .build import LOOSE, inner
-from .propagation import lane_table
+from .propagation import any_of, glide, lane_table, restore
 
 PATIENT = 4  # [-] looks of a flight that make do with the table of a step up to four times shorter than allowed
 GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before
@@ -18,7 +19,7 @@ SLOW_LOOKS = 300  # [-] looks of a flight that lead hardly on before a stepping 
 LOOK_LIMIT = 20_000_000  # [-] looks ahead times modes in one free flight before the run gives up: some 0.1 s
 
 
-@inner(fastmath=LOOSE)
+@inner(arrays=arrays.approach, fastmath=LOOSE)
 def approach(shape, offset, i, q, p):
     """Approach of contact i and its rate."""
     d = 0.0
@@ -68,24 +69,6 @@ def quadratic_wait(d, v, a):
     if v >= 0.0:
         return -2.0 * d / (root + v) if root + v > 0.0 else 0.0
     return (root - v) / a
-
-
-@inner(fastmath=LOOSE)
-def glide(lanes, h, bias, q, p):
-    """Advance a state in place by the free motion over h, whose `lane_table` is given."""
-    for n in range(q.size):
-        q0 = q[n]
-        p0 = p[n]
-        q[n] = lanes[0, n] * q0 + lanes[1, n] * p0 + h * lanes[4, n] * bias[n]
-        p[n] = lanes[2, n] * q0 + lanes[3, n] * p0 + lanes[1, n] * bias[n]
-
-
-@inner()
-def restore(q, p, out_q, out_p):
-    """Copy a state; for less compilation than assigning slices."""
-    for n in range(q.size):
-        out_q[n] = q[n]
-        out_p[n] = p[n]
 
 
 @inner(allocates=True)
@@ -177,12 +160,3 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
             bounds[i, 0] += wait * (bounds[i, 1] + 0.5 * bounds[i, 2] * wait)
             bounds[i, 1] += wait * bounds[i, 2]
     return elapsed, -1, 4
-
-
-@inner()
-def any_of(values):
-    """Whether any value is not zero; for less compilation than the general `any`."""
-    found = False
-    for n in range(values.size):
-        found = found or values[n] != 0
-    return found

@@ -285,36 +285,6 @@ def add_wave(amplitude, start, step, out_real, out_imag):
             s[i] = old * sine + s[i] * cosine
 
 
-@outer()
-def straight_spectrum(step, time, length, first, last, out_spectrum):
-    """Fourier transform of straight pieces of force at omega = 0, step, 2 step, ...
-
-    Parameters: time, length, first, last (n_pieces,): start [s], duration [s] and the force at both ends [N].
-    """
-    n = out_spectrum.size
-    for piece in range(time.size):
-        h, f0, df = length[piece], first[piece], last[piece] - first[piece]
-        turn = np.exp(-1j * step * time[piece])
-        part = np.exp(-1j * step * h)
-        start = 1.0 + 0.0j
-        edge = 1.0 + 0.0j
-        for i in range(n):
-            if i % 256 == 0:  # so that rounding does not add up
-                start = np.exp(-1j * i * step * time[piece])
-                edge = np.exp(-1j * i * step * h)
-            x = i * step * h
-            if x < 1e-2:
-                mean = 1.0 - 0.5j * x - x * x / 6.0 + 1j * x * x * x / 24.0
-                ramp = 0.5 - 1j * x / 3.0 - x * x / 8.0 + 1j * x * x * x / 30.0
-            else:
-                inverse = 1.0 / x
-                mean = -1j * (1.0 - edge) * inverse
-                ramp = (edge * (1.0 + 1j * x) - 1.0) * (inverse * inverse)
-            out_spectrum[i] += h * start * (f0 * mean + df * ramp)
-            start *= turn
-            edge *= part
-
-
 @inner(allocates=True)
 def centroid(contacts, n_contacts, n_steps, h, ends, rates, spring, limit):
     """Mean frequency of the magnitude of the force spectrum from zero to ``limit``.

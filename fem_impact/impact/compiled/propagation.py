@@ -12,132 +12,13 @@ them in parallel lanes; sine and cosine of one angle come from the same reduced 
 
 import numpy as np
 
-from .build import WHOLE, inner, outer
+from . import arrays
+from .arrays import ANGLE_LIMIT, LIGHT, SERIES_END
+from .build import LOOSE, WHOLE, inner, outer
+from .one_mode import mode_matrix, mode_moments
 
-SERIES_LIMIT = 1.0  # [-] below this omega*h the moment recursion cancels and a power series takes over
-LIGHT = 0.9  # [-] damping ratio up to which a mode takes the fast lanes
-SERIES_END = 3.0  # [-] omega*h below which the fast lanes sum a power series: 13 terms leave 3e-17
-ANGLE_LIMIT = 1e6  # [-] angle up to which the reduction in `waves` is exact
-OVERDAMPED = 1.2  # [-] damping ratio from which the two decay rates are far enough apart for partial fractions
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
 N_LANE = 7  # rows of what a run keeps of it, in the order of `lane_table`
-
-
-@inner()
-def mode_matrix(w, z, h):
-    """Exact free motion of one flexible mode: a11, a12, a22 of the state's step, then slow and fast rate and half gap.
-
-    The rates are those of an overdamped mode, zero below; a21 is -w**2 a12.
-    """
-    x = z * w * h
-    if z < 1.0:
-        damped = w * np.sqrt((1.0 - z) * (1.0 + z))
-        decay = np.exp(-x)
-        s = decay * np.sin(damped * h) / damped
-        c = decay * np.cos(damped * h)
-        return c + z * w * s, s, c - z * w * s, 0.0, 0.0, 0.0
-    if z == 1.0:
-        decay = np.exp(-x)
-        return decay * (1.0 + x), decay * h, decay * (1.0 - x), w, w, 0.0
-    root = w * np.sqrt((z - 1.0) * (z + 1.0))
-    fast = z * w + root
-    slow = w * (w / fast)
-    e1 = np.exp(-slow * h)
-    s = e1 * (-np.expm1(-2.0 * root * h)) / (2.0 * root)
-    return e1 + slow * s, s, np.exp(-fast * h) - slow * s, slow, fast, root
-
-
-@inner()
-def exponential_sums(z, out_sums):
-    """phi_k of -z, k = 1 .. out_sums.size, z >= 0: the integrals of (1-r)**(k-1)/(k-1)! exp(-z r) over [0, 1].
-
-    Upwards by recursion while that keeps digits (k <= z), downwards from a power series at the top.
-    """
-    count = out_sums.size
-    upward = min(count, int(min(z, 1e6)))
-    inverse = 1.0
-    if upward > 0:
-        out_sums[0] = -np.expm1(-z) / z
-        for k in range(1, upward):
-            out_sums[k] = (inverse - out_sums[k - 1]) / z
-            inverse /= k + 1.0
-    if upward < count:
-        term = 1.0
-        for k in range(2, count + 1):
-            term /= k
-        inverse = term * count
-        total = 0.0
-        for j in range(1, 60):
-            total += term
-            term *= -z / (count + j)
-            if abs(term) < 1e-18 * total:
-                break
-        out_sums[count - 1] = total
-        for k in range(count - 1, upward, -1):
-            out_sums[k - 1] = inverse - z * out_sums[k]
-            inverse *= k
-
-
-@inner()
-def mode_moments(w, z, h, out_moments, work):
-    """Exact step of one mode: a11, a12, a22, and in out_moments the moments of its impulse response g.
-
-    Moment k is ``h**(-k-1)`` times the integral over [0, h] of ``(h-t)**(k-1)/(k-1)! g(t)``, k = 0 being
-    g(h)/h. They obey ``th**2 m[k+1] = 1/k! - 2 x m[k] - m[k-1]`` with ``th = w h``, ``x = z th``: upwards while
-    k < th, downwards from a power series above; heavily damped modes take partial fractions.
-    """
-    count = out_moments.size - 1
-    if w == 0.0:
-        value = 1.0
-        for k in range(count + 1):
-            out_moments[k] = value
-            value /= k + 2.0
-        return 1.0, h, 1.0
-    th = w * h
-    x = z * th
-    a11, a12, a22, slow, fast, root = mode_matrix(w, z, h)
-    out_moments[0] = a12 / h
-    heavy = z >= OVERDAMPED and fast * h >= SERIES_LIMIT
-    if heavy:
-        exponential_sums(slow * h, work[0])
-        exponential_sums(fast * h, work[1])
-        for k in range(1, count + 1):
-            out_moments[k] = (work[0, k - 1] - work[1, k - 1]) / (2.0 * root * h)
-        return a11, a12, a22
-    upward = min(count, int(min(th, 1e6)))
-    inverse = 1.0
-    before = a22
-    for k in range(upward):
-        if k == 0 and z == 0.0:
-            half = np.sin(0.5 * th) / th
-            new = 2.0 * half * half
-        else:
-            new = (inverse - 2.0 * x * out_moments[k] - before) / (th * th)
-        before = out_moments[k]
-        out_moments[k + 1] = new
-        inverse /= k + 1.0
-    if upward < count:
-        factor = 1.0
-        for k in range(2, count + 2):
-            factor /= k
-        inverse = factor * (count + 1.0)
-        last = 0.0
-        now = 1.0
-        top = 0.0
-        above = 0.0
-        for j in range(1, 80):
-            top += now * factor
-            factor /= count + j + 1.0
-            above += now * factor
-            last, now = now, -2.0 * x * now - th * th * last
-            if (abs(now) + abs(last)) * factor < 1e-19 * abs(top):
-                break
-        out_moments[count] = top
-        for k in range(count, upward + 1, -1):
-            out_moments[k - 1] = inverse - 2.0 * x * out_moments[k] - th * th * above
-            above = out_moments[k]
-            inverse *= k
-    return a11, a12, a22
 
 
 @inner(fastmath={"contract"})
@@ -312,7 +193,7 @@ def near_moments(omega, h, double, n_damped, out_moments):
         factor = after
 
 
-@inner(allocates=True, fastmath={"contract"})
+@inner(allocates=True, arrays=arrays.lane_table, fastmath={"contract"})
 def lane_table(omega, zeta, h, whole, out_lanes):
     """Coefficients of one exact step of length h for every mode, (N_LANE, n_modes), all that others follow from.
 
@@ -377,19 +258,59 @@ def step_table(omega, zeta, h, out_table):
         out_table[11, n] = h * lanes[6, n]
 
 
+@inner()
+def any_of(values):
+    """Whether any value is not zero; for less compilation than the general `any`."""
+    found = False
+    for n in range(values.size):
+        found = found or values[n] != 0
+    return found
+
+
+@inner(arrays=arrays.restore)
+def restore(q, p, out_q, out_p):
+    """Copy a state; for less compilation than assigning slices."""
+    for n in range(q.size):
+        out_q[n] = q[n]
+        out_p[n] = p[n]
+
+
+@inner(arrays=arrays.glide, fastmath=LOOSE)
+def glide(lanes, h, bias, q, p):
+    """Advance a state in place by the free motion over h, whose `lane_table` is given."""
+    for n in range(q.size):
+        q0 = q[n]
+        p0 = p[n]
+        q[n] = lanes[0, n] * q0 + lanes[1, n] * p0 + h * lanes[4, n] * bias[n]
+        p[n] = lanes[2, n] * q0 + lanes[3, n] * p0 + lanes[1, n] * bias[n]
+
+
+@inner(arrays=arrays.commit, fastmath=LOOSE)
+def commit(shape, lanes, h, force, slope, free_q, free_p, out_q, out_p):
+    """Add the motion the step's forces (mean, slope) cause to the free motion."""
+    n_contacts, n_modes = shape.shape
+    for n in range(n_modes):
+        out_q[n] = free_q[n]
+        out_p[n] = free_p[n]
+    for i in range(n_contacts):
+        f = force[i] - 0.5 * slope[i]
+        s = slope[i]
+        if force[i] != 0.0 or s != 0.0:
+            for n in range(n_modes):
+                u = shape[i, n]
+                out_q[n] -= u * h * (f * lanes[4, n] + s * lanes[5, n])
+                out_p[n] -= u * (f * lanes[1, n] + s * lanes[4, n])
+
+
 @inner(allocates=True)
 def push(omega, zeta, shape, bias, row, n_coefficients, length, q, p, out_q, out_p):
     """State after a part of a step, (n_modes,), from the step's start; exact for its polynomial forces."""
+    restore(q, p, out_q, out_p)
     if length <= 0.0:
-        for n in range(q.size):
-            out_q[n] = q[n]
-            out_p[n] = p[n]
         return
     m = shape.shape[0]
     stride = 3 + n_coefficients
-    moments = np.empty(n_coefficients + 1)
-    work = np.empty((2, n_coefficients))
-    weights = np.zeros((n_coefficients, m))
+    weights = np.zeros((max(n_coefficients, 2), m))
     active = False
     for i in range(m):
         scale = 1.0
@@ -398,18 +319,29 @@ def push(omega, zeta, shape, bias, row, n_coefficients, length, q, p, out_q, out
             scale *= (k + 1.0) * length / row[1]
             if weights[k, i] != 0.0:
                 active = True
-    for n in range(q.size):
-        q0 = q[n]
-        a11, a12, a22 = mode_moments(omega[n], zeta[n], length, moments, work)
-        x = bias[n] * moments[1]
-        v = bias[n] * moments[0]
-        if active:
+    if n_coefficients > 2 and active:
+        moments = np.empty(n_coefficients + 1)
+        work = np.empty((2, n_coefficients))
+        for n in range(q.size):
+            q0 = out_q[n]
+            p0 = out_p[n]
+            a11, a12, a22 = mode_moments(omega[n], zeta[n], length, moments, work)
+            x = bias[n] * moments[1]
+            v = bias[n] * moments[0]
             for i in range(m):
                 for k in range(n_coefficients):
                     x -= shape[i, n] * weights[k, i] * moments[k + 1]
                     v -= shape[i, n] * weights[k, i] * moments[k]
-        out_q[n] = a11 * q0 + a12 * p[n] + length * length * x
-        out_p[n] = -omega[n] * omega[n] * a12 * q0 + a22 * p[n] + length * v
+            out_q[n] = a11 * q0 + a12 * p0 + length * length * x
+            out_p[n] = -omega[n] * omega[n] * a12 * q0 + a22 * p0 + length * v
+        return
+    lanes = np.empty((N_LANE, q.size))
+    lane_table(omega, zeta, length, active or any_of(bias), lanes)
+    glide(lanes, length, bias, out_q, out_p)
+    if active:
+        for i in range(m):
+            weights[0, i] += 0.5 * weights[1, i]
+        commit(shape, lanes, length, weights[0], weights[1], out_q, out_p, out_q, out_p)
 
 
 @outer()
