@@ -3,9 +3,9 @@
     python studies/cold_start.py [--repeats 5]
 
 First times `--help`, a strike and one with pictures in new processes: with the kernels compiled, and as on the first
-day, before they are. Processor seconds tell more than wall time where others use the machine, too. Then, in this process, times the spectrum
-of a blow at 256 frequencies and one second of its sound at 300 modes, in shares of the strike and of the second, with
-the largest difference from the direct sum over pieces and from the modes one by one.
+day, before they are. Processor seconds tell more than wall time where others use the machine, too. Then, in this
+process, times the spectrum of a blow at 256 frequencies and one second of its sound at 300 modes, in shares of the
+strike and of the second, with the largest difference from the direct sum over pieces and from the modes one by one.
 """
 
 import argparse

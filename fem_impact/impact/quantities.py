@@ -1,5 +1,6 @@
 """The quantities a user can ask of a blow, and how to name them."""
 
+import copyreg
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -9,6 +10,17 @@ from .._base import check
 QUANTITIES = ("restitution", "impulse", "contact_time", "force", "n_impacts", "spectrum", "sound")
 BANDED = ("spectrum", "sound")  # quantities that need an upper frequency
 USUAL = MappingProxyType(dict.fromkeys(("restitution", "impulse", "contact_time", "force", "n_impacts")))
+
+
+def _locked(values: dict) -> MappingProxyType:
+    return MappingProxyType(values)
+
+
+def _reduced(mapping: MappingProxyType) -> tuple:
+    return _locked, (dict(mapping),)
+
+
+copyreg.pickle(MappingProxyType, _reduced)  # so that plans and responses, which hold such mappings, can be pickled
 
 
 def asked_for(quantity: Any) -> Mapping[str, float | None]:

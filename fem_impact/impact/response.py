@@ -10,7 +10,7 @@ import numpy as np
 
 from .._base import check, markup
 from ..fe import plausible
-from ..modes.modal import Modes, at_rest
+from ..modes.modal import Modes, SampledShapes, at_rest
 from . import force_spectrum, promise
 from .compiled import law, propagation, record
 from .contact import Contact
@@ -19,6 +19,7 @@ from .striker import Striker
 
 CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more than this factor
 TOUCH = 1e-12  # [-] of the largest approach rate: bodies that touch and approach more slowly count as pressed
+SAME = 1e-2  # [-] two descriptions of one body may differ by this in mass and compliance
 PEAK_LOOKS = 16  # [-] samples per step in the search for the peak force; misses (pi/11/16)**2/8 before the parabola
 DIP_BLOCK = 8  # [-] points per static solution: each is a load, and the cost grows with the pairs of points
 
@@ -298,11 +299,18 @@ class Response:
         >>> hit.displacement([(0.2, 0.2)], [0.5]).shape  # half a second later
         (1, 1)
         """
-        if self.at is None or self.history.bias[self.body_slice(len(self.bodies) - 1)].any():
-            raise ValueError("on needs a blow of `strike` without a target_force; strike the modes instead")
-        modes.point("at", self.at)
-        if not np.isclose(modes.mass, self.bodies[-1].mass, rtol=1e-3):
-            raise ValueError(f"modes must be of the body struck, {self.bodies[-1].mass:g} kg, got {modes.mass:g} kg")
+        if self.at is None:
+            raise ValueError("on needs a blow of `strike`, with one strike point")
+        point = modes.point("at", self.at)
+        whole, softness = self.bodies[-1].shapes.compliance(point)[0, 0], modes.shapes.compliance(point)[0, 0]
+        sampled = isinstance(modes.shapes, SampledShapes)  # it may not know the modes left out
+        if not np.isclose(modes.mass, self.bodies[-1].mass, rtol=SAME) or not (
+            sampled or np.isclose(softness, whole, rtol=SAME)
+        ):
+            raise ValueError(
+                f"modes must be of the body struck, {self.bodies[-1].mass:g} kg that yield {whole:.4g} m/N, got "
+                f"{modes.mass:g} kg and {softness:.4g} m/N"
+            )
         return replace(self, ringing=modes, rings=None)
 
     @cached_property
@@ -347,7 +355,8 @@ class Response:
         assert modes is not None and self.at is not None
         still = np.zeros(modes.n_modes)
         shape = -modes.shape_at(self.at[None])
-        rest = {"start_q": still, "start_p": still, "end_q": still, "end_p": still, "bias": still}
+        bias = -self._push * shape[0]
+        rest = {"start_q": still, "start_p": still, "end_q": still, "end_p": still, "bias": bias}
         driven: dict[str, Any] = {"omega": modes.omega, "zeta": modes.damping_ratio, "shape": shape, **rest}
         return replace(self.history, **driven)
 
@@ -442,9 +451,16 @@ class Response:
     @property
     def constant_forces(self) -> np.ndarray:
         """Constant modal forces on the target, (n_modes,) [N kg**-0.5]."""
-        if self._ringing is not None:  # see `on`: there are none
-            return np.zeros(self._ringing.n_modes)
+        if self._ringing is not None:
+            return self._rung.bias
         return self.history.bias[self.body_slice(len(self.bodies) - 1)]
+
+    @property
+    def _push(self) -> float:
+        """Constant force [N] on the target at the strike point."""
+        part = self.body_slice(len(self.bodies) - 1)
+        row = self.history.shape[0, part]
+        return -float(self.history.bias[part] @ row) / (float(row @ row) or 1.0)
 
     def modal_state(self, times: Any, *, body: int = -1) -> tuple[np.ndarray, np.ndarray]:
         """Modal displacements and velocities of the target at any times, in any order.
@@ -510,7 +526,7 @@ class Response:
         """Static deflection [m] of the left-out modes and its rate [m/s], (n_times, n_points); 0 if there are none."""
         dip = self.dips[body] if self.dips else None
         if self._moved(body) is self._ringing and self.at is not None:
-            dip = Dip(self.at[None], ((0, -1.0),), 0.0)
+            dip = Dip(self.at[None], ((0, -1.0),), self._push)
         if dip is None:
             return 0.0, 0.0
         modes, n_ends = self._moved(body), len(dip.points)

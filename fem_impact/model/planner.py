@@ -331,6 +331,9 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
 
     while True:
         modes = seen.modes(cutoff)
+        with blow.target.blame("observe"):
+            for point in blow.points:
+                modes.points("points", [point])
         striker = collision.shortened(blow.striker, _striker_modes(asked, seen.margin)[0])
         with stages("strike"), blow.target.blame("strike"):
             run = partial(collision.strike, modes, striker, blow.contact)
@@ -499,9 +502,13 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     if target == "modal":
         return None
     fits = vectors.usable(blow.target, values["at"]) and values.get("residual", True)
+    fits = fits and not {"n_modes", "max_frequency"} & set(asked.pieces)
     if not fits:
         if target == "vectors":
-            raise ValueError(f"{blow.name}target = 'vectors' needs a plate by elements; use target = 'modal'")
+            raise ValueError(
+                f"{blow.name}target = 'vectors' needs a plate by elements that can be meshed again, its residual, no "
+                "n_modes or max_frequency, and no damping ratios given mode by mode; use target = 'modal'"
+            )
         return None
     with stages("modes"):
         size = asked.pieces.get("size") or vectors.size_for(blow.target, 0.5 / asked.duration, asked.tolerance)
@@ -512,14 +519,19 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
         plan = _last_resort(asked, stages) if target is None else None
         if plan is not None:
             return plan
-        size = smallest
+        soft = blow.contact.stiffness * (size / smallest) ** (2.0 * (blow.contact.exponent + 1.0))
+        needs = DOFS_PER_AREA["argyris"] * mesh.area / size**2
+        raise check.SimulationError(
+            f"{blow.name}this blow needs about {needs:.2g} unknowns, elements of {size:.2g} m, more than the limit of "
+            f"{refinement.MOST_UNKNOWNS}; take a contact with stiffness = {float(f'{0.9 * soft:.1e}'):g}"
+        )
     n_dofs = round(DOFS_PER_AREA["argyris"] * mesh.area / size**2) + DOFS_AT_BLOW
-    count = vectors.first_count(asked.tolerance)
+    count = vectors.first_count(blow.target, 0.5 / asked.duration, asked.tolerance)
     kept = f"the target is described by some {count} Ritz vectors started from the blow, more if their error shows"
     reason = f"argyris elements of {size:.3g} m, smaller towards the blow, with some {n_dofs} unknowns"
     if asked.moving:
         reason += "; motion and sound come from modes driven by the force that the blow finds"
-    shares = dict.fromkeys(("Ritz vectors", "mesh"), 0.5 * (1.0 - STEPS) * asked.tolerance)
+    shares = dict.fromkeys(("Ritz vectors", "mesh"), 0.45 * (1.0 - STEPS) * asked.tolerance)
     why = f"the contact lasts about {asked.duration:.3g} s"
     return _plan(
         asked, target="vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,

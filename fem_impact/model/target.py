@@ -19,7 +19,7 @@ from ..modes.modal import Damping, FieldShapes, Modes
 
 FIRST_LOOK = 20  # [-] modes found first: enough to scale the body and to predict the density of the others
 FIRST_FLEXIBLE = 4  # [-] modes that hold a flexible one: a plate has at most three rigid motions
-CLOSE = 1e-8  # [-] error of the first frequency to which a body is scaled: far below that of any blow
+CLOSE = 1e-6  # [-] error of the first frequency to which a body is scaled: that of a blow is less
 WORST_FREQUENCY = 0.1  # [-] largest frequency error that `find_modes` accepts as a tolerance
 COARSEST = 1e-30  # [-] own element size over a stated one: beyond, the mesh of an outline does not change
 
@@ -141,6 +141,11 @@ class Target:
         # omega**2 inertia = bending k**4 + tension k**2
         root = np.sqrt(tension**2 + 4.0 * bending * inertia * (2.0 * np.pi * frequency) ** 2)
         return float(np.sqrt(2.0 * (2.0 * np.pi * frequency) ** 2 * inertia / (root + tension)).max())
+
+    def count_below(self, frequency: float) -> float:
+        """About how many modes the plate has below a frequency [Hz], before scaling; Weyl's law without its edges."""
+        assert self.mesh is not None
+        return self.wave(frequency) ** 2 * self.mesh.area / (4.0 * np.pi)
 
     def near(self, at: np.ndarray, size: float, stages: Stages) -> System:
         """The body assembled with elements of a size [m] that shrink towards points (n_points, 2) [m]."""

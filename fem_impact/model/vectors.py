@@ -21,6 +21,8 @@ from .target import Stages, Target
 WAVES = 1.2, 0.35  # highest frequency that the first mesh resolves, over that of the contact
 SHIFT = 6.0, 1.0 / 6.0  # shift over the angular frequency of the contact
 FIRST = 84, 0.22  # vectors tried first: they resolve one undisturbed contact
+EXCITED = 12.0, 0.25  # highest frequency of a mode that matters, over that of the contact
+FEWEST = 30  # [-] vectors besides those that stand for modes: for the dip under the load
 MORE = 1.4  # [-] factor on the number of vectors as long as they are too few
 NOTCH = 4.0  # [-] divides what the highest Ritz pairs, which act as a spring, may err, each time
 PATIENCE, LEAST_GAIN = 3, 0.7  # [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7
@@ -37,9 +39,11 @@ def usable(target: Target, at: Any) -> bool:
     return not by_mode and (target.system is None or target.system.element == "argyris")
 
 
-def first_count(tolerance: float) -> int:
-    """Number of vectors tried first."""
-    return round(FIRST[0] * (1e-2 / tolerance) ** FIRST[1])
+def first_count(target: Target, resonance: float, tolerance: float) -> int:
+    """Number of vectors tried first: no more than there are modes that the contact may excite."""
+    ease = 1e-2 / tolerance
+    modes = target.count_below(EXCITED[0] * ease ** EXCITED[1] * resonance / target.stretch)
+    return round(min(FIRST[0] * ease ** FIRST[1], FEWEST + modes))
 
 
 def size_for(target: Target, resonance: float, tolerance: float) -> float:
@@ -78,7 +82,7 @@ class Seen:
         self.target, self.at, self.size, self.fixed, self.stages = target, np.atleast_2d(at), size, fixed, stages
         ease = 1e-2 / tolerance
         self.shift = 2.0 * np.pi * resonance * SHIFT[0] * ease ** SHIFT[1] / target.stretch
-        self.count, self.margin = first_count(tolerance), NOTCH
+        self.count, self.margin = first_count(target, resonance, tolerance), NOTCH
         self.tried: list[float] = []  # [-] truncation errors of the blows so far
         self.fine = self._krylov(size)
         self.coarse: Krylov | None = None

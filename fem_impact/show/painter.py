@@ -7,15 +7,12 @@ with Painter() as painter:
     missing = painter.finish()
 """
 
-import copyreg
 import os
 import pickle
 import subprocess
 import sys
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from types import MappingProxyType
-from typing import IO, Any
 
 from .._base import progress
 from .._base.files import undoable
@@ -67,7 +64,7 @@ class Painter:
         self.task = folder, response
         assert self.process.stdin is not None
         with suppress(BrokenPipeError):  # the process is gone, which `finish` deals with
-            _send((folder, response), self.process.stdin)
+            pickle.dump((folder, response), self.process.stdin, protocol=pickle.HIGHEST_PROTOCOL)
             self.process.stdin.close()
 
     def finish(self) -> str:
@@ -82,17 +79,6 @@ class Painter:
         if self.process.wait():
             return draw(*self.task)
         return last
-
-
-def _send(data: Any, file: IO[bytes]) -> None:
-    """Pickle something that contains read-only mappings."""
-    pickler = pickle.Pickler(file, protocol=pickle.HIGHEST_PROTOCOL)
-    pickler.dispatch_table = {**copyreg.dispatch_table, MappingProxyType: lambda mapping: (_locked, (dict(mapping),))}
-    pickler.dump(data)
-
-
-def _locked(mapping: dict) -> MappingProxyType:
-    return MappingProxyType(mapping)
 
 
 def main() -> None:
