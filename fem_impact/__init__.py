@@ -21,6 +21,8 @@ _NAMES = {
     "taps.records": "Taps read_taps",
     "taps.rig": "measure",
     "taps.fit": "fit",
+    "taps.transfer": "frf mac matched",
+    "taps.update": "update",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 _MODULES = {
