@@ -29,7 +29,6 @@ _MODULES = {
     "mesh": "mesh", "analytic": "modes.analytic", "spectra": "impact.spectra", "threshold": "impact.threshold",
     "figures": "show.figures", "pictures": "show.pictures", "sound": "show.sound", "export": "show.export",
     "hammers": "sweeps.hammers", "report": "pages.report", "explore": "pages.explore",
-    "taps": "taps", "fit_page": "pages.fit_page", "transfer": "taps.transfer",
 }  # fmt: skip
 
 __all__ = [*_HOME, *_MODULES, "__version__"]
