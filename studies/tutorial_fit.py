@@ -95,7 +95,7 @@ def softest(modes: fi.Modes, law: fi.Contact, mass: float) -> float | None:
 
 
 def draw_double_hits(path: Path, limits: dict[float, list[float | None]]) -> None:
-    """The tip from which on each hammer hits twice, for three laws that explain the taps equally well."""
+    """The softest tip with which each hammer hits twice, for three laws that explain the taps equally well."""
     colours = dict(zip(limits, (plots.BLUE, plots.VERMILION, plots.GREEN)))
     curves = [
         plots.Curve(HEADS, np.array([np.nan if x is None else x for x in row]), f"if the hammer weighs {mass:g} kg",
@@ -103,9 +103,9 @@ def draw_double_hits(path: Path, limits: dict[float, list[float | None]]) -> Non
         for mass, row in limits.items()
     ]  # fmt: skip
     figure = plots.curves(
-        curves, x=plots.Axis("mass of the head", "kg", log=True),
+        curves, x=plots.Axis("mass of the head [kg]", log=True),
         y=plots.Axis("stiffness over that of the tip found", log=True, limits=(float(TIPS[0]), float(TIPS[-1]))),
-        title="Above its line, a hammer hits the plate twice",
+        title="The softest tip with which a hammer hits the plate twice",
     )  # fmt: skip
     fi.figures.save(path, figure)
 

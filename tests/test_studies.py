@@ -72,3 +72,22 @@ def test_the_tolerance_walks_along_the_edge_of_what_is_possible(tmp_path, monkey
         assert frontier.difference(dial.run.response, reference) <= dial.tolerance
     assert [dial.run.plan.n_modes for dial in found] == sorted(dial.run.plan.n_modes for dial in found)
     assert frontier.table(found).count("\n") == 4
+
+
+def test_the_coverage_of_intervals_is_what_the_file_says():
+    coverage = study("fit_coverage")
+    found = coverage.judge(coverage.read(STUDIES / "fit_coverage.csv"))
+    held, called, false = (good / count for good, count in found.values())
+    count = next(iter(found.values()))[1]
+    assert count > 200
+    # three standard deviations of a share of 90 % of the intervals counted
+    assert abs(held - 0.9) < 3.0 * np.sqrt(0.09 / count) and called >= 0.95 and false <= 0.05
+
+
+@pytest.mark.slow
+def test_a_new_set_of_taps_is_fitted_as_the_file_says(tmp_path):
+    coverage = study("fit_coverage")
+    rows = coverage.examine(7)  # a wall: mass and stiffness cannot be told
+    told = {each["name"]: each for each in rows}
+    assert told["striker.mass"]["told"] == told["contact.stiffness"]["told"] == "open"
+    assert told["contact.exponent"]["low"] < told["contact.exponent"]["truth"] < told["contact.exponent"]["high"]

@@ -21,6 +21,8 @@ from . import report
 TIMES = 10.0  # [-] residuals are drawn this much larger
 MOST_TAPS = 10  # [-] shown
 MASSES, TIPS = (0.5, 1.0, 2.0), (0.1, 0.3, 1.0, 3.0, 10.0)  # [-] of the double-hit table, over those found
+WIDE = 4.0  # [-] last over first value of a profile from which on its axis is logarithmic
+AROUND = 0.8  # [-] of an interval, shown on either side of it
 SHOWN = 12.0  # [-] highest rise of a profile shown
 
 
@@ -56,12 +58,15 @@ def profiles(found: Found) -> Any:
         for axes, name in zip(all_axes, names):
             profile = found.profiles[name]
             level = float(profile_level(found))
-            axes.plot(profile.values, np.minimum(profile.rise, 10.0 * SHOWN), "o-", color=BLUE, ms=3)
+            axes.plot(profile.values, profile.rise, "o", color=BLUE, ms=3)
+            axes.plot(*profile.curve(), color=BLUE, lw=1.2)
             axes.axhline(level, color=VERMILION, ls="--", lw=1.0)
             if profile.told != "open":
                 axes.axvspan(*profile.interval(), color=SKY, alpha=0.2, lw=0)
-            if profile.log:
+            if profile.log and profile.values[-1] > WIDE * profile.values[0]:
                 axes.set_xscale("log")
+            if profile.told == "told":
+                axes.set_xlim(*_around(profile))
             axes.set_ylim(0.0, SHOWN)
             unit = unit_of(name)
             axes.set_title(f"{name}{f' [{unit}]' if unit else ''}")
@@ -72,6 +77,15 @@ def profiles(found: Found) -> Any:
             axes.set_visible(False)
         all_axes[0].set_ylabel("rise over noise variance")
     return figure
+
+
+def _around(profile: Any) -> tuple[float, float]:
+    """The interval of a profile and AROUND of it on either side."""
+    low, high = profile.interval()
+    if profile.log:
+        wide = (high / low) ** AROUND
+        return low / wide, high * wide
+    return low - AROUND * (high - low), high + AROUND * (high - low)
 
 
 def profile_level(found: Found) -> float:

@@ -14,7 +14,7 @@ from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes.modal import Modes
-from . import profiles, solver
+from . import arguments, profiles, solver
 from .profiles import Profile
 from .records import Taps
 from .rig import Rig
@@ -454,7 +454,7 @@ def fit(
     robust: bool = True,
     profiles: bool = True,
     rng: Any = 0,
-    watch: Callable | None = None,
+    watch: Watch | None = None,
 ) -> Found:
     """Find the hammer, contact and structure that explain measured taps.
 
@@ -521,10 +521,10 @@ def fit(
     taps = joined(taps)
     laws = [contact] if isinstance(contact, Contact) else list(check.several("contact", contact, Contact))
     options = {
-        "target": target, "at": at, "striker": striker, "unknown": unknown, "known": dict(known or {}),
+        "target": target, "at": at, "striker": striker, "unknown": unknown, "known": arguments.table("known", known),
         "response_at": response_at, "window": window, "starts": check.count("starts", starts), "robust": robust,
         "rig": Rig(taps.rate, anti_alias, tip_mass, resonance), "watch": watch,
-        "rng": rng,
+        "rng": arguments.generator("rng", rng),
     }  # fmt: skip
     found = [_fit(taps, contact=law, **options) for law in laws]
     if len(found) > 1:
@@ -540,11 +540,11 @@ def _law_name(law: Contact) -> str:
     return kinds.get(law.exponent, f"power {law.exponent:g}") + (" with loss" if law.loss else "")
 
 
-def joined(taps: Any) -> Taps:
+def joined(taps: Any, name: str = "taps") -> Taps:
     """One table of taps from one or several."""
     if isinstance(taps, Taps):
         return taps
-    several = check.several("taps", taps, Taps)
+    several = check.several(name, taps, Taps)
     n_times = min(len(each.time) for each in several)
     for each in several:
         _same_rate(each, several[0])
@@ -577,9 +577,9 @@ def _fit(taps, *, target, at, striker, contact, unknown, known, response_at, win
     if cut.overload.any():
         bad = np.flatnonzero(cut.overload)
         notes.append(f"left out, because their force is cut off: {', '.join(cut.labels[i] for i in bad)}")
+        if len(bad) == cut.n_taps:
+            raise ValueError("taps must hold one at least whose force is not cut off")
         cut = cut.pick(~cut.overload)
-    if not cut.n_taps:
-        raise ValueError("taps must hold one at least whose force is not cut off")
     place = None if target is None else target.point("at", at)[0]
     setting = Setting(
         target, place, striker, contact, rig, names, points, n_points, float(np.mean(cut.impulse))
@@ -626,7 +626,7 @@ def _fit(taps, *, target, at, striker, contact, unknown, known, response_at, win
 
 def _search(problem: Problem, taps: Taps, length: float, starts: int, rng: Any, watch: Watch | None):
     """The best of several searches, and the sums of squares of all."""
-    begun = solver.starts(problem, length, taps.impulse, starts, np.random.default_rng(rng))
+    begun = solver.starts(problem, length, taps.impulse, starts, rng)
     found = []
     for i, x in enumerate(begun):
         try:

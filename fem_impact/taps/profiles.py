@@ -68,6 +68,16 @@ class Profile:
             ends.append(float(np.exp(found)) if self.log else found)
         return ends[0], ends[1]
 
+    def curve(self, n_points: int = 200) -> tuple[np.ndarray, np.ndarray]:
+        """Values and rise of the profile, (n_points,) each, smooth between the points computed, for drawing."""
+        root = np.sqrt(np.maximum(self.rise, 0.0)) * np.where(self.values < self.value, -1.0, 1.0)
+        x, keep = np.unique(self._coordinate(self.values), return_index=True)
+        if len(x) < 3:
+            return self.values[keep], np.maximum(self.rise[keep], 0.0)
+        fine = np.linspace(x[0], x[-1], n_points)
+        found = PchipInterpolator(x, root[keep])(fine)
+        return (np.exp(fine) if self.log else fine), found**2
+
     @property
     def told(self) -> str:
         """ "told" if both ends are closed, "limited" if one is, "open" if the data do not tell the value."""

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from .._base import check, markup
-from . import readers, triggers, units
+from . import arguments, readers, triggers, units
 
 TOGETHER = 0.05  # [s] pulses closer than this belong to one tap: nobody taps twice within a twentieth of a second
 BEFORE = 0.02  # [s] longest record before a tap
@@ -78,9 +78,14 @@ class Taps:
             raw = raw[None, :, None] if raw.ndim == 1 else raw[..., None] if raw.ndim == 2 else raw
             others = check.array("response", raw, (n_taps, n_times, None))
         n_channels = others.shape[2]
-        names = [f"response {i + 1}" for i in range(n_channels)] if names is None else list(names)
-        unit = ["m/s^2"] * n_channels if units is None else list(units)
-        tags = [f"tap {i + 1}" for i in range(n_taps)] if labels is None else list(labels)
+        names = [f"response {i + 1}" for i in range(n_channels)] if names is None else names
+        names = arguments.texts("names", names, n_channels, "response")
+        unit = arguments.texts("units", ["m/s^2"] * n_channels if units is None else units, n_channels, "response")
+        for text in unit:
+            check.one_of("units", text, [si for si in readers.units.KINDS if si != "N"])
+        tags = [f"tap {i + 1}" for i in range(n_taps)] if labels is None else labels
+        tags = arguments.texts("labels", tags, n_taps, "tap of force")
+        said = arguments.texts("notes", tuple(notes) if isinstance(notes, (list, tuple)) else notes)
         for name, given, wanted in (
             ("names", names, n_channels),
             ("units", unit, n_channels),
@@ -91,7 +96,12 @@ class Taps:
         if overload is None:
             cut = [[triggers.clipped(f), *(triggers.clipped(r) for r in each.T)] for f, each in zip(rows, others)]
         else:
-            cut = np.broadcast_to(np.asarray(overload, bool), (n_taps, 1 + n_channels)).tolist()
+            flags = np.asarray(check.shown(overload) if isinstance(overload, dict) else overload)
+            if flags.dtype != bool or flags.shape not in ((), (n_taps, 1 + n_channels)):
+                raise ValueError(
+                    f"overload must be bools of shape ({n_taps}, {1 + n_channels}), got {check.shown(overload)}"
+                )
+            cut = np.broadcast_to(flags, (n_taps, 1 + n_channels)).tolist()
         begun = [triggers.starts(f, triggers.level(f), n_times) for f in rows]
         onset = np.array([each[0] if each.size else 0 for each in begun]) / rate
         table = xr.Dataset(
@@ -110,7 +120,7 @@ class Taps:
             },
             {"rate": rate},
         )
-        return cls(table, tuple(notes))
+        return cls(table, tuple(said))
 
     @property
     def rate(self) -> float:
@@ -185,18 +195,27 @@ class Taps:
 
     def pick(self, which: Any) -> "Taps":
         """Some of the taps: numbers, a slice or a mask."""
-        index = np.arange(self.n_taps)[which]
-        return Taps(self.table.isel(tap=np.atleast_1d(index)), self.notes)
+        try:
+            index = np.atleast_1d(np.arange(self.n_taps)[which])
+        except (IndexError, TypeError, ValueError):
+            index = np.zeros(0, int)
+        if index.ndim != 1 or not index.size:
+            raise ValueError(f"which must pick some of {self.n_taps} taps by number or mask, got {check.shown(which)}")
+        return Taps(self.table.isel(tap=index), self.notes)
 
     def __len__(self) -> int:
         return self.n_taps
 
     def between(self, start: float, end: float) -> "Taps":
         """The samples from ``start`` to ``end`` [s] only; time begins at zero again."""
+        start, end = check.number("start", start, "s"), check.number("end", end, "s")
         first, last = np.searchsorted(self.time, [start - 0.5 / self.rate, end + 0.5 / self.rate])
         cut = self.table.isel(time=slice(int(first), int(last)))
         if cut.sizes["time"] < readers.FEWEST:
-            raise ValueError(f"between must keep at least {readers.FEWEST} samples, got {start:g} to {end:g} s")
+            raise ValueError(
+                f"start and end must leave at least {readers.FEWEST} samples of {len(self.time)}, got {start:g} and "
+                f"{end:g} s"
+            )
         cut = cut.assign_coords(time=("time", np.arange(cut.sizes["time"]) / self.rate, {"units": "s"}))
         cut["onset"] = cut["onset"] - first / self.rate
         return Taps(cut, self.notes)
@@ -290,6 +309,8 @@ def read_taps(
     if found.rate is not None and rate is not None and abs(found.rate / stated - 1.0) > 1e-3:
         notes.append(f"the file states {found.rate:g} Hz; rate={stated:g} Hz was used")
     unit = _units(found, units)
+    if full_scale is not None:
+        full_scale = check.positive("full_scale", full_scale, "N")
     struck = _force_channel(found, force, unit, name)
     others = _response_channels(found, response, unit, struck)
     scales = _scales(found, scale, struck)
@@ -335,8 +356,8 @@ def _units(found: readers.Recording, given: Mapping[str, str] | None) -> list[st
     unit = []
     for name, stated in zip(found.names, found.units):
         unit.append(stated or units.label(name)[1])
-    for name, text in (given or {}).items():
-        if units.known(text) is None:
+    for name, text in arguments.table("units", given).items():
+        if not isinstance(text, str) or units.known(text) is None:
             words = ", ".join(word for factors in units.KINDS.values() for word in factors)
             raise ValueError(f"units must be one of {words}, got {check.shown(text)} for {name!r}")
         unit[_channel("units", name, found)] = text
@@ -382,7 +403,9 @@ def _force_channel(found: readers.Recording, force: Any, unit: list[str], name: 
 
 def _response_channels(found: readers.Recording, response: Any, unit: list[str], struck: int) -> list[int]:
     if response is not None:
-        asked = [response] if isinstance(response, (str, int, np.integer)) else list(response)
+        asked = [response] if isinstance(response, (str, int, np.integer)) else response
+        if not isinstance(asked, (list, tuple)):
+            raise ValueError(f"response must be the names or numbers of channels, got {check.shown(response)}")
         return [_channel("response", which, found) for which in asked]
     kinds = [units.known(text) for text in unit]
     return [
@@ -396,6 +419,7 @@ def _scales(found: readers.Recording, scale: Any, struck: int) -> dict[int, floa
     if scale is None:
         return {}
     if isinstance(scale, Mapping):
+        scale = arguments.table("scale", scale)
         return {_channel("scale", name, found): check.number(f"scale of {name}", x) for name, x in scale.items()}
     return {struck: check.number("scale", scale)}
 
@@ -432,7 +456,10 @@ def _cut(segments, rate, name, *, trigger, before, length, together):
             places.append((k, int(start), free, after))
     if not places:
         top = max(float(row.max()) for row, _ in segments)
-        raise ValueError(f"no tap was found in {name}: its force stays below {limit:.3g} N and reaches {top:.3g} N")
+        raise ValueError(
+            f"no tap was found in {name}: its force reaches {top:.3g} N and the trigger is {limit:.3g} N; check scale "
+            "and trigger"
+        )
     if len(places) > MOST_TAPS:
         raise ValueError(f"{name} has {len(places)} places above {limit:.3g} N; give trigger= and together=")
     wanted = BEFORE if before is None else check.positive("before", before, "s")
@@ -456,7 +483,7 @@ def _cut(segments, rate, name, *, trigger, before, length, together):
         responses.append(other[first:last] - base[1])
         labels.append(f"tap {number + 1}")
     if not rows:
-        raise ValueError(f"no tap in {name} has a complete record; give a shorter length= or before=")
+        raise ValueError(f"no tap in {name} has a complete record; give a shorter length or before, or check rate")
     largest = max(offsets, key=abs)
     if largest:
         notes.append(f"offsets before the taps were removed, of the force up to {abs(largest):.2g} N")

@@ -8,7 +8,8 @@ import numpy as np
 from .._base import check
 from ..impact.compiled import propagation
 from ..impact.response import History, Response
-from .records import RATES, Taps
+from . import arguments
+from .records import LONGEST, RATES, Taps
 
 FILTERS = {  # end of the pass band and begin of the stop band, each over the sampling rate
     # linear-phase filters of delta-sigma converters: NI 9234 User Manual, "Filtering": 0.453 and 0.547
@@ -203,6 +204,7 @@ def measure(
     (0.2, 0.2)
     """
     rig = Rig(rate, anti_alias, tip_mass, resonance, resonance_damping, noise, bits, full_scale)
+    before, onset = check.non_negative("before", before, "s"), check.non_negative("onset", onset, "s")
     check.one_of("quantity", quantity, ("acceleration", "velocity", "displacement"))
     if len(hit.contacts) != 1:
         raise ValueError(f"hit must have one contact, between hammer and structure, got {len(hit.contacts)}")
@@ -210,7 +212,9 @@ def measure(
     span = last + 0.02 if duration is None else check.positive("duration", duration, "s") - before
     if span <= 0.0:
         raise ValueError(f"duration must be longer than before, {before:g} s, got {duration:g} s")
-    lead = round(check.non_negative("before", before, "s") * rig.rate)
+    if before + onset > LONGEST:
+        raise ValueError(f"before and onset must be at most {LONGEST:g} s together, got {before:g} and {onset:g} s")
+    lead = round(before * rig.rate)
     n_times = lead + max(8, round(span * rig.rate))
     n_fine = FINE * (n_times + 2 * MARGIN)
     if n_fine > MOST_SAMPLES:
@@ -237,7 +241,7 @@ def measure(
     if rig.noise:
         if rng is None:
             raise ValueError("rng must be given for noise: a numpy.random.Generator or a seed")
-        found = found + rig.noise * peak[:, None] * np.random.default_rng(rng).standard_normal(found.shape)
+        found = found + rig.noise * peak[:, None] * arguments.generator("rng", rng).standard_normal(found.shape)
     for i, top in enumerate([rig.full_scale or 1.25 * peak[0], *1.25 * peak[1:]]):
         overload[i] = bool((np.abs(found[i]) >= top).any())
         found[i] = np.clip(found[i], -top, top)

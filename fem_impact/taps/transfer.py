@@ -15,6 +15,7 @@ from .fit import joined
 from .records import Taps
 
 METHODS = ("H1", "H2")
+MOST_TIMES = 2**24  # [-] samples of a transform
 TAPER = 0.25  # [-] of the force window that falls as a cosine, so that no edge is heard
 QUANTITIES = {"receptance": 0, "mobility": 1, "accelerance": 2}  # -> powers of i omega
 FREQUENCY_WEIGHT = 1.0  # [-] of a relative frequency difference of 100 % beside 1 - MAC when modes are paired
@@ -64,7 +65,7 @@ def frf(
     >>> round(float(abs(H).frequency[int(abs(H).argmax())]))  # Hz
     700
     """
-    taps = joined(records)
+    taps = joined(records, "records")
     check.one_of("method", method, METHODS)
     if not taps.response.shape[2]:
         raise ValueError("records must have a response channel; read them with response=")
@@ -76,7 +77,7 @@ def frf(
         tau = check.positive("response_window", response_window, "s")
         fade = np.exp(-np.maximum(time - onset[:, None], 0.0) / tau)
         force, response = force * fade, response * fade[:, :, None]
-    count = len(time) if n_times is None else check.count("n_times", n_times, low=2)
+    count = len(time) if n_times is None else check.count("n_times", n_times, low=2, high=MOST_TIMES)
     F = np.fft.rfft(force, count, axis=1)[:, :, None] / taps.rate  # (n_taps, n_frequencies, 1)
     X = np.fft.rfft(response, count, axis=1) / taps.rate
     ff, xx, xf = (np.abs(F) ** 2).mean(0), (np.abs(X) ** 2).mean(0), (X * F.conj()).mean(0)
@@ -154,12 +155,23 @@ def mac(first: Any, second: Any) -> np.ndarray:
     >>> fi.mac([[1.0, 1.0], [1.0, -1.0]], [[2.0, 1.0], [2.0, 0.0]]).tolist()
     [[1.0, 0.5], [0.0, 0.5]]
     """
-    one, two = (np.asarray(shapes) for shapes in (first, second))
-    if one.ndim != 2 or two.ndim != 2 or len(one) != len(two):
+    one, two = _shapes("first", first), _shapes("second", second)
+    if len(one) != len(two):
         raise ValueError(f"first and second must be shapes at the same points, got {one.shape} and {two.shape}")
     cross = np.abs(one.conj().T @ two) ** 2
     sizes = np.outer((np.abs(one) ** 2).sum(axis=0), (np.abs(two) ** 2).sum(axis=0))
     return cross / np.maximum(sizes, np.finfo(float).tiny)
+
+
+def _shapes(name: str, value: Any) -> np.ndarray:
+    """Real or complex shapes (n_points, n_modes), finite."""
+    try:
+        found = np.asarray(value)
+    except ValueError:
+        found = np.zeros(0, object)
+    if found.dtype.kind not in "iufc" or found.ndim != 2 or not (np.abs(found) <= check.REACH).all():
+        raise ValueError(f"{name} must be finite shapes (n_points, n_modes), got {check.shown(value)}")
+    return found
 
 
 @dataclass(frozen=True)
@@ -189,10 +201,12 @@ def matched(measured: Any, computed: Any, *, points: Any = None) -> tuple[Pair, 
         Where both shapes are compared, for two `Modes`; by default the points of the measured ones. With shapes, modes
         are paired by MAC and frequency together; without, by frequency in ascending order.
     """
-    one, two = (x.frequencies if isinstance(x, Modes) else check.ascending("frequencies", x, "Hz") for x in
-                (measured, computed))  # fmt: skip
+    one, two = (
+        x.frequencies if isinstance(x, Modes) else check.ascending(name, x, "Hz")
+        for name, x in (("measured", measured), ("computed", computed))
+    )
     if not len(one) or len(two) < len(one):
-        raise ValueError(f"computed must have at least the {len(one)} modes measured, got {len(two)}")
+        raise ValueError(f"computed must have at least the {len(one)} modes of measured, got {len(two)}")
     gap = np.abs(np.log(np.maximum(two, 1e-300) / np.maximum(one[:, None], 1e-300)))
     if isinstance(measured, Modes) and isinstance(computed, Modes):
         place = measured.shapes.grid()[0] if points is None else points

@@ -14,7 +14,7 @@ from .._base import check
 from ..impact.contact import Contact, wall_time
 from ..impact.striker import Striker
 from ..modes.modal import Modes
-from . import blows
+from . import arguments, blows
 from .rig import Rig
 
 STRIKER = ("mass", "first_frequency", "mode_ratio", "damping", "tip_mass")
@@ -77,18 +77,15 @@ def checked(
     unknown: Mapping[str, Any], target: Modes | None, striker: Striker, contact: Contact
 ) -> tuple[Unknown, ...]:
     """The unknowns by name; ValueError for a name that nothing here has."""
-    if not isinstance(unknown, Mapping) or not unknown:
-        raise ValueError('unknown must name at least one range, as in {"contact.stiffness": (1e5, 1e8)}')
+    given = arguments.ranges("unknown", unknown)
     contacts = [field.name for field in dataclasses.fields(contact) if field.type in ("float", float)]
     modes = sorted({int(name[4]) for name in unknown if re.match(r"mode\d\.", str(name))})
     known = [f"contact.{name}" for name in contacts] + [f"striker.{name}" for name in STRIKER]
     known += [f"target.{name}" for name in TARGET if target is not None or name == "mass"]
     known += [f"mode{i}.{name}" for i in range(1, MOST_MODES + 1) for name in MODE]
     found = []
-    for name, limits in unknown.items():
+    for name, limits in given.items():
         check.one_of("unknown", name, known)
-        if not isinstance(limits, (tuple, list)) or len(limits) != 2:
-            raise ValueError(f"unknown[{name!r}] must be a range (low, high), got {check.shown(limits)}")
         found.append(Unknown(name, *limits))
         if name.endswith((".stiffness", ".exponent", ".frequency", "mass", "first_frequency")) and found[-1].low < 0.0:
             raise ValueError(f"unknown[{name!r}] must not reach below zero, got {limits[0]:g} {unit_of(name)}")

@@ -12,7 +12,7 @@ from .._base import check
 from .._base.check import SimulationError
 from ..fe.assembly import System
 from ..modes.modal import Modes, find_modes
-from . import transfer
+from . import arguments, transfer
 from .transfer import Pair
 from .unknowns import Unknown
 
@@ -103,7 +103,7 @@ def update(
     """
     if not callable(build):
         raise ValueError(f"build must be a function of a dict of values, got {check.shown(build)}")
-    ranges = [Unknown(name, *limits) for name, limits in unknown.items()]
+    ranges = [Unknown(name, *limits) for name, limits in arguments.ranges("unknown", unknown).items()]
     for each in ranges:
         if not each.log:
             raise ValueError(f"unknown[{each.name!r}] must begin above zero, got {each.low:g}")
@@ -138,9 +138,9 @@ def update(
             columns.append((misfit(moved) - here) / (moved[i] - x[i]))
         return np.column_stack(columns)
 
-    middle = {each.name: float(np.sqrt(each.low * each.high)) for each in ranges} | dict(start or {})
+    middle = {each.name: float(np.sqrt(each.low * each.high)) for each in ranges} | arguments.table("start", start)
     bounds = np.array([each.bounds for each in ranges]).T
-    first = np.array([float(each.inside(check.between(each.name, middle[each.name], each.low, each.high)))
+    first = np.array([float(each.inside(check.between(f"start[{each.name!r}]", middle[each.name], each.low, each.high)))
                       for each in ranges])  # fmt: skip
     inside = np.clip(first, bounds[0] + 1e-9, bounds[1] - 1e-9)
     found = least_squares(misfit, inside, slopes, bounds, ftol=CLOSE, xtol=CLOSE, gtol=1e-12, max_nfev=40)

@@ -78,7 +78,7 @@ def test_modes_are_paired_by_shape_although_their_order_changed(body):
     assert "+11.11 %" in transfer.table(pairs)
     alone = fi.matched([100.0, 200.0, 310.0], [99.0, 150.0, 205.0, 300.0])
     assert [pair.computed for pair in alone] == [0, 2, 3]
-    with pytest.raises(ValueError, match="at least the 3 modes"):
+    with pytest.raises(ValueError, match="at least the 3 modes of"):
         fi.matched([1.0, 2.0, 3.0], [1.0, 2.0])
 
 
