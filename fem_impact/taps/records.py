@@ -299,6 +299,15 @@ def read_taps(
     ------
     ValueError
         If the file, a channel or a tap cannot be found; the message names what there is.
+
+    Examples
+    --------
+    >>> force = 50.0 * np.maximum(np.sin(np.arange(2000) / 4.0), 0.0) * (np.arange(2000) // 12 == 80)  # one half wave
+    >>> np.savetxt("taps.csv", np.column_stack([np.arange(2000) / 10e3, force]), delimiter=",", header="t,Force [N]",
+    ...            comments="")
+    >>> taps = fi.read_taps("taps.csv")
+    >>> taps.n_taps, taps.rate, round(float(taps.peak[0]))
+    (1, 10000.0, 50)
     """
     found = readers.read(path)
     name = check.path("path", path).name

@@ -61,8 +61,9 @@ def frf(
     >>> rod = fi.Modes.from_arrays([0.0, 700.0], [[1.0, 1.0]], points=[[0.0]], mass=1.0, damping_ratio=0.02)
     >>> hit = fi.strike(rod, fi.Striker.rigid(0.02), fi.Contact.linear(1e5), at=[0.0], speed=1.0)
     >>> tap = fi.measure(hit, rate=25600.0, at=[[0.0]], duration=0.5)
-    >>> H = fi.frf(tap).H[:, 0]
-    >>> round(float(abs(H).frequency[int(abs(H).argmax())]))  # Hz
+    >>> found = fi.frf(tap)
+    >>> peak = np.abs(found.H.values[:, 0]).argmax()
+    >>> round(float(found.frequency.values[peak]))  # Hz
     700
     """
     taps = joined(records, "records")
@@ -200,6 +201,12 @@ def matched(measured: Any, computed: Any, *, points: Any = None) -> tuple[Pair, 
     points : array_like, (n_points, dimension) [m], optional
         Where both shapes are compared, for two `Modes`; by default the points of the measured ones. With shapes, modes
         are paired by MAC and frequency together; without, by frequency in ascending order.
+
+    Examples
+    --------
+    >>> pairs = fi.matched([100.0, 310.0], [99.0, 205.0, 300.0])
+    >>> [(pair.computed, round(100 * pair.difference, 1)) for pair in pairs]  # number, %
+    [(0, -1.0), (2, -3.2)]
     """
     one, two = (
         x.frequencies if isinstance(x, Modes) else check.ascending(name, x, "Hz")
