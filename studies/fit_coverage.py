@@ -37,6 +37,7 @@ HIDDEN = {  # what the force alone cannot tell
     "mode": (),
     "mode and hammer": ("contact.stiffness", "contact.loss", "striker.mass", "mode1.mass"),
 }
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
 COLUMNS = ("set", "kind", "rate", "taps", "name", "truth", "value", "low", "high", "told", "hidden", "weak", "seconds")
 
 
@@ -169,16 +170,16 @@ def report(rows: list[dict]) -> str:
 def draw(rows: list[dict], path: Path) -> None:
     """Where the truth lies in its interval, for all that is told; and the three shares."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.8), layout="constrained")
+    places = []
     for kind in KINDS:
         told = [each for each in rows if each["kind"] == kind and each["told"] == "told" and not each["hidden"]]
-        where = [
-            (each["truth"] - each["low"]) / (each["high"] - each["low"]) for each in told if each["high"] > each["low"]
-        ]
-        if where:
-            left.hist(where, bins=np.linspace(-1.0, 2.0, 61), histtype="step", label=f"{kind} ({len(where)})")
+        ends = [(each["truth"] - each["low"], each["high"] - each["low"]) for each in told]
+        places.append([above / wide for above, wide in ends if wide > 0.0])
+    names = [f"{kind} ({len(where)})" for kind, where in zip(KINDS, places)]
+    left.hist(places, bins=np.linspace(-1.0, 2.0, 31), stacked=True, label=names, color=COLOURS)
     left.axvspan(0.0, 1.0, color="#0072B2", alpha=0.08)
     left.set(xlabel="place of the truth in its 90 % interval", ylabel="unknowns")
-    left.legend(frameon=False, fontsize=8)
+    left.legend(frameon=False, fontsize=8, loc="upper left")
     found = judge(rows)
     for i, (good, count) in enumerate(found.values()):
         low, high = (
