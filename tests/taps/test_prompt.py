@@ -48,3 +48,11 @@ def test_wrong_commands_say_what_is_wrong(words, said, tmp_path, capsys):
     assert cli.main(["fit", str(TAPS), "--out", str(tmp_path / "out"), *words]) == 2
     assert said in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "out").exists()
+
+
+def test_a_single_tap_is_fitted_too(tmp_path, capsys):
+    words = ["--response", "Acceleration", "--unknown", "contact.stiffness=1e5:1e13", "--json"]
+    single = TAPS.with_name("acceleration.lvm")
+    assert cli.main(["fit", str(single), "--out", str(tmp_path / "out"), *words]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["left_out"] == [] and data["intervals"]["contact.stiffness"][0] > 1e5

@@ -136,3 +136,24 @@ def test_pickled_arrays_are_refused(tmp_path):
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(ValueError, match="there is no such file"):
         fi.read_taps(tmp_path / "absent.lvm")
+
+
+def test_a_labview_file_with_times_for_each_channel(tmp_path):
+    time, force, acceleration = channels()
+    rows = [f"{t:.6f}\t{f:.9g}\t{t:.6f}\t{a:.9g}\t" for t, f, a in zip(time, force, acceleration)]
+    head = [
+        "LabVIEW Measurement",
+        "Separator\tTab",
+        "Decimal_Separator\t.",
+        "X_Columns\tMulti",
+        readers.END_OF_HEADER,
+        "",
+    ]
+    segment = [
+        "Channels\t2", "Samples\t2600\t2600", "Y_Unit_Label\tNewtons\tm/s^2",
+        f"Delta_X\t{1 / RATE:.9g}\t{1 / RATE:.9g}",
+        readers.END_OF_HEADER, "X_Value\tforce\tX_Value\tacceleration\tComment",
+    ]  # fmt: skip
+    special = ["***Start_Special***", "anything", "***End_Special***"]
+    (tmp_path / "t.lvm").write_text("\n".join([*head, *special, *segment, *rows]) + "\n")
+    check(fi.read_taps(tmp_path / "t.lvm"))
