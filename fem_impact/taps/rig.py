@@ -12,7 +12,7 @@ from . import arguments
 from .records import LONGEST, RATES, Taps
 
 FILTERS = {  # end of the pass band and begin of the stop band, each over the sampling rate
-    # linear-phase filters of delta-sigma converters: NI 9234 User Manual, "Filtering": 0.453 and 0.547
+    # linear-phase filters of delta-sigma converters; data sheets state 0.45 and 0.55 to 0.58 (TI SLAS666B, SBASAU5)
     "delta-sigma": (0.453, 0.547),
     # analysers with a band of rate / 2.56: what folds back must stay outside the band
     "2.56": (1.0 / 2.56, 1.0 - 1.0 / 2.56),
