@@ -19,6 +19,11 @@ _NAMES = {
     "model.planner": "Plan strike",
     "scenes.scene": "Scene load_scene plan",
     "sweeps.grid": "sweep",
+    "taps.records": "Taps read_taps",
+    "taps.rig": "measure",
+    "taps.fit": "fit",
+    "taps.transfer": "frf mac matched",
+    "taps.update": "update",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 _MODULES = {

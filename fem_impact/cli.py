@@ -282,6 +282,7 @@ def _parser() -> argparse.ArgumentParser:
         "print a script that completes commands; eval it in ~/.bashrc", scene="",
     )  # fmt: skip
     add("shell", choices=("bash", "zsh", "tcsh"), nargs="?", default="bash", help="default: bash")
+    _add_taps(verb)
     return parser
 
 
@@ -611,6 +612,67 @@ def _wrapped(text: str) -> str:
     filled = textwrap.TextWrapper(width, subsequent_indent="    ", break_on_hyphens=False)  # keeps paths whole
     lines = (filled.wrap(line) or [""] for line in text.splitlines())
     return "\n".join(line for wrapped in lines for line in wrapped)
+
+
+def _add_taps(verb: Any) -> None:
+    """Add the commands for measured taps."""
+    files = "measured taps: .lvm, .csv, .npz, .wav, .mat or .uff"
+    add = verb(_frf, "frf", "frequency responses of taps, or of a scene as a rig would measure it",
+               scene=f"{files}; or a scene, a TOML file", called="TAPS|SCENE")  # fmt: skip
+    _add_channels(add)
+    add("--method", choices=("H1", "H2"), default="H1", help="H1 for noise in the response, H2 in the force")
+    add("--force-window", metavar="S", type=float, help="the force counts for this time after the onset only")
+    add("--response-window", metavar="S", type=float, help="time constant of an exponential window")
+    add("--out", metavar="FILE", type=_place, help="write them to a .csv or .uff file")
+
+    add = verb(_fit, "fit", "find the hammer and the contact that explain measured taps", scene=files, called="TAPS")
+    add("body", metavar="SCENE", type=_place, nargs="?", help="the scene struck (default: a wall)")
+    _add_channels(add)
+    add("--unknown", metavar="NAME=LOW:HIGH", action="append", default=[],
+        help="a number to find in a range; repeatable (default: stiffness, exponent, loss of the contact)")  # fmt: skip
+    add("--known", metavar="NAME=VALUE", action="append", default=[], help="a number to hold; repeatable")
+    add("--mass", metavar="KG", type=float, help="mass of the hammer (default: the scene's, or 0.1)")
+    add("--out", metavar="DIR", type=_place, help="folder for fit.html, fit.json and scene.toml (default: out/NAME)")
+    add("--json", action="store_true", help="print the contents of fit.json instead of the summary")
+
+
+def _add_channels(add: Any) -> None:
+    """Add the options that say what a file of taps holds."""
+    add("--force", metavar="NAME", help="name or number of the force channel (default: by its unit or name)")
+    add("--response", metavar="NAME", action="append", help="name or number of a response; repeatable")
+    add("--rate", metavar="HZ", type=float, help="sampling rate, if the file does not state it; of a scene: 51200")
+    add("--scale", metavar="N", type=float, help="newtons per unit of the force channel")
+
+
+def _frf(options: argparse.Namespace) -> None:
+    from .taps import prompt  # imported only when needed
+
+    with Display()("frequency responses"):
+        found, notes = prompt.frf(options)
+    _print_notes(notes)
+    _print_table(*prompt.peaks(found))
+    if options.out is not None:
+        prompt.write_frf(options.out, found)
+        _say(f"Files: {options.out}")
+
+
+def _fit(options: argparse.Namespace) -> None:
+    from .pages import fit_page  # imported only when needed
+    from .taps import prompt  # imported only when needed
+
+    folder = options.out if options.out is not None else Path("out") / options.scene.stem
+    with fi.export.staged(folder) as staging:
+        display = Display()
+        with display("fit"):
+            found, scene = prompt.fit(options, partial(display.report, "fits"))
+        data, files = prompt.write(staging, found, scene)
+        with display("page"):
+            target, at = (None, None) if scene is None else (scene.modes(), scene.blow.values["at"])
+            fit_page.write(staging / "fit.html", found, title=f"Taps of {options.scene.name}", target=target, at=at)
+    if options.json:
+        _print_json(data)
+        return
+    _say(*found.summary().splitlines(), f"Files in {folder}{os.sep}: {', '.join(['fit.html', *files])}")
 
 
 if __name__ == "__main__":

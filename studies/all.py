@@ -19,7 +19,7 @@ def main() -> None:
     for script in sorted(path for name in ("fig", "beyond_", "tutorial_") for path in STUDIES.glob(f"{name}*.py")):
         subprocess.run([sys.executable, str(script), str(folder)], check=True)
     (STUDIES / "pictures").mkdir(exist_ok=True)
-    shown = ("fig*", "beyond_*", "ukulele_modes", "ukulele_wave", "hammer_test")
+    shown = ("fig*", "beyond_*", "ukulele_modes", "ukulele_wave", "hammer_test", "fit_*")
     for path in sorted(path for name in shown for path in folder.glob(f"{name}.png")):
         picture = Image.open(path).convert("RGB")
         picture = picture.resize((WIDTH, round(WIDTH * picture.height / picture.width)), Image.Resampling.LANCZOS)

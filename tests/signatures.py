@@ -56,6 +56,7 @@ INNER = {
     "report.Player", "report.audio", "report.template",
     "explore.serve",  # ends at an interruption only, see test_explore
     "ToleranceWarning", "analytic.closed_form",
+    "Taps", "Taps.summary",  # made by read_taps and Taps.from_arrays
     "Modes", "sound.Sound.audible", "sound.Sound.faded", "sound.Sound.wav", "hammers.Hammer.data",
 }  # fmt: skip
 
@@ -108,7 +109,12 @@ def things() -> dict[str, Any]:
     fi.export.write_uff(uff, modes)
     mesh = folder / "plate.msh"
     fi.mesh.save(mesh, square)
+    tip = fi.collide([fi.Modes.rigid(0.03)], [fi.Touch(law, 0, None)], speeds=[1.0], tolerance=1e-2)
+    taps = fi.measure(tip, rate=25600.0, duration=5e-3)
+    taps.save(folder / "taps.npz")
+    bar = fi.Modes.from_arrays([100.0, 300.0], [[1.0, 0.5]], points=[[0.0]], mass=1.0)
     return {
+        "taps": taps, "file of taps": folder / "taps.npz", "bar": bar,
         "metal": metal, "plate": plate, "beam": beam, "square": square, "modes": modes, "striker": striker, "law": law,
         "sphere": fi.Striker.sphere(metal, 0.01), "free": fi.Modes.rigid(1.0), "folder": folder, "path": path,
         "system": fi.assemble(square, plate, {"boundary": "hinged"}), "scene": scene, "uff": uff, "mesh": mesh,
@@ -273,6 +279,40 @@ def table() -> dict[str, dict[str, Any]]:
             "modes": t["modes"], "at": at, "bandwidth": 300.0, "masses": [0.1], "drop": 10.0,
         },
         "hammers.choose": {"modes": t["modes"], "at": at, "bandwidth": 300.0, "masses": [0.1], "drop": 10.0},
+        "read_taps": {
+            "path": t["file of taps"], "force": "force", "response": (), "rate": 25600.0, "scale": 1.0,
+            "units": {"force": "N"}, "trigger": 1.0, "before": 5e-4, "length": 2e-3, "together": 0.05,
+            "full_scale": 1e6,
+        },
+        "Taps.from_arrays": {
+            "force": t["taps"].force, "response": t["taps"].force, "rate": 25600.0, "names": ["a"], "units": ["m/s^2"],
+            "overload": False, "labels": ["one"], "notes": (),
+        },
+        "Taps.pick": {"self": t["taps"], "which": 0},
+        "Taps.between": {"self": t["taps"], "start": 0.0, "end": 2e-3},
+        "Taps.save": {"self": t["taps"], "path": folder / "saved.npz"},
+        "measure": {
+            "hit": t["hit"], "rate": 8000.0, "at": [at], "anti_alias": (4, 3e3), "tip_mass": 1e-3, "resonance": 20e3,
+            "resonance_damping": 0.01, "noise": 0.01, "bits": 16, "full_scale": 1e5, "duration": 0.02, "before": 1e-3,
+            "onset": 0.0, "quantity": "acceleration", "rng": 1,
+        },
+        "frf": {
+            "records": fi.Taps.from_arrays(t["taps"].force, t["taps"].force, rate=25600.0), "method": "H1",
+            "force_window": 2e-3, "response_window": 1e-2, "n_times": 64,
+        },
+        "mac": {"first": [[1.0, 1.0], [1.0, -1.0]], "second": [[1.0], [0.5]]},
+        "matched": {"measured": [100.0], "computed": [99.0, 150.0], "points": None},
+        "matched shapes": {"measured": t["bar"], "computed": t["bar"], "points": [[0.0]]},
+        "fit": {
+            "taps": t["taps"], "target": t["bar"], "at": [0.0], "striker": t["striker"], "contact": t["law"],
+            "unknown": {"contact.stiffness": (1e5, 1e8)}, "known": {"striker.mass": 0.03}, "response_at": None,
+            "anti_alias": "delta-sigma", "tip_mass": 0.0, "resonance": None, "window": (3e-4, 3e-3), "starts": 1,
+            "robust": True, "profiles": False, "rng": 0, "watch": None,
+        },
+        "update": {
+            "build": lambda values: t["bar"].scaled(first_frequency=values["f"]), "measured": [110.0, 330.0],
+            "unknown": {"f": (50.0, 200.0)}, "start": {"f": 90.0}, "points": None,
+        },
         "report.read": {"path": t["path"]},
         "report.write": {"path": folder / "report.html", "scene": t["scene"], "run": t["run"]},
         "pictures.mode_shapes": {"path": folder / "modes.png", "modes": t["modes"], "count": 2, "columns": 2},
@@ -302,7 +342,7 @@ SPOILS: dict[str, Any] = {
 
 
 FUNCTIONS = ("function", "nan function", "type")  # what these do where a function is wanted is up to them
-CALLED = ("watch", "before", "tell", "ready")
+CALLED = ("watch", "before", "tell", "ready", "build")
 
 
 def cases(names: Any = None) -> Iterator[tuple[str, str, str]]:

@@ -36,6 +36,15 @@ def test_python_example_of_a_plan_runs(monkeypatch, capsys):
     assert 0.2 < float(printed.splitlines()[-1]) < 0.4  # 0.314 on modes enough for 1e-4; fifty err by a few per cent
 
 
+def test_python_example_of_a_fit_runs(monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    names = {"fi": fi}
+    exec(compile(blocks("python")[2], "README.md", "exec"), names)
+    assert "4 taps explained to 2.5 % rms" in capsys.readouterr().out
+    low, high = names["found"].interval("contact.exponent")
+    assert 1.5 < low < high < 1.9
+
+
 def test_first_two_commands_are_single_lines_that_install_then_run_and_test():
     run, test = (block.strip() for block in blocks("sh")[:2])
     assert "\n" not in run and "\n" not in test
@@ -59,7 +68,7 @@ def test_shown_commands_are_ones_the_parser_takes(line):
     words = shlex.split(line)
     start = next(i for i, word in enumerate(words) if word.endswith("fem-impact"))
     options = cli._parser().parse_args(words[start + 1 :])  # exits with status 2 where an option does not exist
-    assert options.scene.suffix == ".toml"
+    assert options.scene.suffix in (".toml", ".lvm")
 
 
 def test_licence_is_the_one_the_package_declares():

@@ -63,3 +63,19 @@ def test_decay_is_measured_in_the_file_as_it_was_modelled(tmp_path, monkeypatch)
     modelled = np.log(1e3) / (sounds.DAMPING * 2.0 * np.pi * 100.0)
     # the window lets neighbours through by 1e-3 of their size, over 40 dB of decay
     assert sounds.decay_time(samples, rate, 100.0) == pytest.approx(modelled, rel=1e-2)
+
+
+@pytest.mark.slow
+def test_from_four_taps_to_a_double_hit(tmp_path, capsys):
+    tutorial = import_module("tutorial_fit")
+    found = tutorial.main(tmp_path)
+    verdicts = {one.name: one for one in found["verdicts"]}
+    best = verdicts["the same behind a springy tip"]
+    # a tap of the four predicted from the others, at worst: 1.2 % of its peak, 3.4 % of its rms force
+    assert best.of_peak < 0.015 and best.left_out < 0.04
+    assert verdicts["linear spring"].left_out > 3.0 * best.left_out
+    assert set(found["free"].unidentifiable) == {"contact.stiffness", "contact.loss", "striker.mass"}
+    heavy, light = found["limits"][0.45], found["limits"][0.05]
+    assert all(a <= b for a, b in zip(heavy, light) if a is not None and b is not None)  # stiffer tips hit twice sooner
+    assert {path.name for path in tmp_path.iterdir()} == {"fit_pulses.png", "fit_profiles.png", "fit_double_hits.png"}
+    assert "Weigh the hammer" in capsys.readouterr().out

@@ -1,0 +1,166 @@
+"""One page about a fit: pulses, residuals, profiles of the likelihood, double hits; its pictures alone too."""
+
+import base64
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import t
+
+from .._base import check
+from .._base.check import SimulationError
+from .._base.files import replacing
+from ..scenes.sentences import si
+from ..show import export, figures
+from ..show.figures import BLUE, GREEN, SKY, VERMILION
+from ..taps.fit import Found
+from ..taps.unknowns import unit_of
+from . import report
+
+TIMES = 10.0  # [-] residuals are drawn this much larger
+MOST_TAPS = 10  # [-] shown
+MASSES, TIPS = (0.5, 1.0, 2.0), (0.1, 0.3, 1.0, 3.0, 10.0)  # [-] of the double-hit table, over those found
+WIDE = 4.0  # [-] last over first value of a profile from which on its axis is logarithmic
+AROUND = 0.8  # [-] of an interval, shown on either side of it
+SHOWN = 12.0  # [-] highest rise of a profile shown
+
+
+def pulses(found: Found) -> Any:
+    """Measured and predicted force of each tap, and ten times the residual: a matplotlib figure."""
+    shown = found.used[:MOST_TAPS]
+    columns = min(3, len(shown))
+    rows = -(-len(shown) // columns)
+    with figures.styled(3.2 * columns, 2.4 * rows) as figure:
+        all_axes = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
+        for axes, tap in zip(all_axes, shown):
+            one = found.predict(int(tap))
+            axes.plot(1e3 * one.time, one.measured, ".", color=BLUE, ms=4, label="measured")
+            axes.plot(1e3 * one.time, one.force, color=VERMILION, lw=1.0, label="model")
+            axes.plot(1e3 * one.time, TIMES * one.residual, color=GREEN, lw=0.9, label=f"residual x {TIMES:g}")
+            axes.set_title(f"{found.taps.labels[tap]}: {100 * one.error:.2g} % rms")
+        for axes in all_axes[len(shown) :]:
+            axes.set_visible(False)
+        for axes in all_axes[max(0, len(shown) - columns) : len(shown)]:
+            axes.set_xlabel("time [ms]")
+        all_axes[0].set_ylabel("force [N]")
+        all_axes[0].legend(fontsize=8)
+    return figure
+
+
+def profiles(found: Found) -> Any:
+    """The likelihood profile of every unknown; the level of the 90 % interval is dashed: a matplotlib figure."""
+    names = found.names
+    columns = min(3, len(names))
+    rows = -(-len(names) // columns)
+    with figures.styled(3.2 * columns, 2.4 * rows) as figure:
+        all_axes = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
+        for axes, name in zip(all_axes, names):
+            profile = found.profiles[name]
+            level = float(profile_level(found))
+            axes.plot(profile.values, profile.rise, "o", color=BLUE, ms=3)
+            axes.plot(*profile.curve(), color=BLUE, lw=1.2)
+            axes.axhline(level, color=VERMILION, ls="--", lw=1.0)
+            if profile.told != "open":
+                axes.axvspan(*profile.interval(), color=SKY, alpha=0.2, lw=0)
+            if profile.log and profile.values[-1] > WIDE * profile.values[0]:
+                axes.set_xscale("log")
+            if profile.told == "told":
+                axes.set_xlim(*_around(profile))
+            axes.set_ylim(0.0, SHOWN)
+            unit = unit_of(name)
+            axes.set_title(f"{name}{f' [{unit}]' if unit else ''}")
+            said = {"open": "not told", "limited": "one limit only"}.get(profile.told)
+            if said:
+                axes.text(0.5, 0.85, said, transform=axes.transAxes, ha="center", color=VERMILION)
+        for axes in all_axes[len(names) :]:
+            axes.set_visible(False)
+        all_axes[0].set_ylabel("rise over noise variance")
+    return figure
+
+
+def _around(profile: Any) -> tuple[float, float]:
+    """The interval of a profile and AROUND of it on either side."""
+    low, high = profile.interval()
+    if profile.log:
+        wide = (high / low) ** AROUND
+        return low / wide, high * wide
+    return low - AROUND * (high - low), high + AROUND * (high - low)
+
+
+def profile_level(found: Found) -> float:
+    """Rise of a profile at the ends of the 90 % interval [-]."""
+    return float(t.ppf(0.95, next(iter(found.profiles.values())).freedom) ** 2)
+
+
+def spectrum(found: Found) -> Any:
+    """Amplitude spectra of force and residual, of all taps: a matplotlib figure."""
+    frequency, residual, force = found.residual_spectrum()
+    with figures.styled(6.4, 3.2) as figure:
+        axes = figure.subplots()
+        for rows, colour, label in ((force, BLUE, "force"), (residual, VERMILION, "residual")):
+            axes.semilogy(1e-3 * frequency, np.maximum(rows.T, 1e-12), color=colour, lw=0.9)
+            axes.plot([], [], color=colour, label=label)
+        axes.set(xlabel="frequency [kHz]", ylabel="amplitude [N s]")
+        axes.set_ylim(bottom=max(1e-12, 0.1 * float(np.median(residual))))
+        axes.legend()
+    return figure
+
+
+def double_hits(found: Found, target: Any = None, at: Any = None) -> list[tuple[str, ...]]:
+    """Number of impacts over head mass (rows) and tip stiffness (columns); the first row is the heading."""
+    rows: list[tuple[str, ...]] = [("head", *(f"tip x {tip:g}" for tip in TIPS))]
+    for share in MASSES:
+        mass = share * found.striker.mass
+        cells = []
+        for tip in TIPS:
+            try:
+                cells.append(str(found.double_hit(target, at=at, mass=mass, tip=tip).n_impacts))
+            except SimulationError:
+                cells.append("?")
+        rows.append((si(mass, "kg"), *cells))
+    return rows
+
+
+@check.typed
+def write(
+    path: str | Path, found: Found, *, title: str = "Fit of measured taps", target: Any = None, at: Any = None
+) -> None:
+    """Write the page; needs the extra ``web``. Double hits are predicted for ``target`` or the structure found."""
+    check.extra("jinja2", "web", "a page")
+    struck = target is not None or found.target is not None
+    told = []
+    for name in found.names:
+        profile = found.profiles[name]
+        low, high = profile.interval()
+        value = {"open": "not told", "limited": "a limit only"}.get(profile.told, f"{profile.value:.4g}")
+        told.append((name, value, "" if profile.told == "open" else f"{low:.4g} to {high:.4g}", unit_of(name)))
+    left_out = [f"{100 * one.error:.2g} %" for one in found.left_out()] if len(found.used) > 1 else []
+    page = report.template("fit.html").render(
+        title=title,
+        summary=found.summary().splitlines(),
+        told=told,
+        untold=found.unidentifiable,
+        ridges={name: ", ".join(f"{k} with power {v:.2g}" for k, v in found.ridges[name].items())
+                for name in found.unidentifiable},
+        tiles=[
+            ("taps used", str(len(found.used))), ("rms residual", f"{100 * found.error:.2g} %"),
+            ("left-out taps, worst", max(left_out, key=lambda text: float(text[:-2])) if left_out else "one tap only"),
+            ("whiteness", f"{found.whiteness:.2g}"), ("not told", str(len(found.unidentifiable))),
+            ("taps that disagree", ", ".join(found.outliers) or "none"),
+        ],
+        pictures={name: _uri(draw(found)) for name, draw in
+                  (("pulses", pulses), ("profiles", profiles), ("spectrum", spectrum))},
+        double=double_hits(found, target, at) if struck else [],
+        compared={law: f"{100 * error:.2g} %" for law, error in found.compared.items()},
+        versions=export.versions(),
+        style=(report.WEB / "report.css").read_text(encoding="utf-8"),
+    )  # fmt: skip
+    with replacing(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def _uri(figure: Any) -> str:
+    file = io.BytesIO()
+    figure.savefig(file, format="png", dpi=120)
+    return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode("ascii")

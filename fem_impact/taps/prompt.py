@@ -1,0 +1,120 @@
+"""What `fem-impact frf` and `fem-impact fit` do, apart from printing."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.signal import find_peaks
+
+from .._base import check
+from ..impact.contact import Contact
+from ..impact.striker import Striker
+from ..scenes.scene import Scene, load_scene
+from ..show import export
+from . import found_scene, transfer
+from .fit import Found, Watch
+from .fit import fit as fit_taps
+from .records import Taps, read_taps
+from .rig import measure
+
+RATE = 51200.0  # [Hz] at which a scene is measured
+HAMMER = 0.1  # [kg] of a hammer of which nothing is said
+UNKNOWN = {"contact.stiffness": (1e2, 1e16), "contact.exponent": (1.0, 4.0), "contact.loss": (0.0, 10.0)}
+STEEP = 1.5  # [-] logarithm of a peak over its surroundings: lower ones are noise
+MOST_PEAKS = 20  # [-] listed
+DURATION = 1.0  # [s] of the record of a scene
+
+
+def _taps(options: Any) -> Taps:
+    names: Any = options.response
+    if names is not None:
+        names = [int(name) if name.isdigit() else name for name in names]
+    force = int(options.force) if options.force is not None and options.force.isdigit() else options.force
+    return read_taps(options.scene, force=force, response=names, rate=options.rate, scale=options.scale)
+
+
+def frf(options: Any) -> tuple[xr.Dataset, tuple[str, ...]]:
+    """Frequency responses of a file of taps, or of a scene measured at its observation points; and notes."""
+    if options.scene.suffix.lower() == ".toml":
+        scene = load_scene(options.scene)
+        hit = scene.run(target="modal").response
+        rate = RATE if options.rate is None else options.rate
+        taps = measure(hit, rate=rate, at=scene.points, duration=DURATION)
+    else:
+        taps = _taps(options)
+    found = transfer.frf(
+        taps, method=options.method, force_window=options.force_window, response_window=options.response_window
+    )
+    return found, taps.notes
+
+
+def peaks(found: xr.Dataset) -> tuple[list[tuple[str, ...]], tuple[str, ...]]:
+    """Rows and heading of a table of the largest peaks of each response."""
+    rows: list[tuple[str, ...]] = []
+    for k, name in enumerate(found["channel"].values):
+        size = np.abs(found["H"].values[1:, k])
+        places = find_peaks(np.log(np.maximum(size, 1e-300)), prominence=STEEP)[0]
+        largest = np.sort(places[np.argsort(-size[places])][:MOST_PEAKS])
+        for i in largest:
+            coherence = f"{float(found['coherence'].values[1 + i, k]):.3f}"
+            frequency = f"{float(found['frequency'].values[1 + i]):.5g} Hz"
+            rows.append((str(name), frequency, f"{size[i]:.4g} {found['units'].values[k]}", coherence))
+    return rows, ("response", "peak at", "magnitude", "coherence")
+
+
+def write_frf(path: Path, found: xr.Dataset) -> None:
+    """Write frequency responses as .csv (real and imaginary parts, coherence) or .uff (data set 58)."""
+    ending = check.one_of("path ending", path.suffix.lower(), (".csv", ".uff"))
+    with export.staged(path.parent) as staging:
+        if ending == ".uff":
+            transfer.write_uff(staging / path.name, found)
+            return
+        columns = {"frequency [Hz]": found["frequency"].values}
+        for k, name in enumerate(found["channel"].values):
+            values, unit = found["H"].values[:, k], found["units"].values[k]
+            columns |= {f"{name} real [{unit}]": values.real, f"{name} imaginary [{unit}]": values.imag}
+            columns[f"{name} coherence"] = found["coherence"].values[:, k]
+        (staging / path.name).write_text(export.csv_text(**columns), encoding="utf-8")
+
+
+def _pairs(name: str, texts: list[str]) -> dict[str, list[float]]:
+    """NAME=LOW:HIGH or NAME=VALUE of the command line."""
+    found = {}
+    for text in texts:
+        key, _, values = text.partition("=")
+        try:
+            found[key] = [float(value) for value in values.split(":")]
+        except ValueError:
+            found[key] = []
+        if len(found[key]) != (2 if name == "unknown" else 1):
+            form = "NAME=LOW:HIGH" if name == "unknown" else "NAME=VALUE"
+            raise ValueError(f"--{name} must read {form}, got {text!r}")
+    return found
+
+
+def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None]:
+    """The fit of a file of taps, and the scene struck; None for a wall."""
+    unknown = {name: tuple(limits) for name, limits in _pairs("unknown", options.unknown).items()} or UNKNOWN
+    known = {name: value for name, (value,) in _pairs("known", options.known).items()}
+    taps = _taps(options)
+    given: dict[str, Any] = {"striker": Striker.rigid(options.mass or HAMMER), "contact": Contact.hertz(1e7)}
+    scene = None
+    if options.body is not None:
+        scene = load_scene(options.body)
+        given |= {"target": scene.modes(), "at": scene.blow.values["at"], "contact": scene.make_contact()}
+        if options.mass is None:
+            given["striker"] = scene.make_striker()
+    return fit_taps(taps, unknown=unknown, known=known, watch=watch, **given), scene
+
+
+def write(folder: Path, found: Found, scene: Scene | None) -> tuple[dict[str, Any], list[str]]:
+    """Write fit.json and, if the body struck is known, scene.toml; return the data and the names of the files."""
+    data = export.plain(found.data() | {"summary": found.summary().splitlines(), "versions": export.versions()})
+    export.write_json(folder / "fit.json", data)
+    files = ["fit.json"]
+    modes = [name for name in found.names if name.startswith("mode")]
+    if scene is not None or not (modes or "target.mass" in found.names):
+        found_scene.write_scene(folder / "scene.toml", found, scene)
+        files.append("scene.toml")
+    return data, files

@@ -1,0 +1,396 @@
+"""Read the channels of a measurement from a file; `records` finds the taps in them."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._base import check, isolated
+from . import units
+
+END_OF_HEADER = "***End_of_Header***"
+HEADER_LINES = 200  # [-] of a text table at most, before its numbers begin
+UNEVEN = 0.02, 0.3  # [-] of the step: times may deviate from an even grid by the first, and by the second if rounded
+FEWEST = 8  # [-] samples of a channel
+MOST_CHANNELS = 256  # [-] of a file; an array with more rows holds something else
+RATE_NAMES = ("rate", "fs", "sampling_rate", "samplerate", "sample_rate", "sampling_frequency", "frequency")
+STEP_NAMES = ("dt", "delta_x", "delta_t", "tsample", "sampling_interval")
+TIME_NAMES = ("time", "t", "times", "x_value", "zeit", "time_s")
+EXCITATION, ACCELERATION, VELOCITY, DISPLACEMENT = 13, 12, 11, 8  # codes of quantities in data set 58
+UFF_UNITS = {EXCITATION: "N", 9: "N", ACCELERATION: "m/s^2", VELOCITY: "m/s", DISPLACEMENT: "m"}
+TIME_RESPONSE = 1  # function type of data set 58
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """All channels of a file as they stand there."""
+
+    segments: tuple[np.ndarray, ...]  # each (n_samples, n_channels), in the units of the file
+    names: tuple[str, ...]
+    units: tuple[str, ...]  # as written in the file; "" if it states none
+    rate: float | None  # [Hz] None: the file does not state it
+    notes: tuple[str, ...] = ()
+
+    __repr__ = check.brief
+
+    def __post_init__(self) -> None:
+        for segment in self.segments:
+            segment.setflags(write=False)
+
+
+def read(path: Any) -> Recording:
+    """Read a LabVIEW, text, NumPy, WAV, MATLAB or universal file (data set 58), in a separate process.
+
+    Raises
+    ------
+    ValueError
+        If the file holds no channels, or channels that are uneven in time or not finite.
+    """
+    place = check.path("path", path)
+    found = isolated.read(place, "a measurement", "taps.readers:arrays")
+    count = sum(name.startswith("segment") for name in found)
+    rate = float(found["rate"])
+    return Recording(
+        tuple(found[f"segment{i}"] for i in range(count)),
+        tuple(map(str, found["names"])),
+        tuple(map(str, found["units"])),
+        rate if np.isfinite(rate) else None,
+        tuple(map(str, found["notes"])),
+    )
+
+
+def arrays(path: Path) -> dict[str, np.ndarray]:
+    """The result of `read` as arrays, for the separate process."""
+    reader = {
+        ".lvm": labview, ".npy": numpy_file, ".npz": numpy_file, ".wav": wav, ".mat": matlab, ".uff": universal,
+        ".unv": universal, ".58": universal,
+    }.get(path.suffix.lower())  # fmt: skip
+    if reader is None:
+        with path.open("rb") as file:
+            head = file.read(64)
+        reader = labview if head.startswith(b"LabVIEW Measurement") else universal if _universal(head) else table
+    found = reader(path)
+    for i, segment in enumerate(found.segments):
+        if len(segment) < FEWEST:
+            raise ValueError(f"{path.name} has {len(segment)} samples in segment {i + 1}; at least {FEWEST} are needed")
+        if not (np.abs(segment) <= check.REACH).all():
+            row, column = np.argwhere(~(np.abs(segment) <= check.REACH))[0]
+            raise ValueError(
+                f"{path.name} has a value that is no finite number: sample {row + 1} of {found.names[column]!r} "
+                f"in segment {i + 1}; export it again, or cut it out"
+            )
+    if not found.segments or not found.names:
+        raise ValueError(f"{path.name} holds no channels")
+    if found.rate is not None and not 0.0 < found.rate <= 1e12:
+        raise ValueError(f"{path.name} states a rate of {found.rate:g} Hz")
+    result = {f"segment{i}": segment for i, segment in enumerate(found.segments)}
+    texts = {"names": found.names, "units": found.units, "notes": found.notes}
+    result |= {name: np.array([check.line(text) for text in lines], dtype=str) for name, lines in texts.items()}
+    return result | {"rate": np.array(np.nan if found.rate is None else found.rate)}
+
+
+def _text(path: Path) -> list[str]:
+    """The lines of a text file in UTF-8, UTF-16 or Latin-1."""
+    raw = path.read_bytes()
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return raw.decode("utf-16").splitlines()
+    if b"\0" in raw[:4096]:
+        raise ValueError(f"{path.name} is not text; give .npy, .npz, .wav, .mat or .uff its own ending")
+    try:
+        return raw.decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        return raw.decode("latin-1").splitlines()
+
+
+def labview(path: Path) -> Recording:
+    """A LabVIEW measurement file: every segment has a header of its own.
+
+    References
+    ----------
+    National Instruments, "Specification for the LabVIEW Measurement File (.lvm)".
+    """
+    lines = _text(path)
+    if not lines or not lines[0].startswith("LabVIEW Measurement"):
+        raise ValueError(
+            f"{path.name} does not begin with 'LabVIEW Measurement'; for a plain table use the ending .csv"
+        )
+    separator = "," if any(re.match(r"Separator[\t,]Comma", line) for line in lines[:30]) else "\t"
+    common = _header(lines[: _end_of_header(lines, 0, path)], separator)
+    segments, first, rates = [], None, []
+    for head, names, rows in _labview_segments(lines, separator, path):
+        columns = [name for name in names if name]
+        columns = columns[:-1] if columns and columns[-1] == "Comment" else columns
+        spread = common.get("X_Columns", ["One"])[0]
+        n_channels = int(float((head.get("Channels") or [str(len(columns))])[0]))
+        if not 0 < n_channels <= MOST_CHANNELS:
+            raise ValueError(f"{path.name} states {n_channels} channels; 1 to {MOST_CHANNELS} can be read")
+        if spread == "Multi":
+            use, titles = list(range(1, 2 * n_channels, 2)), columns[1::2]
+        else:  # "No" and "One": the first column is the time, or empty
+            use, titles = list(range(1, 1 + n_channels)), columns[1:]
+        decimal = common.get("Decimal_Separator", ["."])[0]
+        values = _numbers(rows, separator, use, decimal == ",", path)
+        stated = head.get("Y_Unit_Label") or []
+        channel = tuple((titles[i] if i < len(titles) else f"channel {i + 1}") for i in range(n_channels))
+        unit = tuple(stated[i] if i < len(stated) else "" for i in range(n_channels))
+        if first is not None and channel != first[0]:
+            raise ValueError(f"{path.name} has other channels in segment {len(segments) + 1} than in segment 1")
+        first = first or (channel, unit)
+        segments.append(values)
+        steps = head.get("Delta_X") or []
+        if steps and steps[0]:
+            step = float(steps[0].replace(",", "."))
+            rates.append(1.0 / step if step > 0.0 else np.nan)
+    if first is None:
+        raise ValueError(f"{path.name} holds a header but no samples")
+    if rates and not np.allclose(rates, rates[0], rtol=1e-6):
+        raise ValueError(f"{path.name} has segments of different rates, {min(rates):g} and {max(rates):g} Hz")
+    return Recording(tuple(segments), *first, _round_rate(rates[0]) if rates else None)
+
+
+def _end_of_header(lines: list[str], start: int, path: Path) -> int:
+    for i in range(start, len(lines)):
+        if lines[i].startswith(END_OF_HEADER):
+            return i
+    raise ValueError(f"{path.name} has no line {END_OF_HEADER}; it may be cut off")
+
+
+def _header(lines: list[str], separator: str) -> dict[str, list[str]]:
+    """Keys and values of a LabVIEW header."""
+    rows = (line.split(separator) for line in lines)
+    return {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows if row and row[0].strip()}
+
+
+def _labview_segments(lines: list[str], separator: str, path: Path) -> Iterator[tuple[dict, list[str], list[str]]]:
+    """Header, headings and rows of every segment."""
+    i = _end_of_header(lines, 0, path) + 1
+    while i < len(lines):
+        if lines[i].startswith("***Start_Special***"):
+            while i < len(lines) and not lines[i].startswith("***End_Special***"):
+                i += 1
+            i += 1
+        elif lines[i].split(separator)[0].strip() == "Channels":
+            end = _end_of_header(lines, i, path)
+            head = _header(lines[i:end], separator)
+            names = [name.strip() for name in lines[end + 1].split(separator)] if end + 1 < len(lines) else []
+            i = end + 2
+            start = i
+            while i < len(lines) and lines[i].strip() and not lines[i].startswith(("Channels", "***")):
+                i += 1
+            if i > start:
+                yield head, names, lines[start:i]
+        else:
+            i += 1
+
+
+def _numbers(rows: list[str], separator: str | None, use: list[int], comma: bool, path: Path) -> np.ndarray:
+    """Columns ``use`` of rows of text as floats (n_samples, n_columns)."""
+    rows = [row.replace(",", ".") for row in rows] if comma else rows
+    try:
+        return np.loadtxt(rows, delimiter=separator, usecols=use, ndmin=2, comments=None)
+    except (ValueError, IndexError) as error:
+        for i, row in enumerate(rows):
+            cells = row.split(separator)
+            if max(use) >= len(cells) or not all(_number(cells[k], False) for k in use):
+                raise ValueError(
+                    f"{path.name} has a row without {len(use)} numbers, {i + 1} rows into a segment: {row[:60]!r}"
+                ) from None
+        raise ValueError(f"{path.name} cannot be read as numbers: {error}") from None
+
+
+def _round_rate(rate: float) -> float:
+    """A rate as it was set: times are written with few digits."""
+    near = round(rate, 1)
+    return float(near) if abs(near - rate) < 1e-5 * rate else float(rate)
+
+
+def table(path: Path) -> Recording:
+    """A text table: tabs, semicolons, commas or blanks between numbers, points or commas in them, headings or none."""
+    lines = [line for line in _text(path) if line.strip() and not line.lstrip().startswith(("#", "%", "//"))]
+    for separator, comma in (("\t", False), ("\t", True), (";", False), (";", True), (",", False), (None, False),
+                             (None, True)):  # fmt: skip
+        start = _first_row(lines, separator, comma)
+        if start is not None:
+            break
+    else:
+        raise ValueError(f"{path.name} has no rows of numbers in its first {HEADER_LINES} lines")
+    width = len(_cells(lines[start], separator))
+    if width > MOST_CHANNELS:
+        raise ValueError(f"{path.name} has {width} columns; at most {MOST_CHANNELS} can be read")
+    heads = [_cells(line, separator) for line in lines[:start]]
+    heads = [cells for cells in heads if len(cells) == width and any(cells)]
+    names, unit = [f"column {i + 1}" for i in range(width)], [""] * width
+    if heads:
+        if len(heads) > 1 and sum(units.known(cell.strip("[]() ")) is not None for cell in heads[-1]) > 0:
+            names, unit = heads[-2], [cell.strip("[]() ") for cell in heads[-1]]
+        else:
+            names, unit = map(list, zip(*map(units.label, heads[-1])))
+    values = _numbers(lines[start:], separator, list(range(width)), comma, path)
+    return _timed(path, values, names, unit, bool(heads))
+
+
+def _cells(line: str, separator: str | None) -> list[str]:
+    cells = [cell.strip().strip('"') for cell in line.split(separator)]
+    return cells[:-1] if len(cells) > 1 and not cells[-1] else cells
+
+
+def _number(text: str, comma: bool) -> bool:
+    try:
+        float(text.replace(",", ".") if comma else text)
+    except ValueError:
+        return False
+    return True
+
+
+def _first_row(lines: list[str], separator: str | None, comma: bool) -> int | None:
+    """The first of three rows of numbers in a row; None if there is none."""
+    good = 0
+    for i, line in enumerate(lines[: HEADER_LINES + 3]):
+        cells = _cells(line, separator)
+        good = good + 1 if all(_number(cell, comma) for cell in cells) and (separator is None or len(cells) > 1) else 0
+        if good == 3:
+            return i - 2
+    return None
+
+
+def _timed(path: Path, values: np.ndarray, names: list[str], unit: list[str], headed: bool) -> Recording:
+    """The channels of a table; a column of times becomes the rate."""
+    time = [i for i, name in enumerate(names) if name.strip().lower() in TIME_NAMES]
+    notes: tuple[str, ...] = ()
+    if not time and not headed and values.shape[1] > 1 and (np.diff(values[:, 0]) > 0.0).all():
+        time, notes = [0], ("the first column ascends and was taken as time in s",)
+    if not time:
+        return Recording((values,), tuple(names), tuple(unit), None, notes)
+    i = time[0]
+    factor = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6}.get(unit[i], 1.0)
+    rate = _rate(path, factor * values[:, i])
+    keep = [k for k in range(len(names)) if k != i]
+    return Recording((values[:, keep],), tuple(names[k] for k in keep), tuple(unit[k] for k in keep), rate, notes)
+
+
+def _rate(path: Path, time: np.ndarray) -> float:
+    """The rate [Hz] of evenly spaced times; rounding of the written digits is allowed."""
+    if len(time) < 2 or not np.isfinite(time).all() or time[-1] <= time[0]:
+        raise ValueError(f"{path.name} has times that do not ascend; give the channels without them, and rate=")
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    away = np.abs(time - time[0] - step * np.arange(len(time)))
+    spread = float(np.ptp(np.diff(time)))  # times written with few digits differ by one unit of the last
+    if away.max() > np.clip(0.6 * spread / step, *UNEVEN) * step:
+        k = int(away.argmax())
+        raise ValueError(
+            f"{path.name} is not evenly sampled: sample {k + 1} is {away[k]:.2g} s off a step of {step:.3g} s"
+        )
+    return _round_rate(1.0 / step)
+
+
+def _columns(path: Path, found: dict[str, np.ndarray]) -> Recording:
+    """Named arrays as channels: (n_samples,), or (n_taps, n_samples) with the longer axis in time."""
+    rate, notes, channels = None, [], {}
+    for name, value in found.items():
+        low = name.rsplit(".", 1)[-1].lower()
+        if value.dtype.kind not in "iuf" or not value.size:
+            continue
+        if value.size == 1:
+            if low in RATE_NAMES:
+                rate = float(value.ravel()[0])
+            elif low in STEP_NAMES and value.ravel()[0] > 0.0:
+                rate = _round_rate(1.0 / float(value.ravel()[0]))
+        elif low in TIME_NAMES:
+            rate = _rate(path, np.asarray(value, float).reshape(-1, value.shape[-1])[0])
+        else:
+            channels[name] = np.squeeze(np.asarray(value, float))
+    if not channels:
+        raise ValueError(f"{path.name} holds no arrays of samples")
+    longest = max(max(value.shape) for value in channels.values())
+    kept = {}
+    for name, value in channels.items():
+        if value.ndim > 2 or longest not in value.shape:
+            notes.append(f"{name} has shape {value.shape} and was left out")
+            continue
+        kept[name] = np.atleast_2d(value if value.shape[-1] == longest else value.T)
+    n_taps = max(len(value) for value in kept.values())
+    single = len(kept) == 1 and n_taps > 1 and not units.FORCE_NAMES.search(next(iter(kept)))
+    if single:  # one array of several channels
+        (name, rows), n_taps = next(iter(kept.items())), 1
+        if len(rows) > MOST_CHANNELS:
+            raise ValueError(f"{path.name} holds an array of shape {rows.shape}; give channels by time")
+        kept = {f"{name} {i + 1}": row[None] for i, row in enumerate(rows)}
+        notes.append(f"the rows of {name} were taken as {len(rows)} channels")
+    for name in [name for name, value in kept.items() if len(value) != n_taps]:
+        notes.append(f"{name} has {len(kept.pop(name))} rows instead of {n_taps} and was left out")
+    segments = tuple(np.column_stack([value[i] for value in kept.values()]) for i in range(n_taps))
+    return Recording(segments, tuple(kept), ("",) * len(kept), rate, tuple(notes))
+
+
+def numpy_file(path: Path) -> Recording:
+    """An .npy array, or an .npz of named arrays with ``rate``, ``dt`` or ``time`` among them."""
+    loaded = np.load(path, allow_pickle=False)
+    if isinstance(loaded, np.ndarray):
+        return _columns(path, {"array": loaded})
+    return _columns(path, {name: loaded[name] for name in loaded.files})
+
+
+def matlab(path: Path) -> Recording:
+    """A MATLAB file up to version 7; structures are opened one level deep."""
+    from scipy.io import loadmat
+
+    with path.open("rb") as file:
+        if file.read(16).startswith(b"MATLAB 7.3"):
+            raise ValueError(f"{path.name} is a MATLAB 7.3 file; save it with '-v7' and try again")
+    found: dict[str, np.ndarray] = {}
+    for name, value in loadmat(path, simplify_cells=True).items():
+        if name.startswith("__"):
+            continue
+        for key, each in value.items() if isinstance(value, dict) else [(None, value)]:
+            found[name if key is None else f"{name}.{key}"] = np.asarray(each)
+    return _columns(path, found)
+
+
+def wav(path: Path) -> Recording:
+    """A WAV file; integers become parts of full scale."""
+    from scipy.io import wavfile
+
+    rate, values = wavfile.read(path)
+    if values.dtype.kind in "iu":
+        low, high = np.iinfo(values.dtype).min, np.iinfo(values.dtype).max
+        values = (values.astype(float) - 0.5 * (low + high + 1)) / (0.5 * (float(high) - low + 1))
+    values = np.asarray(values, float).reshape(len(values), -1)
+    names = tuple(f"channel {i + 1}" for i in range(values.shape[1]))
+    return Recording((values,), names, ("full scale",) * len(names), float(rate))
+
+
+def _universal(head: bytes) -> bool:
+    lines = head.replace(b"\r", b"").split(b"\n")
+    return len(lines) > 1 and lines[0].strip() == b"-1" and lines[1].strip()[:2].isdigit()
+
+
+def universal(path: Path) -> Recording:
+    """Time records in data set 58 of a universal file; the second record of a channel begins a new segment."""
+    import pyuff
+
+    file = pyuff.UFF(str(path))
+    kinds = [int(kind) for kind in file.get_set_types()]
+    sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
+    sets = [one for one in sets if int(one.get("func_type", 0)) == TIME_RESPONSE]
+    if not sets:
+        raise ValueError(f"{path.name} holds no time records (data set 58, function type 1); its data sets are {kinds}")
+    channels: dict[tuple[Any, ...], list[np.ndarray]] = {}
+    rates, unit = [], {}
+    for one in sets:
+        key = (str(one.get("id1", "")).strip(), int(one.get("rsp_node", 0)), int(one.get("rsp_dir", 0)))
+        channels.setdefault(key, []).append(np.real(np.asarray(one["data"])).astype(float))
+        code = int(one.get("ordinate_spec_data_type", 0))
+        stated = str(one.get("ordinate_axis_units_lab") or "").strip()
+        unit[key] = stated if units.known(stated) else UFF_UNITS.get(code, "" if stated == "NONE" else stated)
+        step = float(one.get("abscissa_inc") or 0.0)
+        rates.append(1.0 / step if step > 0.0 else _rate(path, np.asarray(one["x"], float)))
+    if not np.allclose(rates, rates[0], rtol=1e-6):
+        raise ValueError(f"{path.name} has records of different rates, {min(rates):g} and {max(rates):g} Hz")
+    count = min(len(records) for records in channels.values())
+    length = [min(len(records[i]) for records in channels.values()) for i in range(count)]
+    segments = tuple(np.column_stack([records[i][: length[i]] for records in channels.values()]) for i in range(count))
+    names = tuple(name if name and name != "NONE" else f"node {node} direction {way}" for name, node, way in channels)
+    return Recording(segments, names, tuple(unit[key] for key in channels), _round_rate(rates[0]))

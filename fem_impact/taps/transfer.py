@@ -1,0 +1,329 @@
+"""Frequency responses of measured taps, those of modes at many points, and measured modes beside computed ones."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.optimize import linear_sum_assignment
+
+from .._base import check, isolated, markup
+from .._base.files import replacing
+from ..modes.modal import Modes
+from .fit import joined
+from .records import Taps
+
+METHODS = ("H1", "H2")
+MOST_TIMES = 2**24  # [-] samples of a transform
+TAPER = 0.25  # [-] of the force window that falls as a cosine, so that no edge is heard
+QUANTITIES = {"receptance": 0, "mobility": 1, "accelerance": 2}  # -> powers of i omega
+FREQUENCY_WEIGHT = 1.0  # [-] of a relative frequency difference of 100 % beside 1 - MAC when modes are paired
+UNITS = {"m/s^2": "accelerance", "m/s": "mobility", "m": "receptance"}
+FUNCTION, RESPONSE_CODE = 4, {"m/s^2": 12, "m/s": 11, "m": 8}  # codes of data set 58
+
+
+def frf(
+    records: Any,
+    *,
+    method: str = "H1",
+    force_window: float | None = None,
+    response_window: float | None = None,
+    n_times: int | None = None,
+) -> xr.Dataset:
+    """Frequency responses of a structure from taps, averaged.
+
+    Parameters
+    ----------
+    records : Taps or sequence of Taps, with responses
+    method : "H1" or "H2"
+        H1 holds for noise in the response, H2 for noise in the force.
+    force_window : float [s], optional
+        The force counts for this time from a tenth of it before the tap on; its last quarter falls as a cosine.
+    response_window : float [s], optional
+        Time constant of an exponential window over force and response; it adds 1 / (omega time) to the damping ratio
+        of every mode, which the caller takes off.
+    n_times : int, optional
+        Samples of the transform: more than the record pads it with zeros.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``H`` (frequency, channel), complex, in the response's unit per N; ``coherence`` (frequency, channel);
+        ``force`` (frequency), the mean amplitude spectrum [N s]; attributes ``averages``, ``method``, ``rate``.
+
+    References
+    ----------
+    ISO 7626-5; Bendat and Piersol, Random Data, chapter 6.
+
+    Examples
+    --------
+    >>> rod = fi.Modes.from_arrays([0.0, 700.0], [[1.0, 1.0]], points=[[0.0]], mass=1.0, damping_ratio=0.02)
+    >>> hit = fi.strike(rod, fi.Striker.rigid(0.02), fi.Contact.linear(1e5), at=[0.0], speed=1.0)
+    >>> tap = fi.measure(hit, rate=25600.0, at=[[0.0]], duration=0.5)
+    >>> found = fi.frf(tap)
+    >>> peak = np.abs(found.H.values[:, 0]).argmax()
+    >>> round(float(found.frequency.values[peak]))  # Hz
+    700
+    """
+    taps = joined(records, "records")
+    check.one_of("method", method, METHODS)
+    if not taps.response.shape[2]:
+        raise ValueError("records must have a response channel; read them with response=")
+    force, response = taps.force.copy(), taps.response.copy()
+    time, onset = taps.time, taps.onset
+    if force_window is not None:
+        force *= _force_window(time, onset, check.positive("force_window", force_window, "s"))
+    if response_window is not None:
+        tau = check.positive("response_window", response_window, "s")
+        fade = np.exp(-np.maximum(time - onset[:, None], 0.0) / tau)
+        force, response = force * fade, response * fade[:, :, None]
+    count = len(time) if n_times is None else check.count("n_times", n_times, low=2, high=MOST_TIMES)
+    F = np.fft.rfft(force, count, axis=1)[:, :, None] / taps.rate  # (n_taps, n_frequencies, 1)
+    X = np.fft.rfft(response, count, axis=1) / taps.rate
+    ff, xx, xf = (np.abs(F) ** 2).mean(0), (np.abs(X) ** 2).mean(0), (X * F.conj()).mean(0)
+    tiny = np.finfo(float).tiny
+    H = xf / np.maximum(ff, tiny) if method == "H1" else xx / np.where(xf == 0.0, tiny, xf.conj())
+    coherence = np.abs(xf) ** 2 / np.maximum(ff * xx, tiny)
+    return xr.Dataset(
+        {
+            "H": (("frequency", "channel"), H),
+            "coherence": (("frequency", "channel"), np.clip(coherence, 0.0, 1.0)),
+            "force": ("frequency", np.sqrt(ff[:, 0]), {"units": "N s"}),
+        },
+        {
+            "frequency": ("frequency", np.fft.rfftfreq(count, 1.0 / taps.rate), {"units": "Hz"}),
+            "channel": taps.table["channel"].values,
+            "units": ("channel", [f"{unit}/N" for unit in taps.units]),
+        },
+        {
+            "averages": taps.n_taps, "method": method, "rate": taps.rate,
+            "added_damping": 0.0 if response_window is None else 1.0 / response_window,
+        },
+    )  # fmt: skip
+
+
+def _force_window(time: np.ndarray, onset: np.ndarray, length: float) -> np.ndarray:
+    """One around every tap, zero elsewhere, (n_taps, n_times)."""
+    x = (time - onset[:, None]) / length
+    fall = np.clip((x - (1.0 - TAPER)) / TAPER, 0.0, 1.0)
+    return np.where(x < -0.1, 0.0, 0.5 + 0.5 * np.cos(np.pi * fall))
+
+
+@check.typed
+def functions(modes: Modes, at: Any, to: Any, frequencies: Any, quantity: str = "mobility") -> np.ndarray:
+    """Motion at many points per unit force at many points, over frequency.
+
+    Parameters
+    ----------
+    modes : Modes
+    at : array_like, (n_forces, dimension) [m]
+    to : array_like, (n_points, dimension) [m]
+    frequencies : array_like, (n_frequencies,) [Hz], positive
+    quantity : "receptance", "mobility" or "accelerance"
+
+    Returns
+    -------
+    ndarray, shape (n_frequencies, n_points, n_forces), complex [m/N], [m/(N s)] or [m/(N s^2)]
+        The kept modes are summed; the others act by their residual compliance.
+    """
+    power = QUANTITIES[check.one_of("quantity", quantity, QUANTITIES)]
+    frequency = check.array("frequencies", frequencies, (None,), "Hz", lift=True)
+    if (frequency <= 0.0).any():
+        raise ValueError(f"frequencies must be positive, got {frequency.min():g} Hz")
+    forces, places = modes.points("at", at), modes.points("to", to)
+    struck, moved = modes.shape_at(forces), modes.shape_at(places)  # (n_forces, n_modes), (n_points, n_modes)
+    omega = 2.0 * np.pi * frequency[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = 1.0 / (modes.omega**2 - omega**2 + 2j * modes.damping_ratio * modes.omega * omega)
+    rest = np.zeros((len(places), len(forces)))
+    if modes.dimension:
+        both = np.vstack([forces, places])
+        rest = modes.residual_compliance(both)[len(forces) :, : len(forces)]
+    total = np.einsum("fm,pm,am->fpa", factor, moved, struck) + rest
+    return total * (1j * omega[:, :, None]) ** power
+
+
+def mac(first: Any, second: Any) -> np.ndarray:
+    """Modal assurance criterion of shapes (n_points, n_first) and (n_points, n_second), (n_first, n_second) [-].
+
+    References
+    ----------
+    Allemang and Brown (1982), Proc. 1st IMAC, 110-116.
+
+    Examples
+    --------
+    >>> fi.mac([[1.0, 1.0], [1.0, -1.0]], [[2.0, 1.0], [2.0, 0.0]]).tolist()
+    [[1.0, 0.5], [0.0, 0.5]]
+    """
+    one, two = _shapes("first", first), _shapes("second", second)
+    if len(one) != len(two):
+        raise ValueError(f"first and second must be shapes at the same points, got {one.shape} and {two.shape}")
+    cross = np.abs(one.conj().T @ two) ** 2
+    sizes = np.outer((np.abs(one) ** 2).sum(axis=0), (np.abs(two) ** 2).sum(axis=0))
+    return cross / np.maximum(sizes, np.finfo(float).tiny)
+
+
+def _shapes(name: str, value: Any) -> np.ndarray:
+    """Real or complex shapes (n_points, n_modes), finite."""
+    try:
+        found = np.asarray(value)
+    except ValueError:
+        found = np.zeros(0, object)
+    if found.dtype.kind not in "iufc" or found.ndim != 2 or not (np.abs(found) <= check.REACH).all():
+        raise ValueError(f"{name} must be finite shapes (n_points, n_modes), got {check.shown(value)}")
+    return found
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A measured mode and the computed one that belongs to it."""
+
+    measured: int
+    computed: int
+    measured_frequency: float  # [Hz]
+    computed_frequency: float  # [Hz]
+    mac: float | None  # [-] None without shapes
+
+    @property
+    def difference(self) -> float:
+        """Computed over measured frequency, less one [-]."""
+        return self.computed_frequency / self.measured_frequency - 1.0
+
+
+def matched(measured: Any, computed: Any, *, points: Any = None) -> tuple[Pair, ...]:
+    """Pairs of measured and computed modes, in order of the measured frequencies.
+
+    Parameters
+    ----------
+    measured : Modes, or array_like of frequencies (n_measured,) [Hz]
+    computed : Modes, or array_like of frequencies (n_computed,) [Hz]
+    points : array_like, (n_points, dimension) [m], optional
+        Where both shapes are compared, for two `Modes`; by default the points of the measured ones. With shapes, modes
+        are paired by MAC and frequency together; without, by frequency in ascending order.
+
+    Examples
+    --------
+    >>> pairs = fi.matched([100.0, 310.0], [99.0, 205.0, 300.0])
+    >>> [(pair.computed, round(100 * pair.difference, 1)) for pair in pairs]  # number, %
+    [(0, -1.0), (2, -3.2)]
+    """
+    one, two = (
+        x.frequencies if isinstance(x, Modes) else check.ascending(name, x, "Hz")
+        for name, x in (("measured", measured), ("computed", computed))
+    )
+    if not len(one) or len(two) < len(one):
+        raise ValueError(f"computed must have at least the {len(one)} modes of measured, got {len(two)}")
+    gap = np.abs(np.log(np.maximum(two, 1e-300) / np.maximum(one[:, None], 1e-300)))
+    if isinstance(measured, Modes) and isinstance(computed, Modes):
+        place = measured.shapes.grid()[0] if points is None else points
+        likeness = mac(measured.shape_at(place), computed.shape_at(place))
+        rows, columns = linear_sum_assignment(1.0 - likeness + FREQUENCY_WEIGHT * np.minimum(gap, 10.0))
+        values: list[float | None] = [float(likeness[i, j]) for i, j in zip(rows, columns)]
+    else:
+        rows, columns = np.arange(len(one)), _in_order(gap)
+        values = [None] * len(one)
+    return tuple(
+        Pair(int(i), int(j), float(one[i]), float(two[j]), value) for i, j, value in zip(rows, columns, values)
+    )
+
+
+def _in_order(gap: np.ndarray) -> np.ndarray:
+    """Ascending columns that make the sum of a table (n_rows, n_columns) smallest, by dynamic programming."""
+    n, m = gap.shape
+    best = np.full((n + 1, m + 1), np.inf)
+    best[0] = 0.0
+    for i in range(1, n + 1):
+        for j in range(i, m + 1):
+            best[i, j] = min(best[i, j - 1], best[i - 1, j - 1] + gap[i - 1, j - 1])
+    columns, j = np.zeros(n, int), m
+    for i in range(n, 0, -1):
+        while j > i and best[i, j - 1] <= best[i, j]:
+            j -= 1
+        columns[i - 1] = j = j - 1
+    return columns
+
+
+def table(pairs: tuple[Pair, ...]) -> str:
+    """The pairs as text."""
+    rows = [
+        (pair.measured + 1, f"{pair.measured_frequency:.5g} Hz", pair.computed + 1, f"{pair.computed_frequency:.5g} Hz",
+         f"{100.0 * pair.difference:+.2f} %", "" if pair.mac is None else f"{pair.mac:.3f}")
+        for pair in pairs
+    ]  # fmt: skip
+    return "\n".join(markup.columns(rows, ("measured", "", "computed", "", "difference", "MAC")))
+
+
+def write_uff(path: str | Path, data: Taps | xr.Dataset) -> None:
+    """Write taps (time records) or frequency responses of `frf` to data sets 58 of a universal file; needs pyuff."""
+    pyuff = check.extra("pyuff", "uff", "a universal file")
+    sets = _time_sets(data) if isinstance(data, Taps) else _function_sets(data)
+    with replacing(path) as temporary:
+        pyuff.UFF(str(temporary)).write_sets(sets, mode="overwrite")
+
+
+def _set(name: str, number: int, x: np.ndarray, values: np.ndarray, **codes: Any) -> dict[str, Any]:
+    return {
+        "type": 58, "binary": 0, "id1": name[:60], "id2": "NONE", "id3": "NONE", "id4": "NONE", "id5": "NONE",
+        "ver_num": 0, "load_case_id": 0, "rsp_ent_name": "NONE", "rsp_node": number, "rsp_dir": 3,
+        "ref_ent_name": "NONE", "ref_node": 1, "ref_dir": 3, "num_pts": len(x), "abscissa_spacing": 1,
+        "abscissa_min": float(x[0]), "abscissa_inc": float(x[-1] - x[0]) / (len(x) - 1), "z_axis_value": 0.0,
+        "orddenom_spec_data_type": 0, "x": x, "data": values, **codes,
+    }  # fmt: skip
+
+
+def _time_sets(taps: Taps) -> list[dict[str, Any]]:
+    codes = {"func_type": 1, "ord_data_type": 4, "abscissa_spec_data_type": 17}
+    sets = []
+    for i in range(taps.n_taps):
+        sets.append(_set("force", 1, taps.time, taps.force[i], ordinate_spec_data_type=13, **codes))
+        for k, (name, unit) in enumerate(zip(taps.table["channel"].values, taps.units)):
+            code = RESPONSE_CODE[unit]
+            sets.append(
+                _set(str(name), k + 2, taps.time, taps.response[i, :, k], ordinate_spec_data_type=code, **codes)
+            )
+    return sets
+
+
+def _function_sets(data: xr.Dataset) -> list[dict[str, Any]]:
+    codes = {"func_type": FUNCTION, "ord_data_type": 6, "abscissa_spec_data_type": 18}
+    frequency, sets = data["frequency"].values, []
+    for k, name in enumerate(data["channel"].values):
+        unit = str(data["units"].values[k]).removesuffix("/N")
+        made = _set(
+            str(name), k + 2, frequency, data["H"].values[:, k], ordinate_spec_data_type=RESPONSE_CODE[unit], **codes
+        )
+        sets.append(made | {"orddenom_spec_data_type": 13})
+    return sets
+
+
+def read_frf(path: Any) -> xr.Dataset:
+    """Read the frequency responses (data set 58, function type 4) of a universal file, as `frf` returns them."""
+    found = isolated.read(check.path("path", path), "frequency responses", "taps.transfer:arrays")
+    coords = {"frequency": ("frequency", found["frequency"], {"units": "Hz"}), "channel": found["names"].astype(str)}
+    coords["units"] = ("channel", found["units"].astype(str))
+    return xr.Dataset({"H": (("frequency", "channel"), found["H"])}, coords)
+
+
+def arrays(path: Path) -> dict[str, np.ndarray]:
+    """The result of `read_frf` as arrays, for the separate process."""
+    import pyuff
+
+    file = pyuff.UFF(str(path))
+    kinds = [int(kind) for kind in file.get_set_types()]
+    sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
+    sets = [one for one in sets if int(one.get("func_type", 0)) == FUNCTION]
+    if not sets:
+        raise ValueError(f"{path.name} holds no frequency responses (data set 58, function type 4)")
+    length = min(len(one["data"]) for one in sets)
+    units = {code: unit for unit, code in RESPONSE_CODE.items()}
+    names = [str(one.get("id1", "")).strip() or f"node {one.get('rsp_node')}" for one in sets]
+    columns = np.column_stack([np.asarray(one["data"], complex)[:length] for one in sets])
+    if not np.isfinite(columns).all():
+        raise ValueError(f"{path.name} holds values that are no finite numbers; export it again")
+    return {
+        "frequency": np.asarray(sets[0]["x"], float)[:length],
+        "H": columns,
+        "names": np.array([check.line(name) for name in names], dtype=str),
+        "units": np.array([f"{units.get(int(one.get('ordinate_spec_data_type', 12)), 'm/s^2')}/N" for one in sets]),
+    }

@@ -1,0 +1,37 @@
+"""Units of measured channels, and what they are in SI."""
+
+import re
+
+FORCE = {
+    "N": 1.0, "newton": 1.0, "newtons": 1.0, "kN": 1e3, "mN": 1e-3, "lbf": 4.4482216152605, "lb": 4.4482216152605,
+    "kgf": 9.80665, "kp": 9.80665, "dyn": 1e-5,
+}  # fmt: skip
+ACCELERATION = {
+    "m/s^2": 1.0, "m/s2": 1.0, "m/s²": 1.0, "m/s**2": 1.0, "m*s^-2": 1.0, "ms-2": 1.0, "g": 9.80665, "gn": 9.80665,
+    "mm/s^2": 1e-3, "in/s^2": 0.0254, "ft/s^2": 0.3048,
+}  # fmt: skip
+VELOCITY = {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "µm/s": 1e-6, "in/s": 0.0254}
+DISPLACEMENT = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
+KINDS = {"N": FORCE, "m/s^2": ACCELERATION, "m/s": VELOCITY, "m": DISPLACEMENT}  # SI unit -> factors
+FORCE_NAMES = re.compile(r"force|hammer|kraft|excit|\bexc\b|input|^f$", re.IGNORECASE)
+RESPONSE_NAMES = re.compile(r"accel|resp|veloc|displ|vibro|^a\d*$|^acc", re.IGNORECASE)
+LABEL = re.compile(r"^(.*?)\s*[\[(]([^\])]*)[\])]\s*$")  # "Force [N]", "Force (N)"
+
+
+def known(unit: str) -> tuple[str, float] | None:
+    """The SI unit of a unit's kind, and the factor to it; None for a unit that is not known."""
+    text = unit.strip().replace("μ", "µ")
+    for fold in (str, str.casefold):  # "mN" and "MN" differ, so the exact spelling comes first
+        for si, factors in KINDS.items():
+            for name, factor in factors.items():
+                if fold(name) == fold(text):
+                    return si, factor
+    return None
+
+
+def label(text: str) -> tuple[str, str]:
+    """Name and unit of a heading such as "Force [N]"; a bracket that holds no unit stays in the name."""
+    found = LABEL.match(text.strip())
+    if found and (known(found[2]) or found[2].strip() in ("V", "s", "ms", "-")):
+        return found[1].strip(), found[2].strip()
+    return text.strip(), ""

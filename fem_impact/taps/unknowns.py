@@ -1,0 +1,207 @@
+"""What a fit does not know: names, ranges, and the blow that values of them make."""
+
+import dataclasses
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.special import gamma
+
+from .._base import check
+from ..impact.contact import Contact, wall_time
+from ..impact.striker import Striker
+from ..modes.modal import Modes
+from . import arguments, blows
+from .rig import Rig
+
+STRIKER = ("mass", "first_frequency", "mode_ratio", "damping", "tip_mass")
+TARGET = ("mass", "first_frequency", "damping", "x", "y")
+MODE = ("frequency", "mass", "damping", "gain")
+MOST_MODES = 6  # [-] of an unknown target
+DAMPING = 0.02  # [-] of unknown modes, unless it is unknown too
+RATIO = 1.0  # [-] mode ratio of a striker, unless it is unknown too: two equal masses and a spring
+NAME = re.compile(r"(contact|striker|target|mode\d)\.(\w+)")
+UNITS = {
+    "stiffness": "N/m**exponent", "exponent": "", "loss": "s/m", "mass": "kg", "first_frequency": "Hz",
+    "mode_ratio": "", "damping": "", "tip_mass": "kg", "x": "m", "y": "m", "frequency": "Hz", "gain": "",
+}  # fmt: skip
+TIME = "contact.time"  # the coordinate that stands for the stiffness while fitting [s]
+
+
+def unit_of(name: str) -> str:
+    """The unit of an unknown, for messages and tables."""
+    return "m/s" if name.startswith("speed") else UNITS.get(name.rpartition(".")[2], "s" if name == TIME else "")
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number to be found between two bounds; by its logarithm if both are positive."""
+
+    name: str
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        low, high = check.array(f"unknown[{self.name!r}]", (self.low, self.high), (2,), unit_of(self.name)).tolist()
+        if not low < high:
+            raise ValueError(f"unknown[{self.name!r}] must be a range (low, high), got ({low:g}, {high:g})")
+        check.settle(self, low=low, high=high)
+
+    @property
+    def log(self) -> bool:
+        return self.low > 0.0
+
+    @property
+    def floor(self) -> bool:
+        """Whether the lower bound is a natural limit: what is never negative may be zero."""
+        return self.low == 0.0
+
+    def inside(self, value: Any) -> Any:
+        """Coordinate of a value: its logarithm, or its part of the range."""
+        return np.log(value) if self.log else (np.asarray(value) - self.low) / (self.high - self.low)
+
+    def outside(self, x: Any) -> Any:
+        """Value of a coordinate."""
+        return np.exp(x) if self.log else self.low + np.asarray(x) * (self.high - self.low)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Bounds of the coordinate."""
+        return float(self.inside(self.low)), float(self.inside(self.high))
+
+
+def checked(
+    unknown: Mapping[str, Any], target: Modes | None, striker: Striker, contact: Contact
+) -> tuple[Unknown, ...]:
+    """The unknowns by name; ValueError for a name that nothing here has."""
+    given = arguments.ranges("unknown", unknown)
+    contacts = [field.name for field in dataclasses.fields(contact) if field.type in ("float", float)]
+    modes = sorted({int(name[4]) for name in unknown if re.match(r"mode\d\.", str(name))})
+    known = [f"contact.{name}" for name in contacts] + [f"striker.{name}" for name in STRIKER]
+    known += [f"target.{name}" for name in TARGET if target is not None or name == "mass"]
+    known += [f"mode{i}.{name}" for i in range(1, MOST_MODES + 1) for name in MODE]
+    found = []
+    for name, limits in given.items():
+        check.one_of("unknown", name, known)
+        found.append(Unknown(name, *limits))
+        if name.endswith((".stiffness", ".exponent", ".frequency", "mass", "first_frequency")) and found[-1].low < 0.0:
+            raise ValueError(f"unknown[{name!r}] must not reach below zero, got {limits[0]:g} {unit_of(name)}")
+        if name.endswith((".stiffness", ".exponent", ".frequency", "first_frequency", "r.mass", "t.mass")) and not (
+            found[-1].log
+        ):
+            raise ValueError(f"unknown[{name!r}] must begin above zero, got {limits[0]:g} {unit_of(name)}")
+    for i in modes:
+        for part in ("frequency", "mass"):
+            if f"mode{i}.{part}" not in unknown:
+                raise ValueError(f"unknown must hold mode{i}.{part} too: a mode needs a frequency and a modal mass")
+    if modes != list(range(1, len(modes) + 1)):
+        raise ValueError(f"unknown must number its modes from 1, got {modes}")
+    if striker.modes.n_modes > 1:
+        for part in ("mode_ratio", "damping"):
+            if f"striker.{part}" in unknown and part == "mode_ratio":
+                raise ValueError("unknown striker.mode_ratio is for a rigid striker; this one has modes of its own")
+    elif "striker.first_frequency" not in unknown and {"striker.mode_ratio", "striker.damping"} & set(unknown):
+        raise ValueError("unknown must hold striker.first_frequency too: the striker given is rigid")
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What is known of a blow, and what is not."""
+
+    target: Modes | None  # None: a wall, or a target of unknown modes only
+    at: Any
+    striker: Striker
+    contact: Contact
+    rig: Rig
+    unknown: tuple[Unknown, ...]
+    points: Any  # (n_points, dimension) [m] where the response is measured; None without a known target
+    n_points: int
+    impulse: float  # [N s] of a typical tap: sets the speed at which the contact time is stated
+
+    __repr__ = check.brief
+
+    def bodies(self, values: Mapping[str, float]) -> tuple[blows.Pair, float]:
+        """Both bodies and the contact that the values make, and the mass of the tip [kg]."""
+        striker = self.hammer(values)
+        target = self.structure(values)
+        changed = {
+            name.partition(".")[2]: float(value)
+            for name, value in values.items()
+            if name.startswith("contact.") and name != TIME
+        }
+        return blows.pair(striker, target, replace(self.contact, **changed)), values.get(
+            "striker.tip_mass", self.rig.tip_mass
+        )
+
+    @cached_property
+    def _hammer(self) -> blows.Body:
+        return blows.of_striker(self.striker)
+
+    @cached_property
+    def _structure(self) -> blows.Body:
+        return blows.of_target(self.target, self.at, self.points)  # type: ignore[arg-type]
+
+    def hammer(self, values: Mapping[str, float]) -> blows.Body:
+        """The striker with its unknowns."""
+        part = {name: values.get(f"striker.{name}") for name in STRIKER}
+        body = self._hammer
+        if self.striker.modes.n_modes > 1:
+            return body.scaled(part["mass"], part["first_frequency"], part["damping"])
+        body = body.scaled(part["mass"], None, None)
+        if part["first_frequency"] is None:
+            return body
+        ratio = RATIO if part["mode_ratio"] is None else part["mode_ratio"]
+        damping = DAMPING if part["damping"] is None else part["damping"]
+        return body.with_mode(part["first_frequency"], body.felt_mass / ratio, damping, np.zeros(0))
+
+    def structure(self, values: Mapping[str, float]) -> blows.Body:
+        """The struck body with its unknowns."""
+        part = {name: values.get(f"target.{name}") for name in TARGET}
+        if self.target is None:
+            body = blows.wall(self.n_points)
+            if part["mass"] is not None:
+                u = part["mass"] ** -0.5
+                body = blows.Body(
+                    np.zeros(1), np.zeros(1), np.array([u]), np.zeros(1), np.full((self.n_points, 1), u),
+                    mass=part["mass"],
+                )  # fmt: skip
+        else:
+            if part["x"] is not None or part["y"] is not None:
+                moved = np.array(self.at, float).ravel()
+                for i, axis in enumerate("xy"[: len(moved)]):
+                    moved[i] = moved[i] if part[axis] is None else part[axis]
+                body = blows.of_target(self.target, moved, self.points)
+            else:
+                body = self._structure
+            body = body.scaled(part["mass"], part["first_frequency"], part["damping"])
+        for i in range(1, MOST_MODES + 1):
+            if f"mode{i}.frequency" not in values:
+                break
+            frequency, mass = values[f"mode{i}.frequency"], values[f"mode{i}.mass"]
+            gain = np.full(self.n_points, values.get(f"mode{i}.gain", 1.0))
+            body = body.with_mode(frequency, mass, values.get(f"mode{i}.damping", DAMPING), gain)
+        return body
+
+    def felt_mass(self, values: Mapping[str, float]) -> float:
+        """Mass of the striker at its contact point [kg]."""
+        return self.hammer(values).felt_mass
+
+    def contact_time(self, values: Mapping[str, float]) -> float:
+        """Time [s] on a wall of a blow with half the typical impulse, without loss: what stands for the stiffness."""
+        mass = self.felt_mass(values)
+        k = values.get("contact.stiffness", self.contact.stiffness)
+        a = values.get("contact.exponent", self.contact.exponent)
+        return float(wall_time(k, a, 1.0 / mass, 0.5 * self.impulse / mass))
+
+    def stiffness(self, values: Mapping[str, float], time: float) -> float:
+        """The stiffness [N/m**exponent] that `contact_time` has this contact time [s] for."""
+        mass = self.felt_mass(values)
+        a = values.get("contact.exponent", self.contact.exponent)
+        speed, q = 0.5 * self.impulse / mass, 1.0 / (a + 1.0)
+        shape = 2.0 * np.sqrt(np.pi) * gamma(1.0 + q) / gamma(0.5 + q)
+        deepest = np.log(time * speed / shape)
+        return float(np.exp(2.0 * np.log(speed) - np.log(2.0 * q) + np.log(mass) - deepest / q))

@@ -1,0 +1,165 @@
+"""`update`: material constants that give measured frequencies."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import t
+
+from .._base import check
+from .._base.check import SimulationError
+from ..fe.assembly import System
+from ..modes.modal import Modes, find_modes
+from . import arguments, transfer
+from .transfer import Pair
+from .unknowns import Unknown
+
+STEP = 0.01  # [-] of logarithms, for derivatives by differences: frequencies go with powers of the constants
+MOST_SOLVES = 200  # [-] of the body
+CLOSE = 1e-7  # [-] relative change that ends the search
+MORE = 2  # [-] modes computed beyond those measured, so that one may be missed in the measurement
+POOR = 0.1  # [-] half width of an interval, in logarithms: wider constants are not told
+
+
+@dataclass(frozen=True, eq=False)
+class Updated:
+    """What `update` found."""
+
+    values: Mapping[str, float]
+    spread: Mapping[str, float]  # half width of the 90 % interval, relative; infinite if there is no spare frequency
+    pairs: tuple[Pair, ...]
+    modes: Modes
+    n_solves: int
+
+    __repr__ = check.brief
+
+    @property
+    def error(self) -> float:
+        """Largest relative difference of a frequency [-]."""
+        return max(abs(pair.difference) for pair in self.pairs)
+
+    @property
+    def uncertain(self) -> tuple[str, ...]:
+        """Constants that the frequencies tell to no better than 10 %."""
+        return tuple(name for name, spread in self.spread.items() if spread > POOR)
+
+    def summary(self) -> str:
+        """The constants and the frequencies in a few lines."""
+        lines = [
+            f"{name} = {value:.4g}"
+            + (
+                " (not told by these frequencies)"
+                if self.spread[name] > 1.0
+                else f" (± {100 * self.spread[name]:.2g} %)"
+            )
+            for name, value in self.values.items()
+        ]
+        return "\n".join([*lines, transfer.table(self.pairs), f"{self.n_solves} solves"])
+
+
+def update(
+    build: Callable[[dict[str, float]], Any],
+    measured: Any,
+    unknown: Mapping[str, Any],
+    *,
+    start: Mapping[str, float] | None = None,
+    points: Any = None,
+) -> Updated:
+    """Fit material constants to measured frequencies.
+
+    Parameters
+    ----------
+    build : function of a dict of values, which returns the assembled `System` or its `Modes`
+    measured : array_like, (n_modes,) [Hz], or Modes
+        Ascending frequencies; `Modes` of a measurement are paired with the computed ones by their shapes too.
+    unknown : mapping of name to (low, high), both positive
+    start : mapping of name to value, optional
+        By default the middle of each range.
+    points : array_like, (n_points, dimension) [m], optional
+        Where shapes are compared; by default the measured points.
+
+    Returns
+    -------
+    Updated
+
+    Raises
+    ------
+    ValueError
+        If there are fewer frequencies than unknowns, or ``build`` returns something else.
+    SimulationError
+        If the search does not end within 200 solves.
+
+    Examples
+    --------
+    >>> def bar(values):
+    ...     section = fi.Beam.rectangular(fi.Material(E=values["E"], nu=0.3, rho=7850.0), width=0.02, height=0.01)
+    ...     return fi.assemble(fi.mesh.line(0.5), section, supports={"left": "clamped"})
+    >>> true = fi.find_modes(bar({"E": 205e9}), n_modes=4).frequencies
+    >>> found = fi.update(bar, true, {"E": (50e9, 500e9)})
+    >>> round(found.values["E"] / 1e9, 2)
+    205.0
+    """
+    if not callable(build):
+        raise ValueError(f"build must be a function of a dict of values, got {check.shown(build)}")
+    ranges = [Unknown(name, *limits) for name, limits in arguments.ranges("unknown", unknown).items()]
+    for each in ranges:
+        if not each.log:
+            raise ValueError(f"unknown[{each.name!r}] must begin above zero, got {each.low:g}")
+    target = measured.frequencies if isinstance(measured, Modes) else check.ascending("measured", measured, "Hz")
+    if len(target) < len(ranges) or not ranges:
+        raise ValueError(
+            f"measured must hold at least {len(ranges)} frequencies for as many unknowns, got {len(target)}"
+        )
+    if (target <= 0.0).any():
+        raise ValueError("measured must hold positive frequencies only; leave out rigid motions")
+    kept: dict[bytes, tuple[Modes, tuple[Pair, ...]]] = {}
+
+    def computed(x: np.ndarray) -> tuple[Modes, tuple[Pair, ...]]:
+        key = x.tobytes()
+        if key not in kept:
+            if len(kept) >= MOST_SOLVES:
+                raise SimulationError(f"the search did not end within {MOST_SOLVES} solves; narrow the ranges")
+            modes = _modes(build({each.name: float(each.outside(z)) for each, z in zip(ranges, x)}), len(target))
+            flexible = modes.omega > 0.0
+            own: Any = modes if isinstance(measured, Modes) else modes.frequencies[flexible]
+            kept[key] = modes, transfer.matched(measured, own, points=points)
+        return kept[key]
+
+    def misfit(x: np.ndarray) -> np.ndarray:
+        return np.log([1.0 + pair.difference for pair in computed(x)[1]])
+
+    def slopes(x: np.ndarray) -> np.ndarray:
+        here, columns = misfit(x), []
+        for i, each in enumerate(ranges):
+            moved = x.copy()
+            moved[i] += STEP if x[i] + STEP < each.bounds[1] else -STEP
+            columns.append((misfit(moved) - here) / (moved[i] - x[i]))
+        return np.column_stack(columns)
+
+    middle = {each.name: float(np.sqrt(each.low * each.high)) for each in ranges} | arguments.table("start", start)
+    bounds = np.array([each.bounds for each in ranges]).T
+    first = np.array([float(each.inside(check.between(f"start[{each.name!r}]", middle[each.name], each.low, each.high)))
+                      for each in ranges])  # fmt: skip
+    inside = np.clip(first, bounds[0] + 1e-9, bounds[1] - 1e-9)
+    found = least_squares(misfit, inside, slopes, bounds, ftol=CLOSE, xtol=CLOSE, gtol=1e-12, max_nfev=40)
+    modes, pairs = computed(found.x)
+    spare = len(target) - len(ranges)
+    spread = {each.name: np.inf for each in ranges}
+    if spare > 0:
+        inverse = np.linalg.pinv(found.jac.T @ found.jac) * 2.0 * found.cost / spare
+        flat = np.linalg.svd(found.jac, compute_uv=False)
+        told = flat[-1] > 1e-6 * flat[0]
+        half = float(t.ppf(0.95, spare)) * np.sqrt(np.diag(inverse))
+        spread = {each.name: float(x) if told else np.inf for each, x in zip(ranges, half)}
+    values = {each.name: float(each.outside(z)) for each, z in zip(ranges, found.x)}
+    return Updated(values, spread, pairs, modes, len(kept))
+
+
+def _modes(body: Any, count: int) -> Modes:
+    if isinstance(body, Modes):
+        return body
+    if isinstance(body, System):
+        return find_modes(body, n_modes=count + MORE)
+    raise ValueError(f"build must return a System of fi.assemble or Modes, got {check.shown(body)}")

@@ -1,0 +1,153 @@
+"""From four measured taps to a double hit: what a hammer's file tells about the hammer, and what it does not.
+
+    python studies/tutorial_fit.py [folder]
+
+Reads the taps in `measured/acceleration_multi.lvm`, compares four models by how well they predict a tap from the other
+three, shows which values the taps tell, and asks which plate this hammer would hit twice. Writes fit_pulses.png,
+fit_profiles.png and fit_double_hits.png.
+"""
+
+import sys
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import fem_impact as fi
+from fem_impact.pages import fit_page
+from fem_impact.show import plots
+
+HERE = Path(__file__).parent
+MASS = 0.15  # [kg] of the hammer: nobody wrote it down, and the taps cannot tell it
+MASSES = 0.05, 0.15, 0.45  # [kg] that explain the taps equally well
+SPEED = 0.2  # [m/s] of the taps, for 0.15 kg
+STIFFNESS = {"contact.stiffness": (1e2, 1e18)}
+POWER = STIFFNESS | {"contact.exponent": (1.0, 4.0), "contact.loss": (0.0, 20.0)}
+HEAD = {"striker.first_frequency": (1e3, 2e4), "striker.mode_ratio": (0.1, 100.0), "striker.damping": (0.01, 2.0)}
+MODELS = {  # name -> law to begin with, unknowns
+    "linear spring": (fi.Contact.linear(1e6), STIFFNESS),
+    "Hertz": (fi.Contact.hertz(1e7), STIFFNESS),
+    "power law with loss": (fi.Contact.hertz(1e7), POWER),
+    "the same behind a springy tip": (fi.Contact.hertz(1e7), POWER | {"contact.loss": (0.1, 1e3)} | HEAD),
+}
+PLATE = {"length": 0.4, "width": 0.3, "mass": 1.62, "first_frequency": 190.0}  # 5 mm of aluminium, hinged
+AT = (0.2, 0.15)  # m, its middle
+HEADS = np.geomspace(0.02, 1.0, 25)  # [kg] of other hammers
+TIPS = np.geomspace(1e-3, 10.0, 33)  # [-] stiffness of other tips over the one found
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One model of the four taps."""
+
+    name: str
+    error: float  # [-] rms of all taps over their force
+    left_out: float  # [-] worst tap predicted from the others, over the rms of its force
+    of_peak: float  # [-] the same over its peak
+
+
+def read() -> fi.Taps:
+    """The four taps, force only."""
+    return fi.read_taps(HERE / "measured" / "acceleration_multi.lvm", response=())
+
+
+def fitted(name: str, taps: fi.Taps, extra: dict | None = None, profiles: bool = False):
+    """One model of the taps."""
+    law, unknown = MODELS[name]
+    return fi.fit(
+        taps, striker=fi.Striker.rigid(MASS), contact=law, unknown=unknown | (extra or {}), profiles=profiles,
+        starts=8 if HEAD.items() <= unknown.items() else 4,
+    )  # fmt: skip
+
+
+def compare(taps: fi.Taps) -> list[Verdict]:
+    """All models, by the tap that each predicts worst."""
+    found = []
+    for name in MODELS:
+        made = fitted(name, taps)
+        left_out = made.left_out()
+        found.append(
+            Verdict(name, made.error, max(one.error for one in left_out), max(one.error_of_peak for one in left_out))
+        )
+    return found
+
+
+def plate() -> fi.Modes:
+    return fi.analytic.rectangle(**PLATE, n_modes=60, damping_ratio=0.01)
+
+
+def impacts(modes: fi.Modes, law: fi.Contact, mass: float, tip: float) -> int:
+    """How often a hammer of another mass, with another tip, hits the plate."""
+    changed = fi.Contact.power(law.stiffness * tip, law.exponent, loss=law.loss)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fi.ToleranceWarning)
+        return fi.strike(
+            modes, fi.Striker.rigid(mass), changed, at=AT, speed=SPEED, tolerance=1e-2, max_impacts=3, duration=0.1
+        ).n_impacts
+
+
+def softest(modes: fi.Modes, law: fi.Contact, mass: float) -> float | None:
+    """Stiffness, over the tip found, from which on a hammer of this mass hits twice; None if no tip tried does."""
+    counts = np.array([impacts(modes, law, mass, float(tip)) for tip in TIPS])
+    twice = np.flatnonzero(counts > 1)
+    return float(TIPS[twice[0]]) if twice.size else None
+
+
+def draw_double_hits(path: Path, limits: dict[float, list[float | None]]) -> None:
+    """The softest tip with which each hammer hits twice, for three laws that explain the taps equally well."""
+    colours = dict(zip(limits, (plots.BLUE, plots.VERMILION, plots.GREEN)))
+    curves = [
+        plots.Curve(HEADS, np.array([np.nan if x is None else x for x in row]), f"if the hammer weighs {mass:g} kg",
+                    colours[mass])
+        for mass, row in limits.items()
+    ]  # fmt: skip
+    figure = plots.curves(
+        curves, x=plots.Axis("mass of the head [kg]", log=True),
+        y=plots.Axis("stiffness over that of the tip found", log=True, limits=(float(TIPS[0]), float(TIPS[-1]))),
+        title="The softest tip with which a hammer hits the plate twice",
+    )  # fmt: skip
+    fi.figures.save(path, figure)
+
+
+def main(folder: Path) -> dict:
+    folder.mkdir(parents=True, exist_ok=True)
+    taps = read()
+    print(taps.summary())
+    print("\nModels, each tap predicted from the other three (worst tap):")
+    verdicts = compare(taps)
+    for one in verdicts:
+        print(
+            f"  {one.name}: fitted to {100 * one.error:.2g} %, left out {100 * one.left_out:.2g} % of the rms force, "
+            f"{100 * one.of_peak:.2g} % of the peak"
+        )
+    print("\nWhat the taps tell, and what not (power law with loss, the mass of the hammer unknown too):")
+    free = fitted("power law with loss", taps, {"striker.mass": (0.02, 1.0)}, profiles=True)
+    print(free.summary())
+    best = fitted("the same behind a springy tip", taps)
+    fi.figures.save(folder / "fit_pulses.png", fit_page.pulses(best))
+    fi.figures.save(folder / "fit_profiles.png", fit_page.profiles(free))
+
+    print(f"\nA hinged plate of {PLATE['mass']:g} kg, struck in its middle at {SPEED:g} m/s:")
+    modes, limits = plate(), {}
+    for mass in MASSES:
+        made = fi.fit(
+            taps, striker=fi.Striker.rigid(mass), contact=fi.Contact.hertz(1e7), unknown=POWER, profiles=False, starts=3
+        )
+        limits[mass] = [softest(modes, made.contact, float(head)) for head in HEADS]
+        own = softest(modes, made.contact, mass)
+        verdict = (
+            "hits once with every tip tried" if own is None
+            else f"hits twice, unless its tip is softer than {own:.2g} times the one found" if own <= 1.0
+            else f"hits once; a tip {own:.2g} times as stiff would hit twice"
+        )  # fmt: skip
+        heavy = [head for head, tip in zip(HEADS, limits[mass]) if tip is not None and tip <= 1.0]
+        above = f"; with this tip, heads from {min(heavy):.2g} kg on hit twice" if heavy else ""
+        print(f"  if the hammer weighs {mass:g} kg, it {verdict}{above}")
+    draw_double_hits(folder / "fit_double_hits.png", limits)
+    print("Weigh the hammer: the taps alone cannot tell which of these lines is yours.")
+    return {"verdicts": verdicts, "free": free, "limits": limits}
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "pictures")

@@ -1,0 +1,42 @@
+"""The page of a fit shows what was found and what the data do not tell."""
+
+import pytest
+
+import fem_impact as fi
+from fem_impact.pages import fit_page
+
+
+@pytest.fixture(scope="module")
+def found():
+    body = fi.Modes.from_arrays([900.0], [[2.0]], points=[[0.0]], mass=1.0, damping_ratio=0.02)
+    law = fi.Contact.hertz(5e7)
+    hits = [fi.strike(body, fi.Striker.rigid(0.1), law, at=[0.0], speed=v) for v in (0.5, 1.0, 1.5)]
+    taps = [fi.measure(hit, rate=25600.0, noise=5e-3, rng=i) for i, hit in enumerate(hits)]
+    ranges = {"contact.stiffness": (1e5, 1e10), "striker.mass": (0.02, 0.5), "mode1.mass": (0.05, 1.3)}
+    known = {"mode1.frequency": 900.0}
+    return fi.fit(taps, striker=fi.Striker.rigid(0.1), contact=law, starts=2,
+                  unknown=ranges | {"mode1.frequency": (500.0, 1500.0)}), known  # fmt: skip
+
+
+def test_a_page_with_values_ridges_pictures_and_double_hits(found, tmp_path):
+    made, _ = found
+    fit_page.write(tmp_path / "fit.html", made, title="A <hammer> & a bar")
+    page = (tmp_path / "fit.html").read_text()
+    assert "A &lt;hammer&gt; &amp; a bar" in page
+    assert page.count("data:image/png;base64,") == 3
+    assert "do not tell contact.stiffness" in page and "along its ridge" in page
+    assert "tip x 10" in page and "http" not in page.replace("http-equiv", "")
+
+
+def test_pictures_alone(found, tmp_path):
+    made, _ = found
+    for name, draw in (("pulses", fit_page.pulses), ("profiles", fit_page.profiles), ("spectrum", fit_page.spectrum)):
+        figure = draw(made)
+        fi.figures.save(tmp_path / f"{name}.png", figure)
+        assert len(figure.axes) >= {"pulses": 3, "profiles": 4, "spectrum": 1}[name]
+
+
+def test_double_hits_are_a_table(found):
+    rows = fit_page.double_hits(found[0])
+    assert len(rows) == 1 + len(fit_page.MASSES) and all(len(row) == 1 + len(fit_page.TIPS) for row in rows)
+    assert rows[1][1] == "1"  # a light hammer with a soft tip hits once

@@ -1,0 +1,54 @@
+"""The quick blows of a fit are those of `fi.strike`."""
+
+import numpy as np
+import pytest
+
+import fem_impact as fi
+from fem_impact.taps import blows, rig
+
+AT = (0.17, 0.11)
+
+
+@pytest.fixture(scope="module")
+def plate():
+    return fi.analytic.rectangle(0.4, 0.3, mass=0.8, first_frequency=120.0, n_modes=30, damping_ratio=0.01)
+
+
+@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
+@pytest.mark.parametrize("loss", [0.0, 0.2])
+@pytest.mark.parametrize(
+    "hammer", [fi.Striker.rigid(0.02), fi.Striker.stick(0.1, 900.0, n_modes=4)], ids=["mass", "stick"]
+)
+def test_a_quick_blow_agrees_with_strike_and_its_record_with_measure(plate, hammer, loss):
+    law = fi.Contact.power(1e7, 1.4, loss=loss)
+    hit = fi.strike(plate, hammer, law, at=AT, speed=1.3, tolerance=1e-5)
+    pair = blows.pair(blows.of_striker(hammer), blows.of_target(plate, AT, [(0.1, 0.1)]), law)
+    history = blows.run(pair, 1.3, blows.longest_step(pair, 3e-4), 3e-3)
+    assert abs(history.impulses.sum() - hit.impulse) < 1e-5 * hit.impulse
+    chain = rig.Rig(25600.0)
+    fine = blows.records(pair, np.array([1.3]), duration=3e-4, n_times=80, lead=20, rig=chain, tip_mass=0.0)
+    found = rig.sample(fine, chain, force=True)[0, :, rig.MARGIN : -rig.MARGIN]
+    wanted = fi.measure(hit, rate=25600.0, at=(0.1, 0.1), before=20 / 25600, duration=80 / 25600)
+    assert np.abs(found[0] - wanted.force[0]).max() < 3e-5 * wanted.peak[0]  # 40 steps per contact
+    assert np.abs(found[1] - wanted.response[0, :, 0]).max() < 1e-4 * np.abs(wanted.response).max()
+
+
+def test_a_scaled_body_is_the_scaled_modes(plate):
+    other = blows.of_target(plate, AT).scaled(0.3, 200.0, 0.05)
+    wanted = blows.of_target(plate.scaled(mass=0.3, first_frequency=200.0), AT)
+    assert np.allclose(other.omega, wanted.omega) and np.allclose(np.abs(other.row), np.abs(wanted.row))
+    assert np.isclose(other.rest, wanted.rest, rtol=1e-6) and (other.zeta == 0.05).all()
+
+
+def test_one_more_mode_takes_its_modal_mass():
+    body = blows.wall(1).with_mode(500.0, 0.25, 0.03, np.array([0.5]))
+    assert body.omega[0] == pytest.approx(1000.0 * np.pi) and body.row[0] == 2.0 and body.rows[0, 0] == 1.0
+    assert body.felt_mass == np.inf and blows.of_striker(fi.Striker.rigid(0.2)).felt_mass == pytest.approx(0.2)
+
+
+def test_fast_modes_that_matter_shorten_the_step(plate):
+    wall = blows.pair(blows.of_striker(fi.Striker.rigid(0.02)), blows.wall(), fi.Contact.linear(1e6))
+    assert blows.longest_step(wall, 4e-4) == pytest.approx(1e-5)
+    fast = blows.wall().with_mode(40e3, 0.01, 0.0, np.zeros(0))
+    pair = blows.pair(blows.of_striker(fi.Striker.rigid(0.02)), fast, fi.Contact.linear(1e6))
+    assert blows.longest_step(pair, 4e-4) == pytest.approx(1.0 / (blows.FASTEST * 40e3))

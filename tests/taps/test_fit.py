@@ -1,0 +1,154 @@
+"""From taps to a model: what is told, what is not, and how well other taps are predicted."""
+
+from pathlib import Path
+
+import pytest
+
+import fem_impact as fi
+
+MEASURED = Path(__file__).parents[2] / "studies" / "measured"
+RATE = 25600.0  # [Hz]
+MASS, LAW = 0.2, fi.Contact.power(5e8, 1.7)
+SPEEDS = (0.4, 0.8, 1.2)  # m/s
+
+
+def taps_of(target, place, *, mass=MASS, law=LAW, speeds=SPEEDS, noise=0.005, **rig):
+    hits = [fi.strike(target, fi.Striker.rigid(mass), law, at=place, speed=v, tolerance=1e-5) for v in speeds]
+    return [fi.measure(h, rate=RATE, noise=noise, rng=i, onset=i * 7e-6, **rig) for i, h in enumerate(hits)]
+
+
+@pytest.fixture(scope="module")
+def structure():
+    return fi.Modes.from_arrays([900.0, 2300.0], [[2.0, 1.5]], points=[[0.0]], mass=1.0, damping_ratio=0.02)
+
+
+RANGES = {"contact.stiffness": (1e6, 1e11), "contact.exponent": (1.0, 4.0), "striker.mass": (0.05, 0.8)}
+
+
+@pytest.fixture(scope="module")
+def found(structure):
+    guess = fi.Striker.rigid(0.1)
+    return fi.fit(
+        taps_of(structure, [0.0]), target=structure, at=[0.0], striker=guess, contact=fi.Contact.hertz(1e7),
+        unknown=RANGES, starts=3,
+    )  # fmt: skip
+
+
+def test_on_a_known_structure_everything_is_told(found):
+    assert found.unidentifiable == () and found.limited == ()
+    for name, truth in (("contact.stiffness", 5e8), ("contact.exponent", 1.7), ("striker.mass", MASS)):
+        low, high = found.interval(name, 0.95)
+        assert low < truth < high  # this seed's noise; `studies/fit_coverage.py` counts how often
+        assert found.interval(name, 0.5)[0] > low
+    assert found.interval("striker.mass")[1] / found.interval("striker.mass")[0] < 1.05  # 0.5 % of noise
+    low, high = found.interval("speed[1]", 0.95)
+    assert low < 0.8 < high and high / low < 1.05
+    assert found.whiteness > 0.01
+
+
+def test_taps_are_predicted_and_so_are_new_ones(found, structure):
+    assert max(one.error for one in found.left_out()) < 0.025  # 0.5 % of the peak is 1.3 % of the rms force here
+    new = fi.Taps.from_arrays(taps_of(structure, [0.0], speeds=(1.6,), noise=0.0)[0].force, rate=RATE)
+    one = found.predict(new)
+    assert one.error < 0.01 and one.speed == pytest.approx(1.6, rel=0.02)
+    assert found.predict(2).error == pytest.approx(found.errors[2], rel=0.05)
+
+
+def test_what_was_found_strikes_again(found, structure):
+    hit = fi.strike(structure, found.striker, found.contact, at=[0.0], speed=1.0)
+    wanted = fi.strike(structure, fi.Striker.rigid(MASS), LAW, at=[0.0], speed=1.0)
+    assert hit.peak_force == pytest.approx(wanted.peak_force, rel=0.01)
+    single = found.double_hit(tip=1e-2)
+    assert single.n_impacts == 1 and found.double_hit(mass=0.5, tip=1e3).n_impacts > 1
+
+
+def test_the_summary_says_what_is_told(found):
+    said = found.summary()
+    assert "90 % interval" in said and "striker.mass" in said and "do not tell" not in said
+    assert found.data()["unidentifiable"] == []
+
+
+def test_on_a_wall_mass_and_stiffness_are_a_ridge():
+    wall = fi.Modes.rigid(1e9)
+    ranges = RANGES | {"contact.stiffness": (1e4, 1e13)}
+    made = fi.fit(taps_of(wall, None), striker=fi.Striker.rigid(0.1), contact=LAW, unknown=ranges, starts=2)
+    assert set(made.unidentifiable) == {"contact.stiffness", "striker.mass"}
+    ridge = made.ridges["striker.mass"]
+    # F = k d**a on a wall: the record stays if mass times speed and k / mass**a stay
+    assert ridge["contact.stiffness"] == pytest.approx(1.7, abs=0.05)
+    assert ridge["speed[0]"] == pytest.approx(-1.0, abs=0.05)
+    assert "striker.mass" not in made.values and "speed[0]" not in made.values
+    low, high = made.interval("contact.exponent", 0.95)
+    assert low < 1.7 < high < 1.9 and "do not tell striker.mass" in made.summary()
+
+
+@pytest.mark.slow
+def test_a_response_tells_what_the_force_cannot(structure):
+    both = fi.Modes.from_arrays(
+        [0.0, 900.0], [[1.0, 1.5], [1.0, -0.9]], points=[[0.0], [1.0]], mass=1.0, damping_ratio=0.02
+    )
+    taps = taps_of(both, [0.0], at=[[1.0]])
+    ranges = RANGES | {"target.mass": (0.3, 3.0)}
+    unit = fi.Modes.from_arrays(
+        [0.0, 900.0], [[0.8, 1.2], [0.8, -0.72]], points=[[0.0], [1.0]], mass=1.5625, damping_ratio=0.02
+    )
+    given = {"target": unit, "at": [0.0], "striker": fi.Striker.rigid(0.1), "contact": LAW, "unknown": ranges}
+    blind = fi.fit(taps, starts=2, **given)
+    seeing = fi.fit(taps, starts=2, response_at=[[1.0]], **given)
+    assert {"striker.mass", "target.mass"} <= set(blind.unidentifiable)
+    assert seeing.unidentifiable == ()
+    low, high = seeing.interval("target.mass", 0.95)
+    assert low < 1.0 < high and high / low < 1.1
+
+
+def test_a_tap_that_disagrees_is_named(structure):
+    taps = taps_of(structure, [0.0], speeds=(0.4, 0.7, 1.0, 1.3))
+    other = taps_of(structure, [0.0], law=fi.Contact.power(2e8, 1.7), speeds=(0.9,))
+    made = fi.fit(
+        [*taps, *other], target=structure, at=[0.0], striker=fi.Striker.rigid(0.1), contact=LAW, unknown=RANGES,
+        starts=2, profiles=False,
+    )  # fmt: skip
+    assert list(made.outliers) == ["tap 5"] and made.used == (0, 1, 2, 3)
+    assert made.point["contact.exponent"] == pytest.approx(1.7, abs=0.05)
+
+
+def test_laws_are_compared_by_left_out_taps(structure):
+    laws = [fi.Contact.linear(1e6), fi.Contact.hertz(1e7)]
+    made = fi.fit(
+        taps_of(structure, [0.0], law=fi.Contact.hertz(1e8)), target=structure, at=[0.0], contact=laws,
+        striker=fi.Striker.rigid(0.1), unknown={name: RANGES[name] for name in ("contact.stiffness", "striker.mass")},
+        starts=2, profiles=False,
+    )  # fmt: skip
+    assert made.contact.exponent == 1.5 and made.compared["Hertz"] < 0.3 * made.compared["linear"]
+
+
+@pytest.mark.slow
+def test_four_real_taps_are_predicted_from_each_other():
+    taps = fi.read_taps(MEASURED / "acceleration_multi.lvm", response=())
+    ranges = {"contact.stiffness": (1e3, 1e16), "contact.exponent": (1.0, 4.0), "contact.loss": (0.1, 1e3)}
+    ranges |= {
+        "striker.first_frequency": (1e3, 2e4),
+        "striker.mode_ratio": (0.1, 100.0),
+        "striker.damping": (0.01, 2.0),
+    }
+    made = fi.fit(
+        taps, striker=fi.Striker.rigid(0.15), contact=fi.Contact.linear(1e6), unknown=ranges, profiles=False, starts=8
+    )
+    each = made.left_out()
+    assert max(one.error_of_peak for one in each) < 0.015  # of the peak
+    assert max(one.error for one in each) < 0.04  # of the rms force: two taps of equal peak differ by 3 % in length
+    assert made.whiteness < 0.01 and "residual is not noise" in made.summary()
+
+
+def test_wrong_arguments_are_refused(structure):
+    taps = taps_of(structure, [0.0])
+    given = {"striker": fi.Striker.rigid(0.1), "contact": LAW, "unknown": RANGES}
+    with pytest.raises(ValueError, match="response_at needs accelerations"):
+        fi.fit(taps, response_at=[[0.0]], **given)
+    with pytest.raises(ValueError, match="known and unknown both name"):
+        fi.fit(taps, known={"striker.mass": 0.1}, **given)
+    with pytest.raises(ValueError, match="taps must be"):
+        fi.fit(3, **given)
+    cut = fi.Taps.from_arrays(taps[0].force, rate=RATE, overload=True)
+    with pytest.raises(ValueError, match="not cut off"):
+        fi.fit(cut, **given)

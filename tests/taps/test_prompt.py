@@ -1,0 +1,58 @@
+"""The commands for measured taps."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fem_impact as fi
+from fem_impact import cli
+
+ROOT = Path(__file__).parents[2]
+TAPS = ROOT / "studies" / "measured" / "acceleration_multi.lvm"
+
+
+def test_fit_writes_a_page_numbers_and_a_scene(tmp_path, capsys):
+    words = ["--unknown", "contact.stiffness=1e5:1e13", "--unknown", "contact.exponent=1:3", "--mass", "0.15"]
+    assert cli.main(["fit", str(TAPS), "--out", str(tmp_path / "out"), *words]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "4 taps explained to" in said and "90 % interval" in said
+    data = json.loads((tmp_path / "out" / "fit.json").read_text())
+    assert data["values"]["contact.exponent"] > 1.0 and len(data["left_out"]) == 4
+    assert (tmp_path / "out" / "fit.html").stat().st_size > 5e4
+    assert fi.load_scene(tmp_path / "out" / "scene.toml").make_striker().mass == pytest.approx(0.15)
+
+
+def test_frf_of_a_file_lists_peaks_and_writes_a_table(tmp_path, capsys):
+    assert cli.main(["frf", str(TAPS), "--out", str(tmp_path / "h.csv")]) == 0
+    assert "m/s^2/N" in capsys.readouterr().out
+    rows = np.genfromtxt(tmp_path / "h.csv", delimiter=",", skip_header=1)
+    assert rows.shape[1] == 4 and rows[-1, 0] == pytest.approx(12800.0, rel=0.01)
+
+
+def test_frf_of_a_scene_finds_its_modes(tmp_path, capsys):
+    scene = ROOT / "studies" / "scenes" / "drumstick.toml"
+    assert cli.main(["frf", str(scene), "--rate", "12800"]) == 0
+    first = fi.load_scene(scene).modes(1).frequencies[0]
+    peaks = [float(line.split()[2]) for line in capsys.readouterr().out.splitlines()[1:] if "Hz" in line]
+    assert min(abs(peak - first) for peak in peaks) < 2.0  # 1 s of record resolves 1 Hz
+
+
+@pytest.mark.parametrize(
+    "words, said",
+    [(["--unknown", "contact.stiffness=3"], "must read NAME=LOW:HIGH"), (["--unknown", "tip=1:2"], "must be one of"),
+     (["--known", "striker.mass=x"], "must read NAME=VALUE"), (["--force", "hammer"], "is no channel")],
+)  # fmt: skip
+def test_wrong_commands_say_what_is_wrong(words, said, tmp_path, capsys):
+    assert cli.main(["fit", str(TAPS), "--out", str(tmp_path / "out"), *words]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_single_tap_is_fitted_too(tmp_path, capsys):
+    words = ["--response", "Acceleration", "--unknown", "contact.stiffness=1e5:1e13", "--json"]
+    single = TAPS.with_name("acceleration.lvm")
+    assert cli.main(["fit", str(single), "--out", str(tmp_path / "out"), *words]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["left_out"] == [] and data["intervals"]["contact.stiffness"][0] > 1e5

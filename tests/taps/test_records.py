@@ -1,0 +1,102 @@
+"""The table of taps: what is found in real records, and what is said about it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fem_impact as fi
+
+MEASURED = Path(__file__).parents[2] / "studies" / "measured"
+RATE = 25600.0  # [Hz]
+
+
+def test_four_segments_with_decimal_points():
+    taps = fi.read_taps(MEASURED / "acceleration_multi.lvm")
+    assert taps.n_taps == 4 and taps.rate == RATE and taps.units == ("m/s^2",)
+    assert np.allclose(taps.peak, [131.8, 212.4, 191.3, 221.5], atol=0.3)  # N, as the files' own description has them
+    assert (taps.n_pulses == 1).all() and not taps.table.overload.any()
+    assert any("offsets" in note for note in taps.notes)
+
+
+@pytest.mark.parametrize("name, peak, cut", [("acceleration", 196.0, False), ("camera", 422.0, True)])
+def test_decimal_commas_and_empty_times(name, peak, cut):
+    taps = fi.read_taps(MEASURED / f"{name}.lvm")
+    assert taps.n_taps == 1 and taps.rate == 50e3
+    assert abs(taps.peak[0] - peak) < 1.0  # N
+    assert taps.units == ("m/s^2",) and np.abs(taps.response).max() > 100.0  # given in g
+    assert not taps.overload[0] and bool(taps.table.overload[0, 1]) == cut  # 54.79 g, three times in a row
+    assert any("cut off" in note for note in taps.notes) == cut
+
+
+def record(places, peak=100.0, samples=25600, noise=0.05, offset=2.0, seed=0):
+    force = np.random.default_rng(seed).normal(offset, noise, samples)
+    for place in places:
+        force[place : place + 13] += peak * np.sin(np.pi * (np.arange(13) + 0.5) / 13)
+    return force
+
+
+def test_taps_are_found_in_a_long_record_and_double_hits_stay_together(tmp_path):
+    force = record([5000, 12000, 12200, 20000])
+    force[12200:12213] -= 0.6 * (force[12200:12213] - 2.0)
+    np.savez(tmp_path / "t.npz", force=force, rate=RATE)
+    taps = fi.read_taps(tmp_path / "t.npz")
+    assert taps.n_pulses.tolist() == [1, 2, 1]
+    assert np.allclose(taps.force[:, :300].mean(axis=1), 0.0, atol=0.02)  # the offset is gone
+    assert any("tap 2: more than one pulse" in note for note in taps.notes)
+    apart = fi.read_taps(tmp_path / "t.npz", together=2e-3)
+    assert apart.n_taps == 4
+
+
+def test_a_force_that_pulls_is_turned_around(tmp_path):
+    np.savez(tmp_path / "t.npz", force=-record([5000], offset=0.0), rate=RATE)
+    taps = fi.read_taps(tmp_path / "t.npz")
+    assert taps.peak[0] > 99.0 and any("turned around" in note for note in taps.notes)
+
+
+def test_clipping_and_full_scale_are_seen(tmp_path):
+    force = np.minimum(record([5000], noise=0.02), 80.0)
+    np.savez(tmp_path / "t.npz", force=force, rate=RATE)
+    assert fi.read_taps(tmp_path / "t.npz").overload.tolist() == [True]
+    np.savez(tmp_path / "t.npz", force=record([5000]), rate=RATE)
+    assert fi.read_taps(tmp_path / "t.npz").overload.tolist() == [False]
+    assert fi.read_taps(tmp_path / "t.npz", full_scale=90.0).overload.tolist() == [True]
+
+
+def test_silence_and_wrong_names_are_refused(tmp_path):
+    quiet = np.random.default_rng(0).normal(0.0, 1.0, 5000)
+    np.savez(tmp_path / "t.npz", force=quiet, other=quiet, rate=RATE)
+    with pytest.raises(ValueError, match="no tap was found"):
+        fi.read_taps(tmp_path / "t.npz")
+    with pytest.raises(ValueError, match=r"'forse' is no channel.*did you mean 'force'"):
+        fi.read_taps(tmp_path / "t.npz", force="forse")
+    with pytest.raises(ValueError, match="channel from 0 to 1"):
+        fi.read_taps(tmp_path / "t.npz", force=7)
+    with pytest.raises(ValueError, match="units must be one of"):
+        fi.read_taps(tmp_path / "t.npz", units={"force": "pounds"})
+
+
+def test_saved_taps_are_read_again(tmp_path):
+    taps = fi.read_taps(MEASURED / "acceleration_multi.lvm")
+    taps.save(tmp_path / "t.npz")
+    again = fi.read_taps(tmp_path / "t.npz")
+    assert again.n_taps == 4 and np.abs(again.force - taps.force[:, : len(again.time)]).max() < 0.2  # offset again
+    assert again.units == taps.units
+
+
+def test_arrays_of_wrong_shape_are_refused():
+    with pytest.raises(ValueError, match="at least one tap"):
+        fi.Taps.from_arrays(np.zeros((2, 3)), rate=1e3)
+    with pytest.raises(ValueError, match="response must have shape"):
+        fi.Taps.from_arrays(np.zeros((2, 30)), np.zeros((2, 29)), rate=1e3)
+    with pytest.raises(ValueError, match="names must have 1 entries"):
+        fi.Taps.from_arrays(np.zeros((2, 30)), np.zeros((2, 30)), rate=1e3, names=["a", "b"])
+
+
+def test_parts_of_a_table():
+    taps = fi.read_taps(MEASURED / "acceleration_multi.lvm")
+    two = taps.pick([0, 2])
+    assert two.labels == ("tap 1", "tap 3") and np.array_equal(two.force[1], taps.force[2])
+    cut = taps.between(5e-4, 2e-3)
+    assert cut.time[0] == 0.0 and np.allclose(cut.onset, taps.onset - 5e-4, atol=1 / RATE)
+    assert np.allclose(cut.peak, taps.peak)

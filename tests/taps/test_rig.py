@@ -1,0 +1,99 @@
+"""What a rig makes of a blow: closed forms of filter, sensor, tip, noise and bits."""
+
+import numpy as np
+import pytest
+
+import fem_impact as fi
+from fem_impact.taps import rig
+
+RATE = 25600.0  # [Hz]
+WALL = fi.Touch(fi.Contact.linear(4e6), 0, None)
+
+
+def blow(mass=0.1, speed=1.0, law=None):
+    touch = WALL if law is None else fi.Touch(law, 0, None)
+    return fi.collide([fi.Modes.rigid(mass)], [touch], speeds=[speed], tolerance=1e-6)
+
+
+def test_a_filter_keeps_the_impulse_and_the_spectrum_of_its_band():
+    hit = blow()
+    tap = fi.measure(hit, rate=RATE, anti_alias="delta-sigma", before=2e-3)
+    assert abs(tap.force.sum() / RATE - hit.impulse) < 1e-5 * hit.impulse  # the filter passes zero frequency
+    frequencies = np.fft.rfftfreq(tap.force.shape[1], 1.0 / RATE)
+    band = frequencies < 0.45 * RATE
+    found = np.fft.rfft(tap.force[0])[band] / RATE * np.exp(2j * np.pi * frequencies[band] * 0.00200)
+    lead = round(2e-3 * RATE) / RATE - 2e-3
+    exact = hit.spectrum(frequencies[band]) * np.exp(-2j * np.pi * frequencies[band] * lead)
+    assert np.abs(found - exact).max() < 3e-4 * hit.impulse  # ringing beyond the record's ends
+
+
+def test_half_a_sample_of_onset_shifts_the_record():
+    early, late = (fi.measure(blow(), rate=RATE, onset=shift / RATE) for shift in (0.0, 1.0))
+    assert np.abs(early.force[0, :-1] - late.force[0, 1:]).max() < 1e-9 * early.peak[0]
+    half = fi.measure(blow(), rate=RATE, onset=0.5 / RATE)
+    assert np.abs(half.force - early.force).max() > 0.05 * early.peak[0]
+
+
+def test_butterworth_is_three_decibels_down_at_its_corner():
+    chain = rig.Rig(RATE, (4, 5000.0))
+    found = np.abs(chain.passes(np.array([0.0, 5000.0, 10000.0])))
+    assert np.allclose(found, [1.0, 0.5**0.5, 1.0 / np.sqrt(1.0 + 2.0**8)], rtol=1e-12)
+
+
+def test_the_table_of_filters_falls_between_its_edges():
+    for name, edges in rig.FILTERS.items():
+        passes = rig.Rig(RATE, name).passes(np.array([0.3, 0.7]) * RATE).real
+        assert np.allclose(passes, [1.0, 1.0 if edges is None else 0.0])
+
+
+def test_the_cell_behind_a_rigid_tip_misses_its_share_of_the_force():
+    hit = blow(mass=0.1)
+    whole, behind = (fi.measure(hit, rate=RATE, tip_mass=mass) for mass in (0.0, 0.02))
+    assert np.allclose(behind.force, 0.8 * whole.force, atol=1e-9)
+
+
+def test_the_mode_of_a_hammer_shows_behind_its_tip():
+    hammer = fi.Modes.from_arrays([0.0, 3000.0], [[10.0**0.5, 10.0**0.5]], points=[[0.0]], mass=0.1)
+    law = fi.Touch(fi.Contact.linear(4e6), 0, None, first_at=[0.0])
+    hit = fi.collide([hammer], [law], speeds=[1.0], tolerance=1e-6)
+    tap = fi.measure(hit, rate=RATE, tip_mass=0.01, duration=0.02)
+    later = tap.time > hit.impacts[-1].end + 2e-3
+    spectrum = np.abs(np.fft.rfft(tap.force[0, later]))
+    peak = np.fft.rfftfreq(later.sum(), 1.0 / RATE)[spectrum.argmax()]
+    assert abs(peak - 3000.0) < 70.0  # it rings at its own frequency after the blow; resolution 60 Hz
+    assert tap.force[0, later].max() > 1.0  # N
+
+
+def test_a_response_is_the_motion_of_the_target():
+    plate = fi.Modes.from_arrays([400.0], [[1.5], [0.8]], points=[[0.0], [1.0]], mass=0.5, damping_ratio=0.02)
+    hit = fi.strike(plate, fi.Striker.rigid(0.05), fi.Contact.linear(2e5), at=[0.0], speed=1.0, tolerance=1e-6)
+    tap = fi.measure(hit, rate=51200.0, at=[[1.0]], duration=0.03)
+    late = (tap.time > 0.004) & (tap.time < 0.028)
+    times = tap.time[late] - 51.0 / 51200.0  # the record begins 51 samples before the blow
+    speed = hit.velocity([[1.0]], times)[:, 0]
+    exact = np.gradient(speed, times)
+    assert np.abs(tap.response[0, late, 0] - exact)[1:-1].max() < 2e-3 * np.abs(exact).max()  # central differences
+
+
+def test_noise_bits_and_range():
+    clean = fi.measure(blow(), rate=RATE)
+    with pytest.raises(ValueError, match="rng must be given"):
+        fi.measure(blow(), rate=RATE, noise=0.01)
+    noisy = fi.measure(blow(), rate=RATE, noise=0.01, rng=1)
+    assert abs(np.std(noisy.force - clean.force) / (0.01 * clean.peak[0]) - 1.0) < 0.1  # 551 samples: 3 % of spread
+    coarse = fi.measure(blow(), rate=RATE, bits=8)
+    step = 1.25 * clean.peak[0] / 128.0
+    assert np.abs(coarse.force - clean.force).max() <= 0.5 * step * (1 + 1e-9)
+    over = fi.measure(blow(), rate=RATE, full_scale=500.0)
+    assert over.overload.tolist() == [True] and over.peak[0] == 500.0
+
+
+@pytest.mark.parametrize(
+    "wrong, said",
+    [({"rate": 0.0}, "rate"), ({"anti_alias": "brick"}, "anti_alias must be one of"), ({"noise": -1.0}, "noise"),
+     ({"duration": 1e-4}, "longer than before"), ({"duration": 1e4}, "duration must be shorter"), ({"bits": 1}, "bits"),
+     ({"anti_alias": (0, 1e3)}, "order"), ({"quantity": "jerk"}, "quantity must be one of")],
+)  # fmt: skip
+def test_wrong_rigs_are_refused(wrong, said):
+    with pytest.raises(ValueError, match=said):
+        fi.measure(blow(), **{"rate": RATE} | wrong)

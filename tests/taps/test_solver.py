@@ -1,0 +1,57 @@
+"""Residuals, their derivatives and the search."""
+
+import numpy as np
+import pytest
+
+import fem_impact as fi
+from fem_impact.taps import fit, solver
+
+RANGES = {"contact.stiffness": (1e6, 1e10), "contact.exponent": (1.0, 3.0), "contact.loss": (0.0, 1.0)}
+
+
+@pytest.fixture(scope="module")
+def found():
+    law = fi.Contact.power(3e8, 1.7, loss=0.1)
+    wall = [fi.Touch(law, 0, None)]
+    hits = [fi.collide([fi.Modes.rigid(0.1)], wall, speeds=[v], tolerance=1e-5) for v in (0.5, 1.0)]
+    taps = [fi.measure(hit, rate=25600.0, onset=i * 1e-5) for i, hit in enumerate(hits)]
+    return fi.fit(taps, striker=fi.Striker.rigid(0.1), contact=law, unknown=RANGES, profiles=False, starts=2)
+
+
+def test_without_noise_the_truth_comes_back(found):
+    assert found.error < 1e-4  # the step of the quick blows
+    assert found.point["contact.exponent"] == pytest.approx(1.7, abs=1e-3)
+    assert found.point["contact.stiffness"] == pytest.approx(3e8, rel=1e-2)  # it goes with a power of the exponent
+    assert found.point["contact.loss"] == pytest.approx(0.1, abs=1e-3)
+    assert found.point["speed[1]"] == pytest.approx(1.0, rel=1e-3)
+
+
+def test_derivatives_agree_with_central_differences(found):
+    problem, x = found.problem, found.best.x + 0.01
+    jacobian = problem.jacobian(x)
+    for i in range(len(x)):
+        step = np.zeros(len(x))
+        step[i] = 1e-3
+        central = (problem.residual(x + step) - problem.residual(x - step)) / 2e-3
+        assert np.abs(jacobian[:, i] - central).max() < 1e-3 * np.abs(central).max()  # one-sided steps of 1e-4
+
+
+def test_held_coordinates_stay(found):
+    x = found.best.x.copy()
+    x[1] += 0.05
+    solved = solver.solve(found.problem, x, held=(1,))
+    assert solved.x[1] == x[1] and solved.cost > found.best.cost
+    assert solved.jacobian.shape[1] == len(x) - 1
+
+
+def test_speed_and_onset_are_found_alone(found):
+    x = found.best.x.copy()
+    n = found.problem.n_shared
+    x[n:] += [0.3, -0.3, 1.0, -1.0]
+    assert np.abs(found.problem.aligned(x)[n:] - found.best.x[n:]).max() < 0.1  # a good start, found in three steps
+
+
+def test_too_few_samples_are_refused():
+    taps = fi.Taps.from_arrays(np.array([0, 0, 0, 0, 50, 90, 50, 0, 0, 0.0]), rate=25600.0)
+    with pytest.raises(ValueError, match=r"window must leave samples|too few"):
+        fit.fit(taps, striker=fi.Striker.rigid(0.1), contact=fi.Contact.linear(1.0), unknown=RANGES, window=(0.0, 1e-4))

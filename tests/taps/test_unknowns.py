@@ -1,0 +1,50 @@
+"""Names, ranges and coordinates of unknowns."""
+
+import numpy as np
+import pytest
+
+import fem_impact as fi
+from fem_impact.impact.contact import wall_time
+from fem_impact.taps import unknowns
+from fem_impact.taps.rig import Rig
+
+HAMMER, LAW = fi.Striker.rigid(0.1), fi.Contact.hertz(1e7)
+
+
+@pytest.mark.parametrize(
+    "ranges, said",
+    [({}, "at least one range"), ({"contact.stifness": (1, 2)}, "did you mean 'contact.stiffness'"),
+     ({"contact.stiffness": (2.0, 1.0)}, "must be a range"), ({"contact.stiffness": 3.0}, "must be a range"),
+     ({"contact.stiffness": (0.0, 1.0)}, "must begin above zero"), ({"striker.mass": (-1.0, 1.0)}, "below zero"),
+     ({"mode1.frequency": (1.0, 2.0)}, "mode1.mass too"), ({"striker.damping": (0.01, 0.1)}, "first_frequency too"),
+     ({"mode2.frequency": (1.0, 2.0), "mode2.mass": (1.0, 2.0)}, "number its modes from 1"),
+     ({"target.x": (0.0, 1.0)}, "unknown must be one of")],
+)  # fmt: skip
+def test_wrong_ranges_are_refused(ranges, said):
+    with pytest.raises(ValueError, match=said):
+        unknowns.checked(ranges, None, HAMMER, LAW)
+
+
+def test_coordinates_go_there_and_back():
+    for each in (unknowns.Unknown("striker.mass", 0.01, 1.0), unknowns.Unknown("contact.loss", 0.0, 2.0)):
+        for value in (each.low, 0.3, each.high):
+            assert each.outside(each.inside(value)) == pytest.approx(value, rel=1e-12, abs=1e-12)
+    assert each.floor and each.bounds == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.7])
+def test_the_contact_time_stands_for_the_stiffness(exponent):
+    setting = unknowns.Setting(None, None, HAMMER, LAW, Rig(25600.0), (), None, 0, 0.2)
+    values = {"contact.exponent": exponent, "striker.mass": 0.3}
+    k = setting.stiffness(values, 5e-4)
+    assert wall_time(k, exponent, 1 / 0.3, 0.1 / 0.3) == pytest.approx(5e-4, rel=1e-9)
+    assert setting.contact_time(values | {"contact.stiffness": k}) == pytest.approx(5e-4, rel=1e-9)
+
+
+def test_a_rigid_hammer_gets_a_mode_and_a_wall_gets_modes():
+    setting = unknowns.Setting(None, None, HAMMER, LAW, Rig(25600.0), (), None, 0, 0.2)
+    hammer = setting.hammer({"striker.mass": 0.2, "striker.first_frequency": 2e3, "striker.mode_ratio": 4.0})
+    assert hammer.row.tolist() == pytest.approx([0.2**-0.5, 2.0 * 0.2**-0.5])
+    assert not len(setting.structure({}).omega)
+    body = setting.structure({"target.mass": 2.0, "mode1.frequency": 300.0, "mode1.mass": 0.5})
+    assert body.omega.tolist() == pytest.approx([0.0, 600.0 * np.pi])

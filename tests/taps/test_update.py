@@ -1,0 +1,64 @@
+"""Material constants from measured frequencies."""
+
+import numpy as np
+import pytest
+
+import fem_impact as fi
+
+# [Hz] measured on a wooden plate 0.212 x 0.108 x 0.0045 m, 457 kg/m^3, clamped at one side
+# (Nemus-Project/magpie-matlab, MIT licence)
+MEASURED = (87.0, 160.0, 540.0, 616.0, 651.0, 1061.0)
+
+
+def plate(values):
+    wood = fi.Material.orthotropic(
+        E_along=values["E"], E_across=values["E_across"], G=values["G"], nu=0.3, rho=457.0, angle=0.0
+    )
+    return fi.assemble(fi.mesh.rectangle(0.212, 0.108), fi.Plate(wood, 4.5e-3), supports={"left": "clamped"})
+
+
+@pytest.mark.slow
+def test_three_constants_of_a_wooden_plate_give_all_six_frequencies():
+    ranges = {"E": (5e9, 25e9), "E_across": (0.2e9, 3e9), "G": (0.2e9, 2e9)}
+    found = fi.update(plate, MEASURED, ranges)
+    assert found.error < 0.012  # 1.1 % was found with an independent search
+    for name, value in (("E", 13.0e9), ("E_across", 0.87e9), ("G", 0.52e9)):
+        assert found.values[name] == pytest.approx(value, rel=0.03)
+    assert found.n_solves < 40 and found.uncertain == () and "GPa" not in found.summary()
+
+
+def test_a_bar_gives_its_modulus_and_says_how_well():
+    def bar(values):
+        section = fi.Beam.rectangular(fi.Material(E=values["E"], nu=0.3, rho=7850.0), width=0.02, height=0.01)
+        return fi.assemble(fi.mesh.line(0.5), section, supports={"left": "clamped"})
+
+    true = fi.find_modes(bar({"E": 205e9}), n_modes=5).frequencies
+    noisy = true * (1.0 + 1e-3 * np.random.default_rng(2).standard_normal(5))
+    found = fi.update(bar, noisy, {"E": (50e9, 500e9)})
+    assert abs(found.values["E"] / 205e9 - 1.0) < found.spread["E"] < 0.01
+    assert len(found.pairs) == 5 and found.error < 3e-3
+
+
+def test_constants_that_only_act_together_are_called_untold():
+    def body(values):
+        return fi.Modes.from_arrays(
+            np.array([100.0, 300.0, 700.0]) * np.sqrt(values["E"] / values["rho"]),
+            np.ones((1, 3)),
+            points=[[0.0]],
+            mass=1.0,
+        )
+
+    found = fi.update(body, [110.0, 330.0, 770.0], {"E": (0.1, 10.0), "rho": (0.1, 10.0)})
+    assert set(found.uncertain) == {"E", "rho"} and "not told" in found.summary()
+    assert found.values["E"] / found.values["rho"] == pytest.approx(1.21, rel=1e-3)
+
+
+def test_wrong_arguments_are_refused():
+    with pytest.raises(ValueError, match="at least 2 frequencies"):
+        fi.update(plate, [100.0], {"E": (1.0, 2.0), "G": (1.0, 2.0)})
+    with pytest.raises(ValueError, match="must return a System"):
+        fi.update(lambda values: 3, [100.0], {"E": (1.0, 2.0)})
+    with pytest.raises(ValueError, match="must begin above zero"):
+        fi.update(plate, [100.0], {"E": (0.0, 2.0)})
+    with pytest.raises(ValueError, match="must be a function"):
+        fi.update(3, [100.0], {"E": (1.0, 2.0)})
