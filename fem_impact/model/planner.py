@@ -451,7 +451,8 @@ def _last_resort(asked: _Asked, stages: Stages) -> Plan | None:
     if asked.moving or asked.values.get("striker_force") or asked.values.get("target_force"):
         return None
     with suppress(ValueError):
-        return _idealised(asked, "infinite", stages)
+        plan = _idealised(asked, "infinite", stages)
+        return plan if plan is not None and np.isfinite(plan.error) else None
     return None
 
 

@@ -1,5 +1,6 @@
 """Blows by Ritz vectors against closed forms: within tolerance, honestly estimated, late impacts included."""
 
+import pickle
 import warnings
 
 import numpy as np
@@ -72,3 +73,83 @@ def test_late_impact_is_not_overlooked():
     run, truth = compared("clamped", 3.98e-3, 0.0193, 34.6, 8.8e-2, "hertz", (-0.007, 0.085))
     assert run.response.n_impacts == truth.n_impacts == 4
     assert missed(run.response, truth) <= float(run.response.error) <= 8.8e-2
+
+
+def plate(supports, **more):
+    return fi.assemble(fi.mesh.rectangle(0.465, 0.3), fi.Plate(WOOD, thickness=3e-3, **more), supports)
+
+
+BALL, WOODEN = fi.Striker.rigid(0.03), fi.Contact.hertz(1e6)
+BLOW = {"at": (0.2, 0.11), "speed": 1.0, "tolerance": 1e-3}
+
+
+@pytest.mark.parametrize("more", [{}, {"target_force": 20.0, "max_impacts": 2}])
+def test_motion_after_the_blow_is_that_of_modes(more):
+    """The modes that ring are driven by the force found, a constant one included."""
+    body = plate({"boundary": "hinged"})
+    hit, other = (fi.strike(body, BALL, WOODEN, **BLOW, **more, target=target) for target in ("vectors", "modal"))
+    times, points = [5e-4, 2e-3, 1e-2], [(0.2, 0.11), (0.1, 0.1)]
+    moved, true = (response.displacement(points, times) for response in (hit, other))
+    assert np.abs(moved - true).max() < 0.02 * np.abs(true).max()  # modes up to -60 dB of the force; measured 1e-3
+    # the highest modes carry little of the energy
+    assert hit.modal_energy([0.01]).sum() == pytest.approx(other.modal_energy([0.01]).sum(), rel=0.05)
+    assert hit.energy_error < 1e-12 and hit.energies == pytest.approx(other.energies, rel=1e-2, abs=1e-6)
+
+
+def test_modes_of_another_body_do_not_ring():
+    hit = fi.strike(plate({"boundary": "hinged"}), BALL, WOODEN, **BLOW)
+    mine = fi.find_modes(plate({"boundary": "hinged"}), n_modes=12)
+    assert hit.on(mine).target is mine
+    with pytest.raises(ValueError, match="modes must be of the body struck"):
+        hit.on(fi.find_modes(plate({"left": "clamped"}), n_modes=12))
+    with pytest.raises(ValueError, match="must lie on the body"):
+        hit.on(fi.find_modes(fi.assemble(fi.mesh.disk(0.1), fi.Plate(WOOD, 3e-3), {"outer": "hinged"}), n_modes=12))
+
+
+def test_responses_by_vectors_can_be_copied():
+    hit = fi.strike(plate({"boundary": "hinged"}), BALL, WOODEN, **BLOW)
+    other = pickle.loads(pickle.dumps(hit))
+    assert other.restitution == hit.restitution and other.target.n_modes == hit.target.n_modes
+
+
+def test_skin_under_tension_is_struck():
+    """Of a timpano's skin the blow needs few vectors, while it has thousands of modes below the bending wave's limit."""
+    mylar = fi.Material(E=3.5e9, nu=0.3, rho=1380.0)
+    skin = fi.assemble(fi.mesh.disk(0.3), fi.Plate(mylar, thickness=2e-4, tension=3000.0), {"outer": "clamped"})
+    plan = planner.plan_of(
+        skin, fi.Striker.rigid(0.03), fi.Contact.linear(2e4), at=(0.2, 0.0), speed=1.0, tolerance=1e-2
+    )
+    run = plan.run()
+    assert run.plan.target == "vectors" and run.response.tolerance_met and run.response.finished
+
+
+def test_point_on_a_support_is_struck_as_a_wall():
+    hit = fi.strike(plate({"boundary": "hinged"}), BALL, WOODEN, at=(0.0, 0.1), speed=1.0)
+    assert hit.restitution == pytest.approx(1.0, abs=1e-6) and any("cannot move" in note for note in hit.notes)
+
+
+def test_blow_that_no_mesh_resolves_names_a_contact_that_one_does():
+    body, hard = plate({"boundary": "hinged"}), fi.Contact.hertz(1e17)
+    with pytest.raises(fi.SimulationError, match="more than the limit of") as refusal:
+        fi.plan(body, BALL, hard, **BLOW)
+    softer = float(str(refusal.value).rpartition("stiffness = ")[2])
+    assert fi.plan(body, BALL, fi.Contact.hertz(softer), **BLOW).n_dofs < 160_000
+
+
+@pytest.mark.parametrize("wrong", [{"n_modes": 30}, {"max_frequency": 500.0}, {"residual": False}])
+def test_vectors_refuse_what_only_modes_have(wrong):
+    with pytest.raises(ValueError, match="target = 'vectors' needs"):
+        fi.strike(plate({"boundary": "hinged"}), BALL, WOODEN, **BLOW, target="vectors", **wrong)
+
+
+def test_size_that_the_user_states_is_kept():
+    mesh = fi.mesh.rectangle(0.465, 0.3, size=0.05)
+    body = fi.assemble(mesh, fi.Plate(WOOD, thickness=3e-3), {"boundary": "hinged"})
+    run = planner.plan_of(body, BALL, WOODEN, **BLOW).run()
+    assert run.plan.size == mesh.size and run.response.error.mesh > 0.0
+
+
+def test_free_plates_are_told_alike_on_every_mesh():
+    """Two meshes choose their rigid motions differently; the blow must not take that for an error of the mesh."""
+    hit = fi.strike(plate({}), BALL, WOODEN, **BLOW)
+    assert hit.error.mesh < 1e-4 and hit.tolerance_met
