@@ -48,7 +48,7 @@ RESOLVABLE = 0.3  # [-] largest contact stiffness times residual compliance for 
 # 30 % is the median over many blows.
 AT_LEAST = 0.3
 THINNED = 1.4, 2.0  # [-] two extra runs divide the highest kept frequency by these, to estimate the truncation error
-FALLING = 2.0  # [-] the truncation error falls at least with this power of the highest kept frequency
+FALLING = 2.0, 1.0  # [-] the truncation error falls at least with this power of the highest kept frequency; overdamped
 REST_FLOOR = 1e-12  # [-] residual compliance below this fraction of the total is rounding
 # [-] by dimension: frequency of the replacement mode over the last, sqrt(sum u**2/w**2 / sum u**2/w**4) of those above
 REST_ABOVE = {1: 1.53, 2: 1.73}
@@ -764,7 +764,7 @@ def _truncation(parts, contacts, system: _System, whole: History, scheme, size, 
             if 1.0 < ratio < np.inf:
                 less = [*parts[:i], thin, *parts[i + 1 :]]
                 change = differ(_run(_joined(less, contacts), scheme, size, pace, horizon, n_max), whole)
-                guesses.append(change / (ratio**FALLING - 1.0))
+                guesses.append(change / (ratio ** FALLING[int(part.zeta[-1] > RINGING)] - 1.0))
         found += max(guesses)
     return max(found, AT_LEAST * float(expected)), resolvable
 

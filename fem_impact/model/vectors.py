@@ -26,6 +26,7 @@ FEWEST = 30  # [-] vectors besides those that stand for modes: for the dip under
 MORE = 1.4  # [-] factor on the number of vectors as long as they are too few
 NOTCH = 4.0  # [-] divides what the highest Ritz pairs, which act as a spring, may err, each time
 PATIENCE, LEAST_GAIN = 3, 0.7  # [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7
+TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before
 COARSER = 1.5  # [-] element size of the comparison over that of the blow
 MOST_VECTORS = 1500  # [-] limit on their number: dense matrices of this size take a second
 
@@ -119,10 +120,24 @@ class Seen:
             return True
         if self.coarse is None:
             self.coarse = self._krylov(self.size * COARSER)
+            if self.coarse.system.n_dofs >= self.fine.system.n_dofs:  # the outline allows no larger elements
+                self._refine()
             return True
         finer = self.fine.system.n_dofs * COARSER**2
         if error.mesh <= 0.5 * allowed or self.fixed or finer > refinement.MOST_UNKNOWNS:
             return False
-        self.size /= COARSER
-        self.coarse, self.fine = self.fine, self._krylov(self.size)
+        self._refine()
         return True
+
+    def _refine(self) -> None:
+        """Take a finer mesh; the difference of two counts for either, and a size that the user insists on stays."""
+        before, size = self.fine, self.size
+        for _ in range(TRIES):
+            size /= COARSER
+            other = self._krylov(size)
+            if other.system.n_dofs > before.system.n_dofs:
+                break
+        if self.fixed:
+            self.coarse = other
+        else:
+            self.coarse, self.fine, self.size = before, other, size
