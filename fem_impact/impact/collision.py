@@ -407,14 +407,16 @@ def _may_touch(history: History, other: History, duration: float) -> bool:
     Wherever the open contacts of the first come nearest, the gap must exceed the largest difference of the two motions
     so far. Looks ahead until all modes together cannot bridge the gap. ``duration`` [s] is that of one contact.
     """
-    if history.bias.any() or not history.status == other.status == record.FINISHED:
+    if history.bias.any() or history.status != other.status:
         return False
     rigid, shape = history.omega == 0.0, history.shape
     size = np.hypot(history.end_q, history.end_p / np.where(rigid, 1.0, history.omega))
     gap = -history.offset - shape[:, rigid] @ history.end_q[rigid]
     apart = -shape[:, rigid] @ history.end_p[rigid]  # [m/s]
     ahead = (np.abs(shape[:, ~rigid]) @ size[~rigid] - gap)[apart > 0.0] / apart[apart > 0.0]
-    end = history.end_time + max(0.0, float(ahead.max(initial=0.0)))
+    end = history.end_time
+    if history.status == record.FINISHED:
+        end += max(0.0, float(ahead.max(initial=0.0)))
     times = np.linspace(0.0, end, int(min(LOOKS[1], LOOKS[0] * end / duration)) + 2)
     approach, doubt = history.motion(times), np.zeros((len(times), 1))
     doubt[:, 0] = np.maximum.accumulate(np.abs(approach - other.motion(times)).max(axis=1))

@@ -502,7 +502,7 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     blow, values = asked.blow, asked.values
     if target == "modal":
         return None
-    fits = vectors.usable(blow.target, values["at"]) and values.get("residual", True)
+    fits = vectors.usable(blow.target) and values.get("residual", True)
     fits = fits and not {"n_modes", "max_frequency"} & set(asked.pieces)
     if not fits:
         if target == "vectors":
@@ -536,7 +536,7 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     why = f"the contact lasts about {asked.duration:.3g} s"
     return _plan(
         asked, target="vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
-        element="argyris", steps=STEPS, notes=blow.target.notes,
+        element="argyris", steps=STEPS, mass=blow.target.mass, notes=blow.target.notes,
     )  # fmt: skip
 
 

@@ -142,6 +142,15 @@ class Target:
         root = np.sqrt(tension**2 + 4.0 * bending * inertia * (2.0 * np.pi * frequency) ** 2)
         return float(np.sqrt(2.0 * (2.0 * np.pi * frequency) ** 2 * inertia / (root + tension)).max())
 
+    @property
+    def mass(self) -> float:
+        """Mass [kg] of the plate as struck, with straight edges between the vertices of its mesh."""
+        assert self.mesh is not None and self.section is not None
+        corners = self.mesh.points[self.mesh.cells]
+        (a, b), (c, d) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+        own = float(0.5 * np.abs(a * d - b * c) @ self.section.inertia(corners.mean(axis=1)))
+        return self.scale.get("mass", own + sum(mass for _, mass in self.point_masses))
+
     def count_below(self, frequency: float) -> float:
         """About how many modes the plate has below a frequency [Hz], before scaling; Weyl's law without its edges."""
         assert self.mesh is not None

@@ -31,8 +31,8 @@ COARSER = 1.5  # [-] element size of the comparison over that of the blow
 MOST_VECTORS = 1500  # [-] limit on their number: dense matrices of this size take a second
 
 
-def usable(target: Target, at: Any) -> bool:
-    """Whether vectors can describe the target struck at a point (2,) [m]: a plate that can be meshed again."""
+def usable(target: Target) -> bool:
+    """Whether vectors can describe the target: a plate that can be meshed again."""
     if target.kind != "fe" or target.mesh is None or target.mesh.dimension != 2 or target.mesh.recipe is None:
         return False
     ratio = target.damping_ratio
@@ -41,7 +41,7 @@ def usable(target: Target, at: Any) -> bool:
 
 
 def first_count(target: Target, resonance: float, tolerance: float) -> int:
-    """Number of vectors tried first: no more than there are modes that the contact may excite."""
+    """Number of vectors tried first; hardly more than there are modes that the contact may excite."""
     ease = 1e-2 / tolerance
     modes = target.count_below(EXCITED[0] * ease ** EXCITED[1] * resonance / target.stretch)
     return round(min(FIRST[0] * ease ** FIRST[1], FEWEST + modes))
