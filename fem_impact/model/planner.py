@@ -596,6 +596,8 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
     error = max(float(first.frequency_error.max()), SHORT_WAVES[system.element])
     reason = f"{system.element} elements of {size:.3g} m, about {n_dofs} unknowns, resolve the shortest wave"
     work = cost.by_modes(n_dofs, plan.n_modes) if plan.n_modes > first.n_modes else cost.NOTHING
+    if mesh.dimension == 2:
+        work += cost.compliance(n_dofs + DOFS_AT_BLOW)
     return replace(
         plan, element=system.element, size=size, n_dofs=n_dofs, errors={**plan.errors, "mesh": error},
         reasons=(*plan.reasons, reason), seconds=plan.seconds + work.seconds, memory=plan.memory + work.memory,

@@ -41,6 +41,7 @@ def benchmarks(monkeypatch):
     [
         (cost.strikes, ((100.0, 50), (200.0, 50), (200.0, 100))),
         (cost.by_modes, ((3e3, 20), (6e3, 20), (6e3, 40))),
+        (lambda n, _: cost.compliance(n), ((4e3, 0), (8e3, 0), (9e3, 0))),
         (lambda n, k: cost.by_vectors(n, 3e3, k, 1), ((4e3, 80), (8e3, 80), (8e3, 160))),
         (lambda n, s: cost.by_vectors(n, 3e3, 80, s), ((4e3, 1), (8e3, 1), (8e3, 20))),
     ],
