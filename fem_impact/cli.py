@@ -293,7 +293,11 @@ def _add_choices(add: Any) -> None:
         "--quantity", metavar="Q", action="append",
         help="what the tolerance is for; repeatable: restitution, contact_time, force ..., spectrum=5000 (up to 5 kHz)",
     )  # fmt: skip
-    add("--target", metavar="KIND", help="treat the struck body as rigid, infinite, by vectors or modal, whatever the plan chooses")
+    add(
+        "--target",
+        metavar="KIND",
+        help="treat the struck body as rigid, infinite, by vectors or modal, whatever the plan chooses",
+    )
     add("--n-modes", metavar="N", type=int, help="number of modes to keep for the struck body")
     add("--size", metavar="H", type=float, help="element size [m]")
 

@@ -17,11 +17,13 @@ from .impact.collision import strike
 from .impact.contact import Contact
 from .impact.response import Response
 from .impact.striker import Striker
+from .model import cost
 from .modes.modal import Modes, find_modes
 from .show import export, figures, pictures
 
 SQUARE = 2.0 * np.pi**2  # [-] omega of a hinged unit square of unit stiffness and mass
 
+UNKEPT = "make the folder of the compiled kernels writable; else costs are predicted for another machine"
 EXTRAS = {  # extra: its purpose and the modules it needs
     "cad": ("drawings", "svgelements", "ezdxf"),
     "film": ("films as MP4 files", "imageio_ffmpeg"),
@@ -49,6 +51,7 @@ def examine() -> list[Finding]:
     checks: list[Callable[[], Finding]] = [
         partial(_tried, "finite elements", _finite_elements, "reinstall scikit-fem: it fails or gives wrong numbers"),
         partial(_tried, "compiled kernels", _kernels, "reinstall numba; NUMBA_DISABLE_JIT=1 runs without it, slowly"),
+        partial(_tried, "predicted cost", cost.calibrate, UNKEPT, vital=False),
         partial(_tried, "pictures", _picture, "reinstall matplotlib"),
         partial(_tried, "mode shapes as files", _vtk, "make the folder for temporary files writable"),
         partial(_tried, "3-D rendering", pictures.can_render, pictures.REMEDY, vital=False),

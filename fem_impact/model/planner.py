@@ -13,6 +13,7 @@ import numpy as np
 from .._base import check, markup
 from ..fe import plausible, refinement
 from ..fe.assembly import System
+from ..fe.section import Plate
 from ..impact import accuracy, collision, promise
 from ..impact.collision import BAND_POINTS
 from ..impact.contact import Contact
@@ -20,7 +21,7 @@ from ..impact.quantities import words
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, FieldShapes, Modes, at_rest
-from . import idealisation, vectors
+from . import cost, idealisation, vectors
 from .target import FIRST_LOOK, Stages, Target, Watch
 
 SHARE = 0.45  # [-] of the tolerance for left-out modes, as much for the time steps; the mesh gets the rest
@@ -41,8 +42,8 @@ ARGUMENTS = tuple(signature(collision.strike).parameters)[3:]  # after modes, st
 TARGETS = ("rigid", "infinite", "vectors", "modal")
 DOFS_PER_AREA = {"argyris": 10.4, "hermite": 2.0}  # [-] unknowns per square, or length, of the element size
 DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow
-RATES = {"start": 0.02, "dofs": 6e-5, "pairs": 3.5e-7, "steps": 1e-8}  # [s] each, measured by studies/frontier.py
-BYTES = {"start": 2e8, "dofs": 6e3, "pairs": 40.0}  # [byte] each, measured likewise
+FAINTEST = 8.0  # [-] frequency up to which a force has the fraction FAINT of its impulse, times the contact's duration
+PER_MODE = 65.0  # [-] unknowns per mode found for motion and sound
 COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced
 
 
@@ -532,12 +533,28 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     reason = f"argyris elements of {size:.3g} m, smaller towards the blow, with some {n_dofs} unknowns"
     if asked.moving:
         reason += "; motion and sound come from modes driven by the force that the blow finds"
+    work = cost.by_vectors(n_dofs, DOFS_AT_BLOW, count, _striker_modes(asked, 1.0)[0])
+    if asked.moving:
+        rings = _ringing_count(asked)
+        work += cost.by_modes(PER_MODE * FIRST_LOOK, FIRST_LOOK) + cost.by_modes(PER_MODE * rings, rings)
     shares = dict.fromkeys(("Ritz vectors", "mesh"), 0.45 * (1.0 - STEPS) * asked.tolerance)
     why = f"the contact lasts about {asked.duration:.3g} s"
     return _plan(
         asked, target="vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
-        element="argyris", steps=STEPS, mass=blow.target.mass, notes=blow.target.notes,
+        element="argyris", steps=STEPS, mass=blow.target.mass, notes=blow.target.notes, work=work,
     )  # fmt: skip
+
+
+def _ringing_count(asked: _Asked) -> int:
+    """Predicted number of modes that `_ringing` finds, by Weyl's law."""
+    target, band = asked.blow.target, asked.quantities.get("sound")
+    mesh, section = target.mesh, target.section
+    assert mesh is not None and isinstance(section, Plate)
+    wave = target.wave((band or min(AUDIBLE, FAINTEST / asked.duration)) / target.stretch)
+    stiffness = section.stiffness(mesh.points[mesh.cells].mean(axis=1))
+    ratio = float((stiffness[:, 0, 0] / stiffness[:, 1, 1]).mean())
+    number = mesh.area * wave**2 / (4.0 * np.pi) * min(ratio, 1.0 / ratio) ** 0.25  # waves across the grain are shorter
+    return max(FIRST_LOOK, min(MOST_MODES["fe"] if band else MOST_RINGING, round(number)))
 
 
 def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: float = 1.0) -> Plan:
@@ -591,11 +608,12 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
     n_dofs = round(DOFS_PER_AREA[system.element] * mesh.area / size**mesh.dimension)
     error = max(float(first.frequency_error.max()), SHORT_WAVES[system.element])
     reason = f"{system.element} elements of {size:.3g} m, about {n_dofs} unknowns, resolve the shortest wave"
-    seconds = plan.seconds + RATES["dofs"] * n_dofs + RATES["pairs"] * n_dofs * plan.n_modes
-    memory = plan.memory + BYTES["dofs"] * n_dofs + BYTES["pairs"] * n_dofs * plan.n_modes
+    work = cost.by_modes(n_dofs, plan.n_modes) if plan.n_modes > first.n_modes else cost.NOTHING
+    if mesh.dimension == 2:
+        work += cost.compliance(n_dofs + DOFS_AT_BLOW)
     return replace(
         plan, element=system.element, size=size, n_dofs=n_dofs, errors={**plan.errors, "mesh": error},
-        reasons=(*plan.reasons, reason), seconds=seconds, memory=memory,
+        reasons=(*plan.reasons, reason), seconds=plan.seconds + work.seconds, memory=plan.memory + work.memory,
     )  # fmt: skip
 
 
@@ -608,6 +626,7 @@ def _plan(
     n_modes: int = 0,
     margin: float = 1.0,
     steps: float = SHARE,
+    work: cost.Work = cost.NOTHING,
     **chosen: Any,
 ) -> Plan:
     """The plan for any target: adds striker modes and time steps, with their errors and cost."""
@@ -626,6 +645,7 @@ def _plan(
     lasts = asked.values.get("duration")
     end = "until the final separation" if lasts is None else f"for {lasts:g} s"
     count = asked.duration / dt
+    work = work + cost.strikes(count, n_modes + kept)
     reasons = (*reasons, f"scheme {scheme}, steps of {dt:.3g} s ({count:.0f} per contact), {until}; run {end}")
     return Plan(
         asked.blow,
@@ -640,8 +660,8 @@ def _plan(
         duration=asked.duration,
         errors=MappingProxyType({**errors, "steps": steps * asked.tolerance}),
         reasons=reasons,
-        seconds=RATES["start"] + RATES["steps"] * 10.0 * count * (n_modes + kept),
-        memory=BYTES["start"],
+        seconds=work.seconds,
+        memory=work.memory,
         notes=plausible.together(
             notes, asked.blow.striker.notes, tuple(plausible.number("speed", asked.values["speed"]))
         ),

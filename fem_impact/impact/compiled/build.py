@@ -60,3 +60,8 @@ def inner(allocates: bool = False, arrays: Any = None, **options: Any) -> Any:
     if UNCOUNTED:
         bare["_nrt"] = allocates  # said in both cases, as it is inherited from the caller
     return njit(**bare, **options)
+
+
+def folder(kernel: Any) -> Path | None:
+    """Where a kernel from `outer` is kept on disk; None if it is not compiled."""
+    return Path(kernel.stats.cache_path) if COMPILED else None

@@ -1,0 +1,230 @@
+"""What a blow costs: processor time and memory by kind of target, at the speed of this machine.
+
+The seconds below belong to a machine that takes REFERENCE for a short benchmark. The benchmark tells how much slower
+this machine is at sparse, dense and compiled work; its result is kept beside the compiled kernels.
+"""
+
+import hashlib
+import json
+import math
+import os
+import platform
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, dataclass, fields
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import scipy
+import scipy.sparse as sp
+
+from .._base.files import replacing
+from ..fe.eigenvalues import factorise, one_thread
+from ..impact import collision
+from ..impact.compiled import build
+from ..impact.compiled.energy import run_energy
+from ..impact.contact import Contact
+from ..impact.striker import Striker
+from ..modes import analytic
+
+START = 0.01  # [s] of a strike, besides its time steps
+RUNS = 20.0  # [-] time steps of all runs of a strike, over those of one undisturbed contact
+STEP, MODE_STEP = 2e-7, 3.3e-9  # [s] per time step, and per step and mode
+PLAIN = 1.2e-4  # [s] per time step in plain Python, instead
+ASSEMBLY = 4.5e-5  # [s] per unknown, with the mesh
+FACTORS = 4e-6, 6.5e-8  # [s] per unknown of a factorisation, and per unknown times the root of their number
+SOLVE, TURN = 4.2e-7, 6e-10  # [s] per unknown of a solution, and of making it orthogonal to another vector
+DENSE = 4e-9  # [s] of all small eigenvalue problems, over their size cubed
+LANCZOS = 4.0  # [-] work per mode, over that per Ritz vector
+ROUNDS = 2.2  # [-] work of all attempts over that of the first, in the mean of the scenes
+LIVELY, MORE = 10, 2.2  # [-] strikers that keep so many modes touch for longer, and need so many times more vectors
+FINER = 2.25  # [-] unknowns per area, over those of the mesh that it is compared with
+PROCESS, ELEMENTS = 2.1e8, 5e7  # [byte] of the process with its libraries, and of those for elements
+PER_UNKNOWN, PER_PAIR = 1e4, 16.0  # [byte] per unknown with its factors; per unknown and solution
+WORTH = 1.0  # [s] a run predicted to take longer is worth the benchmark
+REPEATS = 3  # [-] times that the benchmark runs; the fastest counts
+GRID, WIDTH, SOLUTIONS = 22, 6, 30  # [-] nodes per side, unknowns per node and solutions of the sparse benchmark
+SQUARE, MODES, STEPS = 700, 300, 4000  # [-] size of the product of the benchmark; modes and time steps of its strike
+BELIEVED = 20.0  # [-] a machine that is so many times faster or slower was disturbed, or its clock is too coarse
+
+
+@dataclass(frozen=True)
+class Work:
+    """Processor time by kind of work, on the machine of REFERENCE, and memory."""
+
+    sparse: float = 0.0  # [s] assembly, factorisations, solutions
+    dense: float = 0.0  # [s]
+    steps: float = 0.0  # [s] strikes
+    memory: float = 0.0  # [byte]
+
+    def __add__(self, other: "Work") -> "Work":
+        return Work(*(getattr(self, field.name) + getattr(other, field.name) for field in fields(self)))
+
+    @property
+    def seconds(self) -> float:
+        """Processor time [s] on this machine, which is measured if it has not been and much is to be done."""
+        found = self.on(known())
+        return self.on(measured()) if found > WORTH else found
+
+    def on(self, machine: "Machine") -> float:
+        """Processor time [s] on a machine."""
+        return sum(getattr(self, name) * ratio for name, ratio in machine.slower.items())
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Processor time [s] of the parts of the benchmark."""
+
+    sparse: float
+    dense: float
+    steps: float
+
+    @property
+    def slower(self) -> dict[str, float]:
+        """How many times slower than that of REFERENCE this machine is at each kind of work."""
+        return {name: value / getattr(REFERENCE, name) for name, value in asdict(self).items()}
+
+    @property
+    def credible(self) -> bool:
+        """Whether it is one that people use."""
+        return all(1.0 / BELIEVED < ratio < BELIEVED for ratio in self.slower.values())
+
+
+NOTHING = Work()
+REFERENCE = Machine(sparse=0.045, dense=0.02, steps=0.008)  # [s] a virtual machine with two busy cores
+
+
+def strikes(n_steps: float, n_modes: int) -> Work:
+    """All runs of a strike; ``n_steps`` are those of the undisturbed contact, ``n_modes`` those of both bodies."""
+    step = (STEP if build.COMPILED else PLAIN) + MODE_STEP * n_modes
+    return Work(steps=START + RUNS * n_steps * step, memory=PROCESS)
+
+
+def by_modes(n_dofs: float, n_modes: float) -> Work:
+    """Modes on one mesh, their number checked."""
+    return _mesh(n_dofs, LANCZOS * n_modes, n_modes)
+
+
+def compliance(n_dofs: float) -> Work:
+    """Static deflection that stands for the modes left out, on elements that shrink towards the blow."""
+    return _mesh(n_dofs, 2.0, 2.0) + Work(memory=ELEMENTS)
+
+
+def by_vectors(n_dofs: float, n_graded: float, n_vectors: float, n_striker_modes: int) -> Work:
+    """Ritz vectors on the mesh of the blow and on a coarser one, and what the blow may turn out to need.
+
+    ``n_graded`` of the unknowns belong to the elements that shrink towards the blow, alike on both meshes.
+    """
+    n_vectors *= MORE if n_striker_modes >= LIVELY else 1.0
+    coarser = n_graded + (n_dofs - n_graded) / FINER
+    once = _mesh(n_dofs, n_vectors, n_vectors) + _mesh(coarser, n_vectors, n_vectors)
+    return Work(ROUNDS * once.sparse, ROUNDS * DENSE * n_vectors**3, ROUNDS * START, ELEMENTS + once.memory)
+
+
+def _mesh(n_dofs: float, n_solved: float, n_kept: float) -> Work:
+    """Assembly, two factorisations and solutions, each made orthogonal to those before, on one mesh."""
+    factors = 2.0 * (FACTORS[0] + FACTORS[1] * math.sqrt(n_dofs))
+    sparse = n_dofs * (ASSEMBLY + factors + n_solved * (SOLVE + 0.5 * TURN * n_kept))
+    return Work(sparse, memory=n_dofs * (PER_UNKNOWN + PER_PAIR * n_solved))
+
+
+@one_thread
+def benchmark() -> Machine:
+    """Measure this machine with small problems of each kind; takes a third of a second."""
+    line = sp.diags_array([1.0, 1.0, 1.0], offsets=[-1, 0, 1], shape=(GRID, GRID))
+    coupled = sp.kron(sp.kron(line, line), np.ones((WIDTH, WIDTH)))
+    stiff = (coupled + 10.0 * 9.0 * WIDTH * sp.eye_array(coupled.shape[0])).tocsc()
+    full = np.random.default_rng(0).normal(size=(SQUARE, SQUARE))
+    plate = analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=100.0, n_modes=MODES)
+    mass, law = Striker.rigid(0.1), Contact.linear(1e4)
+    lasts = 0.5e-3  # [s] the contact lasts longer
+
+    def sparse() -> None:
+        factors, solution = factorise(stiff), np.ones((stiff.shape[0], 1))
+        for _ in range(SOLUTIONS):
+            solution = factors.solve(solution)
+
+    def steps() -> None:
+        at = (0.465, 0.3)
+        collision.strike(plate, mass, law, at=at, speed=1.0, dt=lasts / STEPS, duration=lasts, residual=False)
+
+    return Machine(sparse=_fastest(sparse), dense=_fastest(lambda: full @ full), steps=_fastest(steps))
+
+
+def _fastest(work: Callable[[], object]) -> float:
+    """Shortest processor time [s] of several runs: other programs on the machine only make it longer."""
+    times = []
+    for _ in range(REPEATS):
+        start = time.process_time()
+        work()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+@cache
+def known() -> Machine:
+    """This machine as measured before, else that of REFERENCE; the same as long as the process lives."""
+    return read() or REFERENCE
+
+
+@cache
+def measured() -> Machine:
+    """This machine as measured before, else measured now, and kept if that is possible."""
+    found = read()
+    if found is not None or place() is None:  # plain Python takes seconds for the steps of the benchmark
+        return found or REFERENCE
+    found = benchmark()
+    if not found.credible:
+        return REFERENCE
+    keep(found)
+    return found
+
+
+def calibrate() -> bool:
+    """Measure this machine anew; return whether the result is credible and could be kept, or the kernels are not."""
+    if place() is None:
+        return True
+    found = benchmark()
+    return found.credible and keep(found)
+
+
+def read() -> Machine | None:
+    """What was kept of this machine; None if there is nothing, or nothing credible."""
+    path = place()
+    if path is None:
+        return None
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        found = Machine(*(float(kept[field.name]) for field in fields(Machine)))
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+    return found if kept.get("stamp") == _stamp() and found.credible else None
+
+
+def keep(machine: Machine) -> bool:
+    """Write a machine beside the compiled kernels; return whether that was possible."""
+    path = place()
+    if path is None:
+        return False
+    with suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as temporary:
+            temporary.write_text(json.dumps({"stamp": _stamp(), **asdict(machine)}), encoding="utf-8")
+        return True
+    return False
+
+
+def place() -> Path | None:
+    """File beside the compiled kernels; one for each machine that shares them. None if no kernels are kept."""
+    folder = build.folder(run_energy)
+    return (
+        None if folder is None else folder / f"speed-{hashlib.sha256(platform.node().encode()).hexdigest()[:12]}.json"
+    )
+
+
+def _stamp() -> str:
+    """A digest of what the benchmark depends on: processor, libraries, kernels and itself."""
+    about = platform.machine(), os.cpu_count(), platform.python_version(), np.__version__, scipy.__version__
+    return hashlib.sha256(repr((about, build.STAMP, REFERENCE)).encode()).hexdigest()

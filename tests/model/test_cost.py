@@ -1,0 +1,149 @@
+"""Predicted cost grows with the size of a model, fits this machine, and never depends on a file."""
+
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import fem_impact as fi
+from fem_impact.impact.compiled import build
+from fem_impact.model import cost
+
+SCENES = Path(__file__).parents[2] / "studies" / "scenes"
+SLOW = cost.Machine(*(2.0 * value for value in (cost.REFERENCE.sparse, cost.REFERENCE.dense, cost.REFERENCE.steps)))
+MUCH = cost.Work(sparse=10.0, dense=1.0, steps=1.0)
+
+
+@pytest.fixture(autouse=True)
+def place(tmp_path, monkeypatch):
+    """A file of its own for every test; what the process has measured is forgotten before and after."""
+    path = tmp_path / "kernels" / "speed.json"
+    monkeypatch.setattr(cost, "place", lambda: path)
+    for remembered in (cost.known, cost.measured):
+        remembered.cache_clear()
+    yield path
+    for remembered in (cost.known, cost.measured):
+        remembered.cache_clear()
+
+
+@pytest.fixture
+def benchmarks(monkeypatch):
+    """Counts the benchmarks, which say SLOW."""
+    made = []
+    monkeypatch.setattr(cost, "benchmark", lambda: made.append(1) or SLOW)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("work", "sizes"),
+    [
+        (cost.strikes, ((100.0, 50), (200.0, 50), (200.0, 100))),
+        (cost.by_modes, ((3e3, 20), (6e3, 20), (6e3, 40))),
+        (lambda n, _: cost.compliance(n), ((4e3, 0), (8e3, 0), (9e3, 0))),
+        (lambda n, k: cost.by_vectors(n, 3e3, k, 1), ((4e3, 80), (8e3, 80), (8e3, 160))),
+        (lambda n, s: cost.by_vectors(n, 3e3, 80, s), ((4e3, 1), (8e3, 1), (8e3, 20))),
+    ],
+)
+def test_more_of_anything_costs_more_time_and_no_less_memory(work, sizes):
+    found = [work(*size) for size in sizes]
+    times, memories = [each.on(cost.REFERENCE) for each in found], [each.memory for each in found]
+    assert times == sorted(set(times)) and memories == sorted(memories)
+
+
+def test_the_time_of_a_finer_mesh_grows_faster_than_its_unknowns():
+    one, four = (cost.by_modes(n, 50).on(cost.REFERENCE) for n in (1e4, 4e4))
+    assert 4.0 < four / one < 8.0  # between a solution per unknown and a factorisation, n**1.5
+
+
+def test_a_machine_half_as_fast_takes_twice_as_long():
+    assert MUCH.on(SLOW) == pytest.approx(2.0 * MUCH.on(cost.REFERENCE))
+    assert replace(MUCH, steps=5.0).on(replace(cost.REFERENCE, steps=SLOW.steps)) == pytest.approx(10.0 + 1.0 + 10.0)
+
+
+def test_without_a_file_cheap_work_is_predicted_with_built_in_rates_and_no_benchmark(place, benchmarks):
+    work = cost.Work(sparse=0.5)
+    assert work.seconds == 0.5 and not benchmarks and not place.exists()
+
+
+def test_much_work_is_worth_one_benchmark_whose_result_is_kept(place, benchmarks):
+    assert MUCH.seconds == MUCH.seconds == pytest.approx(24.0) and len(benchmarks) == 1
+    assert cost.read() == SLOW
+    cost.measured.cache_clear()  # as a new process
+    cost.known.cache_clear()
+    assert MUCH.seconds == pytest.approx(24.0) and len(benchmarks) == 1
+
+
+def test_what_was_kept_of_this_machine_serves_cheap_work_too(place, benchmarks):
+    assert cost.keep(SLOW)
+    assert cost.Work(sparse=0.25).seconds == pytest.approx(0.5) and not benchmarks
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"",
+        b"{",
+        b"\xff\xfe",
+        b"[1]",
+        b"null",
+        b'{"sparse": 1}',
+        b'{"sparse": [], "dense": 1, "steps": 1}',
+        b"[" * 99999,
+    ],
+    ids=["empty", "cut", "no text", "list", "null", "short", "no number", "deep"],
+)
+def test_a_damaged_file_is_replaced_without_a_word(place, benchmarks, text):
+    place.parent.mkdir()
+    place.write_bytes(text)
+    assert cost.read() is None
+    assert MUCH.seconds == pytest.approx(24.0) and cost.read() == SLOW
+
+
+@pytest.mark.parametrize("change", [{"stamp": "other"}, {"dense": 1e9}, {"dense": 0.0}, {"dense": float("nan")}])
+def test_other_kernels_and_impossible_numbers_do_not_count(place, change):
+    assert cost.keep(SLOW) and cost.read() == SLOW
+    place.write_text(json.dumps(json.loads(place.read_text()) | change))
+    assert cost.read() is None
+
+
+def test_where_nothing_can_be_kept_the_machine_is_measured_once_a_process(place, benchmarks):
+    place.parent.write_text("a file where the folder should be")
+    assert MUCH.seconds == MUCH.seconds == pytest.approx(24.0) and len(benchmarks) == 1
+    assert not cost.calibrate()
+
+
+def test_without_compiled_kernels_nothing_is_measured_or_kept(monkeypatch, benchmarks):
+    monkeypatch.setattr(cost, "place", lambda: None)
+    assert pytest.approx(12.0) == MUCH.seconds and cost.calibrate()
+    assert cost.read() is None and not cost.keep(SLOW) and not benchmarks
+
+
+def test_a_disturbed_benchmark_is_not_believed(place, monkeypatch):
+    monkeypatch.setattr(cost, "benchmark", lambda: replace(SLOW, steps=0.0))
+    assert pytest.approx(12.0) == MUCH.seconds and not place.exists()
+
+
+def test_the_result_lies_beside_the_kernels(monkeypatch):
+    monkeypatch.undo()
+    if not build.COMPILED:
+        assert cost.place() is None
+        return
+    assert cost.place().parent == build.folder(cost.run_energy)
+
+
+@pytest.mark.skipif(not build.COMPILED, reason="the benchmark is for compiled kernels")
+def test_the_benchmark_finds_a_machine_that_people_use():
+    assert cost.benchmark().credible  # within a factor of twenty of REFERENCE
+
+
+@pytest.mark.parametrize("name", ["marked_linear", "guitar_top", "drumstick"])
+def test_predicted_time_is_of_the_right_size(name):
+    """Within four, and not two as in studies/cost_predictions.py: a busy machine doubles even the processor time."""
+    scene = fi.load_scene(SCENES / f"{name}.toml")
+    plan = scene.plan(tolerance=1e-2)
+    start = time.process_time()
+    plan.run()
+    taken = time.process_time() - start
+    assert taken / 4.0 < plan.seconds < 4.0 * taken
