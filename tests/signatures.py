@@ -48,7 +48,7 @@ INNER = {
      "Scene.body", "Scene.closed_form", "Scene.fault", "Scene.finder", "Scene.make_contact",
     "Scene.make_section", "Scene.make_striker", "Scene.data",
     "Plan.data", "Plan.run", "Plan.strike", "Response.body_slice", "Response.summary", "Scene.picture",
-    "mesh.Mesh", "mesh.straight", "mesh.fill", "Modes.points",
+    "mesh.Mesh", "mesh.straight", "mesh.fill", "Modes.points", "Modes.stretched",
     "analytic.RectangleShapes", "analytic.BeamShapes", "analytic.DiskShapes",  # behind the checks of Modes
     "export.plain", "export.versions", "export.csv_text", "export.run_data", "export.vtk_ending", "figures.snapshot",
     "figures.in_hertz", "figures.styled", "sound.Sound",
@@ -159,6 +159,10 @@ def table() -> dict[str, dict[str, Any]]:
             "mesh": t["square"], "section": t["plate"], "supports": {"boundary": "hinged"}, "element": "argyris",
             "point_masses": [((0.1, 0.1), 0.01)], "near": [(0.1, 0.1)], "graded": True,
         },
+        "ritz_modes": {
+            "system": t["system"], "points": [at], "max_frequency": 2e3, "n_vectors": 20, "damping_ratio": 0.01,
+        },
+        "Response.on": {"self": t["hit"], "modes": t["modes"]},
         "Modes.from_arrays": {
             "frequencies": [0.0, 10.0], "shapes": [[1.0, 0.5], [1.0, -0.5]], "points": [[0.0, 0.0], [0.1, 0.1]],
             "mass": 1.0, "damping_ratio": 0.01, "compliance": [[1e-3, 0.0], [0.0, 1e-3]],

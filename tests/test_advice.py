@@ -31,8 +31,9 @@ def advice(pattern, call, kind=ValueError):
 
 def test_a_blow_of_too_many_modes_proposes_a_tolerance_that_is_affordable(tmp_path):
     found = loaded(tmp_path, SMALL.replace("695e3", "1e8").replace('source = "analytic"', 'source = "fe"'))
-    enough = advice(r"; tolerance = (\S+) is affordable", lambda: found.plan(tolerance=1e-9), fi.SimulationError)
-    assert found.plan(tolerance=enough).n_modes <= 2000
+    enough = advice(r"; tolerance = (\S+) is affordable", lambda: found.plan(tolerance=1e-9, target="modal"),
+                    fi.SimulationError)  # fmt: skip
+    assert found.plan(tolerance=enough, target="modal").n_modes <= 2000
 
 
 def test_a_blow_too_hard_for_any_tolerance_proposes_a_softer_contact(tmp_path):
@@ -41,9 +42,9 @@ def test_a_blow_too_hard_for_any_tolerance_proposes_a_softer_contact(tmp_path):
     for tolerance in (1e-4, 1.0):
         soft = advice(
             r"no tolerance is large enough; take a contact with stiffness = (\S+)",
-            lambda tolerance=tolerance: found.plan(tolerance=tolerance), fi.SimulationError,
+            lambda tolerance=tolerance: found.plan(tolerance=tolerance, target="modal"), fi.SimulationError,
         )  # fmt: skip
-    assert loaded(tmp_path, text.replace("695e3", str(soft))).plan(tolerance=1.0).n_modes <= 2000
+    assert loaded(tmp_path, text.replace("695e3", str(soft))).plan(tolerance=1.0, target="modal").n_modes <= 2000
 
 
 @pytest.mark.parametrize(
@@ -59,11 +60,12 @@ def test_a_part_of_the_plan_that_is_too_large_gets_its_limit(tmp_path, wanted, p
     assert found.plan(**{key: int(most) if key == "n_modes" else most}).n_modes <= 2000
 
 
-def test_a_band_that_is_too_wide_gets_its_limit(tmp_path):
+@pytest.mark.parametrize("quantity, target", [("sound", None), ("spectrum", "modal")])
+def test_a_band_that_is_too_wide_gets_its_limit(tmp_path, quantity, target):
     found = loaded(tmp_path, SMALL.replace('source = "analytic"', 'source = "fe"'))
-    most = advice(r"band of the quantity of at most (\S+) Hz", lambda: found.plan(quantity="spectrum=1e7"),
-                  fi.SimulationError)  # fmt: skip
-    assert found.plan(quantity=f"spectrum={most}").n_modes <= 2000
+    words = r"band of the quantity of at most (\S+) Hz"
+    most = advice(words, lambda: found.plan(quantity=f"{quantity}=1e7", target=target), fi.SimulationError)
+    assert found.plan(quantity=f"{quantity}={most}", target=target).n_modes <= 2000
 
 
 def test_a_map_of_too_many_modes_proposes_a_tolerance(tmp_path, monkeypatch):

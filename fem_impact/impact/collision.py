@@ -398,7 +398,14 @@ def _poorer(part: _Part, modes: Modes) -> _Part:
     velocity = still
     if part.p.any():
         velocity = float(part.rows[0] @ part.p) * modes.rigid_motion(part.points[:1])
-    return _part(modes, part.touched, part.points, rows, left_out(modes, part.points, rows), part.force, velocity)
+    rest, rigid = left_out(modes, part.points, rows), modes.omega == 0.0
+    # rigid motions are known up to a rotation among them, which would look like a difference of speeds
+    here, there = np.vstack([rows, velocity])[:, rigid], np.vstack([part.rows, part.p])[:, moving]
+    left, _, right = np.linalg.svd(here.T @ there)
+    turned = here @ left @ right
+    rows, velocity = rows.copy(), velocity.copy()
+    rows[:, rigid], velocity[rigid] = turned[:-1], turned[-1]
+    return _part(modes, part.touched, part.points, rows, rest, part.force, velocity)
 
 
 def _may_touch(history: History, other: History, duration: float) -> bool:

@@ -512,6 +512,14 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
                 "n_modes or max_frequency, and no damping ratios given mode by mode; use target = 'modal'"
             )
         return None
+    band = asked.quantities.get("sound")
+    rings = 0.0 if band is None else blow.target.count_below(band / blow.target.stretch)
+    if band is not None and rings > MOST_MODES["fe"]:
+        reach = 0.9 * band * MOST_MODES["fe"] / rings
+        raise check.SimulationError(
+            f"{blow.name}the sound up to {band:g} Hz needs about {rings:.2g} modes, more than the limit of "
+            f"{MOST_MODES['fe']}; give a band of the quantity of at most {float(f'{reach:.1e}'):g} Hz"
+        )
     with stages("modes"):
         size = asked.pieces.get("size") or vectors.size_for(blow.target, 0.5 / asked.duration, asked.tolerance)
     mesh = blow.target.mesh

@@ -380,7 +380,10 @@ class Modes:
             raise ValueError(f"max_frequency must reach the first mode at {self.frequencies[0]:g} Hz")
         fields = {name: getattr(self, name) for name in ("omega", "damping_ratio", "frequency_error", "bounds")}
         kept: dict[str, Any] = {name: x if x is None else x[:keep].copy() for name, x in fields.items()}
-        poorer = {cause: modes.truncated(max_frequency=max_frequency) for cause, modes in self.poorer.items()}
+        poorer = dict(self.poorer)
+        if max_frequency is not None:  # a poorer first mode may lie higher
+            for cause, modes in poorer.items():
+                poorer[cause] = modes.truncated(max_frequency=max(limit, float(modes.frequencies[0])))
         return replace(self, shapes=self.shapes.take(keep), poorer=poorer, **kept)
 
     def damped(self, damping_ratio: Damping) -> "Modes":

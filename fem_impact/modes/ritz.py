@@ -24,7 +24,6 @@ from .modal import Damping, Modes, Shapes, damping_notes, damping_ratios
 
 GROWN = 32  # [-] vectors for which room is made at a time
 DEPENDENT = 1e-10  # [-] a new vector shorter than this fraction of its length before orthogonalisation adds nothing
-LEAD = 1e-6  # [-] entries of rigid motions below this fraction of the largest are rounding
 FEWER = 0.8  # [-] fraction of the vectors with which a second blow tells the error of having no more
 
 
@@ -90,8 +89,7 @@ class Krylov:
         self.stiffness = np.zeros((0, 0))  # (n_projected, n_projected) of the first vectors
         self.count, self.full = 0, False
         self._solve = factorise(system.K + (shift / system.frame.rate) ** 2 * system.M).solve
-        self.rigid = _in_order(system, points)
-        self._moving = system.M @ self.rigid
+        self._moving = system.M @ system.rigid
         flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
         self._next = flexibility.solve(self.loads)  # the static deflection, so that the compliance is exact
         self.compliance = self.loads.T @ self._next  # (n_points, n_points) in the frame
@@ -100,7 +98,7 @@ class Krylov:
     def grow(self, count: int) -> None:
         """Make vectors until there are at least ``count``, or all that the loads can reach."""
         M = self.system.M
-        while self.count < min(count, self.system.n_dofs - self.rigid.shape[1]) and not self.full:
+        while self.count < min(count, self.system.n_dofs - self.system.rigid.shape[1]) and not self.full:
             if self.count + self.width > len(self.vectors):
                 room = np.empty((max(GROWN, self.width), self.system.n_dofs))
                 self.vectors = np.concatenate([self.vectors, room])
@@ -108,7 +106,7 @@ class Krylov:
             heavy = M @ new
             length = np.sqrt(np.einsum("ij,ij->j", new, heavy))
             for start in (max(0, self.count - 2 * self.width), 0):  # the last vectors hold nearly all that must go
-                new = new - self.rigid @ (self._moving.T @ new) - known[start:].T @ (known[start:] @ heavy)
+                new = new - self.system.rigid @ (self._moving.T @ new) - known[start:].T @ (known[start:] @ heavy)
                 heavy = M @ new
             value, turn = np.linalg.eigh(new.T @ heavy / np.outer(length, length))
             kept = value > DEPENDENT**2
@@ -146,31 +144,15 @@ class Krylov:
         return replace(found, poorer={"truncation": self._pairs(max(self.width, int(FEWER * count)), damping_ratio)})
 
     def _pairs(self, count: int, damping_ratio: Damping) -> Modes:
-        frame, rigid = self.system.frame, self.rigid
+        frame, rigid = self.system.frame, self.system.rigid
         value, turn = np.linalg.eigh(self.stiffness[:count, :count])
         omega = np.concatenate([np.zeros(rigid.shape[1]), np.sqrt(np.maximum(value, 0.0)) * frame.rate])
         basis = self.vectors[:count]
         rows = np.hstack([self.loads.T @ rigid, (basis @ self.loads).T @ turn]) * frame.mass**-0.5
         damping = damping_ratios(damping_ratio, omega)
-        shapes = RitzShapes(self.system, self.points, omega, rows, rigid, basis, turn)
+        shapes = RitzShapes(self.system, self.points, omega, rows, basis, turn)
         notes = (*self.system.notes, *damping_notes(damping, omega))
         return Modes(omega, damping, shapes, self.system.mass, np.zeros(len(omega)), notes=notes)
-
-
-def _in_order(system: System, loads: np.ndarray) -> np.ndarray:
-    """Rigid motions (n_dofs, n_rigid) of a plate turned among themselves so that they do not depend on the mesh.
-
-    The first moves the first load; the others turn the body about it.
-    """
-    rigid, points = system.rigid, system.mesh.points
-    if system.mesh.dimension != 2 or not rigid.shape[1]:
-        return rigid
-    ends = points[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])]
-    off = (ends - loads[0]) / system.frame.length
-    plane = np.linalg.lstsq(np.column_stack([np.ones(4), off]), system.interpolate(ends) @ rigid, rcond=None)[0]
-    turn, lower = np.linalg.qr(plane.T)  # the plane (value at the load, slopes) of every motion becomes triangular
-    lead = lower[np.arange(len(turn)), np.argmax(np.abs(lower) > LEAD * np.abs(lower).max(), axis=1)]
-    return rigid @ (turn * np.sign(lead))
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +163,6 @@ class RitzShapes(Shapes):
     loads: np.ndarray  # (n_loads, dimension) [m] points that the vectors started from
     omega: np.ndarray  # (n_all,) [rad/s] of all vectors, rigid motions first
     rows: np.ndarray  # (n_loads, n_all) [kg**-0.5] shapes at the loads
-    rigid: np.ndarray  # (n_dofs, n_rigid) [-] rigid motions
     basis: np.ndarray  # (n_vectors, n_dofs) [-] mass-orthonormal in the frame
     turn: np.ndarray  # (n_vectors, n_vectors) [-] from the basis to the flexible shapes
     kept: int | None = None  # number of shapes that count as modes; the others are left out
@@ -200,7 +181,7 @@ class RitzShapes(Shapes):
             return self.rows
         place = self.system.interpolate(points)
         flexible = (place @ self.basis.T) @ self.turn
-        return np.hstack([place @ self.rigid, flexible]) * self.system.frame.mass**-0.5
+        return np.hstack([place @ self.system.rigid, flexible]) * self.system.frame.mass**-0.5
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         return self.system.contains(points)

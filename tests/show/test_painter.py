@@ -1,7 +1,5 @@
 """A process of its own draws the same pictures, dies with the command, and may die alone."""
 
-from types import MappingProxyType
-
 import numpy as np
 import pytest
 from PIL import Image
@@ -46,12 +44,3 @@ def test_if_it_dies_this_process_draws(hit, tmp_path, monkeypatch):
         other.begin(tmp_path, hit)
         assert other.finish() == "flat"
     assert drawn == [(tmp_path, hit)]
-
-
-def test_read_only_mappings_travel(tmp_path):
-    import pickle
-
-    with (tmp_path / "a").open("wb") as file:
-        painter._send({"a": MappingProxyType({"b": 1})}, file)
-    found = pickle.loads((tmp_path / "a").read_bytes())
-    assert dict(found["a"]) == {"b": 1} and isinstance(found["a"], MappingProxyType)
