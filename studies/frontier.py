@@ -180,7 +180,7 @@ class Dial:
     error: float = np.nan
 
 
-def dials(whole: fi.Scene, target: str = "vectors") -> list[Dial]:
+def dials(whole: fi.Scene, target: str | None = None) -> list[Dial]:
     """Run the chain for each tolerance, loosest first, because peak memory only grows within a process."""
     found = []
     for tolerance in TOLERANCES:
@@ -193,7 +193,10 @@ def dials(whole: fi.Scene, target: str = "vectors") -> list[Dial]:
 
 def table(found: list[Dial]) -> str:
     """The table of the README."""
-    lines = ["| tolerance | seconds | unknowns | vectors | steps | MB | true error |", "|---|---|---|---|---|---|---|"]
+    lines = [
+        "| tolerance | seconds | unknowns | vectors | steps | MB | true error |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for d in found:
         plan, n_steps = d.run.plan, len(d.run.response.history.steps)
         sizes = f"{plan.n_dofs} | {plan.n_modes} | {n_steps} | {d.megabytes:.0f}"
