@@ -27,6 +27,7 @@ MORE = 1.4  # [-] factor on the number of vectors as long as they are too few
 NOTCH = 4.0  # [-] divides what the highest Ritz pairs, which act as a spring, may err, each time
 PATIENCE, LEAST_GAIN = 3, 0.7  # [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7
 TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before
+SHARE = 0.6  # [-] of what the steps leave of the tolerance, for too few vectors, before the mesh is compared
 COARSER = 1.5  # [-] element size of the comparison over that of the blow
 MOST_VECTORS = 1500  # [-] limit on their number: dense matrices of this size take a second
 
@@ -115,10 +116,14 @@ class Seen:
 
     def improved(self, error: Error, allowed: float) -> bool:
         """Take more vectors or a finer mesh, whichever the error of a blow calls for; False if neither is possible."""
-        if error.truncation > 0.5 * allowed and self.count < MOST_VECTORS and not self._stuck(error.truncation):
+        first = self.coarse is None  # the mesh is compared only when there are vectors enough
+        few = error.truncation > SHARE * allowed if first else error.truncation > error.mesh
+        if not first and error.truncation + error.mesh <= allowed:
+            return False
+        if few and self.count < MOST_VECTORS and not self._stuck(error.truncation):
             self.count, self.margin = min(MOST_VECTORS, round(MORE * self.count)), NOTCH * self.margin
             return True
-        if self.coarse is None:
+        if first:
             self.coarse = self._krylov(self.size * COARSER)
             if self.coarse.system.n_dofs >= self.fine.system.n_dofs:  # the outline allows no larger elements
                 self._refine()
