@@ -254,16 +254,13 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> R
     )
     truncation, resolvable = _truncation(parts, contacts, system, coarse, ran, size, differ, pace, *last)
     mesh_error = _mesh_error(bodies, parts, contacts, system, coarse, ran, size, differ, options.tolerance, pace, last)
+    parted = {"truncation": truncation, "mesh": mesh_error}
     for i, body in enumerate(bodies):
         for cause, other in body.poorer.items():
             poorer = [*parts[:i], _poorer(parts[i], other), *parts[i + 1 :]]
             less = _run(_joined(poorer, contacts), ran, size, pace, *last)
-            change = max(differ(less, coarse), float(_may_touch(coarse, less, pace[0])))
-            truncation, mesh_error = (
-                truncation + change * (cause == "truncation"),
-                mesh_error + change * (cause == "mesh"),
-            )
-    error = Error(step_error, truncation, mesh_error, resolvable, sensitivity=_sensitivity(coarse, history))
+            parted[cause] += max(differ(less, coarse), float(_may_touch(coarse, less, pace[0])))
+    error = Error(step_error, **parted, resolvable=resolvable, sensitivity=_sensitivity(coarse, history))
     laws = tuple(touch.law for touch in contacts)
     dips = tuple(_dip(part, system) for part in parts)
     return Response(

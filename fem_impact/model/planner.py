@@ -347,11 +347,12 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
         if other is not None and other.error < response.error.total:
             return carry_out(other, stages)
     plan = replace(plan, n_modes=seen.count, size=seen.size, n_dofs=seen.fine.system.n_dofs)
-    response = replace(response, rings=partial(_ringing, asked, keep))
     if asked.moving:
         with stages("modes"):
-            response = response.on(response.target)
+            response = replace(response, ringing=_ringing(asked, keep, response))
         plan = replace(plan, max_frequency=float(response.target.frequencies[-1]))
+    else:
+        response = replace(response, rings=partial(_ringing, asked, keep))
     return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
 
 

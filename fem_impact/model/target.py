@@ -137,10 +137,8 @@ class Target:
         assert isinstance(section, Plate) and mesh is not None
         middle = mesh.points[mesh.cells].mean(axis=1)
         stiffness, inertia = section.stiffness(middle), section.inertia(middle)
-        bending, tension = np.minimum(stiffness[:, 0, 0], stiffness[:, 1, 1]), section.tension or 0.0
-        # omega**2 inertia = bending k**4 + tension k**2
-        root = np.sqrt(tension**2 + 4.0 * bending * inertia * (2.0 * np.pi * frequency) ** 2)
-        return float(np.sqrt(2.0 * (2.0 * np.pi * frequency) ** 2 * inertia / (root + tension)).max())
+        bending = np.minimum(stiffness[:, 0, 0], stiffness[:, 1, 1])
+        return float(_squared_wave(bending, section.tension or 0.0, inertia, frequency).max() ** 0.5)
 
     @property
     def mass(self) -> float:
@@ -221,14 +219,10 @@ class Target:
         if not isinstance(section, Plate) or not section.tension or self.mesh is None:
             body = self.modes or self.mesh
             return (high / low) ** (0.5 * (2 if body is None else body.dimension))
-        # A stretched plate: omega**2 inertia = bending k**4 + tension k**2, and the number goes as k**2.
         middle = self.mesh.points[self.mesh.cells].mean(axis=1)
         bending, inertia = float(section.stiffness(middle)[:, 0, 0].mean()), float(section.inertia(middle).mean())
-        far, near = (
-            np.sqrt(section.tension**2 + 4.0 * bending * inertia * (2.0 * np.pi * f) ** 2) - section.tension
-            for f in (high, low)
-        )
-        return float(far / near)
+        far, near = (_squared_wave(bending, section.tension, inertia, frequency) for frequency in (high, low))
+        return float(far / near)  # the number goes as the square of the wavenumber
 
     def _system(self, size: float | None, stages: Stages) -> System:
         """The assembled body, with elements of the given size [m]."""
@@ -241,3 +235,9 @@ class Target:
             return self.system if size is None else reassemble(self.system, mesh)
         with stages("assembly"), self.blame("supports"), np.errstate(all="ignore"):
             return assemble(mesh, self.section, dict(self.supports), point_masses=self.point_masses)
+
+
+def _squared_wave(bending: Any, tension: float, inertia: Any, frequency: float) -> Any:
+    """Square of the wavenumber k [rad/m] at a frequency [Hz]: omega**2 inertia = bending k**4 + tension k**2."""
+    pull = inertia * (2.0 * np.pi * frequency) ** 2
+    return 2.0 * pull / (np.sqrt(tension**2 + 4.0 * bending * pull) + tension)
