@@ -25,6 +25,8 @@ SCHEMES = ("A", "A4", "collocation")
 MAX_STEPS = 500_000  # [-] of one run: takes about one second
 MAX_WORK = 500_000_000  # [-] modes times steps of one run: takes about one second
 PLAIN_WORK = 300_000  # [-] modes times steps of one run, if the kernels are not compiled
+REACHED = 20.0  # [-] tolerance advised over the error reached: the steps it leads to may be twice as long
+SOONER = 0.2  # [-] of a run that was given up, what is advised: the last run of a blow halves the steps twice
 FIRST_STEPS = 24.0  # [-] with 24 steps per contact, A4 errs by less than FIRST_ERROR; cheapest first run of 12 to 32
 FIRST_ERROR = 1e-4  # [-] error of A4 with FIRST_STEPS, over many blows
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
@@ -549,15 +551,15 @@ def shortened(striker: Striker, n_modes: int) -> Striker:
 
 
 def _controlled(
-    system, scheme, dt, tolerance, quantities, pace, horizon, n_max
+    system, scheme, dt, tolerance, quantities, pace, horizon, n_max, free=None
 ) -> tuple[History, float, str, History, float]:
-    """Refine until two successive runs agree to the tolerance.
+    """Refine until two successive runs agree to the tolerance; ``free`` if the scheme is our choice.
 
     Returns the finer history, its estimated error, the scheme, the coarser history and its step size.
     """
     differ = partial(_difference, quantities)
     missed = _force_missed if "force" in quantities else lambda _: 0.0
-    free = scheme is None and dt is None
+    free = scheme is None and dt is None if free is None else free
     scheme = scheme or _scheme_for(tolerance, float(system.law[:, 1].min()))
     if scheme == "collocation" and (system.law[:, 1] < 1.0).any():
         raise ValueError(f"scheme collocation needs exponents of at least 1, got {system.law[:, 1].min():g}; use A4")
@@ -567,8 +569,8 @@ def _controlled(
     shortest = min(pace[0], horizon)  # or the horizon could cut both runs to one step, and they would always agree
     if dt is not None:
         dt = min(dt, 0.5 * horizon)
-        fine = _run(system, scheme, dt, pace, horizon, n_max)
-        coarse = _run(system, scheme, 2.0 * dt, pace, horizon, n_max)
+        fine = _run(system, scheme, dt, pace, horizon, n_max, "dt")
+        coarse = _run(system, scheme, 2.0 * dt, pace, horizon, n_max, "dt")
         return fine, max(differ(coarse, fine, over), missed(fine)), scheme, coarse, 2.0 * dt
     if scheme == "collocation":
         sizes = [max(1e-15, tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)]
@@ -596,15 +598,26 @@ def _controlled(
     if met is not None:
         return met
     if free and scheme == "A4" and (system.law[:, 1] >= 1.0).all():
-        return _controlled(system, "collocation", dt, tolerance, quantities, pace, horizon, n_max)
-    hint, advice = "", "raise tolerance" if free else "leave out scheme"
+        return _controlled(system, "collocation", dt, tolerance, quantities, pace, horizon, n_max, True)
+    hint, enough = "", min(REACHED * best, 1.0)
+    advice = f"raise tolerance to {float(f'{enough:.1e}'):g}" if free else "leave out scheme"
     if len(fine.contacts) > 1:
-        hint = f"; small errors grow {_sensitivity(*last):.1g}-fold over {len(fine.contacts)} impacts"
-        advice = "give duration or max_impacts" if free else advice
+        growth = _sensitivity(*last)
+        hint = f"; small errors grow {growth:.1g}-fold over {len(fine.contacts)} impacts"
+        if free and growth == np.inf:  # the last runs were different blows, to which no tolerance applies
+            advice = f"give max_impacts of at most {max(1, _agreed(*last, tolerance * pace[0]))}"
     raise SimulationError(
         f"the step error stays at {best:.1e}, above the tolerance {tolerance:.1e}, with {len(fine.steps)} steps{hint}; "
         f"{advice}"
     )
+
+
+def _agreed(coarse: History, fine: History, apart: float) -> int:
+    """How many impacts end in two runs, one after another, at times no more than ``apart`` [s] from each other."""
+    one, two = (np.sort(history.contacts[:, 1]) for history in (coarse, fine))
+    n = min(len(one), len(two))
+    same = np.abs(one[:n] - two[:n]) <= apart
+    return n if same.all() else int(same.argmin())
 
 
 def _longest_lossy(system: _System, pace: tuple[float, float], tolerance: float) -> float:
@@ -636,8 +649,11 @@ def _most_steps(system: _System) -> int:
     return max(100, PLAIN_WORK // len(system.omega))
 
 
-def _run(system: _System, scheme: str, size: float, pace: tuple[float, float], horizon: float, n_max: int) -> History:
-    """One run; ``size`` is the step in contact [s], for collocation the allowed misfit [-]."""
+def _run(
+    system: _System, scheme: str, size: float, pace: tuple[float, float], horizon: float, n_max: int,
+    chosen_by: str = "tolerance",
+) -> History:  # fmt: skip
+    """One run; ``size`` is the step in contact [s], for collocation the allowed misfit [-]; and what it comes from."""
     parts = (
         system.omega, system.zeta, system.shape, system.offset, system.bias, system.law, system.start_q, system.start_p
     )  # fmt: skip
@@ -653,14 +669,23 @@ def _run(system: _System, scheme: str, size: float, pace: tuple[float, float], h
     time, status = result[5], result[6]
     if status == record.EXHAUSTED:
         raise SimulationError(
-            f"no final separation was reached in {most} steps, up to {time:.4g} s; raise tolerance or dt, or give "
-            "duration or max_impacts"
+            f"no final separation was reached in {most} steps, up to {time:.4g} s; raise {chosen_by}, or give "
+            f"{_sooner(History(*parts, *result))}"
         )
     if status == record.FAILED:
         raise SimulationError(
             f"scheme {scheme} found no valid next step at {time:.4g} s; use scheme A4, or check the units of the scene"
         )
     return History(*parts, *result)
+
+
+def _sooner(history: History) -> str:
+    """A duration, and a number of impacts if some ended, that leave steps for runs of half the step."""
+    time = SOONER * history.end_time
+    ended = int(SOONER * np.count_nonzero(history.contacts[:, 1] < history.end_time))
+    return f"a duration of at most {float(f'{time:.1e}'):g} s" + (
+        f" or max_impacts of at most {ended}" if ended else ""
+    )
 
 
 def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:

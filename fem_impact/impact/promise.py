@@ -3,7 +3,9 @@
 import os
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,13 +43,9 @@ def remedy(hit: "Response") -> str:
     """What would meet the tolerance."""
     error = hit.error
     allowed = SHARE * hit.tolerance
-    advice = []
+    advice: list[str] = []
     if error.truncation > allowed or not error.resolvable:
-        advice += [
-            f"keep {needed} modes of {name} instead of {now}" if needed <= MOST_ADVISED else
-            f"{name} would have to keep some {needed:.1e} modes: take a larger tolerance or a softer contact"
-            for name, needed, now in _more_modes(hit)
-        ]  # fmt: skip
+        advice += _more_modes(hit)
     if error.idealisation > allowed:
         advice.append("give target = 'modal'")
     if error.mesh > allowed:
@@ -86,30 +84,48 @@ def _names(hit: "Response") -> list[str]:
     return ["the striker", "the target"] if len(hit.bodies) == 2 else [f"body {i}" for i in range(len(hit.bodies))]
 
 
-def _more_modes(hit: "Response") -> Iterator[tuple[str, int, int]]:
-    """Name, modes needed and modes kept of every body that keeps too few."""
-    h, allowed = hit.history, SHARE * hit.tolerance
+def _more_modes(hit: "Response") -> Iterator[str]:
+    """How many modes every body that keeps too few needs; what makes them few enough if they are too many."""
     for body, (name, modes, dip) in enumerate(zip(_names(hit), hit.bodies, hit.dips)):
         if dip is None or modes.poorer:  # the number of Ritz vectors has been raised already
             continue
-        own = np.zeros(len(h.omega), bool)
-        own[hit.body_slice(body)] = True
-        needed = 0.0
-        for point, (i, _) in zip(dip.points, dip.touched):
-            law = hit.contacts[i]
-            inverse = float((h.shape[i, (h.omega == 0.0) & ~own] ** 2).sum())  # of the mass that the body feels
-            speed = float(np.abs(h._column(1)[:, i]).max(initial=0.0))
-            if not inverse or not speed:
-                continue
-            share = allowed * CAUTION[not hit.error.resolvable] / (accuracy.LOSSY if law.loss else 1.0)
-            at: dict[str, Any] = {"contact": law, "mass": 1.0 / inverse, "speed": speed}
-            needed = max(needed, accuracy.cutoff_frequency(modes, point, tolerance=share, **at))
-            if hit.error.resolvable and hit.error.truncation > allowed:
-                power = accuracy.order_of(law.exponent, modes.dimension)
-                needed = max(needed, modes.frequencies[-1] * (hit.error.truncation / allowed) ** (1.0 / power))
-        number = SPARE * modes.n_modes * (needed / modes.frequencies[-1]) ** (0.5 * modes.dimension)
-        if number > modes.n_modes + 1:
-            yield name, int(np.ceil(number)), modes.n_modes
+        needs = partial(_modes_needed, hit, body)
+        number = needs(hit.tolerance)
+        if number > MOST_ADVISED:
+            loose = accuracy.least_tolerance(partial(_few_enough, needs))
+            soft = next((s for s in 10.0 ** -np.arange(1.0, 31.0) if needs(hit.tolerance, s) <= MOST_ADVISED), None)
+            ways = [] if loose is None or loose <= hit.tolerance else [f"take a tolerance of {loose:g}"]
+            ways += [] if soft is None else [f"divide the stiffness of its contacts by {1.0 / soft:.0e}"]
+            yield f"{name} would have to keep some {number:.1e} modes; {', or '.join(ways) or 'strike it more softly'}"
+        elif number > modes.n_modes + 1:
+            yield f"keep {int(np.ceil(number))} modes of {name} instead of {modes.n_modes}"
+
+
+def _few_enough(needs: Callable[[float], float], tolerance: float) -> bool:
+    return needs(tolerance) <= MOST_ADVISED
+
+
+def _modes_needed(hit: "Response", body: int, tolerance: float, softer: float = 1.0) -> float:
+    """Modes of a body that a tolerance needs, if the stiffness of its contacts is multiplied by ``softer``."""
+    h, modes, dip, allowed = hit.history, hit.bodies[body], hit.dips[body], SHARE * tolerance
+    assert dip is not None
+    own = np.zeros(len(h.omega), bool)
+    own[hit.body_slice(body)] = True
+    needed = 0.0
+    for point, (i, _) in zip(dip.points, dip.touched):
+        law = replace(hit.contacts[i], stiffness=softer * hit.contacts[i].stiffness)
+        inverse = float((h.shape[i, (h.omega == 0.0) & ~own] ** 2).sum())  # of the mass that the body feels
+        speed = float(np.abs(h._column(1)[:, i]).max(initial=0.0))
+        if not inverse or not speed:
+            continue
+        share = allowed * CAUTION[not hit.error.resolvable] / (accuracy.LOSSY if law.loss else 1.0)
+        at: dict[str, Any] = {"contact": law, "mass": 1.0 / inverse, "speed": speed}
+        needed = max(needed, accuracy.cutoff_frequency(modes, point, tolerance=share, **at))
+        if hit.error.resolvable and hit.error.truncation > allowed:
+            power = accuracy.order_of(law.exponent, modes.dimension)
+            wanted = modes.frequencies[-1] * (hit.error.truncation / allowed) ** (1.0 / power)
+            needed = max(needed, wanted * softer ** (1.0 / (law.exponent + 1.0)))  # as the contact's frequency falls
+    return SPARE * modes.n_modes * (needed / modes.frequencies[-1]) ** (0.5 * modes.dimension)
 
 
 def _finer_modes(hit: "Response") -> Iterator[tuple[str, float]]:

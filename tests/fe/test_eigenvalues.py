@@ -6,7 +6,12 @@ from numpy.testing import assert_allclose
 from scipy import linalg
 from scipy.sparse import csc_matrix
 
+from fem_impact._base.check import SimulationError
+from fem_impact.fe import eigenvalues, refinement
+from fem_impact.fe.assembly import assemble
 from fem_impact.fe.eigenvalues import Flexibility, by_slices, count_below, lowest
+from fem_impact.fe.section import Material, Plate
+from fem_impact.mesh import rectangle
 
 
 def pencil(n, seed, repeated):
@@ -41,3 +46,42 @@ def test_lowest_values_and_their_vectors(search, repeated):
     assert_allclose(gram, np.eye(20), atol=1e-9)
     residual = K @ vectors[:, :20] - (M @ vectors[:, :20]) * found[:20]
     assert np.abs(residual).max() < 1e-6 * values[20]
+
+
+def test_where_a_pivot_vanishes_another_number_of_modes_is_counted(monkeypatch):
+    """A pair of equal unknowns has no pivot midway between its eigenvalues 4 and 6, only beside."""
+    monkeypatch.setattr(eigenvalues, "NUDGES", (0.0,))  # which else step beside
+    values = np.array([1.0, 2.0, 3.0, 7.0, 8.0, 9.0])
+    K = csc_matrix(linalg.block_diag([[5.0, 1.0], [1.0, 5.0]], np.diag(values)))
+    M = csc_matrix(np.eye(8))
+    with pytest.raises(SimulationError, match=r"a pivot vanished .*; change the number of modes"):
+        count_below(K, M, 5.0)  # after four modes
+    assert count_below(K, M, 6.5) == 5  # after five
+
+
+def test_a_beam_whose_slice_misses_modes_is_found_with_another_number(monkeypatch):
+    """A search that loses a mode of the last slice is noticed; fewer modes need no such slice."""
+    whole = eigenvalues._krylov
+    stiff = np.diag((1.0 + np.arange(400.0)) ** 4)
+    body = Flexibility(csc_matrix(stiff), csc_matrix(np.eye(400)), np.zeros((400, 0)), np.zeros(0, int))
+
+    def loses(solve, M, n, available, allowed, width=eigenvalues.BLOCK):
+        found = whole(solve, M, n, available, allowed, width)
+        return found[:, 1:] if width == eigenvalues.NARROW else found
+
+    monkeypatch.setattr(eigenvalues, "_krylov", loses)
+    with pytest.raises(SimulationError, match=r"modes lie between eigenvalues .*; change the number of modes"):
+        by_slices(body, 40)
+    assert_allclose(by_slices(body, 20)[0][:20], np.diag(stiff)[:20], rtol=1e-9)
+
+
+def test_modes_that_stay_missing_are_found_by_asking_for_more(monkeypatch):
+    """A search that loses the same mode again and again is noticed; for all modes, the search is dense."""
+    system = assemble(rectangle(0.4, 0.3, size=0.05), Plate(Material(E=210e9, nu=0.3, rho=7850.0), 1e-3))
+    whole = eigenvalues._krylov
+    monkeypatch.setattr(eigenvalues, "DENSE", 10)
+    monkeypatch.setattr(eigenvalues, "_krylov", lambda *arguments: np.delete(whole(*arguments), 2, axis=1))
+    with pytest.raises(SimulationError, match=r"flexible modes lie below .* were found; ask for a few more modes"):
+        refinement.solve(system, 12, None)
+    many = system.n_dofs // 3
+    assert len(refinement.solve(system, many, None).omega) == many

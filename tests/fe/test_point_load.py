@@ -198,3 +198,6 @@ def test_modes_softer_than_the_body_are_an_error():
     wrong = fi.Modes(0.5 * modes.omega, modes.damping_ratio, modes.shapes, modes.mass)
     with pytest.raises(fi.SimulationError, match=r"softer at \(0.1, 0.07\) m than the whole body"):
         fi.strike(wrong, fi.Striker.rigid(0.02), fi.Contact.linear(1e5), at=(0.1, 0.07), speed=1.0)
+    fine = fi.assemble(fi.mesh.rectangle(0.3, 0.2, size=0.05), PLATE, supports={"boundary": "hinged"})
+    found = fi.find_modes(fine, n_modes=20)  # "find the modes on a finer mesh": of this body, this time
+    assert fi.strike(found, fi.Striker.rigid(0.02), fi.Contact.linear(1e5), at=(0.1, 0.07), speed=1.0).n_impacts

@@ -3,6 +3,7 @@
 import json
 import re
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -97,6 +98,42 @@ def test_collisions_warn_too():
 def test_a_step_of_ones_own_is_blamed():
     with pytest.warns(fi.ToleranceWarning, match=r"mostly from time steps .*leave dt"):
         fi.strike(plate(300), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-6, dt=5e-5)
+    for better in ({}, {"dt": 2e-6}):
+        hit = fi.strike(plate(300), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-6, **better)
+        assert hit.error.step <= 0.4 * hit.tolerance and "leave dt" not in hit.verdict
+
+
+def test_errors_that_miss_only_together_propose_a_tolerance_that_is_met():
+    hit = fi.strike(plate(300), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-3)
+    part = 0.39 * hit.tolerance
+    missed = replace(hit, error=replace(hit.error, step=part, truncation=part, mesh=part))
+    met = float(re.search(r"; take a tolerance of (\S+)$", missed.verdict)[1])
+    assert not missed.tolerance_met and replace(missed, tolerance=met).tolerance_met
+
+
+def test_an_infinite_plate_that_echoes_is_told_to_be_modal():
+    blow = {"at": AT, "speed": 1.0, "tolerance": 1e-2}
+    system = fi.assemble(fi.mesh.rectangle(*SIZE), PLATE, {"boundary": "clamped"})
+    with pytest.warns(fi.ToleranceWarning, match="give target = 'modal'"):
+        fi.strike(system, HAMMER, SOFT, target="infinite", **blow)
+    assert fi.strike(system, HAMMER, SOFT, target="modal", strict=True, **blow).tolerance_met
+
+
+@pytest.mark.parametrize("stiffness, tolerance", [(1e11, 1e-3), (1e10, 1e-6), (1e12, 1e-6)])
+def test_a_contact_that_needs_too_many_modes_gets_what_needs_fewer(stiffness, tolerance):
+    blow, law = {"at": AT, "speed": 1.0}, fi.Contact.hertz(stiffness)
+    words = quiet(plate(40), HAMMER, law, tolerance=tolerance, **blow).verdict
+    assert re.search(r"would have to keep some \S+ modes; ", words)
+    loose, soft = (re.search(p, words) for p in (r"take a tolerance of (\S+)(?:,|$)", r"contacts by (\S+)$"))
+    assert loose or soft
+    ways = [(1.0, float(loose[1]))] if loose else []
+    for softer, allowed in [*ways, *([(float(soft[1]), tolerance)] if soft else [])]:
+        other = fi.Contact.hertz(stiffness / softer)
+        hit = quiet(plate(40), HAMMER, other, tolerance=allowed, **blow)
+        if not hit.tolerance_met:
+            number = int(re.search(r"keep (\d+) modes", hit.verdict)[1])
+            hit = fi.strike(plate(number), HAMMER, other, tolerance=allowed, strict=True, **blow)
+        assert hit.tolerance_met
 
 
 def test_a_coarse_mesh_is_blamed_and_the_advice_works():
