@@ -372,7 +372,7 @@ def _write(
 ) -> dict[str, Any]:
     """Write every file of a strike; return the contents of response.json."""
     from .show import sampling  # imported only when needed
-    from .show.painter import NAMES
+    from .show.canvas import NAMES
 
     response, files = run.response, ["response.json", "force.csv", "force.png"]
     extra: dict[str, Any] = {}

@@ -20,10 +20,10 @@ from ..impact.response import Response
 from ..mesh.mesh_files import boundary
 from ..modes.modal import Modes
 from . import sampling
+from .canvas import COLOURS, VERMILION
 
 # Okabe and Ito's palette: distinct for all common kinds of colour vision, and in print.
-BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
-COLOURS = "PuOr"  # of deflections: symmetric about zero, safe for colour-blind readers
+BLUE, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
 STYLE: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 10.0,

@@ -17,9 +17,7 @@ from pathlib import Path
 from .._base import progress
 from .._base.files import undoable
 from ..impact.response import Response
-from . import pictures
-
-NAMES = ("modes.png", "wave.png", "wave.gif")
+from . import canvas, pictures
 
 
 def draw(folder: Path, response: Response) -> str:
@@ -39,12 +37,11 @@ class Painter:
     def __enter__(self) -> "Painter":
         environment = {
             **os.environ,
-            **pictures.WINDOW,
-            pictures.EXPENDABLE: "1",
+            **canvas.WINDOW,
             "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
         }
         self.process = subprocess.Popen(
-            [sys.executable, "-m", __name__], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            [sys.executable, "-m", canvas.__name__], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
         )  # fmt: skip
         self.stack.enter_context(undoable(self.process.kill))
@@ -64,31 +61,15 @@ class Painter:
         self.task = folder, response
         assert self.process.stdin is not None
         with suppress(BrokenPipeError):  # the process is gone, which `finish` deals with
-            pickle.dump((folder, response), self.process.stdin, protocol=pickle.HIGHEST_PROTOCOL)
+            shown = pictures.film(response), pictures.gallery(response.target)
+            pickle.dump((folder, *shown), self.process.stdin, protocol=pickle.HIGHEST_PROTOCOL)
             self.process.stdin.close()
 
     def finish(self) -> str:
         """Wait for the pictures; the answer is that of `draw`. If the process fails, this one draws them."""
         assert self.task is not None and self.process.stdout is not None
-        last = ""
         for line in self.process.stdout:
-            last = line.decode("utf-8", "replace").rstrip("\n")
-            done, _, total = last.partition("/")
+            done, _, total = line.decode("utf-8", "replace").partition("/")
             if total:
                 progress.report("frames", int(done), int(total))
-        if self.process.wait():
-            return draw(*self.task)
-        return last
-
-
-def main() -> None:
-    """The process itself: reads folder and response, writes the pictures, and prints the progress and the answer."""
-    pictures.can_render()  # takes seconds, during which the response is computed; dies here if it cannot
-    folder, response = pickle.load(sys.stdin.buffer)
-    with progress.heard(lambda _, done, total: print(f"{done}/{total}", flush=True)):
-        missing = draw(folder, response)
-    print(missing)
-
-
-if __name__ == "__main__":
-    main()
+        return draw(*self.task) if self.process.wait() else ""

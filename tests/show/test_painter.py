@@ -7,7 +7,8 @@ from PIL import Image
 import fem_impact as fi
 from fem_impact._base import progress
 from fem_impact.show import painter, pictures
-from fem_impact.show.painter import NAMES, Painter
+from fem_impact.show.canvas import NAMES
+from fem_impact.show.painter import Painter
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from test_cli import TEXT
 
 import fem_impact as fi
 from fem_impact import cli
-from fem_impact.show import painter, pictures, sampling
+from fem_impact.show import canvas, painter, pictures, sampling
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def test_film_holds_every_frame(hit, tmp_path):
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="MP4 files are an extra: fem-impact[film]")
     pictures.animation(tmp_path / "wave.mp4", hit, frames=6)
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "wave.mp4"))
-    assert frames == 6 and abs(seconds - 6 / pictures.RATE) < 0.05
+    assert frames == 6 and abs(seconds - 6 / canvas.RATE) < 0.05
     assert [path.name for path in tmp_path.iterdir()] == ["wave.mp4"]
 
 

@@ -1,0 +1,216 @@
+"""Draws pictures in 3D from arrays alone, without a screen; as a process of its own it starts while a blow is computed.
+
+Nothing of the package is imported here but how files appear and how progress is told, and pyvista only to draw.
+"""
+
+import os
+import pickle
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from PIL import Image
+
+from .._base import progress
+from .._base.files import replacing
+
+NAMES = ("modes.png", "wave.png", "wave.gif")
+PROBE = (
+    "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=(16, 16)); p.add_mesh(pyvista.Sphere()); "
+    "assert p.screenshot(None).std() > 0"
+)
+WINDOW = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
+SIZE = (720, 480)  # [px] size of a frame: a GIF stays below a few megabytes
+FINER = 2  # [-] a frame is drawn with so many pixels for one in each direction, which makes its lines smooth
+TILE = (320, 250)  # [px] size of one mode shape: four side by side on a screen
+RATE = 12  # [1/s] frames per second: enough for a wave, half the size of a film
+PALETTE = 8, 2  # [-] frames from which a GIF takes its colours, and how many of their pixels become one
+HEIGHT = 0.12  # [-] largest drawn deflection over the body's extent
+LIFT = 0.0015  # [-] height of lines above the surface, over their extent
+BALL = 0.03  # [-] drawn radius of the striker over the body's extent
+RIM, VERMILION = "#666666", "#D55E00"  # colours of the body's edge and of the striker
+COLOURS = "PuOr"  # of deflections: symmetric about zero, safe for colour-blind readers
+VIEW = (-0.55, -1.0, 0.75)  # direction to the camera: from the front left, above the plate
+
+
+class Film(NamedTuple):
+    """A body and a striker at several instants."""
+
+    plane: np.ndarray  # (n_points, 2) [m]
+    cells: np.ndarray  # (n_cells, 3)
+    rim: np.ndarray  # (n_sides, 2) sides at the edge
+    at: np.ndarray  # (2,) [m] strike point
+    motion: np.ndarray  # (n_times, n_points) [-] deflection over the largest
+    gap: np.ndarray  # (n_times,) [-] distance of the striker over the largest deflection
+    titles: list[str]
+    telling: int  # number of the frame that shows the wave best
+
+
+class Gallery(NamedTuple):
+    """The shapes of a body, each with largest value 1."""
+
+    plane: np.ndarray  # (n_points, 2) [m]
+    cells: np.ndarray  # (n_cells, 3)
+    shapes: np.ndarray  # (n_points, n_shapes)
+    titles: list[str]
+    rows: int
+    columns: int
+
+
+def main() -> None:
+    """The process: reads folder, film and shapes, writes the pictures, and prints the progress."""
+    exec(PROBE, {})  # takes seconds, during which the response is computed; dies here if nothing renders
+    folder, film, shapes = pickle.load(sys.stdin.buffer)
+    with progress.heard(lambda _, done, total: print(f"{done}/{total}", flush=True)):
+        draw(folder, film, shapes)
+
+
+def draw(folder: Path, film: Film, shapes: Gallery) -> None:
+    """Draw all pictures of a blow into a folder."""
+    pictures = list(frames(film))
+    write_gif(folder / "wave.gif", pictures)
+    write(folder / "wave.png", pictures[film.telling])
+    write(folder / "modes.png", gallery(shapes))
+
+
+def frames(film: Film) -> Iterator[Image.Image]:
+    """A picture of the body at every instant, all on the same scale."""
+    space = _Space(film)
+    try:
+        for i, (deflection, gap, title) in enumerate(zip(film.motion, film.gap, film.titles)):
+            yield space.picture(deflection, float(gap), title)
+            progress.report("frames", i + 1, len(film.titles))
+    finally:
+        space.plotter.close()
+
+
+def gallery(shown: Gallery) -> Image.Image:
+    """Shapes side by side, as warped surfaces with nodal lines."""
+    plotter = _plotter((TILE[0] * shown.columns, TILE[1] * shown.rows), shape=(shown.rows, shown.columns))
+    for i, title in enumerate(shown.titles):
+        plotter.subplot(*divmod(i, shown.columns))
+        shape = shown.shapes[:, i]
+        mesh = _mesh(shown.plane, shown.cells, HEIGHT * _extent(shown.plane) * shape, shape)
+        _add_surface(plotter, mesh)
+        rim = mesh.extract_feature_edges(feature_edges=False, manifold_edges=False, non_manifold_edges=False)
+        _add_line(plotter, rim, RIM)
+        _add_line(plotter, mesh.contour([0.0]), "black")
+        plotter.add_text(title, font_size=9, position="upper_left")
+        _look(plotter, shown.plane, zoom=1.15)
+    picture = Image.fromarray(plotter.screenshot(None))
+    plotter.close()
+    return picture
+
+
+def write(path: str | Path, picture: Image.Image) -> None:
+    """Write a picture, whole or not at all."""
+    with replacing(path) as temporary:
+        picture.save(temporary)
+
+
+def write_gif(path: str | Path, pictures: list[Image.Image]) -> None:
+    """Write pictures as an animation with one palette, so that its colours do not flicker."""
+    some = [picture.reduce(PALETTE[1]) for picture in pictures[:: max(1, len(pictures) // PALETTE[0])]]
+    mosaic = Image.new("RGB", (some[0].width, some[0].height * len(some)))
+    for i, picture in enumerate(some):
+        mosaic.paste(picture, (0, i * picture.height))
+    colours = mosaic.quantize(255)
+    first, *rest = (picture.quantize(palette=colours, dither=Image.Dither.NONE) for picture in pictures)
+    with replacing(path) as temporary:
+        first.save(temporary, save_all=True, append_images=rest, duration=1000 // RATE, loop=0)
+
+
+class _Space:
+    """A window with body, striker and title, which move from frame to frame: a new window takes 0.2 s each."""
+
+    def __init__(self, film: Film) -> None:
+        import pyvista
+
+        self.plane, self.cells, self.at, self.extent = film.plane, film.cells, film.at, _extent(film.plane)
+        self.under = int(np.argmin(((self.plane - self.at) ** 2).sum(axis=1)))  # the striker
+        self.plotter = _plotter((FINER * SIZE[0], FINER * SIZE[1]))
+        self.plotter.disable_anti_aliasing()  # several pixels become one, in half the time
+        self.mesh = _mesh(self.plane, self.cells, np.zeros(len(self.plane)), np.zeros(len(self.plane)))
+        _add_surface(self.plotter, self.mesh)
+        lines = np.column_stack([np.full(len(film.rim), 2), film.rim]).ravel()
+        self.rim = pyvista.PolyData(self.mesh.points, lines=lines)
+        self.plotter.add_mesh(self.rim, color=RIM, line_width=2 * FINER, render=False)
+        ball = pyvista.Sphere(radius=BALL * self.extent)
+        self.ball = self.plotter.add_mesh(ball, color=VERMILION, smooth_shading=True, render=False)
+        _look(self.plotter, self.plane)
+
+    def picture(self, deflection: np.ndarray, distance: float, title: str) -> Image.Image:
+        """One frame; deflection (n_points,) and distance of the striker in units of the largest deflection."""
+        height = -HEIGHT * self.extent * deflection
+        points = np.column_stack([self.plane, height])
+        self.mesh.points, self.mesh["deflection"] = points, -deflection
+        self.mesh.point_data["Normals"] = _normals(points, self.cells)
+        self.rim.points = points + np.array([0.0, 0.0, LIFT * self.mesh.length])
+        above = self.extent * (BALL + min(HEIGHT * distance, 2.0 * HEIGHT))
+        self.ball.position = (*self.at, height[self.under] + above)
+        self.plotter.add_text(title, font_size=10 * FINER, position="upper_left", name="title", render=False)
+        self.plotter.reset_camera_clipping_range()  # the striker may lie outside the bounds
+        self.plotter.render()
+        return Image.fromarray(self.plotter.screenshot(None)).reduce(FINER)
+
+
+def _normals(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Unit normals (n_points, 3) of a surface of triangles: means over the triangles at each point, by area."""
+    a, b, c = points[cells.T]
+    across = np.cross(b - a, c - a)
+    total = np.column_stack([np.bincount(cells.T.ravel(), np.tile(one, 3), len(points)) for one in across.T])
+    return total / np.linalg.norm(total, axis=1, keepdims=True)
+
+
+def _plotter(size: Any, **options: Any) -> Any:
+    os.environ.setdefault(*next(iter(WINDOW.items())))  # VTK reads this when it opens its first window
+    import pyvista
+
+    plotter: Any = pyvista.Plotter(off_screen=True, window_size=size, border=False, **options)
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    return plotter
+
+
+def _mesh(plane: np.ndarray, cells: np.ndarray, height: np.ndarray, value: np.ndarray) -> Any:
+    import pyvista
+
+    faces = np.column_stack([np.full(len(cells), 3), cells]).ravel()
+    mesh = pyvista.PolyData(np.column_stack([plane, height]), faces)
+    mesh["deflection"] = value
+    mesh.point_data["Normals"] = _normals(mesh.points, cells)
+    return mesh
+
+
+def _add_surface(plotter: Any, mesh: Any) -> None:
+    shown = plotter.add_mesh(
+        mesh, scalars="deflection", cmap=COLOURS, clim=(-1.0, 1.0), show_scalar_bar=False, ambient=0.4, diffuse=0.6,
+        specular=0.0, render=False,
+    )  # fmt: skip
+    shown.prop.interpolation = "phong"  # smooth_shading=True would compute the normals again for every picture
+
+
+def _add_line(plotter: Any, line: Any, colour: str) -> None:
+    """Draw a line on the surface, raised a little so that the surface does not hide it."""
+    if line.n_points:
+        raised = line.translate((0.0, 0.0, LIFT * line.length))
+        plotter.add_mesh(raised, color=colour, line_width=2, render=False)
+
+
+def _look(plotter: Any, plane: np.ndarray, zoom: float = 1.35) -> None:
+    """Set the camera, the same for every picture of a body whatever its deflection."""
+    low, high = plane.min(axis=0), plane.max(axis=0)
+    rise = HEIGHT * _extent(plane)
+    plotter.camera_position = [tuple(VIEW), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
+    plotter.reset_camera(render=False, bounds=(low[0], high[0], low[1], high[1], -rise, rise))
+    plotter.camera.zoom(zoom)
+
+
+def _extent(plane: np.ndarray) -> float:
+    return float(np.ptp(plane, axis=0).max())
+
+
+if __name__ == "__main__":
+    main()
