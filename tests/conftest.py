@@ -1,7 +1,9 @@
 """What several tests share: which of many cases alike are run, compiled kernels, a real browser."""
 
+import logging
 import shutil
 import time
+from contextlib import suppress
 from zlib import crc32
 
 import pytest
@@ -63,8 +65,13 @@ def pytest_addoption(parser):
     parser.addoption("--all-cases", action="store_true", help=text)
 
 
+@pytest.hookimpl(tryfirst=True)  # before the groups are read
 def pytest_collection_modifyitems(config, items):
-    """Of the slow cases of a test marked `thin(n)` about every n-th is run, in each run the same."""
+    """What shares a fixture of its file runs on one worker; of slow cases marked `thin(n)` about every n-th is run."""
+    for item in items:
+        shared = any(made[-1].scope == "module" for made in item._fixtureinfo.name2fixturedefs.values())
+        if shared and item.get_closest_marker("xdist_group") is None:
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
     if config.getoption("--all-cases"):
         return
     kept, left_out = [], []
@@ -94,6 +101,24 @@ def pytest_configure(config):
         for scheme in ("A4", "collocation"):
             fi.strike(plate, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), scheme=scheme, **blow)
         fi.sweep(plate, fi.Striker.rigid(0.02), fi.Contact.linear(1e5), over={"mass": [0.02, 0.03]}, **blow)
+
+
+@pytest.fixture
+def read_here(monkeypatch):
+    """Foreign files are read in this process, which saves half a second each; `test_isolated` tests the other one."""
+    from fem_impact._base import isolated
+
+    def run(path, reader, arguments, patience):
+        status, answer = isolated.main(path, reader, arguments)
+        return (status, b"", answer) if status else (status, answer, b"")
+
+    with suppress(ImportError):
+        import h5py
+
+        monkeypatch.setattr(h5py, "File", h5py.File)  # the reader of meshes replaces it
+    monkeypatch.setattr(isolated, "run", run)
+    yield
+    logging.disable(logging.NOTSET)
 
 
 @pytest.fixture(scope="session")

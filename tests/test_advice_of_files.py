@@ -1,7 +1,5 @@
 """Every message about a file that gives advice: following it works."""
 
-import logging
-from contextlib import suppress
 from dataclasses import replace
 
 import meshio
@@ -12,7 +10,6 @@ from scenes import SMALL
 from scipy.io import savemat
 
 import fem_impact as fi
-from fem_impact._base import isolated
 from fem_impact.mesh import drawings, meshio_reader, triangulation
 from fem_impact.taps import readers, transfer
 
@@ -23,21 +20,7 @@ PLATE = '<rect width="400" height="300"/>'
 STEEL = fi.Plate(fi.Material(E=210e9, nu=0.3, rho=7850.0), 1e-3)
 
 
-@pytest.fixture(autouse=True)
-def here(monkeypatch):
-    """Foreign files are read in this process: the process of their own is tested in `test_isolated`."""
-
-    def run(path, reader, arguments, patience):
-        status, answer = isolated.main(path, reader, arguments)
-        return (status, b"", answer) if status else (status, answer, b"")
-
-    with suppress(ImportError):
-        import h5py
-
-        monkeypatch.setattr(h5py, "File", h5py.File)  # the reader of meshes replaces it
-    monkeypatch.setattr(isolated, "run", run)
-    yield
-    logging.disable(logging.NOTSET)
+pytestmark = pytest.mark.usefixtures("read_here")
 
 
 def mesh_of(folder, points=GOOD.points, cells=GOOD.cells, kind="triangle", unit=None, sets=None, **more):

@@ -34,7 +34,7 @@ def samples(category):
 
 
 @pytest.mark.parametrize("category", HERE)
-def test_samples_are_read_before_they_are_mutated(category, tmp_path):
+def test_samples_are_read_before_they_are_mutated(category, tmp_path, read_here):
     for name, raw in samples(category):
         (tmp_path / name).write_bytes(raw)
         if category != "mesh" or name in ("binary41.msh", "plate.vtu"):  # the others in test_mesh_files

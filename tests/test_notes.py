@@ -15,7 +15,7 @@ SECTION = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), 1e-3)
 
 
 @pytest.fixture
-def drawing(tmp_path):
+def drawing(tmp_path, read_here):
     pytest.importorskip("svgelements")
     path = tmp_path / "plate.svg"
     path.write_text(DRAWING)
@@ -44,7 +44,7 @@ def test_a_refined_mesh_file_keeps_its_notes(name):
     assert mesh.refined(2.0 if name == "split" else 0.4).notes == ("two corners were merged",)
 
 
-@pytest.mark.parametrize("wanted", [{"n_modes": 5}, {"n_modes": 300}, {"n_modes": 5, "tolerance": 1e-6}])
+@pytest.mark.parametrize("wanted", [{"n_modes": 5}, {"n_modes": 60}, {"n_modes": 5, "tolerance": 1e-4}])
 def test_modes_and_all_made_from_them_keep_the_notes_of_the_mesh(drawing, wanted):
     system = fi.assemble(fi.mesh.outline(drawing), SECTION, supports={"boundary": "clamped"})
     assert ASSUMED in system.notes[0]

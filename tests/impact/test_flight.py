@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 
 from fem_impact.impact.compiled import flight, propagation
 
+pytestmark = pytest.mark.xdist_group("flight")  # compiled for these tests alone
 ONSET, NEVER, LATER = 0, 1, 2  # how a flight ends, see `flight.find_onset`
 
 

@@ -33,9 +33,7 @@ def rim():
 
 
 @pytest.mark.parametrize("radius", [1.0, 0.999, 0.99])
-@pytest.mark.parametrize(
-    "n_modes", [20, pytest.param(60, marks=pytest.mark.slow), pytest.param(150, marks=pytest.mark.slow), 300]
-)
+@pytest.mark.parametrize("n_modes", [20, *(pytest.param(n, marks=pytest.mark.slow) for n in (60, 150, 300))])
 def test_a_cymbal_is_struck_at_its_rim(rim, radius, n_modes):
     system, exact = rim
     blow = {"at": 0.2 * radius * np.array([np.cos(0.3), np.sin(0.3)]), "speed": 1.0, "tolerance": 1e-3}

@@ -14,6 +14,7 @@ from fem_impact.fe.assembly import assemble
 from fem_impact.fe.section import Material, Plate
 from fem_impact.modes.modal import find_modes
 
+pytestmark = pytest.mark.usefixtures("read_here")
 MESHES = Path(__file__).parents[2] / "meshes"
 PLATE = Plate(Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
 PER_RATE = np.sqrt(7850 * 2e-3 / (210e9 * 2e-3**3 / (12 * (1 - 0.3**2))))

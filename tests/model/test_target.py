@@ -38,7 +38,7 @@ def tapered_bar():
     return fi.assemble(fi.mesh.line(0.6), beam, {"left": fi.Elastic(1e4), "right": fi.Elastic(1e4)}), (0.2,)
 
 
-@pytest.mark.parametrize("body", [springy_plate, drumhead, tapered_bar])
+@pytest.mark.parametrize("body", [pytest.param(springy_plate, marks=pytest.mark.slow), drumhead, tapered_bar])
 def test_system_is_struck_as_its_modes_are(body):
     """The planner's choice against 120 modes of the same system, each within its own tolerance."""
     system, at = body()

@@ -83,7 +83,7 @@ BALL, WOODEN = fi.Striker.rigid(0.03), fi.Contact.hertz(1e6)
 BLOW = {"at": (0.2, 0.11), "speed": 1.0, "tolerance": 1e-3}
 
 
-@pytest.mark.parametrize("more", [{}, {"target_force": 20.0, "max_impacts": 2}])
+@pytest.mark.parametrize("more", [{}, pytest.param({"target_force": 20.0, "max_impacts": 2}, marks=pytest.mark.slow)])
 def test_motion_after_the_blow_is_that_of_modes(more):
     """The modes that ring are driven by the force found, a constant one included."""
     body = plate({"boundary": "hinged"})
@@ -112,6 +112,7 @@ def test_responses_by_vectors_can_be_copied():
     assert other.restitution == hit.restitution and other.target.n_modes == hit.target.n_modes
 
 
+@pytest.mark.slow
 def test_skin_under_tension_is_struck():
     """Of a timpano's skin the blow needs few vectors; by its stiffness alone it would have thousands of modes."""
     mylar = fi.Material(E=3.5e9, nu=0.3, rho=1380.0)

@@ -12,6 +12,7 @@ from fem_impact.modes.modal import Modes, find_modes
 from fem_impact.show import export
 
 pyuff = pytest.importorskip("pyuff", reason="the uff extra is not installed")
+pytestmark = pytest.mark.usefixtures("read_here")
 PLATE = Plate(Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
 
 

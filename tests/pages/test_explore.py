@@ -151,6 +151,7 @@ def test_click_moves_the_strike_point(opened):
     shown.until(refined)  # and the exact blow takes the place of the quick one
 
 
+@pytest.mark.slow
 def test_quick_hand_does_not_queue_up_blows(opened):
     shown = opened()
     box = shown.tab.locator(".noUi-handle").first.bounding_box()
@@ -183,7 +184,7 @@ def test_button_plays_the_sound(opened):
     shown.until("document.getElementById('heard').innerText.includes('Full scale is 10 m/s')")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_page_fits_a_phone(opened, scheme):
     shown = opened(width=375, height=700, color_scheme=scheme)
     assert shown.tab.evaluate("document.documentElement.scrollWidth") == 375
@@ -192,6 +193,7 @@ def test_page_fits_a_phone(opened, scheme):
     assert len(canvases) == 4 and max(canvases) <= 375
 
 
+@pytest.mark.slow
 def test_keyboard_turns_every_slider(opened):
     shown = opened()
     shown.tab.locator(".noUi-handle").nth(6).wait_for()

@@ -28,11 +28,9 @@ def test_a_page_with_values_ridges_pictures_and_double_hits(found, tmp_path):
     assert "tip x 10" in page and "http" not in page.replace("http-equiv", "")
 
 
-def test_pictures_alone(found, tmp_path):
-    made, _ = found
+def test_pictures_alone(found):
     for name, draw in (("pulses", fit_page.pulses), ("profiles", fit_page.profiles), ("spectrum", fit_page.spectrum)):
-        figure = draw(made)
-        fi.figures.save(tmp_path / f"{name}.png", figure)
+        figure = draw(found[0])
         assert len(figure.axes) >= {"pulses": 3, "profiles": 4, "spectrum": 1}[name]
 
 

@@ -250,6 +250,7 @@ def test_cells_of_finite_element_scenes_are_struck_scenes(body, exponent):
             assert_allclose(float(cell[layer]), getattr(hit, layer), rtol=2.0 * hit.tolerance)
 
 
+@pytest.mark.slow
 def test_a_map_with_a_store_keeps_its_modes_too(tmp_path, monkeypatch):
     """The second call finds the modes in the file beside the store: it only takes the first look again."""
     text = QUICK.replace('source = "analytic"', 'source = "fe"').replace("mass = [0.03, 0.05]", "mass = [0.001, 0.002]")

@@ -17,7 +17,8 @@ def hit():
     return fi.strike(plate, fi.Striker.rigid(0.03), fi.Contact.linear(1e4), at=(0.14, 0.09), speed=1.0, tolerance=0.1)
 
 
-def test_it_draws_what_this_process_would_and_counts_the_frames(hit, tmp_path):
+def test_it_draws_what_this_process_would_and_counts_the_frames(hit, tmp_path, monkeypatch):
+    monkeypatch.setattr(pictures, "FRAMES", 6)
     told = []
     with Painter() as other, progress.heard(lambda *each: told.append(each)):
         other.begin(tmp_path, hit)
