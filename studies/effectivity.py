@@ -3,21 +3,23 @@
     python studies/effectivity.py [--scenes 500] [--seed 1] [--by-elements] [--out studies/out]
 
 Prints the share of scenes whose true error is below the tolerance, the ratio of estimated to true error, every miss by
-name, and the cost of the chosen model over that of the cheapest equally accurate setting; writes effectivity.csv and
-effectivity.png. The scenes are TOML texts as a user would write them: hinged rectangles, disks with every edge support,
-beams with all end supports and, by finite elements, a guitar top and a rectangle. A rigid mass strikes them through a
-linear or a Hertz spring, soft to hard, at tolerances from 1e-2 to 1e-5 (finite elements: to 1e-3). The reference uses a
-tenth of the tolerance with the modes and elements that this needs. With ``--by-elements`` every scene is a rectangle or
-a disk by finite elements, seen through Ritz vectors, at tolerances from 1e-1 to 1e-6 and with contacts up to twenty
-times as high as the first mode; the reference is its closed form. For every tenth scene with closed forms, the study
-searches the cheapest setting among all combinations of ten numbers of modes and seven steps.
+name, and the cost of the chosen model over that of the cheapest equally accurate setting; writes effectivity.csv, scene
+by scene, and effectivity.png. An interrupted run goes on where it stopped. The scenes are TOML texts as a user would
+write them: hinged rectangles, disks with every edge support, beams with all end supports and, by finite elements, a
+guitar top and a rectangle. A rigid mass strikes them through a linear or a Hertz spring, soft to hard, at tolerances
+from 1e-2 to 1e-5 (finite elements: to 1e-3). The reference uses a tenth of the tolerance with the modes and elements
+that this needs. With ``--by-elements`` every scene is a rectangle or a disk by finite elements, seen through Ritz
+vectors, at tolerances from 1e-1 to 1e-6 and with contacts up to twenty times as high as the first mode; the reference
+is its closed form. For every tenth scene with closed forms, the study searches the cheapest setting among all
+combinations of ten numbers of modes and seven steps.
 """
 
 import argparse
+import csv
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 import matplotlib
@@ -64,6 +66,7 @@ tolerance = {tolerance!r}
 """
 BEYOND = 0.1  # [-] reference tolerance over scene tolerance
 WITHIN = (0.5, 20.0)  # [-] estimated over true error that counts as honest
+HEADER = "scene", "tolerance", "impacts", "true error", "estimated error", "remark", "seconds over the cheapest"
 CHAOTIC = 3  # [-] scenes with more impacts are chaotic and counted separately
 SEARCHED = 10  # [-] one scene in so many gets a search for the cheapest setting
 NUMBERS = (5, 10, 20, 40, 80, 160, 320, 640, 1280, 2560)  # [-] modes tried
@@ -140,7 +143,8 @@ def examine(name: str, text: str, tolerance: float, search: bool) -> Case:
             path.write_text(text.replace('source = "fe"', 'source = "analytic"'))
             truth = fi.load_scene(path)
     try:
-        scene.strike()  # so that imports and compilation are not timed
+        if search:
+            scene.strike()  # so that imports and compilation are not timed
         start = time.perf_counter()
         hit = scene.strike()
         seconds = time.perf_counter() - start
@@ -169,12 +173,33 @@ def cheapest(scene: fi.Scene, reference: fi.Response, tolerance: float) -> float
     return best
 
 
-def study(n_scenes: int, seed: int, workers: int | None = None, by_elements: bool = False) -> list[Case]:
-    """Examine ``n_scenes`` random scenes."""
+def study(n_scenes: int, seed: int, path: Path, workers: int | None = None, by_elements: bool = False) -> list[Case]:
+    """Examine ``n_scenes`` random scenes but those already in the CSV file ``path``, which grows scene by scene."""
     rng = np.random.default_rng(seed)
     scenes = [(*random_scene(rng, by_elements), i % SEARCHED == 0) for i in range(n_scenes)]
-    with ProcessPoolExecutor(workers) as pool:
-        return list(pool.map(examine, *zip(*scenes)))
+    known = {case.name: case for case in saved(path)}
+    with ProcessPoolExecutor(workers) as pool, path.open("a", newline="") as file:
+        rows = csv.writer(file)
+        if not known:
+            rows.writerow(HEADER)
+        running = [pool.submit(examine, *scene) for scene in scenes if scene[0] not in known]
+        for done in as_completed(running):
+            case = done.result()
+            known[case.name] = case
+            rows.writerow(astuple(case))
+            file.flush()
+    return [known[scene[0]] for scene in scenes]
+
+
+def saved(path: Path) -> list[Case]:
+    """The cases that an earlier run wrote."""
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
+        return [
+            Case(name, float(tolerance), int(impacts), float(true), float(estimated), remark, float(over))
+            for name, tolerance, impacts, true, estimated, remark, over in list(csv.reader(file))[1:]
+        ]
 
 
 def report(cases: list[Case]) -> str:
@@ -232,16 +257,12 @@ def main() -> None:
     parser.add_argument("--workers", type=int, help="number of processes (default: one per core)")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "out")
     options = parser.parse_args()
-    cases = study(options.scenes, options.seed, options.workers, options.by_elements)
-    print(report(cases))
     options.out.mkdir(parents=True, exist_ok=True)
-    rows = [
-        f'"{c.name}",{c.tolerance:.3e},{c.n_impacts},{c.true:.3e},{c.estimated:.3e},{c.over:.3g},"{c.remark}"'
-        for c in cases
-    ]
-    header = "scene,tolerance,impacts,true error,estimated error,seconds over the cheapest,remark"
-    draw(cases, options.out / "effectivity.png")
-    (options.out / "effectivity.csv").write_text("\n".join([header, *rows]) + "\n")
+    name = "effectivity_by_elements" if options.by_elements else "effectivity"
+    path = options.out / f"{name}.csv"
+    cases = study(options.scenes, options.seed, path, options.workers, options.by_elements)
+    print(report(cases))
+    draw(cases, path.with_suffix(".png"))
 
 
 if __name__ == "__main__":

@@ -260,8 +260,11 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> R
     for i, body in enumerate(bodies):
         for cause, other in body.poorer.items():
             poorer = [*parts[:i], _poorer(parts[i], other), *parts[i + 1 :]]
-            less = _run(_joined(poorer, contacts), ran, size, pace, *last)
-            parted[cause] += max(differ(less, coarse), float(_may_touch(coarse, less, pace[0])))
+            try:
+                less = _run(_joined(poorer, contacts), ran, size, pace, *last)
+                parted[cause] += max(differ(less, coarse), float(_may_touch(coarse, less, pace[0])))
+            except SimulationError:  # the poorer body cannot be followed, so it tells nothing
+                parted[cause] += 1.0
     error = Error(step_error, **parted, resolvable=resolvable, sensitivity=_sensitivity(coarse, history))
     laws = tuple(touch.law for touch in contacts)
     dips = tuple(_dip(part, system) for part in parts)

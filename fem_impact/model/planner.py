@@ -25,7 +25,7 @@ from . import cost, idealisation, vectors
 from .target import FIRST_LOOK, Stages, Target, Watch
 
 SHARE = 0.45  # [-] of the tolerance for left-out modes, as much for the time steps; the mesh gets the rest
-STEPS = 0.3  # [-] of the tolerance for the time steps of a blow by Ritz vectors: finer steps cost nothing there
+STEPS = 0.1  # [-] of the tolerance for the time steps of a blow by Ritz vectors: finer steps cost nothing there
 ATTEMPTS = 3  # [-] runs with ever more modes or finer meshes, until the tolerance is met
 NOTCH = 4.0  # [-] each attempt divides what the modes left out or the mesh may err by this
 MESH = 0.1  # [-] of the tolerance for the mesh, whose frequencies may err twice as much as the blow then does

@@ -17,17 +17,18 @@ from ..modes.modal import Modes
 from ..modes.ritz import Krylov
 from .target import Stages, Target
 
-# [-] value at a tolerance of 1e-2, and power of 1e-2 / tolerance with which it grows
-WAVES = 1.2, 0.35  # highest frequency that the first mesh resolves, over that of the contact
+# [-] value at a tolerance of 1e-2 or more, and power of 1e-2 / tolerance with which it grows
+WAVES = 1.6, 0.37  # highest frequency that the first mesh resolves, over that of the contact
 SHIFT = 6.0, 1.0 / 6.0  # shift over the angular frequency of the contact
 FIRST = 84, 0.22  # vectors tried first: they resolve one undisturbed contact
+FOLDED = 4.0, 0.6  # what modes left out may err, over what the highest pairs may that act as a spring
 EXCITED = 12.0, 0.25  # highest frequency of a mode that matters, over that of the contact
 FEWEST = 30  # [-] vectors besides those that stand for modes: for the dip under the load
 MORE = 1.4  # [-] factor on the number of vectors as long as they are too few
 NOTCH = 4.0  # [-] divides what the highest Ritz pairs, which act as a spring, may err, each time
 PATIENCE, LEAST_GAIN = 3, 0.7  # [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7
 TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before
-SHARE = 0.6  # [-] of what the steps leave of the tolerance, for too few vectors, before the mesh is compared
+SHARE = 0.45  # [-] of what the steps leave of the tolerance, for too few vectors, before the mesh is compared
 COARSER = 1.5  # [-] element size of the comparison over that of the blow
 MOST_VECTORS = 1500  # [-] limit on their number: dense matrices of this size take a second
 
@@ -41,11 +42,15 @@ def usable(target: Target) -> bool:
     return not by_mode and (target.system is None or target.system.element == "argyris")
 
 
+def _strictness(tolerance: float) -> float:
+    return max(1.0, 1e-2 / tolerance)
+
+
 def first_count(target: Target, resonance: float, tolerance: float) -> int:
     """Number of vectors tried first; hardly more than there are modes that the contact may excite."""
-    ease = 1e-2 / tolerance
-    modes = target.count_below(EXCITED[0] * ease ** EXCITED[1] * resonance / target.stretch)
-    return round(min(FIRST[0] * ease ** FIRST[1], FEWEST + modes))
+    strict = _strictness(tolerance)
+    modes = target.count_below(EXCITED[0] * strict ** EXCITED[1] * resonance / target.stretch)
+    return round(min(FIRST[0] * strict ** FIRST[1], FEWEST + modes))
 
 
 def size_for(target: Target, resonance: float, tolerance: float) -> float:
@@ -54,7 +59,7 @@ def size_for(target: Target, resonance: float, tolerance: float) -> float:
     assert mesh is not None and isinstance(section, Plate)
     if target.size_stated:
         return mesh.size
-    highest = resonance * WAVES[0] * (1e-2 / tolerance) ** WAVES[1] / target.stretch
+    highest = resonance * WAVES[0] * _strictness(tolerance) ** WAVES[1] / target.stretch
     size = min(mesh.size, refinement.WAVE_PER_ELEMENT["argyris"] / target.wave(highest))
     if section.tension:
         stiffness = float(section.stiffness(mesh.points[mesh.cells].mean(axis=1))[:, 0, 0].max())
@@ -82,10 +87,12 @@ class Seen:
         self, target: Target, at: Any, resonance: float, tolerance: float, size: float, fixed: bool, stages: Stages
     ) -> None:
         self.target, self.at, self.size, self.fixed, self.stages = target, np.atleast_2d(at), size, fixed, stages
-        ease = 1e-2 / tolerance
-        self.shift = 2.0 * np.pi * resonance * SHIFT[0] * ease ** SHIFT[1] / target.stretch
-        self.count, self.margin = first_count(target, resonance, tolerance), NOTCH
+        strict = _strictness(tolerance)
+        self.shift = 2.0 * np.pi * resonance * SHIFT[0] * strict ** SHIFT[1] / target.stretch
+        self.count = first_count(target, resonance, tolerance)
+        self.margin = FOLDED[0] * strict ** FOLDED[1]
         self.tried: list[float] = []  # [-] truncation errors of the blows so far
+        self.spent = False  # whether more vectors no longer help
         self.fine = self._krylov(size)
         self.coarse: Krylov | None = None
 
@@ -120,7 +127,8 @@ class Seen:
         few = error.truncation > SHARE * allowed if first else error.truncation > error.mesh
         if not first and error.truncation + error.mesh <= allowed:
             return False
-        if few and self.count < MOST_VECTORS and not self._stuck(error.truncation):
+        self.spent = self.spent or (few and (self.count >= MOST_VECTORS or self._stuck(error.truncation)))
+        if few and not self.spent:
             self.count, self.margin = min(MOST_VECTORS, round(MORE * self.count)), NOTCH * self.margin
             return True
         if first:
@@ -129,7 +137,8 @@ class Seen:
                 self._refine()
             return True
         finer = self.fine.system.n_dofs * COARSER**2
-        if error.mesh <= 0.5 * allowed or self.fixed or finer > refinement.MOST_UNKNOWNS:
+        useless = self.spent and error.truncation > allowed
+        if error.mesh <= 0.5 * allowed or self.fixed or useless or finer > refinement.MOST_UNKNOWNS:
             return False
         self._refine()
         return True

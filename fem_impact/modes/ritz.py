@@ -24,7 +24,7 @@ from .modal import Damping, Modes, Shapes, damping_notes, damping_ratios
 
 GROWN = 32  # [-] vectors for which room is made at a time
 DEPENDENT = 1e-10  # [-] a new vector shorter than this fraction of its length before orthogonalisation adds nothing
-FEWER = 0.8  # [-] fraction of the vectors with which a second blow tells the error of having no more
+FEWER = 0.7  # [-] fraction of the vectors with which a second blow tells the error of having no more
 
 
 @check.typed
