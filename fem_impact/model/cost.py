@@ -38,7 +38,10 @@ FACTORS = 4e-6, 6.5e-8  # [s] per unknown of a factorisation, and per unknown ti
 SOLVE, TURN = 4.2e-7, 6e-10  # [s] per unknown of a solution, and of making it orthogonal to another vector
 DENSE = 4e-9  # [s] of all small eigenvalue problems, over their size cubed
 LANCZOS = 4.0  # [-] work per mode, over that per Ritz vector
-ROUNDS = 2.2  # [-] work of all attempts over that of the first, in the mean of the scenes
+ATTEMPTS = 3.0  # [-] blows on the way to a tolerance
+# Fitted by studies/cost_predictions.py --fit to blows at tolerances from 1e-2 to 1e-6.
+GROWN = 120.0, 0.7  # [-] first vectors up to this number suffice; if more, the number grows by this power of the ratio
+MESHES = 1.8  # [-] work on all meshes over that on the first and the coarser one that it is compared with
 LIVELY, MORE = 10, 2.2  # [-] strikers that keep so many modes touch for longer, and need so many times more vectors
 FINER = 2.25  # [-] unknowns per area, over those of the mesh that it is compared with
 PROCESS, ELEMENTS = 2.1e8, 5e7  # [byte] of the process with its libraries, and of those for elements
@@ -115,12 +118,15 @@ def compliance(n_dofs: float) -> Work:
 def by_vectors(n_dofs: float, n_graded: float, n_vectors: float, n_striker_modes: int) -> Work:
     """Ritz vectors on the mesh of the blow and on a coarser one, and what the blow may turn out to need.
 
-    ``n_graded`` of the unknowns belong to the elements that shrink towards the blow, alike on both meshes.
+    ``n_graded`` of the unknowns belong to the elements that shrink towards the blow, alike on both meshes. Of
+    ``n_vectors`` the blow begins with, a hard blow or a tight tolerance makes more: each must be made orthogonal to all
+    before, so that the work grows with the square of their number.
     """
-    n_vectors *= MORE if n_striker_modes >= LIVELY else 1.0
+    touching = MORE if n_striker_modes >= LIVELY else 1.0
+    n_vectors *= max(touching, (n_vectors / GROWN[0]) ** GROWN[1])
     coarser = n_graded + (n_dofs - n_graded) / FINER
     once = _mesh(n_dofs, n_vectors, n_vectors) + _mesh(coarser, n_vectors, n_vectors)
-    return Work(ROUNDS * once.sparse, ROUNDS * DENSE * n_vectors**3, ROUNDS * START, ELEMENTS + once.memory)
+    return Work(MESHES * once.sparse, DENSE * n_vectors**3, ATTEMPTS * START, ELEMENTS + once.memory)
 
 
 def _mesh(n_dofs: float, n_solved: float, n_kept: float) -> Work:

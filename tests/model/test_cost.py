@@ -57,6 +57,13 @@ def test_the_time_of_a_finer_mesh_grows_faster_than_its_unknowns():
     assert 4.0 < four / one < 8.0  # between a solution per unknown and a factorisation, n**1.5
 
 
+def test_many_first_vectors_become_more_and_each_costs_more():
+    """The plate of studies/frontier.py at 1e-6 begins with 302 vectors, ends with 592 and takes four times as long."""
+    few, many = (cost.by_vectors(7e3, 3e3, n, 1).on(cost.REFERENCE) for n in (120, 302))
+    assert many > 3.0 * few  # 302 vectors that do not grow would cost 1.9 times as much as 120
+    assert cost.by_vectors(7e3, 3e3, 60, 1).on(cost.REFERENCE) > 0.6 * few  # as many as are enough do not grow
+
+
 def test_a_machine_half_as_fast_takes_twice_as_long():
     assert MUCH.on(SLOW) == pytest.approx(2.0 * MUCH.on(cost.REFERENCE))
     assert replace(MUCH, steps=5.0).on(replace(cost.REFERENCE, steps=SLOW.steps)) == pytest.approx(10.0 + 1.0 + 10.0)
