@@ -675,7 +675,7 @@ class Response:
         lines += [
             f"contact time {self.contact_time * 1e3:.5g} ms, peak force {self.peak_force:.5g} N, "
             f"impulse {self.impulse:.5g} N s",
-            f"restitution {self.restitution:.5f} at {self.speed:g} m/s",
+            f"restitution {round(self.restitution, 5) + 0.0:.5f} at {self.speed:g} m/s",
             f"energy {total:.5g} J: {shares}",
             f"estimated error {error.total:.1e} of {words(self.quantities)}: step {error.step:.1e}, truncation "
             f"{error.truncation:.1e}, mesh {error.mesh:.1e}, idealisation {error.idealisation:.1e}; energy error "

@@ -84,3 +84,10 @@ def test_centroid_is_that_of_the_spectrum():
     size = np.abs(hit.spectrum(frequencies))
     wanted = np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies)
     assert_allclose(hit.spectral_centroid(limit), wanted, rtol=1e-9)  # rounding of 256 turns at most
+
+
+def test_a_body_that_stops_has_no_negative_restitution():
+    """Two equal masses swap their speeds; what is left of the first one's is rounding of either sign."""
+    touch = [fi.Touch(fi.Contact.linear(1e6), 0, 1)]
+    hit = fi.collide([fi.Modes.rigid(0.1)] * 2, touch, speeds=[1.0, 0.0])
+    assert abs(hit.restitution) < 1e-12 and "restitution 0.00000 at 1 m/s" in hit.summary()
