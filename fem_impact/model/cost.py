@@ -40,7 +40,7 @@ DENSE = 4e-9  # [s] of all small eigenvalue problems, over their size cubed
 LANCZOS = 4.0  # [-] work per mode, over that per Ritz vector
 ATTEMPTS = 3.0  # [-] blows on the way to a tolerance
 # Fitted by studies/cost_predictions.py --fit to blows at tolerances from 1e-2 to 1e-6.
-GROWN = 120.0, 0.7  # [-] first vectors up to this number suffice; if more, the number grows by this power of the ratio
+GROWN = 120.0, 0.5  # [-] first vectors up to this number suffice; if more, the number grows by this power of the ratio
 MESHES = 1.8  # [-] work on all meshes over that on the first and the coarser one that it is compared with
 LIVELY, MORE = 10, 2.2  # [-] strikers that keep so many modes touch for longer, and need so many times more vectors
 FINER = 2.25  # [-] unknowns per area, over those of the mesh that it is compared with

@@ -60,7 +60,7 @@ def test_the_time_of_a_finer_mesh_grows_faster_than_its_unknowns():
 def test_many_first_vectors_become_more_and_each_costs_more():
     """The plate of studies/frontier.py at 1e-6 begins with 302 vectors, ends with 592 and takes four times as long."""
     few, many = (cost.by_vectors(7e3, 3e3, n, 1).on(cost.REFERENCE) for n in (120, 302))
-    assert many > 3.0 * few  # 302 vectors that do not grow would cost 1.9 times as much as 120
+    assert many > 2.5 * few  # 302 vectors that do not grow would cost 1.9 times as much as 120
     assert cost.by_vectors(7e3, 3e3, 60, 1).on(cost.REFERENCE) > 0.6 * few  # as many as are enough do not grow
 
 
