@@ -35,9 +35,9 @@ KAPPA = 5.0 / 6.0  # [-] shear coefficient of plates
 LOW = 40  # [-] flexible modes that are integrated; a blow's results depend on few others one by one
 TRUE_VECTORS = 4  # [-] of so many Ritz pairs the lowest one is a mode: those above are packets, whose shear is singular
 TOP = 4  # [-] the upper one of so many parts of the integrated modes tells how those above go on
-NODES = 4  # [-] Gauss points in each direction of a triangle
-RADIAL = 600  # [-] Gauss points along the radius of a disk: 15 for each wave of its fortieth mode
-ALONG = 600  # [-] Gauss points along a beam
+NODES = 3  # [-] Gauss points in each direction of a triangle: slopes to 1e-3, as modes need several triangles
+RADIAL = 160  # [-] Gauss points along the radius of a disk: 20 for each wave of its fortieth mode
+ALONG = 200  # [-] Gauss points along a beam
 ROLLING = 20.0  # [-] G over the rolling shear modulus of softwood: 0.064 E over 0.003 E, Wood Handbook, table 5-1
 
 
