@@ -26,6 +26,7 @@ TIMES = 64  # [-] instants of the blow at which the tension is found
 RINGING = 1.5  # [-] tension that acts on a mode swinging alone, over the mean tension: 3/4 of its largest
 FRONT = 2.0 * np.pi  # [-] radius squared of the bent region over rate times time: where Si(r**2 / (4 rate t)) turns
 DENT = 0.7  # [-] stiffening of a wide plate under a point force over (deflection / thickness)**2, from the held disk
+SLOWER = 3.0  # [-] a mode that is slower or faster than bending waves by this rocks or is pulled; wood differs by less
 NUMBER = "deflection over thickness"
 REMEDY = "large deflections need the plate's stretching: a softer blow, a thicker body, or a nonlinear program"
 
@@ -49,11 +50,12 @@ def of_target(struck: Struck) -> Assumption:
     history, mine = hit.history, struck.mine
     end = max((impact.end for impact in hit.impacts), default=history.end_time)
     times = np.linspace(0.0, end, TIMES + 1)[1:]
-    moved = history.states(times)[0][:, mine] * (history.omega[mine] > 0.0)
+    rocks, pulled = _bends(body, integrals, history.omega[mine])
+    moved = history.states(times)[0][:, mine] * rocks
     stretch = moved**2 @ integrals.slope  # (n_times,) int |grad w|**2
     tension = _tension(body, stretch, _bent_area(body, integrals, times))
     held = float(tension @ stretch / stretch.sum()) if stretch.any() else 0.0
-    omega = np.sqrt(history.omega[mine] ** 2 + held * integrals.slope)
+    omega = np.sqrt(history.omega[mine] ** 2 + held * rocks**2 * integrals.slope)
 
     def rise(modes: Modes, found: Bending | None) -> np.ndarray | None:
         of = known(modes)
@@ -66,8 +68,8 @@ def of_target(struck: Struck) -> Assumption:
 
     effect = struck.heard(struck.changes(omega=struck.of_target(omega)), rise)
     row = np.abs(history.shape[0, mine])
-    largest = float(np.abs(moved @ history.shape[0, mine]).max(initial=0.0))
-    swing = np.divide(row, history.omega[mine], out=np.zeros(len(row)), where=history.omega[mine] > 0.0)
+    largest = float(np.abs(moved @ (pulled * history.shape[0, mine])).max(initial=0.0))
+    swing = np.divide(rocks * pulled * row, history.omega[mine], out=np.zeros(len(row)), where=rocks > 0.0)
     ringing = float(np.sqrt(2.0 * struck.energy @ swing**2))
     return told(max(largest, ringing) / body.thickness, effect, "the thickness" if None in effect.values() else "")
 
@@ -82,6 +84,24 @@ def _tension(body: Known, stretch: np.ndarray, extent: np.ndarray) -> np.ndarray
         return stiff / (2.0 * extent) * stretch * (SLIPS + (1.0 - SLIPS) * body.held)
     area = body.modes.mass / body.extent / section.material.rho
     return section.material.E * area / (2.0 * extent) * stretch * body.held
+
+
+def _bends(body: Known, integrals: Bending, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Share (n_modes,) of each mode's motion that bends the body, and of its stiffness that is not from tension.
+
+    A body that rocks on soft supports, or turns about its hinges, is slower than its bending waves of that length; one
+    that is pulled tight is faster, and its deflection may be many thicknesses.
+    """
+    section = body.section
+    assert section is not None
+    points = body.modes.shapes.grid()[0]
+    stiffness = section.stiffness(points)
+    if isinstance(section, Plate):
+        stiffness = np.sqrt(stiffness[:, 0, 0] * stiffness[:, 1, 1])
+    waves = np.sqrt(float(np.mean(stiffness)) / body.per_extent) * integrals.wave**2
+    ratio = np.divide(omega, waves, out=np.zeros(len(omega)), where=waves > 0.0)
+    pulled = np.minimum(1.0, np.divide(SLOWER, ratio, out=np.ones(len(omega)), where=ratio > 0.0))
+    return np.minimum(1.0, SLOWER * ratio), pulled
 
 
 def _bent_area(body: Known, integrals: Bending, times: np.ndarray) -> np.ndarray:

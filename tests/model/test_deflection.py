@@ -4,7 +4,7 @@ from scipy.integrate import solve_ivp
 
 import fem_impact as fi
 from fem_impact.model import audit, bending
-from fem_impact.model.deflection import RINGING, SLIPS, _tension
+from fem_impact.model.deflection import RINGING, SLIPS, _bends, _tension
 
 E, NU, RHO, H, SIDE = 210e9, 0.3, 7850.0, 1e-3, 0.2
 STEEL = fi.Material(E=E, nu=NU, rho=RHO)
@@ -118,3 +118,24 @@ def test_without_a_thickness_it_is_not_known():
     plate = fi.analytic.rectangle(SIDE, SIDE, mass=0.3, first_frequency=100.0, n_modes=20)
     hit = fi.strike(plate, fi.Striker.rigid(0.05), fi.Contact.linear(2e4), at=(0.07, 0.08), speed=3.0)
     assert found(hit).state == "not known"
+
+
+def shares(mesh, section, supports, n_modes):
+    """Shares of the motion that bend the body and of the stiffness that is not from tension, of its flexible modes."""
+    modes = fi.find_modes(fi.assemble(mesh, section, supports), n_modes=n_modes)
+    known = bending.known(modes)
+    return _bends(known, bending.bending(known), modes.omega)
+
+
+def test_a_plate_that_rocks_on_soft_springs_does_not_bend():
+    plate = fi.Plate(STEEL, 3 * H)
+    soft, _ = shares(fi.mesh.rectangle(SIDE, SIDE), plate, {"boundary": fi.Elastic(1e3)}, 8)
+    assert (soft[:3] < 0.1).all() and (soft[3:] == 1.0).all()  # a piston, and two rocking motions
+    held, loose = shares(fi.mesh.rectangle(SIDE, SIDE), plate, {"boundary": "hinged"}, 8)
+    assert (held == 1.0).all() and (loose == 1.0).all()
+
+
+def test_a_drumhead_may_swing_by_many_thicknesses():
+    skin = fi.Plate(fi.Material(E=4e9, nu=0.38, rho=1390.0), 0.1e-3, tension=4000.0)
+    bends, loose = shares(fi.mesh.disk(0.3), skin, {"boundary": "hinged"}, 5)
+    assert (bends == 1.0).all() and (loose < 0.05).all()
