@@ -73,7 +73,7 @@ def loading(body: Known, integrals: Bending) -> tuple[np.ndarray, np.ndarray] | 
     rho, c = AIR
     omega, per_extent = body.modes.omega, body.per_extent
     moving = (omega > 0.0) & (integrals.wave > 0.0)
-    k, k0 = np.where(moving, integrals.wave, 1.0), omega / c
+    k, k0 = np.where(moving, integrals.wave, 1.0), np.where(moving, omega, c) / c
     if body.modes.dimension == 1:
         width = _width(body)
         if width is None:
@@ -83,11 +83,11 @@ def loading(body: Known, integrals: Bending) -> tuple[np.ndarray, np.ndarray] | 
         return np.where(moving, mass, 0.0), np.where(moving, sound, 0.0)
     short = np.sqrt(np.maximum(k**2 - k0**2, ROUNDED * k**2))
     mass = np.where(k > k0, 2.0 * rho / (per_extent * short), 0.0)
-    share = np.maximum(k / np.maximum(k0, 1e-300), 1.0 + 0.5 * ROUNDED)  # k / k_0 below coincidence
+    share = np.maximum(k / k0, 1.0 + 0.5 * ROUNDED)  # k / k_0 below coincidence
     edges = body.perimeter / (2.0 * np.pi * k * body.extent * np.sqrt(share**2 - 1.0))
     edges *= np.log((share + 1.0) / (share - 1.0)) + 2.0 * share / (share**2 - 1.0)
     swells = k0**2 * integrals.volume**2 * per_extent / (2.0 * np.pi)
-    above = 1.0 / np.sqrt(np.maximum(1.0 - (k / np.maximum(k0, 1e-300)) ** 2, ROUNDED))
+    above = 1.0 / np.sqrt(np.maximum(1.0 - (k / k0) ** 2, ROUNDED))
     small = np.minimum(1.0, k0 * body.perimeter / (2.0 * np.pi))  # edges that are shorter than sound cancel
     efficiency = np.where(k > k0, np.minimum(1.0, np.maximum(swells, edges * small)), above)
     sound = rho * c * efficiency / (per_extent * np.where(moving, omega, 1.0))

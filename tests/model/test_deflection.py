@@ -129,8 +129,8 @@ def shares(mesh, section, supports, n_modes):
 
 def test_a_plate_that_rocks_on_soft_springs_does_not_bend():
     plate = fi.Plate(STEEL, 3 * H)
-    soft, _ = shares(fi.mesh.rectangle(SIDE, SIDE), plate, {"boundary": fi.Elastic(1e3)}, 8)
-    assert (soft[:3] < 0.1).all() and (soft[3:] == 1.0).all()  # a piston, and two rocking motions
+    soft, pulled = shares(fi.mesh.rectangle(SIDE, SIDE), plate, {"boundary": fi.Elastic(1e3)}, 8)
+    assert (soft * pulled)[:3].max() < 0.1 and (soft[3:] == 1.0).all()  # a piston, and two rocking motions
     held, loose = shares(fi.mesh.rectangle(SIDE, SIDE), plate, {"boundary": "hinged"}, 8)
     assert (held == 1.0).all() and (loose == 1.0).all()
 
