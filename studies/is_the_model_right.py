@@ -31,6 +31,7 @@ HERE = Path(__file__).parent
 SPEEDS = 1e-3, 30.0  # [m/s]
 TOLERANCE = 1e-2  # [-] of every blow
 FELT = 1e-4  # [-] a change below this is not drawn: the model is right
+TICKS = 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0  # [mm]
 LEVELS = 1e-3, 1e-2, 0.1, 1.0
 COLOURS = [
     "#0072b2",
@@ -124,19 +125,25 @@ def draw(results: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]], path: Pa
     drawn: set[int] = set()
     colours = ListedColormap(COLOURS)
     for axes, (name, (thickness, speed, found)) in zip(panels[0], results.items()):
-        size = np.nan_to_num(found)
-        worst, which = size.max(axis=2), size.argmax(axis=2)
-        shown = np.ma.masked_where(worst < FELT, which)
-        drawn |= set(which[worst >= FELT].tolist())
+        size, missing = np.nan_to_num(found), np.isnan(found).all(axis=2)
+        worst, which = np.ma.masked_where(missing, size.max(axis=2)), size.argmax(axis=2)
+        felt = ~missing & (size.max(axis=2) >= FELT)
+        shown = np.ma.masked_where(~felt, which)
+        drawn |= set(which[felt].tolist())
+        axes.set_facecolor("#e6e6e6")  # where nothing is drawn
         limits = {"vmin": -0.5, "vmax": len(ALL) - 0.5}
         axes.pcolormesh(1e3 * thickness, speed, shown, cmap=colours, shading="nearest", **limits)
         if np.ptp(worst) > 0.0:
             lines = axes.contour(1e3 * thickness, speed, worst, levels=LEVELS, colors="black", linewidths=0.9)
             axes.clabel(lines, fmt=lambda level: f"{100.0 * level:g} %", fontsize=8)
         axes.set(xscale="log", yscale="log", xlabel="thickness [mm]", ylabel="speed [m/s]")
+        ticks = [x for x in TICKS if 0.99e3 * thickness[0] <= x <= 1.01e3 * thickness[-1]]
+        axes.set_xticks(ticks, [f"{x:g}" for x in ticks])
+        axes.set_xticks([], minor=True)
         axes.set_title(BODIES[name][0], fontsize=9)
     patches = [plt.Rectangle((0, 0), 1, 1, color=COLOURS[i]) for i in sorted(drawn)]
-    names = [ALL[i] for i in sorted(drawn)]
+    patches.append(plt.Rectangle((0, 0), 1, 1, color="#e6e6e6"))
+    names = [*(ALL[i] for i in sorted(drawn)), "below 0.01 %, or not computed"]
     figure.legend(patches, names, loc="outside lower center", ncols=len(names), frameon=False, fontsize=9)
     figure.savefig(path, dpi=130)
     plt.close(figure)

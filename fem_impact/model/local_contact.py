@@ -20,6 +20,7 @@ from .restrike import Struck, softer
 YIELD = 1.6  # [-] largest pressure at first yield over the yield strength, nu = 0.3
 SMALL = 0.5  # [-] contact radius over half the thickness, over a wavelength / (2 pi) or over the distance to an edge
 SLOW = 0.2  # [-] longest period of the striker's own vibration over the contact time
+HARDLY = 1e-6  # [-] loss times speed of a contact that loses nothing
 LAMB = 2.64  # [-] lowest spheroidal mode of a sphere, omega R / c_s, for nu = 0.25; 2.65 for 0.33
 LIVELY = 2.5  # [-] squared shape of that mode at its pole times the mass of the sphere
 SPHERE = "give the striker as a sphere with its material"
@@ -55,12 +56,11 @@ def yielding(struck: Struck) -> Assumption:
     if value <= 1.0:
         return Assumption("no yielding", value, 1.0, still, quantities, remedy, number)
     law = hit.history.law.copy()
-    k, exponent = law[0, :2]
-    mobility = float((hit.history.shape[0] ** 2)[hit.history.omega <= struck.omega].sum())
-    depth = (hit.peak_force / k) ** (1.0 / exponent)
-    speed = np.sqrt(2.0 * hit.peak_force * depth / (exponent + 1.0) * mobility)  # that presses so hard on a wall
-    law[0, 2] += loss_number(restitution(value ** (-2.5))) / speed  # pressure goes as speed**0.4
-    return Assumption("no yielding", value, 1.0, dict(struck.changes(law=law)), quantities, remedy, number)
+    bare = law.copy()
+    bare[0, 2] += HARDLY / hit.speed  # a lossy contact has no compliance in series: both blows are to lack it
+    law[0, 2] += loss_number(restitution(value ** (-2.5))) / hit.speed  # pressure goes as speed**0.4 on a wall
+    effect = dict(struck.changes({"law": bare}, law=law))
+    return Assumption("no yielding", value, 1.0, effect, quantities, remedy, number)
 
 
 def restitution(ratio: float) -> float:

@@ -1,6 +1,6 @@
 """Strike again with other frequencies, damping or contact, and say how much each quantity changes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -70,10 +70,11 @@ class Struck:
         """The blow to compare with: as found, in the steps of a first run."""
         return replace(self.hit, history=collision.again(self.hit.history), audit=None)
 
-    def changes(self, **changed: np.ndarray) -> dict[str, float]:
+    def changes(self, start: Mapping[str, np.ndarray] | None = None, **changed: np.ndarray) -> dict[str, float]:
         """Change of each quantity: absolute for the restitution, relative for the others, 1 if there is no end.
 
-        ``changed`` are fields of the history; the sound is not here, see `heard`.
+        ``changed`` are fields of the history, ``start`` those of the blow to compare with if that is not the one found;
+        the sound is not here, see `heard`.
         """
         h = self.hit.history
         if self.foreseen or all(
@@ -81,10 +82,11 @@ class Struck:
         ):
             return dict.fromkeys(self.quantities, 0.0)
         try:
+            before = self.before if start is None else replace(self.before, history=collision.again(h, **start))
             after = replace(self.before, history=collision.again(h, **changed))
         except SimulationError:
             return dict.fromkeys(self.quantities, 1.0)
-        return {name: _change(name, band, self.before, after) for name, band in self.hit.quantities.items()}
+        return {name: _change(name, band, before, after) for name, band in self.hit.quantities.items()}
 
     def of_target(self, values: np.ndarray, name: str = "omega") -> np.ndarray:
         """A field of the history with the target's part replaced."""
