@@ -104,6 +104,8 @@ def known(modes: Modes) -> Known | None:
     """What the modes of a plate or beam tell of it; None if its shapes are known at points only, or it is rigid."""
     shapes = unwrapped(modes.shapes)[0]
     if isinstance(shapes, (FieldShapes, RitzShapes)):
+        if shapes.system.element == "morley":  # its quadratic shapes have no shear force
+            return None
         return around(modes, modes.section, shapes.system.mesh, shapes.system.supports)
     if isinstance(shapes, RectangleShapes):
         sides = shapes.length, shapes.width

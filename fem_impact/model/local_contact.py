@@ -19,6 +19,7 @@ from .restrike import Struck, softer
 
 YIELD = 1.6  # [-] largest pressure at first yield over the yield strength, nu = 0.3
 SMALL = 0.5  # [-] contact radius over half the thickness, over a wavelength / (2 pi) or over the distance to an edge
+NEAREST = 1e-6  # [-] least distance to an edge over the thickness
 SLOW = 0.2  # [-] longest period of the striker's own vibration over the contact time
 HARDLY = 1e-6  # [-] loss times speed of a contact that loses nothing
 LAMB = 2.64  # [-] lowest spheroidal mode of a sphere, omega R / c_s, for nu = 0.25; 2.65 for 0.33
@@ -57,9 +58,11 @@ def yielding(struck: Struck) -> Assumption:
         return Assumption("no yielding", value, 1.0, still, quantities, remedy, number)
     law = hit.history.law.copy()
     bare = law.copy()
-    bare[0, 2] += HARDLY / hit.speed  # a lossy contact has no compliance in series: both blows are to lack it
-    law[0, 2] += loss_number(restitution(value ** (-2.5))) / hit.speed  # pressure goes as speed**0.4 on a wall
-    effect = dict(struck.changes({"law": bare}, law=law))
+    stored = hit.peak_force * (hit.peak_force / law[0, 0]) ** (1.0 / law[0, 1]) / (law[0, 1] + 1.0)  # [J]
+    speed = abs(hit.speed) or np.sqrt(2.0 * stored / hit.bodies[0].mass)  # at rest, a constant force presses it
+    bare[0, 2] += HARDLY / speed  # a lossy contact has no compliance in series: both blows are to lack it
+    law[0, 2] += loss_number(restitution(value ** (-2.5))) / speed  # pressure goes as speed**0.4 on a wall
+    effect = dict(struck.between({"law": bare}, {"law": law}))
     return Assumption("no yielding", value, 1.0, effect, quantities, remedy, number)
 
 
@@ -101,7 +104,7 @@ def small(struck: Struck) -> Assumption:
     compliance = (1.0 + nu) * (3.0 - 2.0 * nu) / (np.pi * E * h)
     ratios = {number: 2.0 * a / h}
     if struck.clearance is not None:
-        away = max(struck.clearance, a)
+        away = max(struck.clearance, a, NEAREST * h)
         compliance += (1.0 - nu**2) / (2.0 * np.pi * E * away)  # of the image beyond the edge
         ratios["contact radius over the distance to the edge"] = a / away
     history, integrals = hit.history, struck.bending

@@ -70,20 +70,22 @@ class Struck:
         """The blow to compare with: as found, in the steps of a first run."""
         return replace(self.hit, history=collision.again(self.hit.history), audit=None)
 
-    def changes(self, start: Mapping[str, np.ndarray] | None = None, **changed: np.ndarray) -> dict[str, float]:
+    def changes(self, **changed: np.ndarray) -> dict[str, float]:
         """Change of each quantity: absolute for the restitution, relative for the others, 1 if there is no end.
 
-        ``changed`` are fields of the history, ``start`` those of the blow to compare with if that is not the one found;
-        the sound is not here, see `heard`.
+        ``changed`` are fields of the history; the sound is not here, see `heard`.
         """
+        return self.between({}, changed)
+
+    def between(self, start: Mapping[str, np.ndarray], end: Mapping[str, np.ndarray]) -> dict[str, float]:
+        """As `changes`, between two blows with other fields of the history, if the first is not the one found."""
         h = self.hit.history
-        if self.foreseen or all(
-            np.allclose(value, getattr(h, name), rtol=LEAST, atol=0.0) for name, value in changed.items()
-        ):
+        same = (np.allclose(value, getattr(h, name), rtol=LEAST, atol=0.0) for name, value in end.items())
+        if self.foreseen or (not start and all(same)):
             return dict.fromkeys(self.quantities, 0.0)
         try:
-            before = self.before if start is None else replace(self.before, history=collision.again(h, **start))
-            after = replace(self.before, history=collision.again(h, **changed))
+            before = replace(self.before, history=collision.again(h, **start)) if start else self.before
+            after = replace(self.before, history=collision.again(h, **end))
         except SimulationError:
             return dict.fromkeys(self.quantities, 1.0)
         return {name: _change(name, band, before, after) for name, band in self.hit.quantities.items()}

@@ -141,3 +141,24 @@ def test_distance_to_the_edge_is_that_of_the_body():
     system = fi.assemble(fi.mesh.disk(0.1), PLATE, {"boundary": "hinged"})
     modes = fi.find_modes(system, n_modes=3)
     assert audit._clearance(modes, None, np.array([0.06, 0.0])) == pytest.approx(0.04, rel=0.01)
+
+
+@pytest.mark.parametrize("case", ["no touch", "at the edge", "pressed from rest", "morley"])
+def test_odd_blows_are_examined_too(case):
+    how = {"at": (0.12, 0.1), "speed": 1.0}
+    modes, law = modal(30), LAW
+    if case == "no touch":
+        law, how = fi.Contact.hertz(LAW.stiffness, gap=1.0), how | {"duration": 1e-4}
+    if case == "at the edge":
+        how |= {"at": (0.0, 0.1)}
+    if case == "pressed from rest":
+        how |= {"speed": 0.0, "striker_force": 500.0, "duration": 2e-4, "tolerance": 1e-2}
+    if case == "morley":
+        system = fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.1), PLATE, {"boundary": "hinged"}, element="morley")
+        modes = fi.find_modes(system, n_modes=8)
+    hit = fi.strike(modes, BALL, law, **how)
+    assert np.isfinite(hit.model_error) and len(hit.assumptions) == len(assumption.ALL)
+    if case == "no touch":
+        assert hit.n_impacts == 0 and hit.model_error < 1e-6
+    if case == "morley":
+        assert named(hit.assumptions)["thin target"].state == "not known"
