@@ -39,6 +39,11 @@ class Assumption:
         return not self.unknown and all(change is not None for change in self.effect.values())
 
     @property
+    def why(self) -> str:
+        """Why something is not known; "" if everything is."""
+        return self.unknown or ("" if self.known else "the blow with the better model cannot be computed")
+
+    @property
     def worst(self) -> float:
         """Largest known effect [-]."""
         return max((change for change in self.effect.values() if change is not None), default=0.0)
@@ -71,7 +76,7 @@ class Assumption:
         elif self.worst > 0.0:
             said.append(f"changes the {_worst(self.effect)[0]} by {self.worst:.1g}")
         if not self.known:
-            said.append(f"not known: {self.unknown}")
+            said.append(f"not known: {self.why}")
         said += [self.remedy] if self.remedy else []
         return f"{self.name}: {'; '.join(said)}"
 

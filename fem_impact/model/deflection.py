@@ -71,7 +71,9 @@ def of_target(struck: Struck) -> Assumption:
     largest = float(np.abs(moved @ (pulled * history.shape[0, mine])).max(initial=0.0))
     swing = np.divide(rocks * pulled * row, history.omega[mine], out=np.zeros(len(row)), where=rocks > 0.0)
     ringing = float(np.sqrt(2.0 * struck.energy @ swing**2))
-    return told(max(largest, ringing) / body.thickness, effect, "the thickness" if None in effect.values() else "")
+    return told(
+        max(largest, ringing) / body.thickness, effect, "the thickness" if effect.get("sound", 0.0) is None else ""
+    )
 
 
 def _tension(body: Known, stretch: np.ndarray, extent: np.ndarray) -> np.ndarray:

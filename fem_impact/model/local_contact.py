@@ -135,6 +135,6 @@ def slow(struck: Struck) -> Assumption:
     E, nu, rho = striker.material.E, striker.material.nu, striker.material.rho
     own = LAMB * np.sqrt(E / (2.0 * (1.0 + nu) * rho)) / striker.radius
     late = LIVELY / (striker.mass * own**2) * (struck.omega / own) ** 2  # what inertia adds to the static give
-    effect = dict(struck.changes(**softer(hit.history, late)))
+    effect = struck.changes(**softer(hit.history, late))
     remedy = "the striker needs its own modes: a bar, or a flexible striker"
     return Assumption("quasi-static contact", 2.0 * struck.omega / own, SLOW, effect, quantities, remedy, number)

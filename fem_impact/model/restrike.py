@@ -70,14 +70,14 @@ class Struck:
         """The blow to compare with: as found, in the steps of a first run."""
         return replace(self.hit, history=collision.again(self.hit.history), audit=None)
 
-    def changes(self, **changed: np.ndarray) -> dict[str, float]:
-        """Change of each quantity: absolute for the restitution, relative for the others, 1 if there is no end.
+    def changes(self, **changed: np.ndarray) -> dict[str, float | None]:
+        """Change of each quantity: absolute for the restitution, relative for the others, None if that blow fails.
 
         ``changed`` are fields of the history; the sound is not here, see `heard`.
         """
         return self.between({}, changed)
 
-    def between(self, start: Mapping[str, np.ndarray], end: Mapping[str, np.ndarray]) -> dict[str, float]:
+    def between(self, start: Mapping[str, np.ndarray], end: Mapping[str, np.ndarray]) -> dict[str, float | None]:
         """As `changes`, between two blows with other fields of the history, if the first is not the one found."""
         h = self.hit.history
         same = (np.allclose(value, getattr(h, name), rtol=LEAST, atol=0.0) for name, value in end.items())
@@ -87,7 +87,7 @@ class Struck:
             before = replace(self.before, history=collision.again(h, **start)) if start else self.before
             after = replace(self.before, history=collision.again(h, **end))
         except SimulationError:
-            return dict.fromkeys(self.quantities, 1.0)
+            return dict.fromkeys(self.quantities)
         return {name: _change(name, band, before, after) for name, band in self.hit.quantities.items()}
 
     def of_target(self, values: np.ndarray, name: str = "omega") -> np.ndarray:
@@ -96,12 +96,14 @@ class Struck:
         whole[..., self.mine] = values
         return whole
 
-    def heard(self, effect: dict[str, float], shift: Callable[[Modes, Bending | None], Any]) -> dict[str, float | None]:
+    def heard(
+        self, effect: dict[str, float | None], shift: Callable[[Modes, Bending | None], Any]
+    ) -> dict[str, float | None]:
         """The effect with that on the sound: the relative shift of the frequencies heard, weighted by their energy.
 
         ``shift`` returns it, (n_modes,) [-], for modes and their integrals.
         """
-        result: dict[str, float | None] = dict(effect)
+        result = dict(effect)
         if "sound" not in self.hit.quantities:
             return result
         modes = self.hit.target

@@ -42,7 +42,7 @@ def of_target(struck: Struck) -> Assumption:
             return told(None, dict.fromkeys(quantities), "the waves of the body")
         mass = 2.0 * AIR[0] / (body.per_extent * plane_wave(plate, struck.omega))
         row = history.shape[:, mine] / (1.0 + mass) ** 0.25
-        return told(mass, dict(struck.changes(shape=struck.of_target(row, "shape"))))
+        return told(mass, struck.changes(shape=struck.of_target(row, "shape")))
     found = None if body is None or struck.bending is None else loading(body, struck.bending)
     if found is None:
         why = "the shapes of the body" if body is None else "the width of the body"
@@ -62,7 +62,7 @@ def of_target(struck: Struck) -> Assumption:
     effect = struck.heard(struck.changes(**changed), shift)
     weight = struck.energy.sum()
     value = float(struck.energy @ carried / weight) if weight else 0.0
-    return told(value, effect, "the shapes heard" if None in effect.values() else "")
+    return told(value, effect, "the shapes heard" if effect.get("sound", 0.0) is None else "")
 
 
 def loading(body: Known, integrals: Bending) -> tuple[np.ndarray, np.ndarray] | None:

@@ -59,7 +59,7 @@ def of_target(struck: Struck) -> Assumption:
     if body.plate is not None and history.law[0, 3] > 0.0:
         changed |= softer(history, _give(struck, body, body.plate, integrals))
     effect = struck.heard(struck.changes(**changed), lambda _, found: _heard(found))
-    unknown = "the thickness of the body" if None in effect.values() else ""
+    unknown = "the thickness of the body" if effect.get("sound", 0.0) is None else ""
     return told(value, effect, unknown)
 
 
@@ -114,8 +114,8 @@ def of_striker(struck: Struck) -> Assumption:
     integrals = struck.striker_bending
     if body is None or body.thickness is None or integrals is None or integrals.thick is None:
         omega[columns] *= 1.0 - DOUBT
-        effect: dict[str, float | None] = dict(struck.changes(omega=omega))
-        if max(x or 0.0 for x in effect.values()) <= hit.tolerance:
+        effect = struck.changes(omega=omega)
+        if max(np.inf if x is None else x for x in effect.values()) <= hit.tolerance:
             return Assumption("thin striker", None, None, effect, quantities, "", NUMBER)
         unknown = "the thickness of the striker, and the blow depends on its bending modes"
         remedy = "give it as a bar with material and section"

@@ -23,7 +23,7 @@ def of_both(struck: Struck) -> Assumption:
             unstated.append(name)
     if not unstated:
         return Assumption("stated damping", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
-    effect = dict(struck.changes(zeta=zeta))
+    effect = struck.changes(zeta=zeta)
     if "sound" in quantities:
         effect["sound"] = 1.0 if "struck body" in unstated else effect["sound"]  # it would ring for ever
     remedy = f"state the damping ratio of the {' and of the '.join(unstated)}"

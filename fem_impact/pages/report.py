@@ -172,7 +172,7 @@ def _budget(response: Response) -> list[tuple[str, str, float, float]]:
 def _assumption(each: Assumption) -> dict[str, Any]:
     """One row of the table of assumptions: its number, what it changes, and what helps."""
     changes = [f"{QUANTITY_NAMES.get(name, name)} {_share(size)}" for name, size in each.effect.items() if size]
-    changes += [f"not known: {each.unknown}"] if not each.known else []
+    changes += [f"not known: {each.why}"] if not each.known else []
     changes += ["beyond this estimate"] if each.beyond else []
     limit = "" if each.limit is None else f", doubtful above {each.limit:g}"
     return {

@@ -65,3 +65,13 @@ def test_a_limit_of_the_blow_stays():
 def test_frequency_of_the_contact_is_that_of_its_longest_impact():
     case = struck()
     assert case.omega == pytest.approx(np.pi / max(impact.duration for impact in case.hit.impacts))
+
+
+def test_a_blow_that_cannot_be_struck_again_is_not_known(monkeypatch):
+    case = struck()
+
+    def fails(history, **changed):
+        raise fi.SimulationError("no final separation was reached")
+
+    monkeypatch.setattr(collision, "again", fails)
+    assert set(case.changes(omega=0.9 * case.hit.history.omega).values()) == {None}
