@@ -107,7 +107,7 @@ def lines(assumptions: Sequence[Assumption], tolerance: float) -> list[str]:
     """The examination in words: one line if all is well, and one for each assumption that matters or is not known."""
     error, worth = total(assumptions), max(SILENT, SHARE * tolerance)
     telling = [each for each in assumptions if each.worst > worth or each.doubtful]
-    unknown = [each for each in assumptions if not each.known and each not in telling]
+    unknown = [each for each in assumptions if not each.known]
     if not any(each.effect for each in assumptions):
         return _foreseen(assumptions)
     if error <= worth:
