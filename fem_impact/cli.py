@@ -458,6 +458,10 @@ def _map(options: argparse.Namespace) -> None:
     axes = ", ".join(f"{name} ({size})" for name, size in table.sizes.items())
     single, failed = int((table.n_impacts == 1).sum()), int((table.n_impacts < 0).sum())
     _say(_title(scene), f"{table.n_impacts.size} blows over {axes}: {single} hit once, {failed} failed")
+    if "model_error" in table:
+        own, unknown = table.model_error, table.model_error.attrs["not_known"]
+        not_known = f", not counting what is not known ({unknown})" if unknown else ""
+        _say(f"Model: its own error is {float(own.min()):.1g} to {float(own.max()):.1g}{not_known}")
     _print_notes(table.attrs["notes"].splitlines())
     _say(f"Time: {time.perf_counter() - began:.2f} s", f"Files in {folder}{os.sep}: {', '.join(names)}")
 

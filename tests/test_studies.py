@@ -119,3 +119,23 @@ def test_a_new_set_of_taps_is_fitted_as_the_file_says(tmp_path):
     told = {each["name"]: each for each in rows}
     assert told["striker.mass"]["told"] == told["contact.stiffness"]["told"] == "open"
     assert told["contact.exponent"]["low"] < told["contact.exponent"]["truth"] < told["contact.exponent"]["high"]
+
+
+def test_the_model_of_a_wooden_bar_struck_fast_fails_first_as_it_yields(tmp_path, capsys, monkeypatch):
+    right = study("is_the_model_right")
+    soft, hard = (right.effects(right.scene("wood", 0.02, speed).strike()) for speed in (1e-3, 10.0))
+    assert max(soft, key=soft.get) != "no yielding" and soft["no yielding"] == 0.0
+    assert max(hard, key=hard.get) == "no yielding" and hard["no yielding"] > 0.2
+    argv = ["", "--points", "2", "--only", "wood", "--out", str(tmp_path)]
+    monkeypatch.setattr("sys.argv", argv)
+    right.main()
+    assert "no yielding in 25%" in capsys.readouterr().out
+    assert (tmp_path / "is_the_model_right.png").stat().st_size > 10_000
+    assert (tmp_path / "is_the_model_right.csv").read_text().count("\n") == 5
+
+
+def test_what_is_not_known_gets_a_question_mark():
+    right = study("is_the_model_right")
+    hit = right.fi.load_scene(STUDIES / "scenes" / "everyday" / "marimba_yarn.toml").strike()
+    assert np.isnan(right.effects(hit)["no yielding"])
+    assert right.table([{"scene": "a", "still air": "?"}]) == "| scene | still air |\n| --- | --- |\n| a | ? |"

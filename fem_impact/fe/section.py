@@ -29,6 +29,8 @@ class Material:
         Young's modulus across the grain and shear modulus; the material is isotropic without them.
     angle : float [rad]
         Direction of the grain, anticlockwise from the x axis.
+    yield_strength : float [Pa], optional
+        Stress at which it yields in tension; tells whether a contact dents it (`Response.assumptions`).
 
     Examples
     --------
@@ -43,6 +45,7 @@ class Material:
     E_across: float | None = None
     G: float | None = None
     angle: float = 0.0
+    yield_strength: float | None = None
 
     def __post_init__(self) -> None:
         nu = check.number("nu", self.nu)
@@ -53,6 +56,8 @@ class Material:
             rho=check.positive("rho", self.rho, "kg/m^3"),
             angle=check.number("angle", self.angle, "rad"),
         )
+        if self.yield_strength is not None:
+            check.settle(self, yield_strength=check.positive("yield_strength", self.yield_strength, "Pa"))
         if (self.E_across is None) != (self.G is None):
             raise ValueError("E_across and G must be given together; use Material.orthotropic, or give neither")
         if self.E_across is None or self.G is None:
@@ -69,7 +74,7 @@ class Material:
             )
 
     @classmethod
-    def orthotropic(cls, *, E_along, E_across, nu, G, rho, angle=0.0) -> "Material":
+    def orthotropic(cls, *, E_along, E_across, nu, G, rho, angle=0.0, yield_strength=None) -> "Material":
         """Orthotropic material such as tonewood.
 
         Parameters
@@ -83,6 +88,8 @@ class Material:
         rho : float [kg/m^3]
         angle : float [rad]
             Direction of the grain, anticlockwise from the x axis.
+        yield_strength : float [Pa], optional
+            Across the thickness.
 
         Examples
         --------
@@ -92,7 +99,7 @@ class Material:
         """
         for name, value in (("E_along", E_along), ("E_across", E_across), ("G", G)):
             check.positive(name, value, "Pa")
-        return cls(E_along, nu, rho, E_across, G, angle)
+        return cls(E_along, nu, rho, E_across, G, angle, yield_strength)
 
     @property
     def notes(self) -> tuple[str, ...]:

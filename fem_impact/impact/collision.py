@@ -691,6 +691,20 @@ def _sooner(history: History) -> str:
     )
 
 
+def again(history: History, **changed: np.ndarray) -> History:
+    """The same blow with other modes or contacts, by A4 in the steps of a first run, to compare with another such run.
+
+    ``changed`` are fields of the history; without any, it is the blow to compare with.
+    """
+    fields = ("omega", "zeta", "shape", "offset", "bias", "law", "start_q", "start_p")
+    before = _System(*(getattr(history, name) for name in fields))
+    system = replace(before, **changed)
+    pace = _pace(before)
+    horizon = history.end_time if history.status == record.HORIZON else np.inf
+    most = len(history.contacts) if history.status == record.IMPACTS else 0
+    return _run(system, "A4", pace[0] / FIRST_STEPS, pace, horizon, most)
+
+
 def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss nodes on [0, 1] with 1 appended, (count + 1,), and Lagrange polynomials in powers, (count, count)."""
     nodes = 0.5 * (np.polynomial.legendre.leggauss(count)[0] + 1.0)

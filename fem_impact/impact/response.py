@@ -11,7 +11,8 @@ import numpy as np
 from .._base import check, markup
 from ..fe import plausible
 from ..modes.modal import Modes, SampledShapes, at_rest
-from . import force_spectrum, promise
+from . import assumption, force_spectrum, promise
+from .assumption import Assumption
 from .compiled import law, propagation, record
 from .contact import Contact
 from .quantities import USUAL, words
@@ -274,6 +275,8 @@ class Response:
     quantities: Mapping[str, float | None] = field(default_factory=lambda: USUAL)  # that must meet it; bands [Hz]
     ringing: Modes | None = None  # modes of the target driven by the force, see `on`
     rings: Callable[["Response"], Modes] | None = field(default=None, repr=False)  # finds them when they are needed
+    # examines whether the model itself is right, when that is asked for
+    audit: Callable[["Response"], tuple[Assumption, ...]] | None = field(default=None, repr=False)
 
     __repr__ = check.brief
 
@@ -330,6 +333,30 @@ class Response:
     def verdict(self) -> str:
         """One sentence: whether the tolerance is met and, if not, why and what would meet it."""
         return promise.verdict(self)
+
+    @cached_property
+    def assumptions(self) -> tuple[Assumption, ...]:
+        """Is the model itself right? What the blow assumes, and what each assumption does to the quantities asked for.
+
+        Examples
+        --------
+        >>> block = fi.Plate(fi.Material(E=210e9, nu=0.3, rho=7850.0), thickness=0.05)
+        >>> modes = fi.analytic.rectangle(0.1, 0.1, section=block, n_modes=50)
+        >>> hit = fi.strike(modes, fi.Striker.rigid(0.1), fi.Contact.hertz(1e9), at=(0.05, 0.05), speed=1.0)
+        >>> [(each.name, each.doubtful, each.state) for each in hit.assumptions][0]
+        ('thin target', True, 'estimated')
+        """
+        return assumption.unexamined(tuple(self.quantities)) if self.audit is None else self.audit(self)
+
+    @property
+    def model_error(self) -> float:
+        """Sum of what the known assumptions do at most to a quantity asked for [-]; see `assumptions`."""
+        return assumption.total(self.assumptions)
+
+    @property
+    def model_verdict(self) -> tuple[str, ...]:
+        """Whether the model itself is right: one line if all is well, more for each assumption that matters."""
+        return tuple(assumption.lines(self.assumptions, self.tolerance))
 
     @property
     def target(self) -> Modes:
@@ -689,6 +716,8 @@ class Response:
                 f"chaotic: small differences grow {error.sensitivity:.0e}-fold from the first impact to the last; "
                 "trust the number of impacts and averages, not single values"
             )
+        if self.audit is not None:
+            lines += [f"Model: {self.model_verdict[0]}", *(f"  {line}" for line in self.model_verdict[1:])]
         lines += [f"Note: {note}" for note in self.notes]
         return "\n".join(lines)
 

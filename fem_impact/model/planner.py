@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from inspect import signature
 from types import MappingProxyType
 from typing import Any
@@ -14,14 +14,15 @@ from .._base import check, markup
 from ..fe import plausible, refinement
 from ..fe.assembly import System
 from ..fe.section import Plate
-from ..impact import accuracy, collision, promise
+from ..impact import accuracy, assumption, collision, promise
+from ..impact.assumption import Assumption
 from ..impact.collision import BAND_POINTS
 from ..impact.contact import Contact
 from ..impact.quantities import words
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, FieldShapes, Modes, at_rest
-from . import cost, idealisation, vectors
+from . import audit, cost, idealisation, vectors
 from .target import FIRST_LOOK, Stages, Target, Watch
 
 SHARE = 0.45  # [-] of the tolerance for left-out modes, as much for the time steps; the mesh gets the rest
@@ -112,6 +113,17 @@ class Plan:
         """Whether the predicted error is at most the tolerance."""
         return self.error <= self.tolerance
 
+    @cached_property
+    def assumptions(self) -> tuple[Assumption, ...]:
+        """Is the model itself right, as far as that is known before the blow? As in `Response`, without effects.
+
+        They come from the same blow on a wall, which is the hardest; empty if a body is known by its modes only.
+        """
+        values, simplified = _Asked.checked(self.blow, self.changes).values, _outside(self, "infinite")
+        if simplified is None:
+            return ()
+        return audit.foresee(simplified, self.blow.striker, self.blow.contact, values["at"], values["speed"])
+
     @property
     def costly(self) -> bool:
         """Whether the run takes more than COSTLY: ten seconds or two gigabytes."""
@@ -146,7 +158,8 @@ class Plan:
         """All decisions and predictions by name, in SI units."""
         hidden = ("blow", "changes", "first")
         found = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in hidden}
-        return {name: dict(value) if isinstance(value, Mapping) else value for name, value in found.items()}
+        plain = {name: dict(value) if isinstance(value, Mapping) else value for name, value in found.items()}
+        return plain | {"assumptions": assumption.table(self.assumptions)}
 
     def _repr_html_(self) -> str:
         """For notebooks: the plan in words."""
@@ -160,6 +173,9 @@ class Plan:
         lines.append("Predicted errors:")
         errors = [*self.errors.items(), ("total", self.error)]
         lines += [f"  {line}" for line in markup.columns([(name, f"{error:.1e}") for name, error in errors])]
+        if self.assumptions:
+            head, *rest = assumption.lines(self.assumptions, self.tolerance)
+            lines += [f"Model: {head}", *(f"  {line}" for line in rest)]
         lines.append(f"Cost: {self.cost}")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")
@@ -311,7 +327,8 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
         except check.SimulationError:  # too many modes or too fine a mesh: what there is has missed the tolerance
             break
     error = replace(response.error, idealisation=idealised)
-    response = replace(response, tolerance=asked.tolerance, error=error)
+    simplified = None if plan.target == "modal" else _outside(plan, plan.target)
+    response = audit.audited(replace(response, tolerance=asked.tolerance, error=error), simplified)
     plan = replace(plan, n_modes=modes.n_modes if plan.target == "modal" else 0)
     return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
 
@@ -353,6 +370,7 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
         plan = replace(plan, max_frequency=float(response.target.frequencies[-1]))
     else:
         response = replace(response, rings=partial(_ringing, asked, keep))
+    response = audit.audited(response)
     return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
 
 
@@ -446,6 +464,15 @@ def _idealised(asked: _Asked, target: str | None, stages: Stages) -> Plan | None
         mobility=seen.mobility if target == "infinite" else 0.0,
         notes=plausible.together(blow.target.notes, seen.notes),
     )  # fmt: skip
+
+
+def _outside(plan: Plan, kind: str) -> audit.Simplified | None:
+    """The target as its mesh and section describe it, without modes; None if there is only modes."""
+    target = plan.blow.target
+    if target.mesh is None:
+        return None
+    section = None if target.scale else target.section
+    return audit.Simplified(kind, plan.mass or 1.0, target.mesh, section, target.supports)
 
 
 def _last_resort(asked: _Asked, stages: Stages) -> Plan | None:
@@ -787,5 +814,5 @@ def strike(
     if isinstance(modes, Modes) and damping_ratio is None and not set(options) & set(PIECES):
         run = partial(collision.strike, modes, striker, contact, at=at, speed=speed)
         first = run(**options)
-        return promise.kept(_within(first.tolerance, first, run, options), strict)
+        return promise.kept(audit.audited(_within(first.tolerance, first, run, options)), strict)
     return plan_of(modes, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options).strike(strict)

@@ -61,6 +61,7 @@ def _finished(
     physical: tuple[float, float] | None,
     damping_ratio: Damping,
     notes: tuple[str, ...],
+    section: Plate | Beam | None,
 ) -> Modes:
     """Modes for a section, or for a mass and first frequency, scaled from omega**2 at unit mass and rigidity."""
     if physical is not None:
@@ -74,7 +75,7 @@ def _finished(
         raise ValueError(f"size gives frequencies beyond all numbers, {omega[-1]:g} rad/s at unit mass and rigidity")
     unit = Modes(omega, np.zeros(len(omega)), shapes, mass=1.0, notes=notes)
     scaled = unit.scaled(mass=mass, first_frequency=factor * unit.frequencies[omega > 0.0][0])
-    return scaled.damped(damping_ratios(damping_ratio, scaled.omega))
+    return replace(scaled.damped(damping_ratios(damping_ratio, scaled.omega)), section=section)
 
 
 def _physical(
@@ -282,7 +283,7 @@ def rectangle(
     values = omega(*numbers.T) ** 2
     notes = plausible.body((length, width), section)
     shapes = RectangleShapes(length, width, numbers)
-    return _finished(shapes, values, mass, first_frequency, physical, damping_ratio, notes)
+    return _finished(shapes, values, mass, first_frequency, physical, damping_ratio, notes, section)
 
 
 def _lattice(length: float, width: float, wavenumber_squared: float, most: int) -> tuple[np.ndarray, np.ndarray]:
@@ -470,7 +471,7 @@ def beam(
     shapes = BeamShapes(length, pair, np.concatenate([np.zeros(len(rigid)), k]), weights)
     values = np.concatenate([np.zeros(len(rigid)), k**4])
     notes = plausible.body((length,), section)
-    return _finished(shapes, values, mass, first_frequency, physical, damping_ratio, notes)
+    return _finished(shapes, values, mass, first_frequency, physical, damping_ratio, notes, section)
 
 
 def _beam_weights(ends: tuple[str, str], k: np.ndarray) -> np.ndarray:
@@ -726,7 +727,9 @@ def disk(
     )
     shapes = DiskShapes(radius, edge, ratio, wavenumber, order, weights, phases, scale)
     notes = plausible.body((2.0 * radius, 2.0 * radius), section)
-    return _finished(shapes, (wavenumber**2 * root_area) ** 2, mass, first_frequency, physical, damping_ratio, notes)
+    return _finished(
+        shapes, (wavenumber**2 * root_area) ** 2, mass, first_frequency, physical, damping_ratio, notes, section
+    )
 
 
 def _disk_norm(z: np.ndarray, n: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from .._base.remembered import Remembered
 from ..fe import plausible, point_load, refinement
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility
+from ..fe.section import Beam, Plate
 from . import universal_files
 
 HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 2 pi times it must stay in reach
@@ -172,6 +173,7 @@ class Modes:
     notes: tuple[str, ...] = field(default=(), repr=False)  # what was assumed, and probable slips of a unit
     # The same body described less well, by the part of `Error` that a blow with it tells: "truncation", "mesh"
     poorer: Mapping[str, "Modes"] = field(default_factory=dict, repr=False)
+    section: Plate | Beam | None = field(default=None, repr=False)  # None if not known, as that of a scaled body
 
     __repr__ = check.brief
 
@@ -365,8 +367,9 @@ class Modes:
         shapes = ScaledShapes(self.shapes, float(mass**-0.5), frequency)
         bounds = None if self.bounds is None else self.bounds * frequency
         poorer = {cause: modes.stretched(mass, frequency) for cause, modes in self.poorer.items()}
-        whole = self.mass * mass
-        return replace(self, omega=self.omega * frequency, shapes=shapes, mass=whole, bounds=bounds, poorer=poorer)
+        section = self.section if mass == frequency == 1.0 else None
+        scaled: dict[str, Any] = {"shapes": shapes, "mass": self.mass * mass, "bounds": bounds, "poorer": poorer}
+        return replace(self, omega=self.omega * frequency, section=section, **scaled)
 
     def truncated(self, *, max_frequency: float | None = None, n_modes: int | None = None) -> "Modes":
         """The lowest modes only, up to a frequency [Hz] or a number; the residual compliance replaces the others."""
@@ -604,4 +607,4 @@ def find_modes(
         )
     in_hertz = None if enclosed is None else enclosed / (2.0 * np.pi)
     notes = plausible.together(system.notes, damping_notes(damping, found.omega))
-    return Modes(found.omega, damping, shapes, system.mass, found.error, in_hertz, notes)
+    return Modes(found.omega, damping, shapes, system.mass, found.error, in_hertz, notes, section=system.section)

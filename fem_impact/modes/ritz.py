@@ -152,7 +152,8 @@ class Krylov:
         damping = damping_ratios(damping_ratio, omega)
         shapes = RitzShapes(self.system, self.points, omega, rows, basis, turn)
         notes = (*self.system.notes, *damping_notes(damping, omega))
-        return Modes(omega, damping, shapes, self.system.mass, np.zeros(len(omega)), notes=notes)
+        no_error = np.zeros(len(omega))
+        return Modes(omega, damping, shapes, self.system.mass, no_error, notes=notes, section=self.system.section)
 
 
 @dataclass(frozen=True, eq=False)

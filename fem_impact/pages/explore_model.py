@@ -14,6 +14,7 @@ from ..impact.contact import Contact
 from ..impact.response import Response
 from ..mesh.meshes import Mesh
 from ..model import planner
+from ..model.audit import audited
 from ..model.target import Stages
 from ..modes.modal import Modes, SampledShapes
 from ..scenes import maps
@@ -197,7 +198,8 @@ class Bench:
 
 def blow(case: grid.Case) -> Response:
     """The blow of a case; raises SimulationError if the integration fails."""
-    return strike(case.modes, case.striker, case.contact, at=case.at, speed=case.speed, tolerance=TOLERANCE)
+    hit = strike(case.modes, case.striker, case.contact, at=case.at, speed=case.speed, tolerance=TOLERANCE)
+    return audited(hit)
 
 
 def limit_of(case: grid.Case) -> float:

@@ -251,14 +251,27 @@ class Page:
             self.readout.text = self.numbers.render(failed=str(error))
         else:
             self._draw(self.hit)
-            text = base64.b64encode(written(self.bench.saved(settings)).encode()).decode("ascii")
-            self.readout.text = self.numbers.render(
-                cells=_told(self.hit, resonance, limit, known),
-                missed=known and not self.hit.error.total <= TOLERANCE,
-                n_modes=self.bench.base.modes.n_modes,
-                scene=f"data:application/toml;base64,{text}",
-            )
+            if known:  # examined once the sliders rest: that takes longer than the blow
+                self.document.add_timeout_callback(partial(self._examine, self.hit, resonance, limit, settings), REST)
+            self._show(self.hit, _told(self.hit, resonance, limit, known), known, settings)
         self._remap()
+
+    def _examine(self, hit: Response, resonance: float, limit: float, settings: Settings) -> None:
+        """Add the model's own error to the numbers, if they are still those of this blow."""
+        if hit is self.hit:
+            unknown = [each.name for each in hit.assumptions if not each.known]
+            own = power(hit.model_error) + (f", not known: {', '.join(unknown)}" if unknown else "")
+            self._show(hit, [*_told(hit, resonance, limit, True), ("the model's own error", own)], True, settings)
+
+    def _show(self, hit: Response, cells: list[tuple[str, str]], known: bool, settings: Settings) -> None:
+        """Write the numbers below the plots."""
+        text = base64.b64encode(written(self.bench.saved(settings)).encode()).decode("ascii")
+        self.readout.text = self.numbers.render(
+            cells=cells,
+            missed=known and not hit.error.total <= TOLERANCE,
+            n_modes=self.bench.base.modes.n_modes,
+            scene=f"data:application/toml;base64,{text}",
+        )
 
     def _put(self, name: str, **columns: list[float]) -> None:
         """Replace the data of a source, but only if they differ: each change makes the browser redraw."""

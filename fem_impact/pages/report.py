@@ -17,6 +17,8 @@ from scipy.io import wavfile
 from .._base import check, markup
 from .._base.files import replacing
 from ..impact import spectra
+from ..impact.assumption import SILENT, Assumption
+from ..impact.quantities import NAMES as QUANTITY_NAMES
 from ..impact.response import Response
 from ..mesh.mesh_files import boundary
 from ..scenes.scene import Run, Scene, load_scene, scene_of
@@ -104,6 +106,8 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
         response=response,
         verdict=tidy(response.verdict),
         budget=_budget(response),
+        model=tidy(response.model_verdict[0]).capitalize(),
+        assumptions=[_assumption(each) for each in response.assumptions],
         modelled=_modelled(response, run),
         reasons=map(tidy, run.plan.reasons),
         energies=_shares(response),
@@ -163,6 +167,26 @@ def _budget(response: Response) -> list[tuple[str, str, float, float]]:
     ]
     scale = max(response.tolerance, *(value for _, _, value in rows))
     return [(name, how, value, max(0.0, min(1.0, value / scale))) for name, how, value in rows]
+
+
+def _assumption(each: Assumption) -> dict[str, Any]:
+    """One row of the table of assumptions: its number, what it changes, and what helps."""
+    changes = [f"{QUANTITY_NAMES.get(name, name)} {_share(size)}" for name, size in each.effect.items() if size]
+    changes += [f"not known: {each.why}"] if not each.known else []
+    changes += ["beyond this estimate"] if each.beyond else []
+    limit = "" if each.limit is None else f", doubtful above {each.limit:g}"
+    return {
+        "name": each.name,
+        "number": "" if each.value is None else f"{each.number} {each.value:.2g}{limit}",
+        "changes": changes or ["nothing"],
+        "tone": "doubt" if each.beyond or not each.known else "",
+        "remedy": each.remedy if each.doubtful or each.worst > SILENT or not each.known else "",
+    }
+
+
+def _share(size: float) -> str:
+    """A relative change in percent or as a power of ten."""
+    return f"{100.0 * size:.2g} %" if size >= 1e-3 else power(float(f"{size:.0e}"))
 
 
 def _modelled(response: Response, run: Run) -> list[tuple[str, str]]:

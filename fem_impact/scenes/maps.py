@@ -163,7 +163,7 @@ def _quick_map(
     case = replace(case, modes=modes)
     table = grid.sweep(
         modes, striker, law, at=blow["at"], speed=blow["speed"], over=over, tolerance=tolerance, max_frequency=band,
-        residual=blow.get("residual", True), **wanted,
+        residual=blow.get("residual", True), audit=True, **wanted,
     )  # fmt: skip
     return with_theory(table, case, axes)
 

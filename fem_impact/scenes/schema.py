@@ -51,8 +51,8 @@ def _beam(material: Material, *, width: Any = None, height: Any = None, diameter
     return Beam.rectangular(material, width=width, height=height)
 
 
-def _sphere(*, radius: float, E: float, nu: float, rho: float) -> Striker:
-    return Striker.sphere(Material(E=E, nu=nu, rho=rho), radius)
+def _sphere(*, radius: float, E: float, nu: float, rho: float, yield_strength: float | None = None) -> Striker:
+    return Striker.sphere(Material(E=E, nu=nu, rho=rho, yield_strength=yield_strength), radius)
 
 
 def _bar(

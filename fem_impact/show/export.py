@@ -15,6 +15,7 @@ import numpy as np
 
 from .._base import check
 from .._base.files import replacing, staged
+from ..impact.assumption import table
 from ..impact.response import Response
 from ..model.planner import Run
 from ..modes import universal_files
@@ -222,6 +223,8 @@ def numbers(response: Response) -> dict[str, Any]:
     data = {name: getattr(response, name) for name in SCALARS} | {
         "spectral_centroid": {"value": _centroid(response), "max_frequency": CENTROID_BAND},
         "error": {name: getattr(response.error, name) for name in ERROR_PARTS},
+        "model_error": response.model_error,
+        "assumptions": table(response.assumptions),
         "n_modes": response.target.n_modes,
         "max_frequency": response.target.frequencies[-1],
     }

@@ -9,13 +9,13 @@ from scipy.io import wavfile
 
 from .._base import check, markup
 from ..impact.response import Response
+from ..model.still_air import AIR
 from . import sampling
 
 RATE = 48_000  # [Hz] sample rate: all audible modes are below half of it
 FULL_SCALE = 10.0  # [m/s] velocity of sample value 1.0: above that of any plate struck at a few m/s
 LOUDEST = 200.0  # [Pa] pressure of sample value 1.0: 140 dB, far louder than any struck plate at a distance
 REFERENCE = {"m/s": (1e-9, "1 nm/s"), "Pa": (20e-6, "20 µPa")}  # unit: value of 0 dB (ISO 1683) and its name
-AIR = (1.204, 343.2)  # [kg/m^3], [m/s] density and speed of sound at 20 degrees C
 OVERSAMPLING = 8  # [-] instants per sample as the first waves arrive: the finite differences err by 0.5 % at 10 kHz
 HIGHEST_RATE = 1_000_000  # [Hz] highest sample rate: far above what any device plays
 MOST_SAMPLES = 10_000_000  # [-] most samples: three minutes at 48 kHz take about ten seconds to compute

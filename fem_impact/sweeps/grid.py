@@ -21,6 +21,7 @@ from ..impact.collision import RESOLVABLE, strike
 from ..impact.contact import Contact, wall_time
 from ..impact.response import Response
 from ..impact.striker import Striker
+from ..model.audit import audited
 from ..model.planner import COSTLY
 from ..modes.modal import Modes, SampledShapes
 from . import batches
@@ -56,6 +57,7 @@ LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
 
 MOST_CELLS = 10**8  # [-] default limit of a map: half an hour to two hours of work, 8 GB
 SECONDS = {True: 1e-5, False: 2e-3}  # [s] per blow, in a batch or alone: the slower plates of studies/map_speed.py
+LEAST_MODEL_ERROR = 1e-12  # [-] smaller ones are rounding
 Watch = Callable[[int, int], Any]
 Tell = Callable[[str], Any]
 
@@ -102,6 +104,7 @@ class Grid:
     residual: bool
     band: float | None  # [Hz] upper end of the centroid's band
     extra: Mapping[str, Callable[[Response], float]]  # additional layers
+    audit: bool = False  # whether the model's own error is wanted
     kernels: batches.Kernels = field(default_factory=dict)  # computed so far
 
     @property
@@ -129,14 +132,19 @@ class Grid:
             case = case.changed(name, values[i])
         return case
 
+    def blow(self, index: int) -> Response:
+        """The blow of one cell by the modal engine."""
+        case = self.case(index)
+        hit = strike(
+            case.modes, case.striker, case.contact,
+            at=case.at, speed=case.speed, tolerance=self.tolerance, residual=self.residual,
+        )  # fmt: skip
+        return audited(hit)
+
     def strike(self, index: int) -> tuple[np.ndarray, str]:
         """The layers of one cell from the modal engine, and its error text ('' if it succeeded)."""
-        case = self.case(index)
         try:
-            hit = strike(
-                case.modes, case.striker, case.contact,
-                at=case.at, speed=case.speed, tolerance=self.tolerance, residual=self.residual,
-            )  # fmt: skip
+            hit = self.blow(index)
             row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force, hit.error.step]
             row += [hit.spectral_centroid(self.band)] if self.band is not None else []
             row += [function(hit) for function in self.extra.values()]
@@ -182,6 +190,28 @@ class Grid:
             total = total + accuracy.left_out_error(soft, above, exponent, modes.dimension)
             softness = softness + soft
         return np.where(softness <= RESOLVABLE, total * np.where(loss > 0.0, accuracy.LOSSY, 1.0), np.inf)
+
+    def model_error(self) -> tuple[np.ndarray, str]:
+        """The model's own error [-] in the shape of the grid, and what of it is not known.
+
+        Examined at the ends and the middle of every axis, and interpolated in its logarithm; NaN where these fail.
+        """
+        some = [np.unique([0, (n - 1) // 2, n - 1]) for n in self.shape]
+        found = np.empty([len(places) for places in some])
+        unknown: dict[str, None] = {}
+        for at in np.ndindex(*found.shape):
+            index = np.ravel_multi_index([places[i] for places, i in zip(some, at)], self.shape)
+            try:
+                hit = self.blow(int(index))
+            except SimulationError:
+                found[at] = np.nan
+                continue
+            found[at] = max(hit.model_error, LEAST_MODEL_ERROR)
+            unknown |= {each.name: None for each in hit.assumptions if not each.known}
+        logs = np.log(found)
+        for axis, (places, n) in enumerate(zip(some, self.shape)):
+            logs = np.apply_along_axis(lambda column: np.interp(np.arange(n), places, column), axis, logs)  # noqa: B023
+        return np.exp(logs), ", ".join(unknown)
 
     def scene(self) -> dict[str, Any]:
         """The blow that all cells share, as plain numbers."""
@@ -237,6 +267,7 @@ def sweep(
     watch: Watch | None = None,
     max_cells: float = MOST_CELLS,
     tell: Tell | None = None,
+    audit: bool = False,
 ) -> xarray.Dataset:
     """Strike once for every combination of parameters.
 
@@ -270,6 +301,9 @@ def sweep(
         A map with more cells is refused before it starts.
     tell : callable, optional
         Called once before the start, with a sentence on the cost, if the map will take more than 10 s or 2 GB.
+    audit : bool
+        Whether to add ``model_error``, as in `Response`: examined at the ends and the middle of every axis, and
+        interpolated. What is not known there is named in its attributes.
 
     Returns
     -------
@@ -301,7 +335,7 @@ def sweep(
     layers = {} if layers is None else layers
     if not isinstance(layers, Mapping) or not all(isinstance(name, str) and callable(layers[name]) for name in layers):
         raise ValueError(f"layers must map names to functions of a Response, got {check.shown(layers)}")
-    grid = Grid(base, checked_axes(base, over), tolerance, residual, band, dict(layers))
+    grid = Grid(base, checked_axes(base, over), tolerance, residual, band, dict(layers), bool(audit))
     admit(grid.n_cases, len(grid.layers), max_cells, quick=not grid.extra, tell=tell)
     fewer = grid.without_speed()
     numbers, texts = _solve_all(fewer or grid, workers, client, store, watch)
@@ -458,6 +492,10 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray) -> xarray.Da
     data["truncation"] = (dims, left_out, {"units": "1", "long_name": meaning})
     met = data["error"][1] + left_out <= grid.tolerance
     data["tolerance_met"] = (dims, met, {"units": "1", "long_name": "whether both errors together meet the tolerance"})
+    if grid.audit:
+        own, unknown = grid.model_error()
+        meaning = "error of the model itself, interpolated between a few blows"
+        data["model_error"] = (dims, own, {"units": "1", "long_name": meaning, "not_known": unknown})
     data["failure"] = (dims, failures.reshape(grid.shape), {"long_name": "error text of a failed cell"})
     places: dict[str, Any] = {}
     for name, values in grid.axes.items():

@@ -59,3 +59,11 @@ def test_thickness_may_vary():
 def test_refuses_what_no_material_does(make, text):
     with pytest.raises(ValueError, match=text):
         make()
+
+
+def test_a_yield_strength_may_be_stated():
+    assert Material(E=210e9, nu=0.3, rho=7850.0).yield_strength is None
+    wood = {"E_along": 11e9, "E_across": 0.8e9, "nu": 0.37, "G": 0.7e9, "rho": 430.0}
+    assert Material.orthotropic(**wood, yield_strength=5e6).yield_strength == 5e6
+    with pytest.raises(ValueError, match="yield_strength must be positive, got -1 Pa"):
+        Material(E=210e9, nu=0.3, rho=7850.0, yield_strength=-1.0)

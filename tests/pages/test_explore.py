@@ -149,6 +149,7 @@ def test_click_moves_the_strike_point(opened):
     shown.until(f"Math.abs(Bokeh.documents[0].get_model_by_name('x').value - {x}) < 1e-9")  # the sliders follow
     refined = "[...document.querySelectorAll('.readout *')].some(e => /10[⁻0-9]/.test(e.shadowRoot?.textContent ?? ''))"
     shown.until(refined)  # and the exact blow takes the place of the quick one
+    shown.until(refined.replace("/10[⁻0-9]/", "/model's own error/"))  # which is examined when the hand rests
 
 
 @pytest.mark.slow

@@ -68,6 +68,17 @@ def test_texts_of_the_scene_are_escaped(page):
     assert SCRIPT not in text and "&lt;script&gt;document.title" in text
 
 
+def test_page_tells_whether_the_model_is_right(page):
+    text = page.read_text(encoding="utf-8")
+    part = text[text.index('id="model"') : text.index('id="force"')]
+    assert text.index('id="trust"') < text.index('id="model"') and "Is the model right?" in part
+    for name in ("thin target", "no yielding", "still air", "not known: the thickness of the body"):
+        assert name in part
+    told = json.loads(download(text, "response.json"))["response"]
+    assert {each["name"] for each in told["assumptions"]} >= {"thin target", "still air"}
+    assert told["model_error"] >= max(each["effect"]["force"] or 0.0 for each in told["assumptions"])
+
+
 def test_downloads_hold_every_number(page):
     text = page.read_text(encoding="utf-8")
     data = json.loads(download(text, "response.json"))

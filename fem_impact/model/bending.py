@@ -1,0 +1,339 @@
+"""Integrals of a body's bending shapes that tell how thick, how stretched and how loaded by air it is.
+
+A mode of deflection w has the slopes grad w, the shear forces Q = div M of its bending moments, and at free edges a
+twisting moment M_nt that Kirchhoff's theory leaves there and the true plate cannot carry. To first order, rotary
+inertia multiplies omega**2 by 1 - int (rho h**3 / 12) |grad w|**2 / int rho h w**2, shear by
+1 - int |Q|**2 / (kappa G h) / (omega**2 int rho h w**2), and a free edge by 1 - 2 int M_nt**2 l / (2 D66) ds /
+(omega**2 int rho h w**2), where the twist fades over the length l = h / sqrt(12 kappa). The last is what shortens
+Saint-Venant's torsion of a strip, 1 - 0.63 h / b. Many modes are needed and few are integrated: the rest follow from
+those, as rotary inertia and shear go with omega and the edge with none of it.
+
+References
+----------
+Mindlin (1951), J. Appl. Mech. 18, 31-38; Cowper (1966), J. Appl. Mech. 33, 335-340; Timoshenko and Goodier, Theory of
+Elasticity, art. 109 (torsion of a strip).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import special
+
+from ..fe import beam_elements
+from ..fe.assembly import System, support_of_facets
+from ..fe.residual import Moments
+from ..fe.section import Beam, Material, Plate, evaluate
+from ..fe.springs import along_facets
+from ..fe.supports import cells_of_facets
+from ..mesh.meshes import Mesh
+from ..modes.analytic import BeamShapes, DiskShapes, RectangleShapes
+from ..modes.modal import FieldShapes, Modes, ScaledShapes, Shapes
+from ..modes.ritz import RitzShapes
+
+KAPPA = 5.0 / 6.0  # [-] shear coefficient of plates
+LOW = 40  # [-] flexible modes that are integrated; a blow's results depend on few others one by one
+TRUE_VECTORS = 4  # [-] of so many Ritz pairs the lowest one is a mode: those above are packets, whose shear is singular
+TOP = 4  # [-] the upper one of so many parts of the integrated modes tells how those above go on
+NODES = 3  # [-] Gauss points in each direction of a triangle: slopes to 1e-3, as modes need several triangles
+RADIAL = 160  # [-] Gauss points along the radius of a disk: 20 for each wave of its fortieth mode
+ALONG = 200  # [-] Gauss points along a beam
+ROLLING = 20.0  # [-] G over the rolling shear modulus of softwood: 0.064 E over 0.003 E, Wood Handbook, table 5-1
+
+
+@dataclass(frozen=True, eq=False)
+class Bending:
+    """Integrals of mass-normalised shapes, (n_modes,) each; zero for rigid motions."""
+
+    wave: np.ndarray  # [rad/m] root of int |grad w|**2 / int w**2
+    slope: np.ndarray  # [1/kg] int |grad w|**2, on a beam [1/(kg m)] int w'**2
+    volume: np.ndarray  # [m**2 kg**-0.5] int w of a plate; zero for modes that are not integrated
+    rotary: np.ndarray | None  # [-] rotary inertia over inertia; None if the thickness is not known
+    shear: np.ndarray | None  # [-] energy of shear over that of bending
+    edge: np.ndarray | None  # [-] energy of twist that free edges give up, over that of bending
+
+    @property
+    def thick(self) -> np.ndarray | None:
+        """Relative drop of omega**2 of a thick body to first order, (n_modes,) [-]."""
+        if self.rotary is None or self.shear is None or self.edge is None:
+            return None
+        return self.rotary + self.shear + self.edge
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What is known of a body besides its modes."""
+
+    modes: Modes
+    section: Plate | Beam | None
+    extent: float  # [m**2] area of a plate, [m] length of a beam
+    held: float  # [-] share of its edge that supports hold
+    perimeter: float  # [m] of a plate
+
+    @property
+    def plate(self) -> Plate | None:
+        """Its section if it is a plate of known thickness."""
+        return self.section if isinstance(self.section, Plate) else None
+
+    @property
+    def per_extent(self) -> float:
+        """Mean mass per area [kg/m**2] or length [kg/m]."""
+        return self.modes.mass / self.extent
+
+    @property
+    def thickness(self) -> float | None:
+        """Mean thickness [m] in the direction of the blow; None if it is not known."""
+        if self.section is None:
+            return None
+        size = self.section.thickness if isinstance(self.section, Plate) else self.section.height
+        if not callable(size):
+            return float(size)
+        points = self.modes.shapes.grid()[0]
+        return float(evaluate("thickness", size, points, "m").mean())
+
+
+def unwrapped(shapes: Shapes) -> tuple[Shapes, float, float]:
+    """The shapes inside `ScaledShapes`, and the factors [-] of their amplitude and frequency."""
+    amplitude, frequency = 1.0, 1.0
+    while isinstance(shapes, ScaledShapes):
+        amplitude, frequency, shapes = amplitude * shapes.amplitude, frequency * shapes.frequency, shapes.base
+    return shapes, amplitude, frequency
+
+
+def known(modes: Modes) -> Known | None:
+    """What the modes of a plate or beam tell of it; None if its shapes are known at points only, or it is rigid."""
+    shapes = unwrapped(modes.shapes)[0]
+    if isinstance(shapes, (FieldShapes, RitzShapes)):
+        if shapes.system.element == "morley":  # its quadratic shapes have no shear force
+            return None
+        return around(modes, modes.section, shapes.system.mesh, shapes.system.supports)
+    if isinstance(shapes, RectangleShapes):
+        sides = shapes.length, shapes.width
+        return Known(modes, modes.section, sides[0] * sides[1], 1.0, 2.0 * sum(sides))
+    if isinstance(shapes, DiskShapes):
+        a = shapes.radius
+        return Known(modes, modes.section, np.pi * a**2, float(shapes.edge != "free"), 2.0 * np.pi * a)
+    if isinstance(shapes, BeamShapes):
+        return Known(modes, modes.section, shapes.length, _held(list(shapes.ends)), 0.0)
+    return None
+
+
+def around(modes: Modes, section: Plate | Beam | None, mesh: Mesh, supports: Any) -> Known:
+    """What is known of a body with a mesh."""
+    kinds = support_of_facets(mesh, dict(supports))
+    if mesh.dimension == 1:
+        return Known(modes, section, float(np.ptp(mesh.points)), _held(kinds), 0.0)
+    ends = mesh.points[mesh.facets]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    holds = np.array([kind in ("clamped", "hinged") for kind in kinds])
+    return Known(modes, section, mesh.area, float(length[holds].sum() / length.sum()), float(length.sum()))
+
+
+def _held(ends: list) -> float:
+    """Whether both ends of a beam are held, so that it cannot get shorter between them."""
+    return float(all(kind in ("clamped", "hinged") for kind in ends))
+
+
+def bending(body: Known) -> Bending:
+    """The integrals of a body's shapes; those of high modes follow from the low ones."""
+    modes = body.modes
+    shapes, amplitude, _ = unwrapped(modes.shapes)
+    n_rigid = modes.n_rigid
+    few = (modes.n_modes - n_rigid) // TRUE_VECTORS if isinstance(shapes, RitzShapes) else LOW
+    low = slice(n_rigid, min(n_rigid + max(1, min(LOW, few)), modes.n_modes))
+    section = body.section
+    if isinstance(shapes, (FieldShapes, RitzShapes)):
+        system = shapes.system
+        if isinstance(shapes, FieldShapes):
+            vectors = shapes.vectors[:, low]
+        else:
+            vectors = shapes.basis.T @ shapes.turn[:, : low.stop - n_rigid]
+        found = (_plate if modes.dimension == 2 else _beam)(system, vectors, section is not None)
+        found[:2] = found[:2] * amplitude ** np.array([[2.0], [1.0]])
+    elif isinstance(shapes, RectangleShapes):
+        found = _rectangle(shapes.take(low.stop), body, amplitude)
+    elif isinstance(shapes, DiskShapes):
+        found = _disk(shapes, low, body, amplitude)
+    else:
+        assert isinstance(shapes, BeamShapes)
+        found = _beam_shapes(shapes, low, body, amplitude)
+    return _extended(modes, low, found, body.per_extent, section is not None)
+
+
+def _extended(modes: Modes, low: slice, found: np.ndarray, per_extent: float, thick: bool) -> Bending:
+    """All modes, from slope, volume, rotary inertia, shear and edge (5, n_low) of the low ones."""
+    omega, n = modes.omega, modes.n_modes
+    every = np.zeros((5, n))
+    every[:, low] = found
+    if low.stop < n:
+        size = low.stop - low.start
+        top = slice(low.stop - max(1, size // TOP), low.stop)
+        for row in (0, 2, 3):
+            every[row, low.stop :] = np.median(every[row, top] / omega[top]) * omega[low.stop :]
+        every[4, low.stop :] = np.median(found[4])
+    wave = np.sqrt(np.maximum(every[0], 0.0) * per_extent)
+    return Bending(wave, every[0], every[1], *(every[2:] if thick else (None, None, None)))
+
+
+def shear_modulus(material: Material) -> tuple[float, float]:
+    """Shear moduli [Pa] across the thickness, along and across the grain; the second of wood is its rolling shear."""
+    if material.G is None:
+        G = material.E / (2.0 * (1.0 + material.nu))
+        return G, G
+    return material.G, material.G / ROLLING
+
+
+def beam_kappa(section: Beam) -> float:
+    """Cowper's shear coefficient [-] of a rectangle or circle."""
+    nu = section.material.nu if section.material.G is None else 0.0
+    return 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu) if section.round else 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu)
+
+
+def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
+    """Slope, volume, rotary inertia, shear and edge (5, n) of a plate's shapes (n_dofs, n) by elements."""
+    space: Any = system.space
+    frame, section = system.frame, system.section
+    assert isinstance(section, Plate)
+    cells = np.arange(len(space.origin))
+    node, weight = np.polynomial.legendre.leggauss(NODES)
+    a, b = (x.ravel() for x in np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij"))
+    share = 0.25 * np.outer(weight, weight).ravel() * (1.0 - a)
+    x = space.origin[:, None] + (np.column_stack([a, b * (1.0 - a)]) - 1.0 / 3.0) @ space.jacobian.transpose(0, 2, 1)
+    area = np.abs(np.linalg.det(space.jacobian))[:, None] * share  # (n_cells, n_q)
+    moved = (system.expand @ vectors)[system.element_dofs.T]  # (n_cells, 21, n)
+    flat = frame.centre + frame.length * x.reshape(-1, 2)
+    value, slope = space.functions(cells, x, (0, 1))
+    steep = np.einsum("eiqk,eiqk->eqk", *(2 * [slope @ moved[:, None]]))
+    result = np.zeros((5, vectors.shape[1]))
+    result[0] = np.einsum("eq,eqk->k", area, steep) / frame.mass
+    result[1] = np.einsum("eq,eqk->k", area, value @ moved) * frame.length**2 * frame.mass**-0.5
+    if not thick:
+        return result
+    h = evaluate("thickness", section.thickness, flat, "m").reshape(area.shape)
+    inertia = section.inertia(flat).reshape(area.shape)
+    result[2] = np.einsum("eq,eqk->k", area * inertia * h**2 / 12.0, steep) / (frame.inertia * frame.length**2)
+    moments = Moments(system)
+    force = moments.derivatives(cells, x, 1)  # (n_cells, 2, 3, n_q, 21)
+    Q = [force[:, 0, 0] + force[:, 1, 2], force[:, 0, 2] + force[:, 1, 1]]
+    along, across = shear_modulus(section.material)
+    c, s = np.cos(section.material.angle), np.sin(section.material.angle)
+    energy = (vectors * (system.K @ vectors)).sum(axis=0)
+    for q, modulus in ((c * Q[0] + s * Q[1], along), (-s * Q[0] + c * Q[1], across)):
+        soft = frame.stiffness / frame.length**2 / (KAPPA * modulus * h)
+        result[3] += np.einsum("eq,eqk->k", area * soft, (q @ moved) ** 2) / energy
+    rim = system.rim
+    free = np.flatnonzero(np.array(rim.kinds) == "free") if rim is not None else np.zeros(0, int)
+    if len(free) and rim is not None:
+        at = cells_of_facets(rim.facets[free], space.vertices)[0]
+        place, step = along_facets(space, rim.facets[free], at)
+        ds = np.linalg.norm(step, axis=2)
+        nx, ny = np.moveaxis(step / ds[..., None], 2, 0)[..., None]  # its sign does not matter
+        moment = moments.derivatives(at, place, 0)[:, 0]
+        twist = ((moment[:, 1] - moment[:, 0]) * nx * ny + moment[:, 2] * (nx**2 - ny**2)) @ moved[at]
+        flat = frame.centre + frame.length * place.reshape(-1, 2)
+        h = evaluate("thickness", section.thickness, flat, "m").reshape(ds.shape)
+        stiff = section.stiffness(flat)[:, 2, 2].reshape(ds.shape) / frame.stiffness
+        fades = h / np.sqrt(12.0 * KAPPA) / frame.length
+        result[4] = np.einsum("eq,eqk->k", ds * fades / stiff, twist**2) / energy
+    return result
+
+
+def _beam(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
+    """The same of a beam's shapes by elements; the shear force is the slope of the polynomial moment."""
+    space: Any = system.space
+    frame, section = system.frame, system.section
+    assert isinstance(section, Beam)
+    x, dx = beam_elements.quadrature(space)
+    moved = (system.expand @ vectors)[system.element_dofs.T]
+    slope, bend = space.functions(np.arange(len(x)), x[..., None], (1, 2))
+    steep = (slope @ moved) ** 2  # (n_cells, n_q, n)
+    result = np.zeros((5, vectors.shape[1]))
+    result[0] = np.einsum("eq,eqk->k", dx, steep) / (frame.length * frame.mass)
+    if not thick:
+        return result
+    place = (frame.centre + frame.length * x.reshape(-1, 1)).clip(system.mesh.points.min(), system.mesh.points.max())
+    stiffness, inertia = section.stiffness(place).reshape(x.shape), section.inertia(place).reshape(x.shape)
+    gyration = stiffness * section.material.rho / section.material.E  # rho I [kg m]
+    result[2] = np.einsum("eq,eqk->k", dx * gyration, steep) / (frame.inertia * frame.length**2)
+    moment = (stiffness / frame.stiffness)[..., None] * (bend @ moved)
+    node = np.polynomial.legendre.leggauss(x.shape[1])[0]
+    fit = np.linalg.inv(np.polynomial.legendre.legvander(node, len(node) - 1))
+    turn = np.polynomial.legendre.legval(node, np.polynomial.legendre.legder(np.eye(len(node)))).T @ fit
+    Q = np.einsum("pq,eqk->epk", turn, moment) * (2.0 / space.length)[:, None, None]
+    area = inertia / section.material.rho
+    soft = frame.stiffness / frame.length**2 / (beam_kappa(section) * shear_modulus(section.material)[0] * area)
+    result[3] = np.einsum("eq,eqk->k", dx * soft, Q**2) / (vectors * (system.K @ vectors)).sum(axis=0)
+    return result
+
+
+def _uniform(body: Known) -> tuple[float, float]:
+    """Rotary inertia and shear [m**2] of a uniform body over its squared wavenumber."""
+    section = body.section
+    if section is None:
+        return 0.0, 0.0
+    origin = np.zeros((1, body.modes.dimension))
+    G = shear_modulus(section.material)[0]
+    if isinstance(section, Plate):
+        h = float(evaluate("thickness", section.thickness, origin, "m")[0])
+        return h**2 / 12.0, float(section.stiffness(origin)[0, 0, 0]) / (KAPPA * G * h)
+    area = float(section.inertia(origin)[0]) / section.material.rho
+    squared = float(section.stiffness(origin)[0]) / (section.material.E * area)
+    return squared, squared * section.material.E / (beam_kappa(section) * G)
+
+
+def _rectangle(shapes: RectangleShapes, body: Known, amplitude: float) -> np.ndarray:
+    """The same of a hinged rectangle, exactly."""
+    m, n = shapes.numbers.T
+    k = np.pi**2 * ((m / shapes.length) ** 2 + (n / shapes.width) ** 2)
+    odd = (1.0 - (-1.0) ** m) * (1.0 - (-1.0) ** n)
+    rotary, shear = _uniform(body)
+    area = shapes.length * shapes.width
+    volume = 2.0 * amplitude * area * odd / (np.pi**2 * m * n)
+    return np.stack([amplitude**2 * area * k, volume, rotary * k, shear * k, 0.0 * k])
+
+
+def _disk(shapes: DiskShapes, low: slice, body: Known, amplitude: float) -> np.ndarray:
+    """The same of a disk, by quadrature along its radius."""
+    node, weight = np.polynomial.legendre.leggauss(RADIAL)
+    r, dr = 0.5 * (node + 1.0)[:, None], 0.25 * (weight * (node + 1.0))[:, None]  # times r
+    z, n, share = shapes.z[low], shapes.order[low], shapes.weight[low]
+
+    def parts(r: np.ndarray) -> tuple[np.ndarray, ...]:
+        """J and I and their slopes at radii (n_r, 1)."""
+        grown = share * np.exp(z * (r - 1.0))
+        i = special.ive(n, z * r) * grown
+        di = 0.5 * (special.ive(n - 1, z * r) + special.ive(n + 1, z * r)) * grown * z
+        return special.jv(n, z * r), special.jvp(n, z * r) * z, i, di
+
+    j, dj, i, di = parts(r)
+    whole = (dr * (j + i) ** 2).sum(axis=0)
+    steep = (dr * ((dj + di) ** 2 + (n * (j + i) / r) ** 2)).sum(axis=0) / whole
+    force = (dr * ((di - dj) ** 2 + (n * (i - j) / r) ** 2)).sum(axis=0) / whole  # of the Laplacian, over z**4
+    a = shapes.radius
+    rotary, shear = _uniform(body)
+    result = np.zeros((5, len(z)))
+    result[0] = steep * np.pi * amplitude**2
+    mean = 2.0 * np.pi * (dr * (j + i)).sum(axis=0) * shapes.scale[low]
+    result[1] = np.where(n == 0, mean, 0.0) * amplitude * a**2
+    result[2], result[3] = rotary * steep / a**2, shear * force / a**2
+    if shapes.edge == "free" and body.thickness is not None:
+        j, dj, i, di = (part[0] for part in parts(np.ones((1, 1))))
+        fades = body.thickness / np.sqrt(12.0 * KAPPA)
+        result[4] = 2.0 * (1.0 - shapes.nu) * fades / a * (n * (dj + di - j - i)) ** 2 / (z**4 * whole)
+    return result
+
+
+def _beam_shapes(shapes: BeamShapes, low: slice, body: Known, amplitude: float) -> np.ndarray:
+    """The same of a uniform beam, by quadrature along it."""
+    node, weight = np.polynomial.legendre.leggauss(ALONG)
+    x, dx = 0.5 * (node + 1.0)[:, None], 0.5 * weight[:, None]
+    k, (a, b, c, d) = shapes.k[low], shapes.weights[low].T
+    sine, cosine, near, far = np.sin(k * x), np.cos(k * x), c * np.exp(-k * x), d * np.exp(k * (x - 1.0))
+    steep = (dx * (k * (b * cosine - a * sine - near + far)) ** 2).sum(axis=0)
+    force = (dx * (k * (a * sine - b * cosine - near + far)) ** 2).sum(axis=0)  # third derivative over k**2
+    rotary, shear = _uniform(body)
+    squared = shapes.length**2
+    zero = 0.0 * k
+    return np.stack(
+        [steep * amplitude**2 / shapes.length, zero, rotary * steep / squared, shear * force / squared, zero]
+    )

@@ -1,0 +1,129 @@
+"""Are the deflections small? What the stretching of the body, which the linear theory leaves out, does to a blow.
+
+Berger's tension N = E h / (2 A (1 - nu**2)) int |grad w|**2 of the motion found stiffens every mode by
+N int |grad phi|**2. It is exact for a beam with held ends and 14 % too stiff for a hinged square that cannot slip at
+its edges; one that can slip is a quarter as stiff. During the blow the bent part of the plate, as far as its waves have
+come, is held by the part around it.
+
+References
+----------
+Berger (1955), J. Appl. Mech. 22, 465-472; Chu and Herrmann (1956), J. Appl. Mech. 23, 532-540; Woinowsky-Krieger
+(1950), J. Appl. Mech. 17, 35-36 (beams).
+"""
+
+import numpy as np
+
+from ..fe.section import Plate
+from ..impact.assumption import Assumption
+from ..modes.modal import Modes
+from .bending import Bending, Known, known
+from .idealisation import Waves
+from .restrike import Struck
+
+LIMIT = 0.2  # [-] deflection over thickness at which the frequency of a hinged square rises by 2 %
+SLIPS = 0.25  # [-] stretching of a plate whose edge may move in its plane over that of one whose edge may not
+TIMES = 64  # [-] instants of the blow at which the tension is found
+RINGING = 1.5  # [-] tension that acts on a mode swinging alone, over the mean tension: 3/4 of its largest
+FRONT = 2.0 * np.pi  # [-] radius squared of the bent region over rate times time: where Si(r**2 / (4 rate t)) turns
+DENT = 0.7  # [-] stiffening of a wide plate under a point force over (deflection / thickness)**2, from the held disk
+SLOWER = 3.0  # [-] a mode that is slower or faster than bending waves by this rocks or is pulled; wood differs by less
+NUMBER = "deflection over thickness"
+REMEDY = "large deflections need the plate's stretching: a softer blow, a thicker body, or a nonlinear program"
+
+
+def of_target(struck: Struck) -> Assumption:
+    """The struck body."""
+    body, quantities = struck.target, struck.quantities
+
+    def told(value: float | None, effect: dict, unknown: str = "") -> Assumption:
+        remedy = "give material and section" if unknown else REMEDY
+        return Assumption("small deflections", value, LIMIT, effect, quantities, remedy, NUMBER, unknown)
+
+    if struck.hit.bodies[-1].dimension == 0:
+        return told(0.0, dict.fromkeys(quantities, 0.0))
+    if body is None or body.section is None or body.thickness is None:
+        return told(None, dict.fromkeys(quantities), "the thickness of the body")
+    if struck.ideal:
+        return told(*_simplified(struck, body))
+    hit, integrals = struck.hit, struck.bending
+    assert integrals is not None
+    history, mine = hit.history, struck.mine
+    end = max((impact.end for impact in hit.impacts), default=history.end_time)
+    times = np.linspace(0.0, end, TIMES + 1)[1:]
+    rocks, pulled = _bends(body, integrals, history.omega[mine])
+    moved = history.states(times)[0][:, mine] * rocks
+    stretch = moved**2 @ integrals.slope  # (n_times,) int |grad w|**2
+    tension = _tension(body, stretch, _bent_area(body, integrals, times))
+    held = float(tension @ stretch / stretch.sum()) if stretch.any() else 0.0
+    omega = np.sqrt(history.omega[mine] ** 2 + held * rocks**2 * integrals.slope)
+
+    def rise(modes: Modes, found: Bending | None) -> np.ndarray | None:
+        of = known(modes)
+        if found is None or of is None or of.section is None:
+            return None
+        energy = np.where(modes.omega > 0.0, hit.modal_energy([end])[0], 0.0)
+        soft = np.divide(found.slope, modes.omega**2, out=np.zeros(modes.n_modes), where=modes.omega > 0.0)
+        mean = RINGING * float(_tension(of, np.array([energy @ soft]), np.array([of.extent]))[0])
+        return np.sqrt(1.0 + mean * soft) - 1.0
+
+    effect = struck.heard(struck.changes(omega=struck.of_target(omega)), rise)
+    row = np.abs(history.shape[0, mine])
+    largest = float(np.abs(moved @ (pulled * history.shape[0, mine])).max(initial=0.0))
+    swing = np.divide(rocks * pulled * row, history.omega[mine], out=np.zeros(len(row)), where=rocks > 0.0)
+    ringing = float(np.sqrt(2.0 * struck.energy @ swing**2))
+    return told(
+        max(largest, ringing) / body.thickness, effect, "the thickness" if effect.get("sound", 0.0) is None else ""
+    )
+
+
+def _tension(body: Known, stretch: np.ndarray, extent: np.ndarray) -> np.ndarray:
+    """Berger's tension (n,) [N/m], of a beam [N], from int |grad w|**2 (n,) over an area (n,) [m**2] or length [m]."""
+    section = body.section
+    assert section is not None and body.thickness is not None
+    if isinstance(section, Plate):
+        moduli = section.material.plane_stress
+        stiff = float(np.sqrt(moduli[0, 0] * moduli[1, 1])) * body.thickness
+        return stiff / (2.0 * extent) * stretch * (SLIPS + (1.0 - SLIPS) * body.held)
+    area = body.modes.mass / body.extent / section.material.rho
+    return section.material.E * area / (2.0 * extent) * stretch * body.held
+
+
+def _bends(body: Known, integrals: Bending, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Share (n_modes,) of each mode's motion that bends the body, and of its stiffness that is not from tension.
+
+    A body that rocks on soft supports, or turns about its hinges, is slower than its bending waves of that length; one
+    that is pulled tight is faster, and its deflection may be many thicknesses.
+    """
+    section = body.section
+    assert section is not None
+    points = body.modes.shapes.grid()[0]
+    stiffness = section.stiffness(points)
+    if isinstance(section, Plate):
+        stiffness = np.sqrt(stiffness[:, 0, 0] * stiffness[:, 1, 1])
+    waves = np.sqrt(float(np.mean(stiffness)) / body.per_extent) * integrals.wave**2
+    ratio = np.divide(omega, waves, out=np.zeros(len(omega)), where=waves > 0.0)
+    pulled = np.minimum(1.0, np.divide(SLOWER, ratio, out=np.ones(len(omega)), where=ratio > 0.0))
+    return np.minimum(1.0, SLOWER * ratio), pulled
+
+
+def _bent_area(body: Known, integrals: Bending, times: np.ndarray) -> np.ndarray:
+    """Area (n,) [m**2] that bending waves have reached by some times, of a beam its length [m]."""
+    flexible = integrals.wave > 0.0
+    if body.modes.dimension == 1 or not flexible.any():
+        return np.full(len(times), body.extent)
+    rate = float(np.median(body.modes.omega[flexible] / integrals.wave[flexible] ** 2))
+    return np.minimum(body.extent, np.pi * FRONT * rate * times)
+
+
+def _simplified(struck: Struck, body: Known) -> tuple[float | None, dict[str, float | None], str]:
+    """A body treated as rigid or infinite: its plate gives by its mobility times the impulse."""
+    plate, hit = body.plate, struck.hit
+    if plate is None or callable(plate.thickness) or body.thickness is None:
+        return None, dict.fromkeys(struck.quantities), "the deflection of a body treated as rigid"
+    waves = Waves.of(plate.material, plate.thickness)
+    value = waves.mobility(body.per_extent) * hit.impulse / body.thickness
+    stiffening = DENT * value**2
+    if struck.ideal == "rigid":  # what the body gives changes the blow by no more than the error of leaving it out
+        return value, dict.fromkeys(struck.quantities, min(1.0, stiffening) * hit.error.idealisation), ""
+    row = hit.history.shape[:, struck.mine] / (1.0 + stiffening) ** 0.25
+    return value, dict(struck.changes(shape=struck.of_target(row, "shape"))), ""

@@ -1,0 +1,144 @@
+"""Strike again with other frequencies, damping or contact, and say how much each quantity changes."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .._base.check import SimulationError
+from ..impact import accuracy, collision
+from ..impact.response import History, Response
+from ..modes.modal import Modes
+from .bending import Bending, Known, bending, known
+
+BAND_POINTS = 129  # [-] frequencies at which two spectra are compared
+LEAST = 1e-9  # [-] smaller relative changes of what is struck are not struck again
+
+
+@dataclass(frozen=True, eq=False)
+class Struck:
+    """A finished blow, with what is known of its bodies, ready to be struck again."""
+
+    hit: Response
+    target: Known | None  # None if its shapes are not known
+    striker: Known | None
+    ideal: str = ""  # "rigid" or "infinite" if the target was simplified so
+    clearance: float | None = None  # [m] from the strike point to the nearest edge; None if it is not known
+    foreseen: bool = False  # whether the blow is only one on a wall, before the true one: nothing is struck again
+
+    @cached_property
+    def bending(self) -> Bending | None:
+        """Integrals of the target's shapes; None if they are not known or the target was simplified."""
+        return None if self.target is None or self.ideal else bending(self.target)
+
+    @cached_property
+    def striker_bending(self) -> Bending | None:
+        """Integrals of the striker's shapes, if it is a flexible body that is known."""
+        return None if self.striker is None else bending(self.striker)
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The quantities asked for."""
+        return tuple(self.hit.quantities)
+
+    @cached_property
+    def omega(self) -> float:
+        """Angular frequency [rad/s] of the contact: pi over the duration of the longest impact, or that on a wall."""
+        longest = max((impact.duration for impact in self.hit.impacts), default=0.0)
+        if longest > 0.0:
+            return float(np.pi / longest)
+        mass = 1.0 if self.hit.striker is None else self.hit.striker.felt_mass
+        return 2.0 * np.pi * accuracy.contact_resonance(self.hit.contact, mass, self.hit.speed or 1.0)
+
+    @property
+    def mine(self) -> slice:
+        """The columns of the target in the history."""
+        return self.hit.body_slice(len(self.hit.bodies) - 1)
+
+    @cached_property
+    def energy(self) -> np.ndarray:
+        """Energy [J] of each of the target's modes after the last impact, without rigid motions."""
+        h = self.hit.history
+        q, p = h.states(np.array([max((impact.end for impact in self.hit.impacts), default=0.0)]))
+        found = 0.5 * (p[0, self.mine] ** 2 + (h.omega[self.mine] * q[0, self.mine]) ** 2)
+        return np.where(h.omega[self.mine] > 0.0, found, 0.0)
+
+    @cached_property
+    def before(self) -> Response:
+        """The blow to compare with: as found, in the steps of a first run."""
+        return replace(self.hit, history=collision.again(self.hit.history), audit=None)
+
+    def changes(self, **changed: np.ndarray) -> dict[str, float | None]:
+        """Change of each quantity: absolute for the restitution, relative for the others, None if that blow fails.
+
+        ``changed`` are fields of the history; the sound is not here, see `heard`.
+        """
+        return self.between({}, changed)
+
+    def between(self, start: Mapping[str, np.ndarray], end: Mapping[str, np.ndarray]) -> dict[str, float | None]:
+        """As `changes`, between two blows with other fields of the history, if the first is not the one found."""
+        h = self.hit.history
+        same = (np.allclose(value, getattr(h, name), rtol=LEAST, atol=0.0) for name, value in end.items())
+        if self.foreseen or (not start and all(same)):
+            return dict.fromkeys(self.quantities, 0.0)
+        try:
+            before = replace(self.before, history=collision.again(h, **start)) if start else self.before
+            after = replace(self.before, history=collision.again(h, **end))
+        except SimulationError:
+            return dict.fromkeys(self.quantities)
+        return {name: _change(name, band, before, after) for name, band in self.hit.quantities.items()}
+
+    def of_target(self, values: np.ndarray, name: str = "omega") -> np.ndarray:
+        """A field of the history with the target's part replaced."""
+        whole = getattr(self.hit.history, name).copy()
+        whole[..., self.mine] = values
+        return whole
+
+    def heard(
+        self, effect: dict[str, float | None], shift: Callable[[Modes, Bending | None], Any]
+    ) -> dict[str, float | None]:
+        """The effect with that on the sound: the relative shift of the frequencies heard, weighted by their energy.
+
+        ``shift`` returns it, (n_modes,) [-], for modes and their integrals.
+        """
+        result = dict(effect)
+        if "sound" not in self.hit.quantities:
+            return result
+        modes = self.hit.target
+        integrals = self.bending
+        if modes is not self.hit.bodies[-1]:
+            from_modes = known(modes)
+            integrals = None if from_modes is None else bending(from_modes)
+        end = max((impact.end for impact in self.hit.impacts), default=0.0)
+        energy = self.hit.modal_energy([end])[0]
+        band = self.hit.quantities["sound"] or np.inf
+        energy = np.where((modes.omega > 0.0) & (modes.frequencies <= band), energy, 0.0)
+        moved = shift(modes, integrals)
+        result["sound"] = None if moved is None else float(energy @ np.abs(moved) / (energy.sum() or 1.0))
+        return result
+
+
+def _change(name: str, band: float | None, one: Response, two: Response) -> float:
+    if name == "restitution":
+        return abs(one.restitution - two.restitution)
+    if name == "n_impacts":
+        return abs(one.n_impacts - two.n_impacts) / max(1, one.n_impacts)
+    if name == "spectrum":
+        assert band is not None
+        frequencies = np.linspace(0.0, band, BAND_POINTS)
+        first, second = one.spectrum(frequencies), two.spectrum(frequencies)
+        return float(np.abs(first - second).max() / (np.abs(first).max() or 1.0))
+    if name == "sound":
+        return 0.0
+    key = {"force": "peak_force"}.get(name, name)
+    size = getattr(one, key)
+    return abs(getattr(two, key) - size) / size if size else float(getattr(two, key) != 0.0)
+
+
+def softer(history: History, compliance: float) -> dict[str, np.ndarray]:
+    """The fields that change if the contact gets more compliance [m/N] in series."""
+    law = history.law.copy()
+    law[:, 3] = np.maximum(0.0, law[:, 3] + compliance)
+    return {"law": law}

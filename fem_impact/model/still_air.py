@@ -1,0 +1,110 @@
+"""Is the air negligible? Its mass, which moves with the body, and the sound that carries energy away.
+
+Each side of a plate whose bending waves are shorter than those of sound moves rho_0 / sqrt(k**2 - k_0**2) of air per
+area; longer ones radiate with the efficiency 1 / sqrt(1 - k**2 / k_0**2). Below coincidence a finite plate in a baffle
+radiates from its edges, and its lowest modes as sources of their volume; without a baffle it radiates less. A strip of
+width b moves pi rho_0 b**2 / 4 per length. A damping that was stated stands for all of it, the sound included.
+
+References
+----------
+Cremer, Heckl and Petersson (2005), Structure-Borne Sound, ch. 6; Leppington, Broadbent and Heron (1982), Proc. R. Soc.
+London A 382, 245-271; Wallace (1972), J. Acoust. Soc. Am. 51, 946-952.
+"""
+
+import numpy as np
+
+from ..impact.assumption import Assumption
+from ..modes.modal import Modes
+from .bending import Bending, Known, known
+from .restrike import Struck
+from .thinness import plane_wave
+
+AIR = (1.204, 343.2)  # [kg/m^3], [m/s] density and speed of sound at 20 degrees C
+LIMIT = 0.02  # [-] mass of the air over that of the body at which frequencies drop by 1 %
+ROUNDED = 0.1  # [-] of k**2: k**2 - k_0**2 does not get smaller, as the waves of a finite plate are not straight
+NUMBER = "mass of the air moved over that of the body"
+
+
+def of_target(struck: Struck) -> Assumption:
+    """The struck body."""
+    body, quantities = struck.target, struck.quantities
+
+    def told(value: float | None, effect: dict, unknown: str = "") -> Assumption:
+        remedy = "give material and section" if unknown else "the air's mass and the sound have to be modelled"
+        return Assumption("still air", value, LIMIT, effect, quantities, remedy, NUMBER, unknown)
+
+    if struck.hit.bodies[-1].dimension == 0 or struck.ideal == "rigid":
+        return told(None, dict.fromkeys(quantities, 0.0))
+    history, mine = struck.hit.history, struck.mine
+    if struck.ideal:
+        plate = None if body is None else body.plate
+        if plate is None or body is None:
+            return told(None, dict.fromkeys(quantities), "the waves of the body")
+        mass = 2.0 * AIR[0] / (body.per_extent * plane_wave(plate, struck.omega))
+        row = history.shape[:, mine] / (1.0 + mass) ** 0.25
+        return told(mass, struck.changes(shape=struck.of_target(row, "shape")))
+    found = None if body is None or struck.bending is None else loading(body, struck.bending)
+    if found is None:
+        why = "the shapes of the body" if body is None else "the width of the body"
+        return told(None, dict.fromkeys(quantities), why)
+    carried, sound = found
+    changed = {
+        "omega": struck.of_target(history.omega[mine] / np.sqrt(1.0 + carried)),
+        "shape": struck.of_target(history.shape[:, mine] / np.sqrt(1.0 + carried), "shape"),
+        "zeta": struck.of_target(np.maximum(history.zeta[mine], sound), "zeta"),
+    }
+
+    def shift(modes: Modes, integrals: Bending | None) -> np.ndarray | None:
+        of = known(modes)
+        loaded = None if of is None or integrals is None else loading(of, integrals)
+        return None if loaded is None else 1.0 - 1.0 / np.sqrt(1.0 + loaded[0])
+
+    effect = struck.heard(struck.changes(**changed), shift)
+    weight = struck.energy.sum()
+    value = float(struck.energy @ carried / weight) if weight else 0.0
+    return told(value, effect, "the shapes heard" if effect.get("sound", 0.0) is None else "")
+
+
+def loading(body: Known, integrals: Bending) -> tuple[np.ndarray, np.ndarray] | None:
+    """Mass of the air over that of the body, and damping ratio by sound, (n_modes,) [-] each; None if not known.
+
+    For a plate in a baffle; one without moves as much air, but radiates less.
+    """
+    rho, c = AIR
+    omega, per_extent = body.modes.omega, body.per_extent
+    moving = (omega > 0.0) & (integrals.wave > 0.0)
+    k, k0 = np.where(moving, integrals.wave, 1.0), np.where(moving, omega, c) / c
+    if body.modes.dimension == 1:
+        width = _width(body)
+        if width is None:
+            return None
+        mass = np.minimum(0.25 * np.pi * rho * width**2, 2.0 * rho * width / k) / per_extent
+        sound = 0.25 * np.pi * mass * (0.5 * k0 * width) ** 2
+        return np.where(moving, mass, 0.0), np.where(moving, sound, 0.0)
+    short = np.sqrt(np.maximum(k**2 - k0**2, ROUNDED * k**2))
+    mass = np.where(k > k0, 2.0 * rho / (per_extent * short), 0.0)
+    share = np.maximum(k / k0, 1.0 + 0.5 * ROUNDED)  # k / k_0 below coincidence
+    edges = body.perimeter / (2.0 * np.pi * k * body.extent * np.sqrt(share**2 - 1.0))
+    edges *= np.log((share + 1.0) / (share - 1.0)) + 2.0 * share / (share**2 - 1.0)
+    swells = k0**2 * integrals.volume**2 * per_extent / (2.0 * np.pi)
+    above = 1.0 / np.sqrt(np.maximum(1.0 - (k / k0) ** 2, ROUNDED))
+    small = np.minimum(1.0, k0 * body.perimeter / (2.0 * np.pi))  # edges that are shorter than sound cancel
+    efficiency = np.where(k > k0, np.minimum(1.0, np.maximum(swells, edges * small)), above)
+    sound = rho * c * efficiency / (per_extent * np.where(moving, omega, 1.0))
+    return np.where(moving, mass, 0.0), np.where(moving, sound, 0.0)
+
+
+def _width(body: Known) -> float | None:
+    """Mean width [m] of a beam."""
+    section = body.section
+    if section is None or body.thickness is None:
+        return None
+    return body.per_extent / section.material.rho / body.thickness
+
+
+def coincidence(body: Known, integrals: Bending) -> float | None:
+    """Frequency [Hz] above which the bending waves are faster than sound, c**2 / (2 pi) k**2 / omega; None if rigid."""
+    moving = (body.modes.omega > 0.0) & (integrals.wave > 0.0)
+    if not moving.any():
+        return None
+    return float(AIR[1] ** 2 / (2.0 * np.pi) * np.median(integrals.wave[moving] ** 2 / body.modes.omega[moving]))

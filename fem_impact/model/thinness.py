@@ -1,0 +1,128 @@
+"""Is the body thin? What shear and rotary inertia, which Kirchhoff and Euler leave out, do to a blow.
+
+Every frequency drops as 1 / sqrt(1 + rotary + shear + edge), `bending.Bending`: the compliances of bending and of shear
+add up, and so do the two inertias, which stays right in sign and size where the first order is not. The modes left out
+yield more by shear, too: in all, a point force on a thick plate sinks in by ln(k_2 / k_1) / (2 pi kappa G h) between
+two wavenumbers; beyond k h = 2 the half space of Hertz's contact has the rest.
+
+References
+----------
+Mindlin (1951), J. Appl. Mech. 18, 31-38; Wang (1994), J. Vib. Acoust. 116, 536-540.
+"""
+
+import numpy as np
+
+from ..fe.section import Plate
+from ..impact.assumption import Assumption
+from .bending import KAPPA, Bending, Known, shear_modulus
+from .restrike import Struck, softer
+
+LIMIT = 0.23  # [-] thickness times wavenumber at which a wave is 1 % too fast for nu = 0.3
+DENT = 2.0  # [-] thickness times wavenumber beyond which a force is local to the contact
+DOUBT = 0.2  # [-] drop of all frequencies by which a striker of unknown thickness is tried
+NUMBER = "thickness times wavenumber"
+THICKER = "a thick-plate theory is needed (Reissner and Mindlin), or a thinner body, or a softer contact"
+SLENDER = "a thick-beam theory is needed (Timoshenko), or a thinner body, or a softer contact"
+NO_SECTION = "the thickness is not stated; give material and section instead of mass and first frequency"
+
+
+def lowered(thick: np.ndarray) -> np.ndarray:
+    """Frequencies of a thick body over those of the thin one, from the relative drop of omega**2 to first order."""
+    return 1.0 / np.sqrt(1.0 + thick)
+
+
+def of_target(struck: Struck) -> Assumption:
+    """The struck body."""
+    body, quantities = struck.target, struck.quantities
+
+    def told(value: float | None, effect: dict, unknown: str = "") -> Assumption:
+        plate = body is None or body.modes.dimension == 2
+        remedy = NO_SECTION if unknown else THICKER if plate else SLENDER
+        return Assumption("thin target", value, LIMIT, effect, quantities, remedy, NUMBER, unknown)
+
+    if struck.hit.bodies[-1].dimension == 0:
+        return Assumption("thin target", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
+    if body is None or body.thickness is None:
+        return told(None, dict.fromkeys(quantities), "the thickness of the body")
+    if struck.ideal:
+        return told(*_simplified(struck, body))
+    integrals, history = struck.bending, struck.hit.history
+    assert integrals is not None and integrals.thick is not None
+    wave = integrals.wave
+    weight = struck.energy.sum()
+    value = body.thickness * float(np.sqrt(struck.energy @ wave**2 / weight)) if weight else 0.0
+    assert integrals.rotary is not None
+    changed = {
+        "omega": struck.of_target(history.omega[struck.mine] * lowered(integrals.thick)),
+        "shape": struck.of_target(history.shape[:, struck.mine] / np.sqrt(1.0 + integrals.rotary), "shape"),
+    }
+    if body.plate is not None and history.law[0, 3] > 0.0:
+        changed |= softer(history, _give(struck, body, body.plate, integrals))
+    effect = struck.heard(struck.changes(**changed), lambda _, found: _heard(found))
+    unknown = "the thickness of the body" if effect.get("sound", 0.0) is None else ""
+    return told(value, effect, unknown)
+
+
+def _heard(found: Bending | None) -> np.ndarray | None:
+    return None if found is None or found.thick is None else 1.0 - lowered(found.thick)
+
+
+def _shear_give(plate: Plate, thickness: float, low: float) -> float:
+    """Deflection [m/N] by shear under a point force, between a wavenumber [rad/m] and that of a dent."""
+    G = float(np.mean(shear_modulus(plate.material)))
+    return max(0.0, np.log(DENT / (thickness * low))) / (2.0 * np.pi * KAPPA * G * thickness) if low > 0.0 else 0.0
+
+
+def _give(struck: Struck, body: Known, plate: Plate, integrals: Bending) -> float:
+    """Compliance [m/N] by shear that the residual compliance of the modes left out lacks."""
+    assert body.thickness is not None
+    return _shear_give(plate, body.thickness, float(integrals.wave[-1]))
+
+
+def plane_wave(plate: Plate, omega: float) -> float:
+    """Wavenumber [rad/m] of a plate's bending waves, by the geometric mean of its stiffnesses if orthotropic."""
+    origin = np.zeros((1, 2))
+    D = plate.stiffness(origin)[0]
+    return float((plate.inertia(origin)[0] * omega**2 / np.sqrt(D[0, 0] * D[1, 1])) ** 0.25)
+
+
+def _simplified(struck: Struck, body: Known) -> tuple[float | None, dict[str, float | None], str]:
+    """A rigid body gives by shear alone; the mobility of an infinite plate rises as its waves get slower."""
+    plate, history = body.plate, struck.hit.history
+    if plate is None or body.thickness is None or callable(plate.thickness):
+        return None, dict.fromkeys(struck.quantities), "the waves of this body, without its modes"
+    wave = plane_wave(plate, struck.omega)
+    value = body.thickness * wave
+    changed = softer(history, _shear_give(plate, body.thickness, wave))
+    if struck.ideal == "infinite":
+        G = float(np.mean(shear_modulus(plate.material)))
+        D = float(plate.stiffness(np.zeros((1, 2)))[0, 0, 0])
+        drop = value**2 / 12.0 + D * wave**2 / (KAPPA * G * body.thickness)
+        # the modes of a wide plate get denser by the whole drop of omega**2, and so does the mobility
+        changed["shape"] = struck.of_target(history.shape[:, struck.mine] * np.sqrt(1.0 + drop), "shape")
+    return value, dict(struck.changes(**changed)), ""
+
+
+def of_striker(struck: Struck) -> Assumption:
+    """A flexible striker: its own section, or if that is not known a trial with lower frequencies."""
+    hit, quantities = struck.hit, struck.quantities
+    flexible = hit.bodies[0].omega > 0.0
+    if not hit.bodies[0].dimension or not flexible.any():
+        return Assumption("thin striker", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
+    body, omega = struck.striker, hit.history.omega.copy()
+    columns = hit.body_slice(0)
+    integrals = struck.striker_bending
+    if body is None or body.thickness is None or integrals is None or integrals.thick is None:
+        omega[columns] *= 1.0 - DOUBT
+        effect = struck.changes(omega=omega)
+        if max(np.inf if x is None else x for x in effect.values()) <= hit.tolerance:
+            return Assumption("thin striker", None, None, effect, quantities, "", NUMBER)
+        unknown = "the thickness of the striker, and the blow depends on its bending modes"
+        remedy = "give it as a bar with material and section"
+        return Assumption("thin striker", None, LIMIT, dict.fromkeys(quantities), quantities, remedy, NUMBER, unknown)
+    omega[columns] *= lowered(integrals.thick)
+    h = hit.history
+    end = h.states(np.array([max((impact.end for impact in hit.impacts), default=0.0)]))
+    energy = 0.5 * (end[1][0, columns] ** 2 + (h.omega[columns] * end[0][0, columns]) ** 2) * flexible
+    value = body.thickness * float(np.sqrt(energy @ integrals.wave**2 / (energy.sum() or 1.0)))
+    return Assumption("thin striker", value, LIMIT, dict(struck.changes(omega=omega)), quantities, SLENDER, NUMBER)

@@ -1,0 +1,80 @@
+import json
+
+import pytest
+
+from fem_impact.impact import assumption
+from fem_impact.impact.assumption import Assumption
+
+USUAL = ("restitution", "force")
+
+
+def make(effect, value=0.1, limit=0.2, unknown="", name="thin target"):
+    return Assumption(name, value, limit, effect, USUAL, "use a thicker theory", "thickness over wave", unknown)
+
+
+WELL = make({"restitution": 1e-6, "force": 3e-6})
+UNKNOWN = make(dict.fromkeys(USUAL), None, unknown="the thickness", name="still air")
+
+
+def test_if_all_is_well_there_is_one_line():
+    assert assumption.lines([WELL, WELL], 1e-4) == ["the model's own error is below 1e-4"]
+
+
+def test_the_line_never_claims_less_than_the_sum():
+    many = [make({"restitution": 8e-5, "force": 0.0})] * 3
+    assert assumption.lines(many, 1e-2) == ["the model's own error is below 1e-3"]  # 2.4e-4
+
+
+def test_what_is_not_known_is_said_even_if_the_rest_is_well():
+    (line,) = assumption.lines([WELL, UNKNOWN], 1e-4)
+    assert line == "the model's own error is below 1e-4, not counting what is not known (still air)"
+
+
+def test_an_assumption_that_matters_gets_a_line_with_its_number_its_limit_and_the_remedy():
+    head, line = assumption.lines([make({"restitution": 0.01, "force": 0.03}, 0.3), WELL], 1e-3)
+    assert head == "the model's own error is about 0.03"
+    assert line == (
+        "thin target: thickness over wave 0.3 (above 0.2); changes the peak force by 0.03; use a thicker theory"
+    )
+
+
+def test_a_large_effect_is_beyond_the_estimate():
+    large = make({"restitution": 0.4, "force": 0.03}, 1.0)
+    assert large.beyond and large.state == "beyond this estimate"
+    head, line = assumption.lines([large], 1e-3)
+    assert "beyond this estimate" in head and "restitution by some 40%, beyond this estimate" in line
+
+
+def test_a_number_beyond_its_limit_is_said_even_if_it_changes_little():
+    assert len(assumption.lines([make({"restitution": 1e-7, "force": 0.0}, 2.0)], 1e-4)) == 2
+
+
+def test_before_the_blow_only_numbers_are_known():
+    foreseen = [make({}, 0.5), make({}, 0.1, name="still air")]
+    head, line = assumption.lines(foreseen, 1e-4)
+    assert head == "doubtful: thin target" and line.startswith("thin target: thickness over wave 0.5 (above 0.2)")
+    assert foreseen[0].state == "foreseen"
+    assert assumption.lines(foreseen[1:], 1e-4) == ["no assumption of the model itself is foreseen to fail"]
+
+
+@pytest.mark.parametrize(
+    "each, state",
+    [(WELL, "estimated"), (UNKNOWN, "not known"), (make({"restitution": None, "force": 0.5}), "beyond this estimate")],
+)
+def test_states(each, state):
+    assert each.state == state
+
+
+def test_total_adds_the_worst_of_each():
+    assert assumption.total([WELL, make({"restitution": 0.01, "force": 0.002}), UNKNOWN]) == pytest.approx(0.010003)
+
+
+def test_a_table_is_plain_data():
+    (row,) = json.loads(json.dumps(assumption.table([UNKNOWN])))
+    assert row["state"] == "not known" and row["effect"] == {"restitution": None, "force": None}
+
+
+def test_a_blow_that_nobody_examined_knows_nothing():
+    found = assumption.unexamined(USUAL)
+    assert tuple(each.name for each in found) == assumption.ALL
+    assert {each.state for each in found} == {"not known"}

@@ -1,0 +1,164 @@
+import copy
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fem_impact as fi
+from fem_impact.impact import assumption
+from fem_impact.model import audit
+
+SCENES = Path(__file__).parents[2] / "studies" / "scenes"
+STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0, yield_strength=2e9)
+PLATE = fi.Plate(STEEL, 0.01)
+BALL = fi.Striker.sphere(STEEL, 5e-3)
+LAW = fi.Contact.between(BALL, PLATE)
+
+
+def modal(n_modes=60, **how):
+    return fi.analytic.rectangle(0.4, 0.3, section=PLATE, n_modes=n_modes, damping_ratio=0.01, **how)
+
+
+def named(found):
+    return {each.name: each for each in found}
+
+
+def test_every_blow_tells_all_its_assumptions_in_one_order():
+    hit = fi.strike(modal(), BALL, LAW, at=(0.12, 0.1), speed=0.1)
+    assert tuple(each.name for each in hit.assumptions) == assumption.ALL
+    for each in hit.assumptions:
+        assert set(each.effect) == set(hit.quantities) and each.quantities == tuple(hit.quantities)
+    assert hit.model_error == pytest.approx(sum(each.worst for each in hit.assumptions))
+
+
+def test_a_blow_that_keeps_every_assumption_says_so_in_one_line():
+    block = fi.Plate(STEEL, 0.01)
+    modes = fi.analytic.rectangle(0.4, 0.3, section=block, n_modes=300, damping_ratio=0.01)
+    soft = fi.Striker.sphere(fi.Material(E=1e6, nu=0.4, rho=1100.0, yield_strength=1e7), 5e-3)
+    hit = fi.strike(modes, soft, fi.Contact.between(soft, block), at=(0.12, 0.1), speed=0.01, tolerance=1e-2)
+    assert hit.model_verdict == ("the model's own error is below 1e-3",)
+    assert "Model: the model's own error is below 1e-3" in hit.summary()
+
+
+def test_the_quantities_asked_for_are_those_that_get_an_effect():
+    hit = fi.strike(modal(), BALL, LAW, at=(0.12, 0.1), speed=0.1, quantity=("spectrum=5000", "sound=3000"))
+    effect = named(hit.assumptions)["thin target"].effect
+    assert set(effect) == {"spectrum", "sound"} and 0.0 < effect["sound"] < 0.2 and effect["spectrum"] > 0.0
+
+
+@pytest.mark.parametrize("target", ["vectors", "modal", "infinite", "rigid"])
+def test_the_examination_knows_every_kind_of_target(target):
+    mesh = fi.mesh.rectangle(0.8, 0.6)
+    system = fi.assemble(mesh, PLATE, {"boundary": "hinged"})
+    how = {"tolerance": 1e-2, "damping_ratio": 0.01, "target": target}
+    hit = fi.strike(
+        system, BALL, LAW, at=(0.35, 0.3), speed=0.05, **how, **({"n_modes": 150} if target == "modal" else {})
+    )
+    found = named(hit.assumptions)
+    for name in ("thin target", "small deflections", "no yielding", "local contact", "still air"):
+        assert found[name].known, found[name].sentence
+    # k h of the contact's own frequency, by the wave in an endless plate; the modes that ring lie below and above
+    assert 0.2 < found["thin target"].value < 1.0
+    assert 0.0 < found["thin target"].worst < 0.1
+
+
+def test_simple_targets_agree_with_modes_on_what_thickness_does():
+    system = fi.assemble(fi.mesh.rectangle(0.8, 0.6), PLATE, {"boundary": "hinged"})
+    found = []
+    for target in ("vectors", "infinite"):
+        how = {"tolerance": 1e-2, "damping_ratio": 0.01, "target": target}
+        hit = fi.strike(system, BALL, LAW, at=(0.35, 0.3), speed=0.05, **how)
+        found.append(named(hit.assumptions)["thin target"].effect)
+    for name in ("restitution", "force"):
+        assert found[1][name] == pytest.approx(found[0][name], rel=1.0, abs=1e-3)  # estimates by two formulas
+
+
+def test_a_body_of_scaled_mass_is_not_known():
+    found = named(fi.load_scene(SCENES / "drumstick.toml").strike(tolerance=1e-2).assumptions)
+    for name in ("thin target", "small deflections", "no yielding"):
+        assert found[name].state == "not known"
+    assert found["still air"].known and found["still air"].value > 0.02  # its mass per area is known
+
+
+def test_the_disk_of_the_scenes_speaks_up():
+    scene = fi.load_scene(SCENES / "disk.toml")
+    plan = scene.plan()
+    assert named(plan.assumptions)["thin target"].doubtful and "doubtful: thin target" in str(plan)
+    hit = plan.strike()
+    told = named(hit.assumptions)["thin target"]
+    assert told.doubtful and 1e-3 < told.worst < 0.2 and "thin target" in hit.summary()
+
+
+def test_a_plan_foresees_what_the_blow_then_finds():
+    system = fi.assemble(fi.mesh.rectangle(0.8, 0.6), PLATE, {"boundary": "hinged"})
+    how = {"at": (0.35, 0.3), "speed": 2.0, "tolerance": 1e-2, "damping_ratio": 0.01}
+    before = named(fi.plan(system, BALL, LAW, **how).assumptions)
+    after = named(fi.strike(system, BALL, LAW, **how).assumptions)
+    for name in ("no yielding", "quasi-static contact"):
+        assert before[name].value == pytest.approx(after[name].value, rel=0.2)  # a wall is a little harder
+        assert before[name].effect == {}
+    assert before["thin target"].value == pytest.approx(after["thin target"].value, rel=0.5)
+    assert before["small deflections"].value >= 0.5 * after["small deflections"].value
+
+
+def test_nothing_can_be_foreseen_of_modes_alone():
+    plan = fi.plan(modal(), BALL, LAW, at=(0.12, 0.1), speed=1.0, tolerance=1e-2)
+    assert plan.assumptions == () and "Model" not in str(plan)
+
+
+def test_a_beam_is_foreseen_as_far_as_it_is_known():
+    bar = fi.Beam.rectangular(STEEL, width=0.03, height=0.01)
+    system = fi.assemble(fi.mesh.line(0.3), bar, {})
+    plan = fi.plan(system, BALL, fi.Contact.between(BALL, STEEL), at=(0.1,), speed=1.0, tolerance=1e-2)
+    found = named(plan.assumptions)
+    assert found["no yielding"].known and found["thin target"].state == "not known"
+
+
+def test_collisions_of_several_bodies_are_not_examined():
+    law = fi.Contact.linear(1e6)
+    hit = fi.collide([fi.Modes.rigid(0.1)] * 2, [fi.Touch(law, 0, 1)], speeds=[1.0, 0.0])
+    assert {each.state for each in hit.assumptions} == {"not known"} and hit.model_error == 0.0
+    assert "Model" not in hit.summary()
+
+
+def test_a_rigid_mass_assumes_nothing_of_plates():
+    found = named(fi.strike(fi.Modes.rigid(1.0), fi.Striker.rigid(0.1), LAW, at=None, speed=1.0).assumptions)
+    for name in ("thin target", "small deflections", "local contact", "still air", "stated damping"):
+        assert found[name].worst == 0.0 and found[name].known
+
+
+def test_a_response_with_its_examiner_can_be_copied_and_pickled():
+    hit = fi.strike(modal(20), BALL, LAW, at=(0.12, 0.1), speed=0.1)
+    for twin in (pickle.loads(pickle.dumps(hit)), copy.deepcopy(hit)):
+        assert [each.effect for each in twin.assumptions] == [each.effect for each in hit.assumptions]
+
+
+def test_distance_to_the_edge_is_that_of_the_body():
+    disk = fi.analytic.disk(0.1, section=PLATE, n_modes=5)
+    assert audit._clearance(disk, None, np.array([0.06, 0.0])) == pytest.approx(0.04)
+    assert audit._clearance(modal(3), None, np.array([0.39, 0.1])) == pytest.approx(0.01)
+    system = fi.assemble(fi.mesh.disk(0.1), PLATE, {"boundary": "hinged"})
+    modes = fi.find_modes(system, n_modes=3)
+    assert audit._clearance(modes, None, np.array([0.06, 0.0])) == pytest.approx(0.04, rel=0.01)
+
+
+@pytest.mark.parametrize("case", ["no touch", "at the edge", "pressed from rest", "morley"])
+def test_odd_blows_are_examined_too(case):
+    how = {"at": (0.12, 0.1), "speed": 1.0}
+    modes, law = modal(30), LAW
+    if case == "no touch":
+        law, how = fi.Contact.hertz(LAW.stiffness, gap=1.0), how | {"duration": 1e-4}
+    if case == "at the edge":
+        how |= {"at": (0.0, 0.1)}
+    if case == "pressed from rest":
+        how |= {"speed": 0.0, "striker_force": 500.0, "duration": 2e-4, "tolerance": 1e-2}
+    if case == "morley":
+        system = fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.1), PLATE, {"boundary": "hinged"}, element="morley")
+        modes = fi.find_modes(system, n_modes=8)
+    hit = fi.strike(modes, BALL, law, **how)
+    assert np.isfinite(hit.model_error) and len(hit.assumptions) == len(assumption.ALL)
+    if case == "no touch":
+        assert hit.n_impacts == 0 and hit.model_error < 1e-6
+    if case == "morley":
+        assert named(hit.assumptions)["thin target"].state == "not known"

@@ -1,0 +1,119 @@
+import numpy as np
+import pytest
+
+import fem_impact as fi
+from fem_impact.model import audit, bending, still_air
+
+SPRUCE = fi.Material(E=10e9, nu=0.3, rho=450.0)
+STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
+RHO, C = still_air.AIR
+
+
+def found(hit):
+    return next(each for each in audit.examine(hit) if each.name == "still air")
+
+
+def loading(modes):
+    known = bending.known(modes)
+    return still_air.loading(known, bending.bending(known))
+
+
+def rayleigh(modes, mode, n=48):
+    """Added mass over mass, and damping ratio by sound, of a baffled rectangle's mode on both sides.
+
+    Rayleigh's integral of the shape with itself, on a grid of equal squares; that of a square on itself by its disk.
+    """
+    sides = np.ptp(modes.shapes.grid()[0], axis=0)
+    count = np.maximum(2, np.round(n * sides / sides.max())).astype(int)
+    axes = [side * (np.arange(k) + 0.5) / k for side, k in zip(sides, count)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    area = float(np.prod(sides / count))
+    shape = modes.shape_at(points)[:, mode]
+    omega = modes.omega[mode]
+    k = omega / C
+    far = np.hypot(*(points[:, None] - points[None]).T)
+    np.fill_diagonal(far, 1.0)
+    green = np.exp(-1j * k * far) / far
+    a = np.sqrt(area / np.pi)
+    np.fill_diagonal(green, 2.0 * np.pi * a / area * (1.0 - 0.5j * k * a))  # of a disk on its centre
+    pressure = 1j * omega * RHO / (2.0 * np.pi) * (green @ shape) * area  # for unit modal velocity
+    impedance = 2.0 * (shape @ pressure) * area
+    return impedance.imag / omega, impedance.real / (2.0 * omega)
+
+
+@pytest.mark.parametrize("mode", [0, 1, 3, 8])
+@pytest.mark.parametrize("h", [1e-3, 3e-3])
+def test_air_on_a_baffled_plate_is_that_of_rayleighs_integral(mode, h):
+    modes = fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(SPRUCE, h), n_modes=12)
+    mass, damping = (each[mode] for each in loading(modes))
+    true = rayleigh(modes, mode)
+    assert 0.5 < mass / true[0] < 2.0
+    assert 1.0 / 3.0 < damping / true[1] < 6.0  # an average over modes: those with nodal lines radiate less
+
+
+def test_above_coincidence_a_plate_radiates_as_an_endless_one():
+    modes = fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(SPRUCE, 0.01), n_modes=300)
+    known = bending.known(modes)
+    fast = modes.frequencies > 2.0 * still_air.coincidence(known, bending.bending(known))
+    assert fast.sum() > 20
+    mass, damping = loading(modes)
+    high = int(np.flatnonzero(fast)[-1])
+    assert mass[high] == 0.0
+    sigma = damping[high] * modes.omega[high] * 4.5 / (RHO * C)
+    assert 1.0 < sigma < 1.3  # 1 / sqrt(1 - k**2 / k_0**2)
+
+
+def test_coincidence_is_that_of_the_textbook():
+    # Cremer, Heckl and Petersson: c**2 / (2 pi) sqrt(rho h / D), 12 kHz for 1 mm of steel
+    modes = fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(STEEL, 1e-3), n_modes=12)
+    known = bending.known(modes)
+    D = 210e9 * 1e-9 / (12.0 * 0.91)
+    expected = C**2 / (2.0 * np.pi) * np.sqrt(7.85 / D)
+    assert still_air.coincidence(known, bending.bending(known)) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_thin_spruce_plate_feels_a_quarter_of_its_mass_in_air():
+    # 2 rho_0 / (rho h k): for 1 mm at k = 20 / m some 13 % on each side, 27 % on both
+    modes = fi.analytic.rectangle(0.4, 0.4, section=fi.Plate(SPRUCE, 1e-3), n_modes=6)
+    at = int(np.argmin(np.abs(bending.bending(bending.known(modes)).wave - 20.0)))
+    wave = bending.bending(bending.known(modes)).wave[at]
+    assert loading(modes)[0][at] * wave == pytest.approx(2.0 * RHO / 0.45, rel=0.05)
+
+
+def test_effect_is_that_of_a_plate_with_the_air_of_rayleighs_integral():
+    thin = fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(SPRUCE, 1.5e-3), n_modes=8, damping_ratio=0.01)
+    at = [(0.12, 0.1)]
+    mass = np.array([rayleigh(thin, mode, 32)[0] for mode in range(8)])
+    row = thin.shape_at(at)
+    hits = []
+    for factor in (np.ones(8), 1.0 / np.sqrt(1.0 + mass)):
+        modes = fi.Modes.from_arrays(thin.frequencies * factor, row * factor, points=at, mass=thin.mass)
+        modes = modes.damped(thin.damping_ratio)
+        body = thin if factor[0] == 1.0 else modes
+        law = fi.Contact.linear(2e4)
+        blow = {"at": at[0], "speed": 0.3, "tolerance": 1e-6, "residual": False, "max_impacts": 1}
+        hits.append(fi.strike(body, fi.Striker.rigid(0.02), law, **blow))
+    told = found(hits[0])
+    true = abs(hits[1].contact_time / hits[0].contact_time - 1.0)
+    assert true > 2e-3
+    assert true / 3.0 < told.effect["contact_time"] < 3.0 * true
+
+
+def test_steel_in_air_keeps_silent():
+    modes = fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(STEEL, 0.01), n_modes=60, damping_ratio=0.005)
+    hit = fi.strike(modes, fi.Striker.rigid(0.05), fi.Contact.hertz(1e8), at=(0.12, 0.1), speed=1.0)
+    assert found(hit).value < 5e-3 and found(hit).worst < 1e-3 and found(hit).known
+
+
+def test_a_bar_moves_the_air_around_its_width():
+    bar = fi.Beam.rectangular(SPRUCE, width=0.05, height=0.01)
+    modes = fi.analytic.beam(0.4, ends=("free", "free"), section=bar, n_modes=5)
+    mass, _ = loading(modes)
+    around = np.pi * RHO * 0.05**2 / 4.0 / (450.0 * 0.05 * 0.01)  # Lamb, Hydrodynamics, art. 71: a moving strip
+    assert mass[2] == pytest.approx(around, rel=1e-9) and (mass[:2] == 0.0).all()
+
+
+def test_a_beam_of_unknown_width_is_not_known():
+    modes = fi.analytic.beam(0.4, ends=("free", "free"), mass=0.1, first_frequency=500.0, n_modes=8)
+    hit = fi.strike(modes, fi.Striker.rigid(0.05), fi.Contact.hertz(1e8), at=0.2, speed=1.0)
+    assert found(hit).state == "not known" and "width" in found(hit).sentence

@@ -1,0 +1,115 @@
+import numpy as np
+import pytest
+import thick_references as thick
+
+import fem_impact as fi
+from fem_impact.model import audit
+
+E, NU, RHO = 210e9, 0.3, 7850.0
+STEEL = fi.Material(E=E, nu=NU, rho=RHO)
+SIDES = 0.3, 0.2
+
+
+def found(hit, name="thin target"):
+    return next(each for each in audit.examine(hit) if each.name == name)
+
+
+def thick_modes(modes, h, at):
+    """The same hinged plate by Mindlin's theory, at one point; its shapes have their rotary inertia."""
+    omega = np.maximum.accumulate(thick.wang(modes.omega, h, E, NU, RHO))  # equal ones differ by rounding
+    squared = modes.omega * np.sqrt(12.0 * RHO * (1.0 - NU**2) / E) / h
+    turned = 1.0 - RHO * omega**2 / (thick.KAPPA * E / (2.0 * (1.0 + NU)) * squared)
+    shape = modes.shape_at(at) / np.sqrt(1.0 + h**2 / 12.0 * squared * turned**2)
+    return fi.Modes.from_arrays(omega / (2.0 * np.pi), shape, points=[at], mass=modes.mass)
+
+
+def blow(modes, mass, stiffness, at, residual=False):
+    law = fi.Contact.hertz(stiffness)
+    return fi.strike(modes, fi.Striker.rigid(mass), law, at=at, speed=1.0, tolerance=1e-6, residual=residual)
+
+
+def true_effect(h, mass, stiffness, at, n_modes=250):
+    plate = fi.analytic.rectangle(*SIDES, section=fi.Plate(STEEL, h), n_modes=n_modes)
+    thin, other = (blow(modes, mass, stiffness, at) for modes in (plate, thick_modes(plate, h, at)))
+    true = {"restitution": abs(other.restitution - thin.restitution)}
+    for name, key in (("impulse", "impulse"), ("contact_time", "contact_time"), ("force", "peak_force")):
+        true[name] = abs(getattr(other, key) / getattr(thin, key) - 1.0)
+    return thin, other, true
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_effect_of_thickness_on_random_blows_is_that_of_mindlins_plate(seed):
+    rng = np.random.default_rng(seed)
+    h, mass = np.exp(rng.uniform(np.log([1e-3, 3e-3]), np.log([3e-2, 0.1])))
+    at = (rng.uniform(0.2, 0.5) * SIDES[0], rng.uniform(0.2, 0.5) * SIDES[1])
+    time = np.exp(rng.uniform(np.log(5e-5), np.log(5e-4)))  # [s] about the contact's
+    thin, other, true = true_effect(h, mass, mass / time**2.5 * 3.0, at)
+    effect = found(thin).effect
+    for name, size in true.items():
+        if thin.n_impacts != other.n_impacts:
+            assert max(effect.values()) > 0.01  # one touch more: that it matters is all an estimate can say
+        elif size < 0.2:
+            assert 0.33 * size - 1e-5 <= effect[name] <= 3.0 * size + 1e-5  # 1e-5: difference of two runs at 1e-6
+        else:
+            assert effect[name] > 0.1
+
+
+def test_a_thick_block_speaks_up_about_its_thickness():
+    block = fi.analytic.rectangle(0.1, 0.1, section=fi.Plate(STEEL, 0.05), n_modes=50)
+    hit = blow(block, 0.1, 1e9, (0.05, 0.05), residual=True)
+    told = found(hit)
+    assert told.value > 2.0 and told.doubtful and told.known
+    assert told.worst < 1e-3  # so stiff a block hardly moves, thick or thin
+    assert "thin target: thickness times wavenumber 2.2 (above 0.23)" in hit.summary()
+    assert "thick-plate theory" in hit.summary()
+
+
+def test_a_thick_high_mode_that_the_blow_hardly_excites_matters_little():
+    plate = fi.analytic.rectangle(*SIDES, section=fi.Plate(STEEL, 0.01), n_modes=300)
+    soft, hard = (blow(plate, 0.05, stiffness, (0.12, 0.09), residual=True) for stiffness in (1e6, 3e10))
+    assert found(soft).value < 0.5 * found(hard).value
+    assert found(soft).worst < 0.1 * found(hard).worst
+
+
+def test_a_beam_of_a_marimba_is_examined_too():
+    bar = fi.Beam.rectangular(STEEL, width=0.03, height=0.02)
+    exact = []
+    for shear in (False, True):
+        modes = fi.analytic.beam(0.3, ends=("free", "free"), section=bar, n_modes=14)
+        if shear:
+            area, inertia = 0.03 * 0.02, 0.03 * 0.02**3 / 12.0
+            kGA = 10.0 * (1.0 + NU) / (12.0 + 11.0 * NU) * E / (2.0 * (1.0 + NU)) * area
+            omega = thick.timoshenko(0.3, E * inertia, RHO * area, RHO * inertia, kGA, ("free", "free"), 12)
+            frequencies = np.concatenate([np.zeros(2), omega]) / (2.0 * np.pi)
+            shapes = modes.shape_at([0.15])
+            modes = fi.Modes.from_arrays(frequencies, shapes, points=[(0.15,)], mass=modes.mass)
+        exact.append(blow(modes, 0.1, 3e9, 0.15))
+    true = abs(exact[1].peak_force / exact[0].peak_force - 1.0)
+    assert true > 1e-3
+    assert 0.33 * true < found(exact[0]).effect["force"] < 3.0 * true
+
+
+def test_a_striker_whose_bending_matters_and_whose_thickness_is_not_known_says_so():
+    plate = fi.analytic.rectangle(*SIDES, section=fi.Plate(STEEL, 0.003), n_modes=100)
+    stick = fi.Striker.stick(mass=0.05, first_frequency=500.0)
+    hit = fi.strike(plate, stick, fi.Contact.hertz(1e8), at=(0.1, 0.1), speed=1.0, tolerance=1e-3)
+    told = found(hit, "thin striker")
+    assert told.state == "not known" and told.value is None and "thickness of the striker" in told.sentence
+
+
+def test_a_bar_that_strikes_has_its_own_thickness():
+    wood = fi.Material(E=12e9, nu=0.3, rho=600.0)
+    rod = fi.analytic.beam(0.4, ends=("hinged", "free"), section=fi.Beam.circular(wood, diameter=0.03), n_modes=20)
+    plate = fi.analytic.rectangle(*SIDES, section=fi.Plate(STEEL, 0.003), n_modes=100)
+    hit = fi.strike(plate, fi.Striker.flexible(rod, at=0.4), fi.Contact.hertz(1e9), at=(0.1, 0.1), speed=1.0)
+    told = found(hit, "thin striker")
+    assert told.known and 0.1 < told.value < 3.0 and told.worst > 1e-4
+
+
+@pytest.mark.parametrize("modes", ["scaled", "measured"])
+def test_what_is_not_known_is_not_known(modes):
+    plate = fi.analytic.rectangle(*SIDES, mass=0.2, first_frequency=100.0, n_modes=60)
+    if modes == "measured":
+        plate = fi.Modes.from_arrays(plate.frequencies, plate.shape_at([(0.1, 0.1)]), points=[(0.1, 0.1)], mass=0.2)
+    told = found(fi.strike(plate, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), at=(0.1, 0.1), speed=1.0))
+    assert told.state == "not known" and set(told.effect.values()) == {None}
