@@ -16,10 +16,9 @@ from ..mesh.meshes import Mesh
 from ..model import planner
 from ..model.target import Stages
 from ..modes.modal import Modes, SampledShapes
-from ..scenes import maps
 from ..scenes.scene import Scene
 from ..scenes.schema import PATHS
-from ..sweeps import grid
+from ..sweeps import bodies, grid
 
 TOLERANCE = 1e-3  # [-] of the blows shown: errors smaller than the plots can show
 MAP_TOLERANCE = 1e-2  # [-] of the blows on the map, which only counts impacts
@@ -76,7 +75,7 @@ class Bench:
         case = grid.Case(first, scene.make_striker(), scene.make_contact(), at, float(scene.blow.values["speed"]))
         bench = cls(scene, scene.body(), case)
         hard = replace(bench.start, stiffness=SPANS["stiffness"] ** 0.5, mass=bench.start.mass / SPANS["mass"] ** 0.5)
-        needed = maps.number_of_modes(first, maps.needed_frequency(bench.case(hard), TOLERANCE))
+        needed = bodies.number_of_modes(first, bodies.needed_frequency(bench.case(hard), TOLERANCE))
         if needed <= first.n_modes:
             return bench
         more = planner.struck(plan.but(n_modes=min(needed, MOST_MODES)), Stages())
