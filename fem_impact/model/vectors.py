@@ -85,6 +85,7 @@ class Seen:
         ease = 1e-2 / tolerance
         self.shift = 2.0 * np.pi * resonance * SHIFT[0] * ease ** SHIFT[1] / target.stretch
         self.count, self.margin = first_count(target, resonance, tolerance), NOTCH
+        self.whole: Modes | None = None  # all Ritz pairs of the last `modes`
         self.tried: list[float] = []  # [-] truncation errors of the blows so far
         self.fine = self._krylov(size)
         self.coarse: Krylov | None = None
@@ -111,7 +112,7 @@ class Seen:
             if self.coarse is not None:
                 other = replace(self.coarse.modes(self.count), poorer={})
                 found = replace(found, poorer={**found.poorer, "mesh": other})
-        found = self.target.finished_vectors(found)
+        self.whole = found = self.target.finished_vectors(found)
         return found.truncated(max_frequency=cutoff(found, self.margin) * (1.0 + 1e-9))
 
     def improved(self, error: Error, allowed: float) -> bool:
