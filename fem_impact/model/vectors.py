@@ -62,6 +62,11 @@ def size_for(target: Target, resonance: float, tolerance: float) -> float:
     return size
 
 
+def hopeless(tried: list[float]) -> bool:
+    """Whether the last PATIENCE steps towards more vectors gained nothing; takes the errors of all steps."""
+    return len(tried) > PATIENCE and min(tried[-PATIENCE:]) > LEAST_GAIN * min(tried[:-PATIENCE])
+
+
 class Seen:
     """A target as a blow at one point sees it.
 
@@ -93,7 +98,7 @@ class Seen:
     def _stuck(self, truncation: float) -> bool:
         """Whether the last PATIENCE steps towards more vectors gained nothing."""
         self.tried.append(truncation)
-        return len(self.tried) > PATIENCE and min(self.tried[-PATIENCE:]) > LEAST_GAIN * min(self.tried[:-PATIENCE])
+        return hopeless(self.tried)
 
     def _krylov(self, size: float) -> Krylov:
         system = self.target.near(self.at, size, self.stages)

@@ -13,6 +13,7 @@ from .._base.check import SimulationError
 from ..impact import force_spectrum
 from ..impact.contact import Contact
 from ..impact.response import Response
+from ..modes.modal import Modes
 from ..scenes.schema import written
 from ..scenes.sentences import RAISED, place, power, si
 from ..show import sound
@@ -55,7 +56,9 @@ class Page:
         self.picture: Picture | None = None
         self.waiting = self.mapping = False
         self.hit: Response | None = None
-        self.refined, self.rest = bench.start.at, bench.residual(bench.start)  # where the compliance is exact, and it
+        # where the blow is exact, and the compliance or the vectors there
+        self.refined = None if bench.told else bench.start.at
+        self.seen, self.rest = None, bench.residual(bench.start)
 
     def show(self) -> None:
         """Put everything on the page and strike once."""
@@ -237,7 +240,7 @@ class Page:
         self.waiting = False
         settings = self.settings
         known = self.refined == settings.at
-        case = self.bench.case(settings, None if known else self.rest)
+        case = self.bench.case(settings, None if known else self.rest, self.seen if known else None)
         self._label(settings, case.contact)
         at = settings.at if len(settings.at) > 1 else (*settings.at, 0.0)
         self._put("at", x=[at[0]], y=[at[1]])
@@ -255,7 +258,7 @@ class Page:
             self.readout.text = self.numbers.render(
                 cells=_told(self.hit, resonance, limit, known),
                 missed=known and not self.hit.error.total <= TOLERANCE,
-                n_modes=self.bench.base.modes.n_modes,
+                what=_described(case.modes),
                 scene=f"data:application/toml;base64,{text}",
             )
         self._remap()
@@ -320,20 +323,22 @@ class Page:
         wanted = self._background()
 
         def work() -> None:
-            rest = self.bench.residual(wanted)
-            self.document.add_next_tick_callback(lambda: self._refine(wanted.at, rest))
+            known = self.refined == wanted.at
+            seen = self.seen if known else self.bench.seen(wanted.at)
+            rest = self.rest if known else self.bench.residual(wanted)
+            self.document.add_next_tick_callback(lambda: self._refine(wanted.at, rest, seen))
             try:
-                picture = self.bench.picture(wanted)
+                picture = self.bench.picture(wanted, seen)
             except (SimulationError, ValueError):
                 picture = None
             self.document.add_next_tick_callback(lambda: self._mapped(wanted, picture))
 
         self.pool.submit(work)
 
-    def _refine(self, at: tuple[float, ...], rest: float) -> None:
-        """Store the residual compliance of a new strike point and strike again: its blows are exact from now on."""
+    def _refine(self, at: tuple[float, ...], rest: float, seen: Any) -> None:
+        """Store what is known of a new strike point and strike again: its blows are exact from now on."""
         if self.refined != at:
-            self.refined, self.rest = at, rest
+            self.refined, self.rest, self.seen = at, rest, seen
             self.update()
 
     def _entitle_map(self) -> None:
@@ -350,7 +355,8 @@ class Page:
     def _listen(self) -> None:
         if self.hit is None:
             return
-        heard = sound.synthesise(self.hit, self.bench.scene.points[0], duration=PLAYED)
+        rung = self.hit if not self.hit.target.poorer else self.hit.on(self.bench.case(self.settings).modes)
+        heard = sound.synthesise(rung, self.bench.scene.points[0], duration=PLAYED)
         level = heard.peak_level
         raised = max(0.0, report.QUIET - level) if math.isfinite(level) else 0.0
         note = f"Full scale is {heard.full_scale:g} {heard.unit}; peak {level:.1f} dB"
@@ -372,6 +378,13 @@ def _told(hit: Response, resonance: float, limit: float, exact: bool) -> list[tu
         ("contact resonance", f"{si(resonance, 'Hz', 3)}, {ratio}"),
         ("estimated error", error),
     ]
+
+
+def _described(modes: Modes) -> str:
+    """What carries the blow, in words."""
+    if modes.poorer:
+        return f"{modes.n_modes} Ritz vectors started from the strike point"
+    return f"the first {modes.n_modes} modes"
 
 
 def _quads(picture: Picture) -> dict[str, Any]:

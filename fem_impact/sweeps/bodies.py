@@ -222,8 +222,9 @@ class Sized:
             seen = Views(self.target, some, max(resonance), self.tolerance, size, self.target.size_stated, stages)
             if seen.at_rest:
                 return None
+            tried: dict[tuple[int, int], list[float]] = {}
             for blows in (extreme, [*extreme, *self.chance]):
-                found = self._enough(seen, blows, stages)
+                found = self._enough(seen, blows, tried, stages)
             views |= {tuple(point.tolist()): sampled(modes, point[None]) for point, modes in zip(some, found)}
         return views
 
@@ -236,12 +237,32 @@ class Sized:
         smallest = (area / refinement.MOST_UNKNOWNS) ** 0.5
         return None if size < smallest and not target.size_stated else size
 
-    def _enough(self, seen: Views, blows: Sequence[Mapping[str, float]], stages: Stages) -> list[Modes]:
-        """The target as seen from each point, with vectors and a mesh good enough for some blows."""
+    def _enough(
+        self,
+        seen: Views,
+        blows: Sequence[Mapping[str, float]],
+        tried: dict[tuple[int, int], list[float]],
+        stages: Stages,
+    ) -> list[Modes]:
+        """The target as seen from each point, with vectors and a mesh good enough for some blows.
+
+        ``tried`` collects the truncation errors of each point and blow. A blow that more vectors do not make any better
+        is given up, as it would be alone, and does not stop the others.
+        """
         while True:
             found = [seen.of(i, self._cutoff(point)) for i, point in enumerate(seen.at)]
+            errors, lost = [], False
             with stages("strike"):
-                error = self._judged([self.at(m, p, values) for m, p in zip(found, seen.at) for values in blows])
+                for (i, modes), (n, values) in product(enumerate(found), enumerate(blows)):
+                    before = tried.setdefault((i, n), [])
+                    if not vectors.hopeless(before):
+                        errors.append(self._error(self.at(modes, seen.at[i], values)))
+                        before.append(errors[-1][0])
+                        lost |= vectors.hopeless(before)
+            if lost:
+                seen.tried.clear()  # the others have not been tried as often
+            worst = np.sort(np.array(errors or [(0.0, 0.0)]), axis=0)  # (n_struck, 2)
+            error = Error(0.0, *worst[len(worst) - 1 - int(SPARED * len(worst))].tolist())
             if not seen.improved(error, (1.0 - ALLOWED) * self.tolerance):
                 return found
 
@@ -261,20 +282,16 @@ class Sized:
 
         return cutoff
 
-    def _judged(self, cells: Sequence[Case]) -> Error:
-        """Errors of vectors and mesh in some blows, but for SPARED of them; a blow that fails tells nothing."""
-        found = []
-        for case in cells:
-            try:
-                hit = collision.strike(
-                    case.modes, case.striker, case.contact, at=case.at, speed=case.speed,
-                    tolerance=max(planner.FINEST, planner.STEPS * self.tolerance), max_impacts=self.max_impacts,
-                )  # fmt: skip
-            except check.SimulationError:
-                continue
-            found.append((hit.error.truncation, hit.error.mesh))
-        errors = np.sort(np.array(found or [(0.0, 0.0)]), axis=0)  # (n_struck, 2)
-        return Error(0.0, *errors[len(errors) - 1 - int(SPARED * len(errors))].tolist())
+    def _error(self, case: Case) -> tuple[float, float]:
+        """Errors of vectors and of the mesh in a blow; nothing if it fails."""
+        try:
+            hit = collision.strike(
+                case.modes, case.striker, case.contact, at=case.at, speed=case.speed,
+                tolerance=max(planner.FINEST, planner.STEPS * self.tolerance), max_impacts=self.max_impacts,
+            )  # fmt: skip
+        except check.SimulationError:
+            return 0.0, 0.0
+        return hit.error.truncation, hit.error.mesh
 
 
 # --- a file of vectors -----------------------------------------------------------------------------------------------
