@@ -8,8 +8,8 @@ Stick and hinged plate of *Euphonics* 12.1, 300 modes, tolerance 1e-3. Times are
 include compilation.
 
 On plates by elements (scenes of `scene_speed.py`): a map of 20 x 20 cells at the tolerance 1e-2, over half a decade of
-the striker's mass and two decades of stiffness; the choice among ten hammers; and how long `fem-impact explore` takes to
-open and to know a new strike point. Through vectors and through modes in turn, one run each, compared cell by cell.
+the striker's mass and two decades of stiffness; the choice among ten hammers; and how long `fem-impact explore` takes
+to open and to know a new strike point. Through vectors and through modes in turn, one run each, compared cell by cell.
 """
 
 import argparse
