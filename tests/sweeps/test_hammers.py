@@ -124,7 +124,7 @@ def test_modes_wanted_follow_from_the_hardest_tip():
 
 
 def test_hammers_on_elements_are_those_on_the_closed_form():
-    """Ritz vectors, to 3e-3, end a range where no description of the body touches twice any more."""
+    """Ritz vectors, to 6e-3, end a range where no description of the body touches twice any more."""
     wood = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), thickness=3e-3)
     body = fi.assemble(fi.mesh.rectangle(0.465, 0.3), wood, {"boundary": "hinged"})
     at = (0.2, 0.11)
@@ -135,7 +135,7 @@ def test_hammers_on_elements_are_those_on_the_closed_form():
     while bad / good > 1.0001:
         middle = (good * bad) ** 0.5
         good, bad = (middle, bad) if impacts(truth, at, 0.05, middle) == 1 else (good, middle)
-    assert heavy.hardest == pytest.approx(good, rel=0.01) and heavy.error < 3e-3 and not heavy.works
+    assert heavy.hardest == pytest.approx(good, rel=0.01) and heavy.error < 6e-3 and not heavy.works
     centre = 500.0 / hammers.half_sine_reach(10.0)
     assert light.unlimited and light.limit == pytest.approx(10.0 * 0.01 * (2.0 * np.pi * centre) ** 2)
     hit = fi.strike(truth, fi.Striker.rigid(0.01), fi.Contact.linear(light.softest), at=at, speed=1.0)
