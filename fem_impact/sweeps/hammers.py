@@ -192,7 +192,7 @@ def choose_on(
     found: list[Hammer] = []
     for mass in masses:
         progress.report("hammers", len(found), len(masses))
-        limit = None if hardest is None else accuracy.resonant_stiffness(mass, hardest)
+        limit = None if hardest is None else float(accuracy.resonant_stiffness(mass, hardest))
         found.append(_hammer(modes, at, mass, bandwidth, drop, (centre, lowest), limit))
     progress.report("hammers", len(found), len(masses))
     return tuple(found)

@@ -137,6 +137,6 @@ def test_hammers_on_elements_are_those_on_the_closed_form():
         good, bad = (middle, bad) if impacts(truth, at, 0.05, middle) == 1 else (good, middle)
     assert heavy.hardest == pytest.approx(good, rel=0.01) and heavy.error < 6e-3 and not heavy.works
     centre = 500.0 / hammers.half_sine_reach(10.0)
-    assert light.unlimited and light.limit == pytest.approx(10.0 * 0.01 * (2.0 * np.pi * centre) ** 2)
+    assert light.unlimited is True and light.limit == pytest.approx(10.0 * 0.01 * (2.0 * np.pi * centre) ** 2)
     hit = fi.strike(truth, fi.Striker.rigid(0.01), fi.Contact.linear(light.softest), at=at, speed=1.0)
     assert hammers.bandwidth_of(hit, 10.0) == pytest.approx(500.0, rel=3e-3)
