@@ -499,7 +499,7 @@ def _hammer(options: argparse.Namespace) -> None:
             ranges = ", ".join(f"{low:.3g} to {high:.3g} N/m" for low, high in hammer.working)
             _say(f"{1e3 * hammer.mass:.4g} g: every range that works: {ranges}")
     if any(hammer.unlimited for hammer in hammers):
-        _say(">: no limit up to this tip, where the model ends: it keeps too few modes for harder ones")
+        _say(">: no limit up to this tip, the hardest for which the model of the body is made")
     idle = ", ".join(f"{1e3 * hammer.mass:.4g} g" for hammer in hammers if not hammer.works)
     if idle:
         _say(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; try lighter hammers")

@@ -2,22 +2,34 @@
 
     python studies/map_speed.py [--bounces 1000000]
     python studies/map_speed.py --cluster 10000000      threads against Dask with two workers of one thread
+    python studies/map_speed.py --elements [NAME ...]   Ritz vectors against modes on plates by elements
 
 Stick and hinged plate of *Euphonics* 12.1, 300 modes, tolerance 1e-3. Times are the best of several runs and do not
 include compilation.
+
+On plates by elements (scenes of `scene_speed.py`): a map of 20 x 20 cells at the tolerance 1e-2, over half a decade of
+the striker's mass and two decades of stiffness; the choice among ten hammers; and how long `fem-impact explore` takes
+to open and to know a new strike point. Through vectors and through modes in turn, one run each, compared cell by cell.
 """
 
 import argparse
 import os
 import resource
+import tempfile
 import time
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
+import scene_speed
 import source_scenes as source
 from scipy.integrate import solve_ivp
 
 import fem_impact as fi
+from fem_impact.pages import explore_model
+from fem_impact.sweeps import bodies, hammers
+from fem_impact.sweeps import grid as cells
 
 STICK = source.stick()
 
@@ -86,14 +98,126 @@ def by_cluster(bounces):
     print(f"largest memory of this process: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
 
 
+MASSES = [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]  # [kg] of hammers, as at the prompt
+BANDWIDTH = 1000.0  # [Hz] that they should reach
+
+
+def scenes(only=()):
+    """Scenes of plates by elements, by name; their texts are those of scene_speed.py."""
+    found = {}
+    for name, (text, _) in scene_speed.NAMED.items():
+        if not only or name in only:
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / f"{name}.toml"
+                path.write_text(text.replace("../../meshes", (Path(__file__).parents[1] / "meshes").as_posix()))
+                found[name] = fi.load_scene(path)
+                found[name].built  # noqa: B018  reads the outline while the folder is there
+    return found
+
+
+def timed(work, *arguments, **options):
+    """Wall time [s] and what the work gives; None in its place if it refuses."""
+    start = time.perf_counter()
+    try:
+        found = work(*arguments, **options)
+    except fi.SimulationError as refusal:
+        return time.perf_counter() - start, None, str(refusal)
+    return time.perf_counter() - start, found, ""
+
+
+def map_of(scene, alone, tolerance=1e-2, side=20):
+    """A map about a scene, through vectors (``alone``) or modes; with the number of either."""
+    striker, law = scene.make_striker(), scene.make_contact()
+    over = {
+        "mass": striker.mass * np.geomspace(10**-0.25, 10**0.25, side),
+        "stiffness": law.stiffness * np.geomspace(0.1, 10.0, side),
+    }
+    blow = scene.blow.values
+    base, axes = bodies.body_of(
+        scene.built.target,
+        striker,
+        law,
+        at=blow["at"],
+        speed=blow["speed"],
+        over=over,
+        tolerance=tolerance,
+        alone=alone,
+    )
+    return cells.run(base, axes, tolerance=tolerance), base.modes.n_modes
+
+
+def hammers_of(scene, vectors):
+    """The choice of a hammer for a scene, through vectors or modes."""
+    target = scene.built.target
+    if not vectors:  # as many modes as the choice takes where there are no vectors
+        target = replace(target, modes=target.finished(target.find(hammers.MOST_MODES, tolerance=1e-2)))
+    return hammers.choose_on(target, scene.blow.values["at"], BANDWIDTH, MASSES)
+
+
+def apart(one, other):
+    """Largest difference of two maps in cells with as many impacts, and the number of the other cells."""
+    same = (one.n_impacts == other.n_impacts).values
+    found = np.abs(one.restitution - other.restitution).values
+    for name in ("impulse", "contact_time", "peak_force"):
+        found = np.maximum(found, np.abs(one[name] / other[name] - 1.0).values)
+    return found[same].max(), int((~same).sum())
+
+
+def by_elements(only):
+    """Compare vectors with modes on plates by elements."""
+    for name, scene in scenes(only).items():
+        plate = scene.built.target
+        fi.strike(fi.Modes.rigid(1.0), fi.Striker.rigid(0.1), fi.Contact.hertz(1e6), at=None, speed=1.0)  # compiles
+        grid(source.plate(2.0, n_modes=30), 3)
+        print(f"{name}: {plate.mass:.3g} kg, load {os.getloadavg()[0]:.1f}")
+        seconds, found, _ = timed(map_of, scene, True)
+        table, count = found
+        met = float(table.tolerance_met.mean())
+        print(f"  map by {count} vectors {seconds:.1f} s, {met:.0%} of the cells meet the tolerance", flush=True)
+        before, other, refusal = timed(map_of, scene, False)
+        if other is None:
+            print(f"  map by modes refused: {refusal}")
+        else:
+            off, counts = apart(table, other[0])
+            print(
+                f"  map by {other[1]} modes {before:.1f} s, {before / seconds:.1f} times; cells with as many impacts "
+                f"differ by at most {off:.1e}, {counts} of {table.n_impacts.size} have another number"
+            )
+        seconds, one, _ = timed(hammers_of, scene, True)
+        before, two, refusal = timed(hammers_of, scene, False)
+        print(
+            f"  hammers by vectors {seconds:.1f} s, by modes {before:.1f} s, {before / seconds:.1f} times", flush=True
+        )
+        for first, second in zip(one, two or ()):
+            if first.hardest and second.hardest and not (first.unlimited or second.unlimited):
+                print(f"    {1e3 * first.mass:.4g} g: hardest tip {first.hardest:.4g} and {second.hardest:.4g} N/m")
+        seconds, bench, _ = timed(explore_model.Bench.of, scene)
+        point, seen, _ = timed(bench.seen, bench.start.at)
+        before, _, _ = timed(lambda: scene.modes(explore_model.MOST_MODES))  # noqa: B023
+        print(
+            f"  explore opens after {seconds:.1f} s, before after {before:.1f} s or more; a strike point is known by "
+            f"{seen.n_modes} vectors after {point:.1f} s"
+        )
+        for stiffness in (1.0, 100.0):
+            settings = replace(bench.start, stiffness=stiffness)
+            exact, quick = (explore_model.blow(bench.case(settings, seen=modes)).error.total for modes in (seen, None))
+            print(
+                f"    {stiffness:g} times the stiffness: error {exact:.1e} by vectors, {quick:.1e} by the first modes"
+            )
+
+
 def main():
     """Measure and print the times."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--bounces", type=int, default=1_000_000)
     parser.add_argument("--cluster", type=int, default=0, metavar="BOUNCES")
+    parser.add_argument("--elements", nargs="*", metavar="NAME")
     wanted = parser.parse_args()
     bounces = wanted.bounces
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
+    if wanted.elements is not None:
+        by_elements(wanted.elements)
+        return
     if wanted.cluster:
         by_cluster(wanted.cluster)
         return

@@ -212,6 +212,7 @@ def table() -> dict[str, dict[str, Any]]:
         "Striker.flexible": {"modes": t["free"], "at": None},
         "Response.displacement": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "body": -1, "residual": True},
         "Response.velocity": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "body": -1, "residual": True},
+        "Response.motion_error": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "velocity": False},
         "Response.modal_state": {"self": t["hit"], "times": [0.0, 1e-3], "body": -1},
         "Response.modal_energy": {"self": t["hit"], "times": [0.0, 1e-3], "body": -1},
         "Response.spectral_centroid": {"self": t["hit"], "max_frequency": 5e3},

@@ -22,6 +22,11 @@ CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more 
 TOUCH = 1e-12  # [-] of the largest approach rate: bodies that touch and approach more slowly count as pressed
 SAME = 1e-2  # [-] two descriptions of one body may differ by this in mass and compliance
 PEAK_LOOKS = 16  # [-] samples per step in the search for the peak force; misses (pi/11/16)**2/8 before the parabola
+# [-] largest difference of descriptions up to which Ritz vectors tell a motion: as much as modes err that are found
+# as far as the force reaches
+MOVED = {"displacement": 1e-2, "velocity": 3e-2}
+LASTS = 2.0  # [-] and no longer than this many times the run, as later echoes may be missing from all of them
+LOOKED_AT = 200  # [-] times at which this error is estimated
 DIP_BLOCK = 8  # [-] points per static solution: each is a load, and the cost grows with the pairs of points
 
 
@@ -277,6 +282,7 @@ class Response:
     rings: Callable[["Response"], Modes] | None = field(default=None, repr=False)  # finds them when they are needed
     # examines whether the model itself is right, when that is asked for
     audit: Callable[["Response"], tuple[Assumption, ...]] | None = field(default=None, repr=False)
+    vectors: Modes | None = field(default=None, repr=False)  # all Ritz pairs of the target, if it is described by them
 
     __repr__ = check.brief
 
@@ -314,7 +320,7 @@ class Response:
                 f"modes must be of the body struck, {self.bodies[-1].mass:g} kg that yield {whole:.4g} m/N, got "
                 f"{modes.mass:g} kg and {softness:.4g} m/N"
             )
-        return replace(self, ringing=modes, rings=None)
+        return replace(self, ringing=modes, rings=None, vectors=None)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
@@ -527,6 +533,8 @@ class Response:
     def displacement(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
         """Displacement [m] of the target, (n_times, n_points); positive in the direction of the blow.
 
+        After a blow by Ritz vectors these tell the motion as long as they can (`motion_error`); otherwise modes do.
+
         Parameters
         ----------
         points : array_like, shape (n_points, dimension) [m]
@@ -538,6 +546,8 @@ class Response:
             It matters within about one wavelength of the last mode from a contact, and costs one static solution per
             point.
         """
+        if residual and self._told(points, times, body, "displacement"):
+            return self._seen[0].displacement(points, times)
         q, _ = self.modal_state(times, body=body)
         motion = q @ self._moved(body).shape_at(points).T  # (n_times, n_modes) @ (n_modes, n_points)
         return motion + self._dip(points, times, body)[0] if residual else motion
@@ -545,9 +555,54 @@ class Response:
     @check.typed
     def velocity(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
         """Velocity [m/s] of the target, (n_times, n_points); parameters as in `displacement`."""
+        if residual and self._told(points, times, body, "velocity"):
+            return self._seen[0].velocity(points, times)
         _, p = self.modal_state(times, body=body)
         motion = p @ self._moved(body).shape_at(points).T
         return motion + self._dip(points, times, body)[1] if residual else motion
+
+    @cached_property
+    def _seen(self) -> tuple["Response", ...]:
+        """The same blow with the motion of its own Ritz vectors, and with that of each poorer description."""
+        assert self.vectors is not None
+        each = self.vectors, *self.vectors.poorer.values()
+        return tuple(replace(self, rings=None, ringing=modes, vectors=None) for modes in each)
+
+    @check.typed
+    def motion_error(self, points: Any, times: Any, *, velocity: bool = False) -> float:
+        """Estimated error [-] of the target's motion as its Ritz vectors tell it, over the largest motion asked for.
+
+        The error of the blow, and the difference from the motion told by fewer vectors and by those of a coarser mesh
+        under the same force. Infinite where vectors do not tell the motion: after a blow by modes, later than twice the
+        duration of the run, and where that difference exceeds 1e-2 (3e-2 in the velocity).
+
+        Parameters
+        ----------
+        points, times : as in `displacement`
+        velocity : bool
+            Whether the error is that of `velocity`.
+        """
+        name = "velocity" if velocity else "displacement"
+        apart = self._apart(points, times, name)
+        return apart + self.error.total if apart <= MOVED[name] else float("inf")
+
+    def _apart(self, points: Any, times: Any, name: str) -> float:
+        """Largest difference [-] of the motions told by the descriptions of the target, over the largest motion."""
+        times = check.array("times", times, (None,), "s", lift=True)
+        lasting = not times.size or times.max() <= LASTS * self.history.end_time
+        if self.vectors is None or not self.vectors.poorer or not lasting:
+            return float("inf")
+        if len(times) > LOOKED_AT:
+            times = times[np.linspace(0, len(times) - 1, LOOKED_AT).astype(int)]
+        one, *others = (getattr(blow, name)(points, times) for blow in self._seen)
+        largest = float(np.abs(one).max(initial=0.0))
+        apart = sum(float(np.abs(one - other).max(initial=0.0)) for other in others)
+        return apart / largest if largest else 0.0
+
+    def _told(self, points: Any, times: Any, body: int, name: str) -> bool:
+        """Whether Ritz vectors tell a motion well enough."""
+        mine = self.vectors is not None and body in (-1, len(self.bodies) - 1)
+        return mine and self._apart(points, times, name) <= MOVED[name]
 
     def _dip(self, points: Any, times: Any, body: int) -> tuple[Any, Any]:
         """Static deflection [m] of the left-out modes and its rate [m/s], (n_times, n_points); 0 if there are none."""

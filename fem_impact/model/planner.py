@@ -44,6 +44,7 @@ TARGETS = ("rigid", "infinite", "vectors", "modal")
 DOFS_PER_AREA = {"argyris": 10.4, "hermite": 2.0}  # [-] unknowns per square, or length, of the element size
 DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow
 FAINTEST = 8.0  # [-] frequency up to which a force has the fraction FAINT of its impulse, times the contact's duration
+TOLD_AT = 200  # [-] times at which the motion of Ritz vectors is judged
 PER_MODE = 65.0  # [-] unknowns per mode found for motion and sound
 COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced
 
@@ -364,14 +365,19 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
         if other is not None and other.error < response.error.total:
             return carry_out(other, stages)
     plan = replace(plan, n_modes=seen.count, size=seen.size, n_dofs=seen.fine.system.n_dofs)
-    if asked.moving:
+    response = replace(response, rings=partial(_ringing, asked, keep), vectors=seen.whole)
+    if "sound" in asked.quantities or (blow.moving and not _told(blow.points, response)):
         with stages("modes"):
             response = replace(response, ringing=_ringing(asked, keep, response))
         plan = replace(plan, max_frequency=float(response.target.frequencies[-1]))
-    else:
-        response = replace(response, rings=partial(_ringing, asked, keep))
     response = audit.audited(response)
     return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
+
+
+def _told(points: tuple, response: Response) -> bool:
+    """Whether Ritz vectors tell the motion of all points as long as the blow lasts."""
+    times = np.linspace(0.0, response.history.end_time, TOLD_AT)
+    return all(np.isfinite(response.motion_error([point], times)) for point in points)
 
 
 def _ringing(asked: _Asked, keep: Any, response: Response) -> Modes:
@@ -568,7 +574,8 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     kept = f"the target is described by some {count} Ritz vectors started from the blow, more if their error shows"
     reason = f"argyris elements of {size:.3g} m, smaller towards the blow, with some {n_dofs} unknowns"
     if asked.moving:
-        reason += "; motion and sound come from modes driven by the force that the blow finds"
+        reason += "; motion comes from the vectors as long as they tell it, later motion and sound from modes driven "
+        reason += "by the force that the blow finds"
     work = cost.by_vectors(n_dofs, DOFS_AT_BLOW, count, _striker_modes(asked, 1.0)[0])
     if asked.moving:
         rings = _ringing_count(asked)

@@ -200,7 +200,7 @@ class Target:
         if self.kind == "analytic" and (size is None or self.source == "analytic"):
             body = None
         elif first is None:
-            body = self._system(size, stages or Stages())
+            body = self.assembled(stages or Stages(), size)
             wanted = None if insisted else min(tolerance, WORST_FREQUENCY)
         else:  # start from the mesh of the first modes and refine it if it cannot resolve the shortest wave
             assert isinstance(first.shapes, FieldShapes)
@@ -224,8 +224,8 @@ class Target:
         far, near = (_squared_wave(bending, section.tension, inertia, frequency) for frequency in (high, low))
         return float(far / near)  # the number goes as the square of the wavenumber
 
-    def _system(self, size: float | None, stages: Stages) -> System:
-        """The assembled body, with elements of the given size [m]."""
+    def assembled(self, stages: Stages, size: float | None = None) -> System:
+        """The assembled body, with elements of the given size [m] or the mesh's own."""
         assert self.mesh is not None and self.section is not None
         mesh = self.mesh
         if size is not None:

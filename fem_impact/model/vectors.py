@@ -67,6 +67,11 @@ def size_for(target: Target, resonance: float, tolerance: float) -> float:
     return size
 
 
+def hopeless(tried: list[float]) -> bool:
+    """Whether the last PATIENCE steps towards more vectors gained nothing; takes the errors of all steps."""
+    return len(tried) > PATIENCE and min(tried[-PATIENCE:]) > LEAST_GAIN * min(tried[:-PATIENCE])
+
+
 class Seen:
     """A target as a blow at one point sees it.
 
@@ -91,6 +96,7 @@ class Seen:
         self.shift = 2.0 * np.pi * resonance * SHIFT[0] * strict ** SHIFT[1] / target.stretch
         self.count = first_count(target, resonance, tolerance)
         self.margin = FOLDED[0] * strict ** FOLDED[1]
+        self.whole: Modes | None = None  # all Ritz pairs of the last `modes`
         self.tried: list[float] = []  # [-] truncation errors of the blows so far
         self.spent = False  # whether more vectors no longer help
         self.fine = self._krylov(size)
@@ -99,7 +105,7 @@ class Seen:
     def _stuck(self, truncation: float) -> bool:
         """Whether the last PATIENCE steps towards more vectors gained nothing."""
         self.tried.append(truncation)
-        return len(self.tried) > PATIENCE and min(self.tried[-PATIENCE:]) > LEAST_GAIN * min(self.tried[:-PATIENCE])
+        return hopeless(self.tried)
 
     def _krylov(self, size: float) -> Krylov:
         system = self.target.near(self.at, size, self.stages)
@@ -118,7 +124,7 @@ class Seen:
             if self.coarse is not None:
                 other = replace(self.coarse.modes(self.count), poorer={})
                 found = replace(found, poorer={**found.poorer, "mesh": other})
-        found = self.target.finished_vectors(found)
+        self.whole = found = self.target.finished_vectors(found)
         return found.truncated(max_frequency=cutoff(found, self.margin) * (1.0 + 1e-9))
 
     def improved(self, error: Error, allowed: float) -> bool:

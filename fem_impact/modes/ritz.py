@@ -11,6 +11,7 @@ Wilson, Yuan and Dickens (1982), Earthquake Eng. Struct. Dyn. 10, 813-821 (load-
 Meurant (2010), Matrices, Moments and Quadrature, ch. 6 (Lanczos and Gauss quadrature).
 """
 
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -82,17 +83,28 @@ class Krylov:
     """
 
     def __init__(self, system: System, points: np.ndarray, shift: float) -> None:
-        self.system, self.points = system, points
+        self.system = system
+        self._solve = factorise(system.K + (shift / system.frame.rate) ** 2 * system.M).solve
+        self._moving = system.M @ system.rigid
+        self._flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
+        self._begin(points)
+
+    def _begin(self, points: np.ndarray) -> None:
+        system = self.system
+        self.points = points
         self.loads = np.asarray(system.interpolate(points).todense()).T  # (n_dofs, n_points)
         self.width = len(points)
         self.vectors = np.empty((0, system.n_dofs))  # (room, n_dofs) mass-orthonormal rows
         self.stiffness = np.zeros((0, 0))  # (n_projected, n_projected) of the first vectors
         self.count, self.full = 0, False
-        self._solve = factorise(system.K + (shift / system.frame.rate) ** 2 * system.M).solve
-        self._moving = system.M @ system.rigid
-        flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
-        self._next = flexibility.solve(self.loads)  # the static deflection, so that the compliance is exact
+        self._next = self._flexibility.solve(self.loads)  # the static deflection, so that the compliance is exact
         self.compliance = self.loads.T @ self._next  # (n_points, n_points) in the frame
+
+    def beside(self, points: np.ndarray) -> "Krylov":
+        """Vectors started from other points, with the same factorisations."""
+        other = copy(self)
+        other._begin(points)
+        return other
 
     @one_thread
     def grow(self, count: int) -> None:

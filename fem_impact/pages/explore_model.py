@@ -13,19 +13,27 @@ from ..impact.collision import strike
 from ..impact.contact import Contact
 from ..impact.response import Response
 from ..mesh.meshes import Mesh
-from ..model import planner
+from ..model import planner, vectors
 from ..model.audit import audited
 from ..model.target import Stages
 from ..modes.modal import Modes, SampledShapes
-from ..scenes import maps
 from ..scenes.scene import Scene
 from ..scenes.schema import PATHS
-from ..sweeps import grid
+from ..sweeps import bodies, grid
 
 TOLERANCE = 1e-3  # [-] of the blows shown: errors smaller than the plots can show
 MAP_TOLERANCE = 1e-2  # [-] of the blows on the map, which only counts impacts
 FIRST_LOOK = 30  # [-] modes found first, to estimate the number needed
 MOST_MODES = 100  # [-] largest number; the residual compliance replaces the rest, and the page shows the error
+VECTORS = 1e-2  # [-] error limit of the vectors of a plate by elements: some seconds for each strike point
+MOST_UNKNOWNS = 10_000  # [-] of their mesh, besides the elements that shrink towards the blow
+SHARES = (
+    1.0,
+    0.75,
+    0.5,
+    0.25,
+    0.0,
+)  # [-] of the sliders' logarithmic way to the hardest blow that vectors are made for
 CELLS = {False: 24, True: 10}  # [-] along each axis of the map, without and with loss, where blows take longer
 SPANS = {  # [-] slider end over the scene's value
     "thickness": 2.0, "mass": 20.0, "stiffness": 1000.0, "speed": 10.0, "bending": 20.0
@@ -70,14 +78,20 @@ class Bench:
 
     @classmethod
     def of(cls, scene: Scene) -> "Bench":
-        """The bench of a scene, with enough modes for its shortest blow, but at most `MOST_MODES`."""
+        """The bench of a scene, with enough modes for its shortest blow, but at most `MOST_MODES`.
+
+        If vectors can tell the blows (`seen`), the first few modes do: they bridge the seconds until the vectors of a
+        new strike point are found.
+        """
         plan = scene.plan(target="modal", n_modes=FIRST_LOOK)
         first = planner.struck(plan, Stages())
         at = np.atleast_1d(np.asarray(scene.blow.values["at"], float))
         case = grid.Case(first, scene.make_striker(), scene.make_contact(), at, float(scene.blow.values["speed"]))
         bench = cls(scene, scene.body(), case)
+        if bench.told:
+            return bench
         hard = replace(bench.start, stiffness=SPANS["stiffness"] ** 0.5, mass=bench.start.mass / SPANS["mass"] ** 0.5)
-        needed = maps.number_of_modes(first, maps.needed_frequency(bench.case(hard), TOLERANCE))
+        needed = bodies.number_of_modes(first, bodies.needed_frequency(bench.case(hard), TOLERANCE))
         if needed <= first.n_modes:
             return bench
         more = planner.struck(plan.but(n_modes=min(needed, MOST_MODES)), Stages())
@@ -120,23 +134,24 @@ class Bench:
         same = (unit / wanted) ** (settings.exponent + 1.0)  # contact time ~ stiffness**(-1 / (exponent + 1))
         return replace(law, stiffness=settings.stiffness * same, exponent=settings.exponent, loss=settings.loss)
 
-    def case(self, settings: Settings, rest: float | None = None) -> grid.Case:
+    def case(self, settings: Settings, rest: float | None = None, seen: Modes | None = None) -> grid.Case:
         """The arguments of `strike`; raises ValueError if the strike point is not on the body.
 
         ``rest`` [m/N] replaces the residual compliance at the strike point: its static solution would take too long
-        while a slider moves.
+        while a slider moves. ``seen`` is the body as `seen` from that point, which replaces its modes.
         """
         case = replace(self.base.changed("mass", settings.mass), contact=self.law(settings))
         if settings.bending is not None:
             case = case.changed("striker_frequency", settings.bending)
-        if rest is not None:
+        if seen is not None:
+            case = replace(case, modes=seen)
+        elif rest is not None:
             case = replace(case, modes=self._sampled(settings.at, rest))
         modes, ratio = case.modes, settings.thickness
         if settings.damping != self.start.damping:
             modes = modes.damped(settings.damping)
         if ratio != 1.0:  # mass and all frequencies grow with the thickness
-            first = float(modes.frequencies[modes.n_rigid])
-            modes = modes.scaled(mass=ratio * modes.mass, first_frequency=ratio * first)
+            modes = modes.stretched(ratio, ratio)
         case = replace(case, modes=modes)
         return case.changed("speed", settings.speed).changed("at", settings.at)
 
@@ -145,13 +160,48 @@ class Bench:
         static = modes.modal_compliance(point) + rest
         return replace(modes, shapes=SampledShapes(point, modes.shape_at(point), static))
 
+    @property
+    def told(self) -> bool:
+        """Whether Ritz vectors can tell the blows, as far as is known without finding them."""
+        return vectors.usable(self.scene.built.target) and bool(self.scene.blow.values.get("residual", True))
+
+    def seen(self, at: tuple[float, ...]) -> Modes | None:
+        """The body as blows at a point see it, by Ritz vectors; None if only modes can tell them.
+
+        Made for blows between the softest and the hardest of the sliders, unless these ask for too fine a mesh.
+        """
+        target, start = self.scene.built.target, self.start
+        if not self.told:
+            return None
+        point = self.base.modes.point("at", at)[0]
+        case, unit = replace(self.base, at=point), self.base.contact.stiffness
+
+        def harder(share: float) -> dict[str, float]:
+            return {
+                "mass": start.mass / SPANS["mass"] ** share, "stiffness": unit * SPANS["stiffness"] ** share,
+                "speed": start.speed * SPANS["speed"] ** (share * (case.contact.exponent > 1.0)),
+            }  # fmt: skip
+
+        assert target.mesh is not None
+        area = planner.DOFS_PER_AREA["argyris"] * target.mesh.area
+        for share in SHARES:
+            hard = harder(share)
+            size = vectors.size_for(target, case.with_values(hard).resonance, VECTORS)
+            if area / size**2 <= MOST_UNKNOWNS:
+                masses = start.mass, start.mass * SPANS["mass"] ** (0.5 * share)
+                heavier = [{**harder(part * share), "mass": mass} for part in (0.0, 0.5, 1.0) for mass in masses]
+                sized = bodies.Sized(target, case, [hard, harder(-share)], heavier, VECTORS)
+                views = sized.views(point[None], Stages())
+                return None if views is None else next(iter(views.values()))
+        return None
+
     def residual(self, settings: Settings) -> float:
         """The residual compliance [m/N] at the strike point."""
         return float(self.base.modes.residual_compliance([settings.at])[0, 0])
 
-    def picture(self, settings: Settings) -> Picture:
-        """The map at these settings, over every mass and stiffness that the sliders reach."""
-        case = self.case(settings)
+    def picture(self, settings: Settings, seen: Modes | None = None) -> Picture:
+        """The map at these settings, over every mass and stiffness that the sliders reach; ``seen`` as in `case`."""
+        case = self.case(settings, seen=seen)
         count = CELLS[case.contact.loss > 0.0]
         mass, stiffness = (np.geomspace(*self.range(name), count) for name in ("mass", "stiffness"))
         over = {"stiffness": stiffness * case.contact.stiffness / settings.stiffness, "mass": mass}
@@ -159,7 +209,7 @@ class Bench:
             case.modes, case.striker, case.contact, at=case.at, speed=case.speed, over=over, tolerance=MAP_TOLERANCE,
             workers=1,
         )  # fmt: skip
-        there = [self.case(replace(settings, mass=float(value), stiffness=1.0)) for value in mass]
+        there = [self.case(replace(settings, mass=float(value), stiffness=1.0), seen=seen) for value in mass]
         found = np.array([limit_of(one) for one in there])
         ratio = found / np.array([one.resonance for one in there])
         ratio[~((ratio > 0.0) & (ratio < math.inf))] = math.nan

@@ -13,6 +13,7 @@ from .._base.check import SimulationError
 from ..impact import force_spectrum
 from ..impact.contact import Contact
 from ..impact.response import Response
+from ..modes.modal import Modes
 from ..scenes.schema import written
 from ..scenes.sentences import RAISED, place, power, si
 from ..show import sound
@@ -55,7 +56,9 @@ class Page:
         self.picture: Picture | None = None
         self.waiting = self.mapping = False
         self.hit: Response | None = None
-        self.refined, self.rest = bench.start.at, bench.residual(bench.start)  # where the compliance is exact, and it
+        # where the blow is exact, and the compliance or the vectors there
+        self.refined = None if bench.told else bench.start.at
+        self.seen, self.rest = None, bench.residual(bench.start)
 
     def show(self) -> None:
         """Put everything on the page and strike once."""
@@ -237,7 +240,7 @@ class Page:
         self.waiting = False
         settings = self.settings
         known = self.refined == settings.at
-        case = self.bench.case(settings, None if known else self.rest)
+        case = self.bench.case(settings, None if known else self.rest, self.seen if known else None)
         self._label(settings, case.contact)
         at = settings.at if len(settings.at) > 1 else (*settings.at, 0.0)
         self._put("at", x=[at[0]], y=[at[1]])
@@ -252,24 +255,26 @@ class Page:
         else:
             self._draw(self.hit)
             if known:  # examined once the sliders rest: that takes longer than the blow
-                self.document.add_timeout_callback(partial(self._examine, self.hit, resonance, limit, settings), REST)
-            self._show(self.hit, _told(self.hit, resonance, limit, known), known, settings)
+                self.document.add_timeout_callback(
+                    partial(self._examine, self.hit, resonance, limit, settings, _described(case.modes)), REST
+                )
+            self._show(self.hit, _told(self.hit, resonance, limit, known), known, settings, _described(case.modes))
         self._remap()
 
-    def _examine(self, hit: Response, resonance: float, limit: float, settings: Settings) -> None:
+    def _examine(self, hit: Response, resonance: float, limit: float, settings: Settings, what: str) -> None:
         """Add the model's own error to the numbers, if they are still those of this blow."""
         if hit is self.hit:
             unknown = [each.name for each in hit.assumptions if not each.known]
             own = power(hit.model_error) + (f", not known: {', '.join(unknown)}" if unknown else "")
-            self._show(hit, [*_told(hit, resonance, limit, True), ("the model's own error", own)], True, settings)
+            self._show(hit, [*_told(hit, resonance, limit, True), ("the model's own error", own)], True, settings, what)
 
-    def _show(self, hit: Response, cells: list[tuple[str, str]], known: bool, settings: Settings) -> None:
+    def _show(self, hit: Response, cells: list[tuple[str, str]], known: bool, settings: Settings, what: str) -> None:
         """Write the numbers below the plots."""
         text = base64.b64encode(written(self.bench.saved(settings)).encode()).decode("ascii")
         self.readout.text = self.numbers.render(
             cells=cells,
             missed=known and not hit.error.total <= TOLERANCE,
-            n_modes=self.bench.base.modes.n_modes,
+            what=what,
             scene=f"data:application/toml;base64,{text}",
         )
 
@@ -333,20 +338,22 @@ class Page:
         wanted = self._background()
 
         def work() -> None:
-            rest = self.bench.residual(wanted)
-            self.document.add_next_tick_callback(lambda: self._refine(wanted.at, rest))
+            known = self.refined == wanted.at
+            seen = self.seen if known else self.bench.seen(wanted.at)
+            rest = self.rest if known else self.bench.residual(wanted)
+            self.document.add_next_tick_callback(lambda: self._refine(wanted.at, rest, seen))
             try:
-                picture = self.bench.picture(wanted)
+                picture = self.bench.picture(wanted, seen)
             except (SimulationError, ValueError):
                 picture = None
             self.document.add_next_tick_callback(lambda: self._mapped(wanted, picture))
 
         self.pool.submit(work)
 
-    def _refine(self, at: tuple[float, ...], rest: float) -> None:
-        """Store the residual compliance of a new strike point and strike again: its blows are exact from now on."""
+    def _refine(self, at: tuple[float, ...], rest: float, seen: Any) -> None:
+        """Store what is known of a new strike point and strike again: its blows are exact from now on."""
         if self.refined != at:
-            self.refined, self.rest = at, rest
+            self.refined, self.rest, self.seen = at, rest, seen
             self.update()
 
     def _entitle_map(self) -> None:
@@ -363,7 +370,8 @@ class Page:
     def _listen(self) -> None:
         if self.hit is None:
             return
-        heard = sound.synthesise(self.hit, self.bench.scene.points[0], duration=PLAYED)
+        rung = self.hit if not self.hit.target.poorer else self.hit.on(self.bench.case(self.settings).modes)
+        heard = sound.synthesise(rung, self.bench.scene.points[0], duration=PLAYED)
         level = heard.peak_level
         raised = max(0.0, report.QUIET - level) if math.isfinite(level) else 0.0
         note = f"Full scale is {heard.full_scale:g} {heard.unit}; peak {level:.1f} dB"
@@ -385,6 +393,13 @@ def _told(hit: Response, resonance: float, limit: float, exact: bool) -> list[tu
         ("contact resonance", f"{si(resonance, 'Hz', 3)}, {ratio}"),
         ("estimated error", error),
     ]
+
+
+def _described(modes: Modes) -> str:
+    """What carries the blow, in words."""
+    if modes.poorer:
+        return f"{modes.n_modes} Ritz vectors started from the strike point"
+    return f"the first {modes.n_modes} modes"
 
 
 def _quads(picture: Picture) -> dict[str, Any]:

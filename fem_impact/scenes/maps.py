@@ -1,9 +1,8 @@
-"""Maps of scenes: finds the modes they need, adds contact resonance and threshold, and writes pictures and files."""
+"""Maps of scenes: finds what they need of the body, adds resonance and threshold, writes pictures and files."""
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -14,15 +13,14 @@ import xarray
 
 from .._base import check
 from ..fe import plausible
-from ..impact import accuracy, threshold
-from ..model import planner
+from ..impact import threshold
+from ..model.target import Stages
 from ..show import figures, plots
-from ..sweeps import grid, hammers
+from ..sweeps import bodies, grid, hammers
+from ..sweeps.cells import ALIASES, AXES, Case
 from .scene import Scene
 from .schema import MAKERS, Part
 
-FIRST_LOOK = 40  # [-] modes found first, to estimate how many a map needs
-MOST_MODES = 300  # [-] modes used to choose a hammer, whatever the bandwidth; residual compliance replaces the others
 FORMATS = ("nc", "zarr")
 FILES = (".nc", ".zarr", ".csv", ".png")  # a folder name must not end like this
 MOST_ROWS = 10**6  # [-] a larger map gets no CSV file
@@ -59,7 +57,8 @@ def map_scene(
         Replaces the tolerance of the scene.
     **wanted
         ``workers``, ``client``, ``store``, ``watch``, ``max_cells`` and ``tell`` of `sweep`; and ``stage``, called with
-        "modes" while modes are found, which returns a context manager. Beside a store, the modes are kept in a file.
+        the name of each stage before the blows, which returns a context manager. Beside a store, a file keeps what was
+        found of the body.
 
     Returns
     -------
@@ -79,7 +78,7 @@ def map_scene(
         raise ValueError(
             f'{scene.path}: [map] is missing; add it and name the axes, as in over = {{ "striker.mass" = [0.01, 0.1] }}'
         )
-    quick = {name: values for name, values in over.items() if grid.ALIASES.get(name, name) in grid.AXES}
+    quick = {name: values for name, values in over.items() if ALIASES.get(name, name) in AXES}
     slow = {name: list(values) for name, values in over.items() if name not in quick}
     for name in slow:
         _check_key(scene, name)
@@ -124,7 +123,7 @@ def _plain(value: Any) -> Any:
 def _check_key(scene: Scene, key: str) -> None:
     known = [f"{t}.{k}" for t in MAKERS for k in getattr(getattr(scene, t, None), "values", {})]
     if key not in known:
-        names = [*grid.AXES, *grid.ALIASES, *known]
+        names = [*AXES, *ALIASES, *known]
         raise ValueError(f"{scene.path}: [map] over: {key} is not an axis{check.nearest(key, names)}")
 
 
@@ -132,67 +131,21 @@ def _quick_map(
     scene: Scene, over: Mapping[str, Any], band: float | None, tolerance: float, wanted: Mapping[str, Any]
 ) -> xarray.Dataset:
     """A map whose axes do not need a new body."""
-    law, striker, blow = scene.make_contact(), scene.make_striker(), scene.blow.values
-    wanted = dict(wanted)
-    stage, store = wanted.pop("stage", None) or nullcontext, wanted.get("store")
-    keep = None if store is None else Path(store).with_name(f"{Path(store).name}.modes.npz")
-    with stage("modes"):
-        first = scene.modes(FIRST_LOOK)
-    case = grid.Case(first, striker, law, np.atleast_1d(np.asarray(blow["at"], float)), blow["speed"])
-    axes = grid.checked_axes(case, over)
-
-    def reach(tolerance: float) -> float:
-        return max(
-            needed_frequency(corner, tolerance) * case.modes.frequencies[-1] / corner.modes.frequencies[-1]
-            for corner in _corners(case, axes)
-        )
-
-    needed = reach(tolerance)
-    modes = case.modes
-    if needed > modes.frequencies[-1]:
-        number, most = number_of_modes(modes, needed), planner.MOST_MODES[scene.built.target.kind]
-        if number > most:
-            enough = accuracy.least_tolerance(lambda tolerance: number_of_modes(modes, reach(tolerance)) <= most)
-            raise check.SimulationError(
-                f"{scene.path}: the shortest blow of the map needs about {number} modes, at most {most} are allowed; "
-                f"{'no tolerance is large enough' if enough is None else f'tolerance = {enough:g} is affordable'}; or "
-                "leave out the stiffest contacts and the lightest strikers"
-            )
-        with stage("modes"):
-            modes = scene.modes(number, keep=keep)
-    case = replace(case, modes=modes)
-    table = grid.sweep(
-        modes, striker, law, at=blow["at"], speed=blow["speed"], over=over, tolerance=tolerance, max_frequency=band,
-        residual=blow.get("residual", True), audit=True, **wanted,
-    )  # fmt: skip
+    blow, wanted = scene.blow.values, dict(wanted)
+    stages, keep = Stages(wanted.pop("stage", None)), grid.kept_beside(wanted.get("store"))
+    residual = blow.get("residual", True)
+    try:
+        case, axes = bodies.body_of(
+            scene.built.target, scene.make_striker(), scene.make_contact(), at=blow["at"], speed=blow["speed"],
+            over=over, tolerance=tolerance, alone=residual and not wanted.get("layers"), keep=keep, stages=stages,
+        )  # fmt: skip
+    except check.SimulationError as error:
+        raise check.SimulationError(f"{scene.path}: {error}") from None
+    table = grid.run(case, axes, tolerance=tolerance, max_frequency=band, residual=residual, audit=True, **wanted)
     return with_theory(table, case, axes)
 
 
-def _corners(case: grid.Case, axes: Mapping[str, np.ndarray]) -> Iterator[grid.Case]:
-    """The blows at every combination of the ends of the axes."""
-    ends = [values if name == "at" else np.unique([values.min(), values.max()]) for name, values in axes.items()]
-    for chosen in product(*ends):
-        corner = case
-        for name, value in zip(axes, chosen):
-            corner = corner.changed(name, value)
-        yield corner
-
-
-def needed_frequency(case: grid.Case, tolerance: float) -> float:
-    """Frequency [Hz] up to which a blow needs modes to meet the tolerance."""
-    return accuracy.cutoff_frequency(
-        case.modes, case.at, contact=case.contact, mass=case.striker.felt_mass, speed=case.speed,
-        tolerance=planner.SHARE * tolerance,
-    )  # fmt: skip
-
-
-def number_of_modes(first: Any, frequency: float) -> int:
-    """Approximate number of modes up to a frequency [Hz], from the first modes by Weyl's law."""
-    growth = (frequency / first.frequencies[-1]) ** (0.5 * first.dimension)
-    return math.ceil(1.1 * first.n_modes * growth)
-
-
-def with_theory(table: xarray.Dataset, case: grid.Case, axes: Mapping[str, np.ndarray]) -> xarray.Dataset:
+def with_theory(table: xarray.Dataset, case: Case, axes: Mapping[str, np.ndarray]) -> xarray.Dataset:
     """Add ``contact_resonance`` and ``threshold`` [Hz] to a map, each along the axes it depends on."""
     striker = ("mass", "striker_frequency")
     for name, find, needs, meaning in (
@@ -212,7 +165,7 @@ def with_theory(table: xarray.Dataset, case: grid.Case, axes: Mapping[str, np.nd
     return table
 
 
-def _threshold(case: grid.Case) -> float:
+def _threshold(case: Case) -> float:
     found = threshold.threshold_frequency(case.modes, case.at, case.striker.felt_mass)
     return math.nan if found is None or math.isinf(found) else found
 
@@ -353,4 +306,4 @@ def write(folder: Path, table: xarray.Dataset, form: str = "nc") -> list[str]:
 @check.typed
 def hammers_for(scene: Scene, bandwidth: float, masses: Any, *, drop: float = 10.0) -> tuple[hammers.Hammer, ...]:
     """What each hammer can do at the strike point of a scene; the scene's own striker is ignored."""
-    return hammers.choose(scene.modes(MOST_MODES), scene.blow.values["at"], bandwidth, masses, drop=drop)
+    return hammers.choose_on(scene.built.target, scene.blow.values["at"], bandwidth, masses, drop=drop)

@@ -16,6 +16,7 @@ import xarray
 from .._base import check
 from .._base.check import SimulationError
 from ..fe import plausible
+from ..fe.assembly import System
 from ..impact import accuracy
 from ..impact.collision import RESOLVABLE, strike
 from ..impact.contact import Contact, wall_time
@@ -23,27 +24,13 @@ from ..impact.response import Response
 from ..impact.striker import Striker
 from ..model.audit import audited
 from ..model.planner import COSTLY
-from ..modes.modal import Modes, SampledShapes
-from . import batches
+from ..model.target import Target
+from ..modes.modal import Damping, Modes
+from . import batches, bodies
+from .cells import AXES, FAMILY_AXES, REACH, Case, checked_axes
 from .store import LARGEST_BLOCK, Texts, block_size, by_cluster, by_store
 
 TOLERANCE = 1e-3  # [-] default error limit of a map
-AXES = {  # name: unit, what it is, its name in a scene file
-    "mass": ("kg", "mass of the striker", "striker.mass"),
-    "striker_frequency": ("Hz", "first flexible frequency of the striker", "striker.first_frequency"),
-    "stiffness": ("N/m**exponent", "stiffness of the contact", "contact.stiffness"),
-    "exponent": ("", "exponent of the contact", "contact.exponent"),
-    "loss": ("s/m", "loss factor of the contact", "contact.loss"),
-    "gap": ("m", "distance the striker travels before contact", "contact.gap"),
-    "speed": ("m/s", "speed of the striker's contact point", "strike.speed"),
-    "at": ("m", "strike point", "strike.at"),
-    "target_mass": ("kg", "mass of the struck body", "target.mass"),
-    "target_frequency": ("Hz", "first flexible frequency of the struck body", "target.first_frequency"),
-    "damping_ratio": ("", "damping ratio of the struck body", "target.damping_ratio"),
-}
-ALIASES = {alias: name for name, (_, _, alias) in AXES.items()}
-FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  # each value needs new kernels
-REACH = 1e30  # [SI] speeds, masses and frequencies lie between 1/REACH and REACH: beyond, the kernels never finish
 LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
     "n_impacts": ("", "number of separate contacts"),
     "contact_time": ("s", "total time in contact"),
@@ -55,43 +42,12 @@ LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
 }
 
 
+DOUBTED = {True: 10_000, False: 100}  # [-] cells struck again for the error of vectors, in a batch or alone
 MOST_CELLS = 10**8  # [-] default limit of a map: half an hour to two hours of work, 8 GB
 SECONDS = {True: 1e-5, False: 2e-3}  # [s] per blow, in a batch or alone: the slower plates of studies/map_speed.py
 LEAST_MODEL_ERROR = 1e-12  # [-] smaller ones are rounding
 Watch = Callable[[int, int], Any]
 Tell = Callable[[str], Any]
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """One cell of a map: the arguments of `strike`."""
-
-    modes: Modes
-    striker: Striker
-    contact: Contact
-    at: np.ndarray  # (dimension,) [m]
-    speed: float  # [m/s]
-
-    @property
-    def resonance(self) -> float:
-        """Contact resonance [Hz] of the striker on a rigid wall."""
-        return accuracy.contact_resonance(self.contact, self.striker.felt_mass, self.speed)
-
-    def changed(self, name: str, value: Any) -> "Case":
-        """The same blow with one parameter of `AXES` replaced."""
-        if name == "at":
-            return replace(self, at=self.modes.point("at", value)[0])
-        if name == "speed":
-            return replace(self, speed=check.positive("speed", value, "m/s", reach=REACH))
-        if name in ("stiffness", "exponent", "loss", "gap"):
-            return replace(self, contact=replace(self.contact, **{name: float(value)}))
-        if name in ("mass", "striker_frequency"):
-            key = "mass" if name == "mass" else "first_frequency"
-            return replace(self, striker=replace(self.striker, modes=self.striker.modes.scaled(**{key: value})))
-        if name == "damping_ratio":
-            return replace(self, modes=self.modes.damped(value))
-        key = "mass" if name == "target_mass" else "first_frequency"
-        return replace(self, modes=self.modes.scaled(**{key: value}))
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +61,7 @@ class Grid:
     band: float | None  # [Hz] upper end of the centroid's band
     extra: Mapping[str, Callable[[Response], float]]  # additional layers
     audit: bool = False  # whether the model's own error is wanted
+    max_impacts: int | None = None  # what follows does not matter where cells are computed alone
     kernels: batches.Kernels = field(default_factory=dict)  # computed so far
 
     @property
@@ -119,6 +76,12 @@ class Grid:
     def lossy(self) -> bool:
         """Whether any contact loses energy."""
         return bool(self.base.contact.loss or "loss" in self.axes)
+
+    @property
+    def quick(self) -> bool:
+        """Whether all cells are computed together."""
+        exponents = self.axes.get("exponent", [self.base.contact.exponent])
+        return not (self.lossy or self.extra) and min(exponents) >= 1.0
 
     @property
     def layers(self) -> list[str]:
@@ -138,6 +101,7 @@ class Grid:
         hit = strike(
             case.modes, case.striker, case.contact,
             at=case.at, speed=case.speed, tolerance=self.tolerance, residual=self.residual,
+            max_impacts=self.max_impacts,
         )  # fmt: skip
         return audited(hit)
 
@@ -152,11 +116,23 @@ class Grid:
             return np.full(len(self.layers), np.nan), str(error)
         return np.array(row, float), ""
 
+    def doubt(self, index: int) -> float:
+        """Error [-] of the body's vectors and mesh in one cell struck alone; 0 if that fails."""
+        case = self.case(index)
+        try:
+            error = strike(
+                case.modes, case.striker, case.contact, at=case.at, speed=case.speed, tolerance=self.tolerance
+            ).error
+        except SimulationError:
+            return 0.0
+        return error.truncation + error.mesh
+
     def left_out(self) -> np.ndarray:
         """Expected error [-] of leaving out modes, in the shape of the grid; infinite where they govern the contact."""
         if not self.residual:
             return np.zeros(self.shape)
         base, places = self.base, self.axes.get("at", self.base.at[None])
+        seen = [base.changed("at", place).modes for place in places] if base.views else [base.modes] * len(places)
 
         def along(name: str, values: Any) -> np.ndarray:
             """Values of an axis, or one that all cells share, shaped to broadcast over the grid."""
@@ -174,19 +150,21 @@ class Grid:
         felt = base.striker.felt_mass * weight
         omega = np.pi / wall_time(stiffness, exponent, 1.0 / felt, speed)
         yielding = base.modes.dimension > 0
-        left = [base.modes.residual_compliance(place[None])[0, 0] if yielding else 0.0 for place in places]
+        left = [modes.residual_compliance(place)[0, 0] if yielding else 0.0 for modes, place in zip(seen, places)]
+        last = along("at", [modes.omega[-1] for modes in seen])
+        striker = base.striker
         sides = [
-            (base.modes, along("at", left), "target_mass", "target_frequency"),
-            (base.striker.modes, np.array(base.striker.left_out[0][0, 0]), "mass", "striker_frequency"),
-        ]
+            (base.modes, along("at", left), last, base.first, "target_mass", "target_frequency"),
+            (striker.modes, striker.left_out[0][0, 0], striker.modes.omega[-1], None, "mass", "striker_frequency"),
+        ]  # fmt: skip
         total, softness = np.zeros(self.shape), np.zeros(self.shape)
-        for modes, rest, mass, frequency in sides:
+        for modes, rest, edge, first, mass, frequency in sides:
             if not modes.dimension or not modes.omega.any():
                 continue
-            first = float(modes.frequencies[modes.omega > 0.0][0])
+            first = first or float(modes.frequencies[modes.omega > 0.0][0])
             ratio = value(frequency, first) / first
             soft = felt * omega**2 * np.maximum(rest, 0.0) * modes.mass / value(mass, modes.mass) / ratio**2
-            above = np.minimum(1.0, omega / (modes.omega[-1] * ratio))
+            above = np.minimum(1.0, omega / (edge * ratio))
             total = total + accuracy.left_out_error(soft, above, exponent, modes.dimension)
             softness = softness + soft
         return np.where(softness <= RESOLVABLE, total * np.where(loss > 0.0, accuracy.LOSSY, 1.0), np.inf)
@@ -225,14 +203,7 @@ class Grid:
 
     def sampled(self) -> "Grid":
         """The same grid with each body reduced to its contact points: small enough to send to a cluster."""
-        places = self.axes.get("at", self.base.at[None])
-        striker = self.base.striker
-        if striker.modes.dimension:
-            striker = replace(striker, modes=_sampled(striker.modes, striker.at[None]))
-        places = np.unique(np.vstack([places, self.base.at[None]]), axis=0)
-        return replace(
-            self, base=replace(self.base, modes=_sampled(self.base.modes, places), striker=striker), kernels={}
-        )
+        return replace(self, base=self.base.sampled(self.axes.get("at", self.base.at[None])), kernels={})
 
     def without_speed(self) -> "Grid | None":
         """The grid at one speed if every contact is linear, so that speed only scales the forces; otherwise None."""
@@ -242,15 +213,9 @@ class Grid:
         return replace(self, axes={**self.axes, "speed": self.axes["speed"][:1]})
 
 
-def _sampled(modes: Modes, points: np.ndarray) -> Modes:
-    """Modes at the given points only; leaves out the compliance between different points, which no blow needs."""
-    static = np.diag([float(modes.shapes.compliance(point[None])[0, 0]) for point in points])
-    return replace(modes, shapes=SampledShapes(points, modes.shape_at(points), static))
-
-
 @check.typed
 def sweep(
-    modes: Modes,
+    modes: Modes | System,
     striker: Striker,
     contact: Contact,
     *,
@@ -259,6 +224,7 @@ def sweep(
     over: Mapping[str, Any],
     tolerance: float = TOLERANCE,
     max_frequency: float | None = None,
+    damping_ratio: Damping | None = None,
     layers: Mapping[str, Callable[[Response], float]] | None = None,
     residual: bool = True,
     workers: int | None = None,
@@ -274,7 +240,8 @@ def sweep(
     Parameters
     ----------
     modes, striker, contact, at, speed
-        The blow that all cells share, as in `strike`; the axes replace some of it.
+        The blow that all cells share, as in `strike`; the axes replace some of it. Of a `System`, a map computes what
+        its cells need: Ritz vectors started from each strike point if it is a plate, otherwise modes.
     over : mapping of axis name to values
         Names are those of `AXES` (``mass`` is the striker's) or those of a scene file (``striker.mass``). Values of
         ``at`` are points, shape (n_points, dimension) [m]; all others are one-dimensional, in SI units.
@@ -283,6 +250,8 @@ def sweep(
     max_frequency : float [Hz], optional
         Adds the layer ``centroid``, the spectral centroid of the band from zero to this frequency. It has no default:
         the mean frequency of a pulse grows without limit as the band widens.
+    damping_ratio : float or function of frequency [Hz], optional
+        Damping of a system, which has none of its own.
     layers : mapping of name to function of a Response, optional
         Additional scalars to compute; the functions run in threads. Every cell is then computed alone, which is about
         a hundred times slower (``studies/map_speed.py``); so are cells with an exponent below 1.
@@ -309,8 +278,8 @@ def sweep(
     -------
     xarray.Dataset
         One dimension per axis, in the order given; variables as in `LAYERS` with their units; ``truncation``, the
-        expected error of modes left out; ``tolerance_met``; and ``failure``, the error text of a cell that failed (its
-        numbers are then NaN and its n_impacts is -1).
+        expected error of modes left out, or of having no more vectors and no finer mesh; ``tolerance_met``; and
+        ``failure``, the error text of a cell that failed (its numbers are then NaN and its n_impacts is -1).
         ``attrs["scene"]`` holds the blow all cells share, as JSON; ``attrs["notes"]`` what was assumed, one note per
         line.
 
@@ -328,22 +297,99 @@ def sweep(
     [[1, 1, 4], [1, 2, 4]]
     """
     tolerance = check.tolerance(tolerance)
-    base = Case(modes, striker, contact, modes.point("at", at)[0], check.positive("speed", speed, "m/s", reach=REACH))
+    if isinstance(modes, Modes):
+        modes = modes if damping_ratio is None else modes.damped(damping_ratio)
+        speed = check.positive("speed", speed, "m/s", reach=REACH)
+        base = Case(modes, striker, contact, modes.point("at", at)[0], speed)
+        axes = checked_axes(base, over)
+    else:
+        base, axes = bodies.body_of(
+            Target.of(modes, damping_ratio), striker, contact, at=at, speed=speed, over=over, tolerance=tolerance,
+            alone=residual and not layers, keep=kept_beside(store),
+        )  # fmt: skip
+    return run(
+        base, axes, tolerance=tolerance, max_frequency=max_frequency, layers=layers, residual=residual, workers=workers,
+        client=client, store=store, watch=watch, max_cells=max_cells, tell=tell, audit=audit,
+    )  # fmt: skip
+
+
+def kept_beside(store: str | Path | None) -> Path | None:
+    """File beside a store that keeps what was found of the struck body."""
+    return None if store is None else Path(store).with_name(f"{Path(store).name}.modes.npz")
+
+
+def run(
+    base: Case,
+    axes: Mapping[str, np.ndarray],
+    *,
+    tolerance: float,
+    max_frequency: float | None = None,
+    layers: Mapping[str, Callable[[Response], float]] | None = None,
+    residual: bool = True,
+    workers: int | None = None,
+    client: Any = None,
+    store: str | Path | None = None,
+    watch: Watch | None = None,
+    max_cells: float = MOST_CELLS,
+    tell: Tell | None = None,
+    audit: bool = False,
+) -> xarray.Dataset:
+    """The map of a blow over axes that are checked; arguments as in `sweep`."""
     band = None if max_frequency is None else check.positive("max_frequency", max_frequency, "Hz")
     workers = None if workers is None else check.count("workers", workers)
     max_cells = check.number("max_cells", max_cells)
     layers = {} if layers is None else layers
     if not isinstance(layers, Mapping) or not all(isinstance(name, str) and callable(layers[name]) for name in layers):
         raise ValueError(f"layers must map names to functions of a Response, got {check.shown(layers)}")
-    grid = Grid(base, checked_axes(base, over), tolerance, residual, band, dict(layers), bool(audit))
+    grid = Grid(base, axes, tolerance, residual, band, dict(layers), bool(audit))
     admit(grid.n_cases, len(grid.layers), max_cells, quick=not grid.extra, tell=tell)
     fewer = grid.without_speed()
     numbers, texts = _solve_all(fewer or grid, workers, client, store, watch)
     failures = np.full((fewer or grid).n_cases, "", dtype=f"<U{max(map(len, texts.values()), default=1)}")
     failures[list(texts)] = list(texts.values())
+    doubt = described(fewer or grid, numbers, workers)
     if fewer is not None:
         numbers, failures = _with_speed(grid, fewer, numbers, failures)
-    return _dataset(grid, numbers, failures)
+    return _dataset(grid, numbers, failures, np.broadcast_to(doubt, grid.shape))
+
+
+def described(grid: Grid, numbers: np.ndarray, workers: int | None = None) -> np.ndarray:
+    """Error [-] of too few Ritz vectors and of their mesh in each cell, in the shape of the grid; zero for modes.
+
+    Evenly spaced cells, at most DOUBTED, are struck again on the body described less well (`Modes.poorer`); any other
+    cell has the error of the nearest of them. Too few vectors may agree on a final separation that is none; therefore
+    cells with several impacts are also struck alone, because `strike` looks for that.
+    """
+    causes = {cause for modes in grid.base.views.values() for cause in modes.poorer}
+    if not causes:
+        return np.zeros(grid.shape)
+    most = DOUBTED[grid.quick]
+    thinner = max(1.0, (grid.n_cases / most) ** (1.0 / len(grid.shape)))
+    chosen = [np.unique(np.round(np.linspace(0, n - 1, max(1, int(n / thinner)))).astype(int)) for n in grid.shape]
+    axes = {name: values[some] for (name, values), some in zip(grid.axes.items(), chosen)}
+    few = replace(grid, axes=axes, band=None, kernels={})
+    names = [grid.layers.index(name) for name in few.layers]
+    mine = numbers.reshape(-1, *grid.shape)[np.ix_(np.array(names), *chosen)]
+    total = np.zeros(few.shape)
+    for cause in sorted(causes):
+        other, _ = solve(replace(few, base=grid.base.poorer(cause), kernels={}), 0, few.n_cases, workers=workers)
+        total += _apart(few.layers, mine, other.reshape(mine.shape))
+    several = np.flatnonzero(mine[few.layers.index("n_impacts")] > 1)
+    several = several[:: max(1, -(-len(several) // DOUBTED[False]))]
+    with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
+        total.flat[several] = np.maximum(total.flat[several], list(pool.map(few.doubt, several)))
+    nearest = [np.abs(np.arange(n)[:, None] - some).argmin(axis=1) for n, some in zip(grid.shape, chosen)]
+    return total[np.ix_(*nearest)]
+
+
+def _apart(names: list[str], one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Largest difference of two maps in the quantities under tolerance; 1 if their impacts differ in number."""
+    mine, its = dict(zip(names, one)), dict(zip(names, other))
+    apart = np.abs(mine["restitution"] - its["restitution"])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for name in ("impulse", "contact_time", "peak_force"):
+            apart = np.fmax(apart, np.abs(its[name] / mine[name] - 1.0))
+    return np.where(mine["n_impacts"] == its["n_impacts"], apart, 1.0)
 
 
 def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, tell: Tell | None = None) -> None:
@@ -446,36 +492,7 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
     return numbers, texts
 
 
-def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Checked values of every axis, under its name in `AXES`."""
-    if not isinstance(over, Mapping) or not over:
-        raise ValueError(f"over must name at least one axis, for example {{'mass': [...]}}, got {check.shown(over)}")
-    axes: dict[str, np.ndarray] = {}
-    for given, values in over.items():
-        name = ALIASES.get(given, given)
-        check.one_of("over", name, AXES)
-        if name in axes:
-            raise ValueError(f"over names the axis {name} twice")
-        if name == "at":
-            axes[name] = base.modes.points("over['at']", values)
-        else:
-            axes[name] = check.array(f"over[{given!r}]", values, (None,), AXES[name][0])
-        if not len(axes[name]):
-            raise ValueError(f"over[{given!r}] must contain at least one value")
-        if name in ("stiffness", "exponent", "loss", "gap"):
-            for value in axes[name]:
-                base.changed(name, value)
-        elif name != "at":
-            for value in axes[name]:
-                if name == "damping_ratio":
-                    check.non_negative(name, value)
-                else:
-                    check.positive(name, value, AXES[name][0], reach=REACH)
-            base.changed(name, axes[name][0])  # raises if the body cannot change this way, whatever the value
-    return axes
-
-
-def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray) -> xarray.Dataset:
+def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray, doubt: np.ndarray) -> xarray.Dataset:
     """The map as a Dataset, with units on layers and axes."""
     dims = tuple(grid.axes)
     data: dict[str, Any] = {}
@@ -487,8 +504,8 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray) -> xarray.Da
         if name == "centroid":
             attributes["max_frequency"] = grid.band
         data[name] = (dims, values.reshape(grid.shape), attributes)
-    left_out = grid.left_out()
-    meaning = "expected error of leaving out modes; infinite where they govern the contact"
+    left_out = grid.left_out() + doubt
+    meaning = "expected error of the body's description; infinite where modes left out govern the contact"
     data["truncation"] = (dims, left_out, {"units": "1", "long_name": meaning})
     met = data["error"][1] + left_out <= grid.tolerance
     data["tolerance_met"] = (dims, met, {"units": "1", "long_name": "whether both errors together meet the tolerance"})

@@ -1,7 +1,7 @@
 """Choosing a hammer: which mass and tip stiffness reach a required bandwidth without a double hit."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -9,19 +9,25 @@ import numpy as np
 from scipy.optimize import brentq
 
 from .._base import check, progress
+from ..fe.assembly import System
 from ..impact import accuracy
 from ..impact.collision import strike
 from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.spectra import half_sine_spectrum
 from ..impact.striker import Striker
-from ..modes.modal import Modes
-from . import grid
+from ..model import vectors
+from ..model.target import Stages, Target
+from ..modes.modal import Damping, Modes
+from . import bodies, grid
+from .cells import Case
 
 TOLERANCE = 1e-2  # [-] error limit of the blows that are looked at first
 DECIDED = 1e-4  # [-] error limit of the blows that decide where a range of tips ends
 WIDTH = 1e-3  # [-] relative width to which the ends of a range are found
-HARDEST = 10.0  # [-] hardest tip of `highest_frequency`, over that whose half sine has the bandwidth
+HARDEST = 10.0  # [-] hardest tip on a body of Ritz vectors, over that whose half sine has the bandwidth
+VECTORS = 6e-3  # [-] error limit of vectors and mesh in the blows of all tips
+MOST_MODES = 300  # [-] modes used otherwise, whatever the bandwidth; residual compliance replaces the others
 SOFTEST = 0.03  # [-] softest tip tried, over the one with the bandwidth and over the one tuned to the first mode
 PER_DECADE = 100, 12  # [-] tips per decade at which impacts are counted, and at which the bandwidth is found
 STIFFEST = 100.0  # [-] hardest tip tried, over the one for which the modes are complete
@@ -36,12 +42,12 @@ Ranges = tuple[tuple[float, float], ...]  # [N/m] softest and hardest tip of eac
 
 @dataclass(frozen=True)
 class Hammer:
-    """What one hammer can do on a body, with tips between the softest tried and the hardest that the modes resolve."""
+    """What one hammer can do on a body, with tips between the softest tried and the hardest that the model resolves."""
 
     mass: float  # [kg]
     single: Ranges  # tips that hit once; narrower gaps and ranges than 2 % may be missed
     working: Ranges  # tips that hit once and reach the bandwidth
-    limit: float  # [N/m] hardest tip that the modes resolve: the model ends here
+    limit: float  # [N/m] hardest tip tried: the model of the body ends here
     reach: float | None  # [Hz] bandwidth with the hardest tip; None: no tip hits once
     error: float | None  # [-] estimated error of the blow with that tip
     notes: tuple[str, ...] = ()  # what the body assumed, and numbers that are probably a slip of a unit
@@ -130,18 +136,30 @@ def _centre(bandwidth: float, drop: float) -> float:
 
 
 @check.typed
-def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float = 10.0) -> tuple[Hammer, ...]:
+def choose(
+    modes: Modes | System,
+    at: Any,
+    bandwidth: float,
+    masses: Any,
+    *,
+    drop: float = 10.0,
+    damping_ratio: Damping | None = None,
+) -> tuple[Hammer, ...]:
     """Find the tips that suit each rigid hammer, by striking with linear tips from soft to hard.
 
     Parameters
     ----------
-    modes : Modes
-        Modes of the body under test. The search ends with the hardest tip that they resolve (`Response.error`).
+    modes : Modes or System
+        The body under test. With modes, the search ends with the hardest tip that they resolve (`Response.error`). A
+        `System` is described by what the blows need of it, and the search ends ten times above the tip whose half sine
+        has the bandwidth.
     at : strike point, (dimension,) [m]
     bandwidth : float [Hz]
         Frequency up to which the force spectrum must stay within ``drop`` of its value at 0 Hz.
     masses : array_like, shape (n_masses,) [kg]
     drop : float [dB]
+    damping_ratio : float or function of frequency [Hz], optional
+        Damping of a system, which has none of its own.
 
     Returns
     -------
@@ -160,46 +178,104 @@ def choose(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float 
     >>> light.works, heavy.works
     (True, False)
     """
+    return choose_on(Target.of(modes, damping_ratio), at, bandwidth, masses, drop=drop)
+
+
+def choose_on(
+    target: Target, at: Any, bandwidth: float, masses: Any, *, drop: float = 10.0, stages: Stages | None = None
+) -> tuple[Hammer, ...]:
+    """As `choose`, on a body however it is known."""
     masses, centre = _checked(masses), _centre(bandwidth, drop)
+    modes, hardest = _body(target, at, masses, centre, stages or Stages())
     flexible = modes.frequencies[modes.omega > 0.0]
     lowest = float(flexible[0]) if len(flexible) else centre
     found: list[Hammer] = []
     for mass in masses:
         progress.report("hammers", len(found), len(masses))
-        found.append(_hammer(modes, at, mass, bandwidth, drop, (centre, lowest)))
+        limit = None if hardest is None else float(accuracy.resonant_stiffness(mass, hardest))
+        found.append(_hammer(modes, at, mass, bandwidth, drop, (centre, lowest), limit))
     progress.report("hammers", len(found), len(masses))
     return tuple(found)
 
 
-def _hammer(modes: Modes, at: Any, mass: float, bandwidth: float, drop: float, tuned: tuple[float, float]) -> Hammer:
-    """What one hammer can do; ``tuned`` are frequencies [Hz] far above those of the contact with the softest tip."""
-    striker = Striker.rigid(mass)
+def _body(target: Target, at: Any, masses: np.ndarray, centre: float, stages: Stages) -> tuple[Modes, float | None]:
+    """The body as the blows of all hammers need it; if by Ritz vectors, their highest contact resonance [Hz], too."""
+    if target.modes is not None:
+        return target.finished(target.modes), None
+    if vectors.usable(target):
+        outline = bodies.outline(target, stages)
+        case = Case(outline, Striker.rigid(masses[0]), Contact.linear(1.0), outline.point("at", at)[0], 1.0)
+        hardest = HARDEST**0.5 * centre
+
+        def blows(*resonances: float) -> list[dict[str, float]]:
+            pairs = [(mass, accuracy.resonant_stiffness(mass, f)) for mass in masses for f in resonances]
+            return [{"mass": mass, "stiffness": tip} for mass, tip in pairs]
+
+        # only whether a second impact follows matters
+        wanted = bodies.Sized(
+            target, case, blows(hardest, SOFTEST**0.5 * centre), blows(centre), VECTORS, max_impacts=2
+        )
+        views = wanted.views(case.at[None], stages)
+        if views is not None:
+            return next(iter(views.values())), hardest
+    with stages("modes"):
+        return target.finished(target.find(MOST_MODES, tolerance=TOLERANCE, stages=stages)), None
+
+
+def _hammer(
+    modes: Modes,
+    at: Any,
+    mass: float,
+    bandwidth: float,
+    drop: float,
+    tuned: tuple[float, float],
+    limit: float | None,
+) -> Hammer:
+    """What one hammer can do.
+
+    ``tuned`` are frequencies [Hz] far above those of the contact with the softest tip; ``limit`` is the hardest tip
+    [N/m], or None for the hardest that the modes resolve.
+    """
+    striker, alone = Striker.rigid(mass), replace(modes, poorer={})
+
+    @cache
+    def whole(tip: float) -> Response:
+        return strike(modes, striker, Contact.linear(tip), at=at, speed=1.0, tolerance=DECIDED)
 
     @cache
     def hit(tip: float, tolerance: float = DECIDED) -> Response:
-        return strike(modes, striker, Contact.linear(tip), at=at, speed=1.0, tolerance=tolerance)
+        return strike(alone, striker, Contact.linear(tip), at=at, speed=1.0, tolerance=tolerance)
 
     def once(tip: float) -> bool:
-        return hit(tip).n_impacts == 1
+        """Whether a tip hits once, as told by all descriptions of the body."""
+        if not modes.poorer or hit(tip).n_impacts != 1:
+            return hit(tip).n_impacts == 1
+        error = whole(tip).error
+        return error.truncation < 1.0 and error.mesh < 1.0
 
     def reaches(tip: float, tolerance: float = DECIDED) -> bool:
         return _reaches(hit(tip, tolerance), bandwidth, drop)
 
     low = SOFTEST * mass * (2.0 * np.pi * min(tuned)) ** 2
-    high = _last_resolved(modes, at, mass) if modes.omega.any() else STIFFEST * mass * (2.0 * np.pi * max(tuned)) ** 2
+    if limit is not None:
+        high = limit
+    elif modes.omega.any():
+        high = _last_resolved(modes, at, mass)
+    else:
+        high = STIFFEST * mass * (2.0 * np.pi * max(tuned)) ** 2
     if high <= low:
         return Hammer(float(mass), (), (), high, None, None, modes.notes)
     tips = _series(low, high, PER_DECADE[0])
-    table = grid.sweep(
-        modes, striker, Contact.linear(1.0), at=at, speed=1.0, over={"stiffness": tips}, tolerance=TOLERANCE
-    )
-    single = _ranges(tips, table.n_impacts.values == 1, once)
+    case = Case(modes, striker, Contact.linear(1.0), modes.point("at", at)[0], 1.0)
+    series = grid.Grid(case, {"stiffness": tips}, TOLERANCE, True, None, {}, max_impacts=2)
+    counts = grid.solve(series, 0, len(tips))[0][series.layers.index("n_impacts")]
+    single = _ranges(tips, counts == 1, once)
     working: Ranges = ()
     for ends in single:
         tips = _series(*ends, PER_DECADE[1])
         working += _ranges(tips, np.array([reaches(float(tip), TOLERANCE) for tip in tips]), reaches)
     last = _widest(working or single)[1] if single else None
-    reach, error = (bandwidth_of(hit(last), drop), hit(last).error.total) if last else (None, None)
+    reach, error = (bandwidth_of(hit(last), drop), whole(last).error.total) if last else (None, None)
     return Hammer(float(mass), single, working, high, reach, error, modes.notes)
 
 

@@ -142,10 +142,14 @@ def test_sound_and_spectrum_bring_the_modes_they_need(scene):
     assert fi.plan(SCENES / "heavy_plate.toml", quantity={"spectrum": 5e3}).target == "rigid"
 
 
-def test_points_of_observation_want_the_motion_of_modes(scene):
+def test_points_of_observation_want_motion(scene):
+    """That of the vectors if they tell it while the blow lasts, otherwise that of modes, found at once."""
     assert scene(PLATE + "[observe]\npoints = [[0.1, 0.1]]\n", mass=500e3).plan().target == "vectors"
     run = scene(PLATE + "[observe]\npoints = [[0.1, 0.1]]\n", mass=0.2).run()
-    assert run.seconds["modes"] > 0.0 and run.plan.max_frequency == run.response.target.frequencies[-1]
+    told = np.isfinite(run.response.motion_error([(0.1, 0.1)], [run.response.history.end_time]))
+    assert told == (run.plan.max_frequency is None)
+    run = scene(PLATE + "[observe]\npoints = [[0.1, 0.1]]\n", mass=0.2).run(quantity=["restitution", "sound=300"])
+    assert run.plan.max_frequency == run.response.target.frequencies[-1]
 
 
 def test_fewer_quantities_take_fewer_steps():

@@ -91,3 +91,33 @@ def test_a_saved_scene_strikes_as_the_page_does(stand, tmp_path):
     shown = explore_model.blow(stand.case(settings))
     assert saved.n_impacts == shown.n_impacts
     assert saved.impulse == pytest.approx(shown.impulse, rel=5e-3)  # both promise 1e-3
+
+
+ELEMENTS = TEXT.replace('source = "analytic"', 'source = "fe"').replace("stiffness = 695e3", "stiffness = 2e6")
+
+
+def test_hard_blows_on_elements_are_resolved_by_vectors(tmp_path):
+    """Where the first modes leave the contact unresolved; against a thousand modes in closed form."""
+    (tmp_path / "elements.toml").write_text(ELEMENTS)
+    bench = explore_model.Bench.of(fi.load_scene(tmp_path / "elements.toml"))
+    seen = bench.seen(bench.start.at)
+    assert bench.told and seen.poorer and bench.base.modes.n_modes == explore_model.FIRST_LOOK
+    mesh = bench.mesh
+    body = fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=1000, damping_ratio=0.01)
+    assert mesh.points.max() == pytest.approx(0.465)
+    for changes in ({"stiffness": 100.0, "mass": 0.01}, {"damping": 0.05, "thickness": 1.5}):
+        settings = replace(bench.start, **changes)
+        case = bench.case(settings, seen=seen)
+        hit, few = explore_model.blow(case), explore_model.blow(bench.case(settings))
+        ratio = settings.thickness
+        truth = fi.strike(
+            body.scaled(mass=0.2 * ratio, first_frequency=100.0 * ratio).damped(settings.damping),
+            case.striker, case.contact, at=case.at, speed=case.speed, tolerance=1e-4, max_impacts=hit.n_impacts,
+        )  # fmt: skip
+        assert hit.error.resolvable and hit.error.total < min(2e-2, few.error.total)
+        assert hit.peak_force == pytest.approx(truth.peak_force, rel=max(1e-3, hit.error.total))
+        assert hit.impacts[0].impulse == pytest.approx(truth.impacts[0].impulse, rel=max(1e-3, hit.error.total))
+
+
+def test_bodies_in_closed_form_keep_their_modes(stand):
+    assert not stand.told and stand.seen(stand.start.at) is None

@@ -1,0 +1,47 @@
+"""A struck plate as blows at several points see it: Ritz vectors started from each point, on meshes they share.
+
+A map strikes one body again and again. Every mesh is factorised once for all its points; the vectors of each point then
+cost one solution each, and are as good as those of a single blow there.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..modes.modal import Modes
+from ..modes.ritz import Krylov
+from .vectors import Seen
+
+TOGETHER = 8  # [-] points that share a mesh: each adds elements that shrink towards it
+
+
+class Krylovs(Krylov):
+    """Vectors of the first point; `each` has those of all points, one after another."""
+
+    def __init__(self, system, points: np.ndarray, shift: float) -> None:
+        super().__init__(system, points[:1], shift)
+        self.each: list[Krylov] = [self, *(self.beside(point[None]) for point in points[1:])]
+        self.compliance = np.diag([float(one.compliance[0, 0]) for one in self.each])
+
+
+class Views(Seen):
+    """`Seen` from several points (n_points, 2) [m]: with the same shift, meshes and number of vectors."""
+
+    fine: Krylovs
+    coarse: Krylovs | None
+
+    def _krylov(self, size: float) -> Krylovs:
+        system = self.target.near(self.at, size, self.stages)
+        with self.stages("vectors"):
+            return Krylovs(system, self.at, self.shift)
+
+    def of(self, point: int, cutoff: Callable[[Modes, float], float]) -> Modes:
+        """The target as seen from one of the points; ``cutoff`` as in `Seen.modes`."""
+        with self.stages("vectors"):
+            found = self.fine.each[point].modes(self.count)
+            if self.coarse is not None:
+                other = replace(self.coarse.each[point].modes(self.count), poorer={})
+                found = replace(found, poorer={**found.poorer, "mesh": other})
+        found = self.target.finished_vectors(found)
+        return found.truncated(max_frequency=cutoff(found, self.margin) * (1.0 + 1e-9))

@@ -1,0 +1,352 @@
+"""What a map needs of the struck body: Ritz vectors at each strike point if they can carry its blows, or else modes."""
+
+import hashlib
+import json
+import math
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from .._base.files import replacing
+from ..fe import refinement
+from ..fe.eigenvalues import Flexibility
+from ..impact import accuracy, collision
+from ..impact.contact import Contact
+from ..impact.response import Error
+from ..impact.striker import Striker
+from ..model import planner, vectors
+from ..model.target import CLOSE, FIRST_FLEXIBLE, Stages, Target
+from ..model.target import FIRST_LOOK as LEAST_KEPT
+from ..model.views import TOGETHER, Views
+from ..modes.modal import FieldShapes, Modes, SampledShapes, damping_ratios
+from .batches import ALLOWED
+from .cells import REACH, Case, checked_axes, sampled
+
+FIRST_LOOK = 40  # [-] modes found first, to estimate how many a map needs
+STRUCK = 10, 4  # [-] cells in all, and at each strike point at least, by which the vectors are judged
+SPARED = 0.2  # [-] of these may miss the tolerance: beside a cell with another number of impacts no error is small
+SEED = 0  # [-] of the choice of cells: the same map gives the same vectors
+
+Axes = Mapping[str, np.ndarray]
+Views_ = Mapping[tuple[float, ...], Modes]
+
+
+def body_of(
+    target: Target,
+    striker: Striker,
+    contact: Contact,
+    *,
+    at: Any,
+    speed: float,
+    over: Mapping[str, Any],
+    tolerance: float,
+    alone: bool = True,
+    keep: Path | None = None,
+    stages: Stages | None = None,
+) -> tuple[Case, dict[str, np.ndarray]]:
+    """The blow that all cells of a map share, on a body described as well as its cells need, and the map's axes.
+
+    Parameters
+    ----------
+    target : Target
+    striker, contact, at, speed, over, tolerance
+        As in `sweep`.
+    alone : bool
+        Whether only the numbers of the blows are wanted, with the residual compliance; otherwise modes are found.
+    keep : path of an .npz file, optional
+        Saves the vectors or the modes; the same map later reads them from there.
+    """
+    stages = stages or Stages()
+    speed = check.positive("speed", speed, "m/s", reach=REACH)
+    if alone and vectors.usable(target):
+        case = _started(outline(target, stages), striker, contact, at, speed)
+        axes = checked_axes(case, over)
+        seen = by_vectors(target, case, axes, tolerance=tolerance, stages=stages, keep=keep)
+        if seen is not None:
+            return seen, axes
+    with stages("modes"):
+        first = target.find(FIRST_LOOK, tolerance=tolerance, stages=stages)
+    case = _started(target.finished(first), striker, contact, at, speed)
+    axes = checked_axes(case, over)
+    with stages("modes"):
+        return _by_modes(target, case, axes, tolerance, keep), axes
+
+
+def _started(modes: Modes, striker: Striker, contact: Contact, at: Any, speed: float) -> Case:
+    return Case(modes, striker, contact, modes.point("at", at)[0], speed)
+
+
+def outline(target: Target, stages: Stages) -> Modes:
+    """What stands for a plate until its vectors are known: it has its points, its mass and one frequency, 1 rad/s."""
+    system = target.system or target.assembled(stages)
+    flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
+    shapes = FieldShapes(system, np.zeros((system.n_dofs, 1)), flexibility)
+    return Modes(np.ones(1), np.zeros(1), shapes, target.mass)
+
+
+def corners(axes: Axes) -> list[dict[str, Any]]:
+    """Values of the axes at every combination of their ends; all strike points count as ends."""
+    ends = [values if name == "at" else np.unique([values.min(), values.max()]) for name, values in axes.items()]
+    return [dict(zip(axes, chosen)) for chosen in product(*ends)]
+
+
+# --- modes -----------------------------------------------------------------------------------------------------------
+
+
+def _by_modes(target: Target, case: Case, axes: Axes, tolerance: float, keep: Path | None) -> Case:
+    """The blow on as many modes as the shortest contact of the map needs."""
+
+    def reach(tolerance: float) -> float:
+        found = (case.with_values(values) for values in corners(axes))
+        return max(
+            needed_frequency(corner, tolerance) * case.modes.frequencies[-1] / corner.modes.frequencies[-1]
+            for corner in found
+        )
+
+    modes, needed = case.modes, reach(tolerance)
+    if needed <= modes.frequencies[-1]:
+        return case
+    number, most = number_of_modes(modes, needed), planner.MOST_MODES[target.kind]
+    if number > most:
+        enough = accuracy.least_tolerance(lambda tolerance: number_of_modes(modes, reach(tolerance)) <= most)
+        raise check.SimulationError(
+            f"the shortest blow of the map needs about {number} modes, at most {most} are allowed; "
+            f"{_affordable(enough)}"
+        )
+    first = None
+    if keep is not None and target.kind == "fe":
+        first = target.find(LEAST_KEPT, tolerance=tolerance)  # what is kept starts from its mesh
+    more = target.find(number, tolerance=tolerance, first=first, keep=keep)
+    return replace(case, modes=target.finished(more))
+
+
+def _affordable(enough: float | None) -> str:
+    """What a user can change of a map that needs too much."""
+    said = "no tolerance is large enough" if enough is None else f"tolerance = {enough:g} is affordable"
+    return f"{said}; or leave out the stiffest contacts and the lightest strikers"
+
+
+def needed_frequency(case: Case, tolerance: float) -> float:
+    """Frequency [Hz] up to which a blow needs modes to meet the tolerance."""
+    return accuracy.cutoff_frequency(
+        case.modes, case.at, contact=case.contact, mass=case.striker.felt_mass, speed=case.speed,
+        tolerance=planner.SHARE * tolerance,
+    )  # fmt: skip
+
+
+def number_of_modes(first: Modes, frequency: float) -> int:
+    """Approximate number of modes up to a frequency [Hz], from the first modes by Weyl's law."""
+    growth = (frequency / first.frequencies[-1]) ** (0.5 * first.dimension)
+    return math.ceil(1.1 * first.n_modes * growth)
+
+
+# --- Ritz vectors ----------------------------------------------------------------------------------------------------
+
+
+def by_vectors(
+    target: Target, case: Case, axes: Axes, *, tolerance: float, stages: Stages, keep: Path | None = None
+) -> Case | None:
+    """The blow on Ritz vectors that carry every cell of a map; None if no mesh allowed or a point struck forbids it.
+
+    Parameters
+    ----------
+    target : Target, see `vectors.usable`
+    case : Case
+        On any `Modes` of the target.
+    axes : mapping of axis name to values, see `cells.checked_axes`
+    tolerance : float [-]
+        Of every cell; vectors and mesh may take what the time steps leave of it.
+    keep : path of an .npz file, optional
+        Saves the vectors at the strike points; the same map later reads them from there.
+
+    Notes
+    -----
+    The shortest contact of all cells chooses shift and first mesh. A few cells, those of the shortest and the longest
+    contact among them, are struck with all vectors, with fewer and on a coarser mesh; the errors decide on more vectors
+    or a finer mesh, as that of a single blow does.
+    """
+    if "target_frequency" in axes:
+        first = target.finished(target.find(FIRST_FLEXIBLE, tolerance=CLOSE))
+        case = replace(case, first=float(first.frequencies[first.omega > 0.0][0]))
+    points = axes.get("at", case.at[None])
+    key = _key(target, case, axes, tolerance)
+    views = None if keep is None else _read(keep, key)
+    if views is None:
+        others = {name: values for name, values in axes.items() if name != "at"}
+        rng, number = np.random.default_rng(SEED), max(STRUCK[1], math.ceil(STRUCK[0] / len(points)))
+        chance = [{name: rng.choice(values) for name, values in others.items()} for _ in range(number - 2)]
+        views = Sized(target, case, corners(others), chance, tolerance).views(points, stages)
+        if keep is not None and views is not None:
+            _write(keep, key, views)
+    if views is None:
+        return None
+    return replace(case, modes=views[tuple(points[0].tolist())], at=points[0], views=views)
+
+
+@dataclass(frozen=True, eq=False)
+class Sized:
+    """Many blows at one point, and what they ask of the vectors there."""
+
+    target: Target
+    case: Case  # what the blows share
+    ends: Sequence[Mapping[str, float]]  # values of the axes; the shortest and the longest contact are among them
+    chance: Sequence[Mapping[str, float]]  # values of the axes of other blows by which the vectors are judged
+    tolerance: float  # [-]
+    max_impacts: int | None = None  # what follows does not matter
+
+    def at(self, modes: Modes, point: np.ndarray, values: Mapping[str, float]) -> Case:
+        """One blow on a body of given modes."""
+        return replace(self.case, modes=modes, at=point, views={}).with_values(values)
+
+    def raised(self, values: Mapping[str, float]) -> float:
+        """Factor [-] by which an axis raises every frequency of the body in a blow."""
+        wanted = values.get("target_frequency")
+        return 1.0 if wanted is None or self.case.first is None else wanted / self.case.first
+
+    def views(self, points: np.ndarray, stages: Stages) -> Views_ | None:
+        """The target as seen from each point (n_points, 2) [m], reduced to it; None if that is impossible."""
+        resonance = [self.case.with_values(values).resonance / self.raised(values) for values in self.ends]
+        size = self._size(max(resonance))
+        if size is None:
+            return None
+        extreme = [self.ends[int(np.argmax(resonance))], self.ends[int(np.argmin(resonance))]]
+        views: dict[tuple[float, ...], Modes] = {}
+        for start in range(0, len(points), TOGETHER):
+            some = points[start : start + TOGETHER]
+            seen = Views(self.target, some, max(resonance), self.tolerance, size, self.target.size_stated, stages)
+            if seen.at_rest:
+                return None
+            tried: dict[tuple[int, int], list[float]] = {}
+            for blows in (extreme, [*extreme, *self.chance]):
+                found = self._enough(seen, blows, tried, stages)
+            views |= {tuple(point.tolist()): sampled(modes, point[None]) for point, modes in zip(some, found)}
+        return views
+
+    def _size(self, resonance: float) -> float | None:
+        """Element size [m] of the first mesh for the highest contact resonance [Hz]; None if it is too small."""
+        target = self.target
+        size = vectors.size_for(target, resonance, self.tolerance)
+        assert target.mesh is not None
+        area = planner.DOFS_PER_AREA["argyris"] * target.mesh.area
+        smallest = (area / refinement.MOST_UNKNOWNS) ** 0.5
+        return None if size < smallest and not target.size_stated else size
+
+    def _enough(
+        self,
+        seen: Views,
+        blows: Sequence[Mapping[str, float]],
+        tried: dict[tuple[int, int], list[float]],
+        stages: Stages,
+    ) -> list[Modes]:
+        """The target as seen from each point, with vectors and a mesh good enough for some blows.
+
+        ``tried`` collects the truncation errors of each point and blow. A blow that more vectors do not make any better
+        is given up, as it would be alone, and does not stop the others.
+        """
+        while True:
+            found = [seen.of(i, self._cutoff(point)) for i, point in enumerate(seen.at)]
+            errors, lost = [], False
+            with stages("strike"):
+                for (i, modes), (n, values) in product(enumerate(found), enumerate(blows)):
+                    before = tried.setdefault((i, n), [])
+                    if not vectors.hopeless(before):
+                        errors.append(self._error(self.at(modes, seen.at[i], values)))
+                        before.append(errors[-1][0])
+                        lost |= vectors.hopeless(before)
+            if lost:
+                seen.tried.clear()  # the others have not been tried as often
+            worst = np.sort(np.array(errors or [(0.0, 0.0)]), axis=0)  # (n_struck, 2)
+            error = Error(0.0, *worst[len(worst) - 1 - int(SPARED * len(worst))].tolist())
+            if not seen.improved(error, (1.0 - ALLOWED) * self.tolerance):
+                return found
+
+    def _cutoff(self, point: np.ndarray) -> Callable[[Modes, float], float]:
+        """Highest frequency [Hz] that any blow needs of some modes; takes them and a safety factor."""
+
+        def cutoff(modes: Modes, margin: float) -> float:
+            needed = []
+            for values in self.ends:
+                case = self.at(modes, point, values)
+                loss = accuracy.LOSSY if case.contact.loss else 1.0
+                allowed = planner.SHARE * self.tolerance / (planner.CAUTION * loss * margin)
+                law: dict[str, Any] = {"contact": case.contact, "mass": case.striker.felt_mass, "speed": case.speed}
+                limit = accuracy.tail_cutoff(case.modes, point[None], tolerance=allowed, **law)
+                needed.append(limit / self.raised(values))
+            return max(needed)
+
+        return cutoff
+
+    def _error(self, case: Case) -> tuple[float, float]:
+        """Errors of vectors and of the mesh in a blow; nothing if it fails."""
+        try:
+            hit = collision.strike(
+                case.modes, case.striker, case.contact, at=case.at, speed=case.speed,
+                tolerance=max(planner.FINEST, planner.STEPS * self.tolerance), max_impacts=self.max_impacts,
+            )  # fmt: skip
+        except check.SimulationError:
+            return 0.0, 0.0
+        return hit.error.truncation, hit.error.mesh
+
+
+# --- a file of vectors -----------------------------------------------------------------------------------------------
+
+
+def _key(target: Target, case: Case, axes: Axes, tolerance: float) -> str:
+    """Hash of everything that determines the vectors of a map."""
+    shapes = case.modes.shapes
+    assert isinstance(shapes, FieldShapes)
+    system, striker = shapes.system, case.striker
+    ratio = 0.0 if target.damping_ratio is None else target.damping_ratio
+    told = {
+        "striker": [*striker.modes.omega.tolist(), striker.felt_mass, *striker.shape.tolist()],
+        "contact": vars(case.contact),
+        "blow": [case.speed, tolerance, *case.at.tolist(), case.first],
+        "target": [target.mass, dict(target.scale), target.size_stated],
+        "damping": damping_ratios(ratio, np.geomspace(1.0, 1e7, 50)).tolist(),
+        "axes": {name: values.tolist() for name, values in axes.items()},
+    }
+    body = hashlib.sha256(json.dumps(told, sort_keys=True).encode())
+    for matrix in (system.K, system.M):
+        body.update(matrix.data.tobytes())
+    body.update(repr((system.frame.length, system.frame.stiffness, system.frame.inertia)).encode())
+    return body.hexdigest()
+
+
+def _write(path: Path, key: str, views: Views_) -> None:
+    """Save the vectors at the points that they started from."""
+    arrays: dict[str, Any] = {"key": key, "places": np.array(list(views))}
+    for i, modes in enumerate(views.values()):
+        arrays |= {f"{i} mass": modes.mass, f"{i} notes": np.array(modes.notes, dtype=str)}
+        for cause, some in {"": modes, **modes.poorer}.items():
+            assert isinstance(some.shapes, SampledShapes)
+            columns = some.omega, some.damping_ratio, some.shapes.values, some.shapes.static
+            arrays |= {f"{i} {cause} {n}": column for n, column in enumerate(columns)}
+    with replacing(path) as temporary, open(temporary, "wb") as file:
+        np.savez(file, **arrays)
+
+
+def _read(path: Path, key: str) -> Views_ | None:
+    """What `_write` saved for the same map; None if there is no such file, or it is damaged."""
+    try:
+        with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
+            if str(file["key"]) != key:
+                return None
+            views = {}
+            for i, place in enumerate(file["places"]):
+                mass, notes = float(file[f"{i} mass"]), tuple(map(str, file[f"{i} notes"]))
+                found = {}
+                for cause in ("", "truncation", "mesh"):
+                    if f"{i} {cause} 0" in file:
+                        omega, zeta, rows, static = (file[f"{i} {cause} {n}"] for n in range(4))
+                        found[cause] = Modes(omega, zeta, SampledShapes(place[None], rows, static), mass, notes=notes)
+                whole = found.pop("")
+                views[tuple(place.tolist())] = replace(whole, poorer=found)
+            return views
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError, MemoryError):
+        return None  # find the vectors again and overwrite it

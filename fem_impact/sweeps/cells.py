@@ -1,0 +1,139 @@
+"""The cells of a map: one blow, and the parameters along which a map may vary it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from ..impact import accuracy
+from ..impact.contact import Contact
+from ..impact.striker import Striker
+from ..modes.modal import Modes, SampledShapes
+
+AXES = {  # name: unit, what it is, its name in a scene file
+    "mass": ("kg", "mass of the striker", "striker.mass"),
+    "striker_frequency": ("Hz", "first flexible frequency of the striker", "striker.first_frequency"),
+    "stiffness": ("N/m**exponent", "stiffness of the contact", "contact.stiffness"),
+    "exponent": ("", "exponent of the contact", "contact.exponent"),
+    "loss": ("s/m", "loss factor of the contact", "contact.loss"),
+    "gap": ("m", "distance the striker travels before contact", "contact.gap"),
+    "speed": ("m/s", "speed of the striker's contact point", "strike.speed"),
+    "at": ("m", "strike point", "strike.at"),
+    "target_mass": ("kg", "mass of the struck body", "target.mass"),
+    "target_frequency": ("Hz", "first flexible frequency of the struck body", "target.first_frequency"),
+    "damping_ratio": ("", "damping ratio of the struck body", "target.damping_ratio"),
+}
+ALIASES = {alias: name for name, (_, _, alias) in AXES.items()}
+FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  # each value needs new kernels
+REACH = 1e30  # [SI] speeds, masses and frequencies lie between 1/REACH and REACH: beyond, the kernels never finish
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One cell of a map: the arguments of `strike`."""
+
+    modes: Modes
+    striker: Striker
+    contact: Contact
+    at: np.ndarray  # (dimension,) [m]
+    speed: float  # [m/s]
+    # The body as seen from each strike point, if it is described by Ritz vectors, which differ from point to point
+    views: Mapping[tuple[float, ...], Modes] = field(default_factory=dict)
+    first: float | None = None  # [Hz] first flexible mode of the body, if the first of its vectors may be another
+
+    @property
+    def resonance(self) -> float:
+        """Contact resonance [Hz] of the striker on a rigid wall."""
+        return accuracy.contact_resonance(self.contact, self.striker.felt_mass, self.speed)
+
+    @property
+    def first_frequency(self) -> float:
+        """First flexible frequency [Hz] of the struck body."""
+        return self.first or float(self.modes.frequencies[self.modes.omega > 0.0][0])
+
+    def changed(self, name: str, value: Any) -> "Case":
+        """The same blow with one parameter of `AXES` replaced."""
+        if name == "at":
+            seen = self.views.get(tuple(np.atleast_1d(np.asarray(value, float)).tolist()), self.modes)
+            return replace(self, at=seen.point("at", value)[0], modes=seen)
+        if name == "speed":
+            return replace(self, speed=check.positive("speed", value, "m/s", reach=REACH))
+        if name in ("stiffness", "exponent", "loss", "gap"):
+            return replace(self, contact=replace(self.contact, **{name: float(value)}))
+        if name in ("mass", "striker_frequency"):
+            key = "mass" if name == "mass" else "first_frequency"
+            return replace(self, striker=replace(self.striker, modes=self.striker.modes.scaled(**{key: value})))
+        if name == "damping_ratio":
+            return self._with(lambda modes: modes.damped(value))
+        if name == "target_mass":
+            return self._with(lambda modes: modes.scaled(mass=value))
+        if self.first is None:
+            return self._with(lambda modes: modes.scaled(first_frequency=value))
+        ratio = check.positive("first_frequency", value, "Hz") / self.first
+        return replace(self._with(lambda modes: modes.stretched(1.0, ratio)), first=ratio * self.first)
+
+    def with_values(self, values: Mapping[str, Any]) -> "Case":
+        """The same blow with several parameters of `AXES` replaced."""
+        case = self
+        for name, value in values.items():
+            case = case.changed(name, value)
+        return case
+
+    def _with(self, change: Callable[[Modes], Modes]) -> "Case":
+        """The same blow on a body changed alike wherever it is seen from."""
+        return replace(
+            self, modes=change(self.modes), views={place: change(modes) for place, modes in self.views.items()}
+        )
+
+    def poorer(self, cause: str) -> "Case":
+        """The same blow on the body described less well (`Modes.poorer`)."""
+        return self._with(lambda modes: modes.poorer.get(cause, modes))
+
+    def sampled(self, places: np.ndarray) -> "Case":
+        """The same blow on bodies reduced to their contact points, (n_points, dimension) [m] of the one struck."""
+        striker = self.striker
+        if striker.modes.dimension:
+            striker = replace(striker, modes=sampled(striker.modes, striker.at[None]))
+        if self.views:
+            views = {place: sampled(modes, np.array([place])) for place, modes in self.views.items()}
+            return replace(self, modes=sampled(self.modes, self.at[None]), striker=striker, views=views)
+        places = np.unique(np.vstack([places, self.at[None]]), axis=0)
+        return replace(self, modes=sampled(self.modes, places), striker=striker)
+
+
+def sampled(modes: Modes, points: np.ndarray) -> Modes:
+    """Modes at the given points only; leaves out the compliance between different points, which no blow needs."""
+    static = np.diag([float(modes.shapes.compliance(point[None])[0, 0]) for point in points])
+    poorer = {cause: sampled(other, points) for cause, other in modes.poorer.items()}
+    return replace(modes, shapes=SampledShapes(points, modes.shape_at(points), static), poorer=poorer)
+
+
+def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Checked values of every axis, under its name in `AXES`."""
+    if not isinstance(over, Mapping) or not over:
+        raise ValueError(f"over must name at least one axis, for example {{'mass': [...]}}, got {check.shown(over)}")
+    axes: dict[str, np.ndarray] = {}
+    for given, values in over.items():
+        name = ALIASES.get(given, given)
+        check.one_of("over", name, AXES)
+        if name in axes:
+            raise ValueError(f"over names the axis {name} twice")
+        if name == "at":
+            axes[name] = base.modes.points("over['at']", values)
+        else:
+            axes[name] = check.array(f"over[{given!r}]", values, (None,), AXES[name][0])
+        if not len(axes[name]):
+            raise ValueError(f"over[{given!r}] must contain at least one value")
+        if name in ("stiffness", "exponent", "loss", "gap"):
+            for value in axes[name]:
+                base.changed(name, value)
+        elif name != "at":
+            for value in axes[name]:
+                if name == "damping_ratio":
+                    check.non_negative(name, value)
+                else:
+                    check.positive(name, value, AXES[name][0], reach=REACH)
+            base.changed(name, axes[name][0])  # raises if the body cannot change this way, whatever the value
+    return axes

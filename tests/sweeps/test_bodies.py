@@ -1,0 +1,134 @@
+"""Maps of plates by elements, told by Ritz vectors: against closed forms and single blows, and when modes serve."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.model.target import Target
+from fem_impact.sweeps import bodies
+
+WOOD = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), thickness=3e-3)
+AT = (0.2, 0.11)
+BALL = fi.Striker.rigid(0.03)
+
+
+def plate(**more):
+    return fi.assemble(fi.mesh.rectangle(0.465, 0.3), WOOD, {"boundary": "hinged"}, **more)
+
+
+def closed(n_modes=1500):
+    body = plate()
+    return fi.analytic.closed_form(body.mesh, WOOD, {"boundary": "hinged"})(n_modes=n_modes)
+
+
+def apart(table, truth):
+    """Error of each cell; 1 where the number of impacts differs."""
+    found = np.abs(table.restitution - truth.restitution).values
+    for name in ("impulse", "contact_time", "peak_force"):
+        found = np.maximum(found, np.abs(table[name] / truth[name] - 1.0).values)
+    return np.where((table.n_impacts == truth.n_impacts).values, found, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("law", "soft", "hard", "tolerance"),
+    [
+        (fi.Contact.hertz(1e6), 1e5, 1e7, 1e-2),
+        pytest.param(fi.Contact.linear(1e5), 1e4, 1e6, 1e-2, marks=pytest.mark.slow),
+        pytest.param(fi.Contact.hertz(1e6), 1e5, 1e8, 1e-3, marks=pytest.mark.slow),
+    ],
+)
+def test_a_map_of_elements_is_that_of_the_closed_form(law, soft, hard, tolerance):
+    over = {"stiffness": np.geomspace(soft, hard, 8), "mass": np.geomspace(3e-3, 0.06, 8)}
+    table = fi.sweep(plate(), BALL, law, at=AT, speed=1.0, over=over, tolerance=tolerance)
+    truth = fi.sweep(closed(), BALL, law, at=AT, speed=1.0, over=over, tolerance=tolerance / 20.0)
+    found, met = apart(table, truth), table.tolerance_met.values
+    # one cell in 64 may hold a touch of 1e-5 of the impulse, which decides the number of impacts
+    assert (found > (table.error + table.truncation).values).sum() <= 1
+    assert (found[met] > tolerance).sum() <= 1 and met.mean() > 0.85
+    assert (table.truncation > 0.0).all()
+
+
+def test_cells_at_several_points_are_single_blows_there():
+    points = [(0.2, 0.11), (0.1, 0.2), (0.33, 0.08)]
+    over = {"mass": [5e-3, 0.03], "at": points}
+    law = fi.Contact.hertz(3e6)
+    table = fi.sweep(plate(), BALL, law, at=AT, speed=1.0, over=over, tolerance=1e-2, damping_ratio=0.01)
+    for i, point in enumerate(points):
+        for mass in over["mass"]:
+            cell = table.sel(mass=mass).isel(at=i)
+            hit = fi.strike(
+                plate(), fi.Striker.rigid(mass), law, at=point, speed=1.0, tolerance=1e-2, damping_ratio=0.01
+            )
+            assert int(cell.n_impacts) == hit.n_impacts
+            assert float(cell.restitution) == pytest.approx(hit.restitution, abs=2e-2)  # 1e-2 each
+            assert float(cell.peak_force) == pytest.approx(hit.peak_force, rel=2e-2)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("target_mass", [0.05, 0.3]),
+        ("target_frequency", [80.0, 200.0]),
+        ("damping_ratio", [0.0, 0.05]),
+        ("loss", [0.0, 0.3]),
+        ("gap", [0.0, 1e-3]),
+    ],
+)
+def test_axes_of_body_and_contact_are_those_of_the_closed_form(name, values):
+    shared = {"at": AT, "speed": 1.0, "over": {name: values}}
+    table = fi.sweep(plate(), BALL, fi.Contact.hertz(2e6), tolerance=1e-2, **shared)
+    truth = fi.sweep(closed(600), BALL, fi.Contact.hertz(2e6), tolerance=1e-3, **shared)
+    assert apart(table, truth).max() < 1e-2 and table.tolerance_met.all()
+
+
+def test_what_vectors_cannot_tell_is_told_by_modes():
+    beam = fi.assemble(
+        fi.mesh.line(0.4), fi.Beam.rectangular(WOOD.material, width=0.02, height=0.01), {"left": "clamped"}
+    )
+    blow = {"at": 0.3, "speed": 1.0, "over": {"mass": [5e-3, 0.02]}, "tolerance": 1e-2}
+    table = fi.sweep(beam, BALL, fi.Contact.linear(1e4), **blow)
+    modes = fi.sweep(fi.find_modes(beam, n_modes=60), BALL, fi.Contact.linear(1e4), **blow)
+    assert apart(table, modes).max() < 1e-2
+    resting = fi.sweep(plate(), BALL, fi.Contact.hertz(1e6), at=(0.0, 0.1), speed=1.0, over={"mass": [0.03]})
+    assert float(resting.restitution[0]) == pytest.approx(1.0, abs=1e-6)  # as a wall
+    layered = fi.sweep(
+        plate(), BALL, fi.Contact.hertz(1e5), at=AT, speed=1.0, over={"mass": [0.03]}, tolerance=1e-2,
+        layers={"far": lambda hit: float(hit.displacement([(0.1, 0.1)], [1e-3], residual=False)[0, 0])},
+    )  # fmt: skip
+    assert abs(float(layered.far[0])) > 1e-6  # of a body that is known everywhere
+
+
+def test_points_off_the_body_and_wrong_axes_are_told_before_the_work():
+    shared = {"speed": 1.0, "tolerance": 1e-2}
+    with pytest.raises(ValueError, match="at must lie on the body, got"):
+        fi.sweep(plate(), BALL, fi.Contact.hertz(1e6), at=(9.0, 9.0), over={"mass": [0.1]}, **shared)
+    with pytest.raises(ValueError, match=r"over\['at'\] must lie on the body"):
+        fi.sweep(plate(), BALL, fi.Contact.hertz(1e6), at=AT, over={"at": [(9.0, 9.0)]}, **shared)
+    with pytest.raises(ValueError, match="over"):
+        fi.sweep(plate(), BALL, fi.Contact.hertz(1e6), at=AT, over={"weight": [0.1]}, **shared)
+
+
+def test_kept_vectors_serve_the_same_map_only(tmp_path):
+    def found(tolerance=1e-2, mass=0.03, keep=tmp_path / "kept.npz"):
+        over = {"mass": [0.01, mass], "at": [AT, (0.1, 0.2)]}
+        return bodies.body_of(
+            Target.of(plate()), BALL, fi.Contact.hertz(1e6), at=AT, speed=1.0, over=over, tolerance=tolerance, keep=keep
+        )[0]
+
+    first, size = found(), (tmp_path / "kept.npz").stat().st_size
+    again = found()
+    assert size < 1e6  # only what the strike points show
+    for place, modes in first.views.items():
+        for one, other in (
+            (modes, again.views[place]),
+            *zip(modes.poorer.values(), again.views[place].poorer.values()),
+        ):
+            assert_allclose(one.omega, other.omega, rtol=0.0)
+            assert_allclose(one.shape_at([place]), other.shape_at([place]), rtol=0.0)
+    assert set(modes.poorer) == {"truncation", "mesh"}
+    before = (tmp_path / "kept.npz").read_bytes()
+    found(mass=0.02)
+    assert (tmp_path / "kept.npz").read_bytes() != before
+    (tmp_path / "kept.npz").write_bytes(before[:100])
+    assert_allclose(found().modes.omega, first.modes.omega, rtol=1e-9)

@@ -1,0 +1,55 @@
+"""One cell of a map: what each axis replaces, on bodies that are seen from each strike point."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.modes.modal import SampledShapes
+from fem_impact.sweeps.cells import Case, sampled
+
+HERE, THERE = (0.3, 0.2), (0.7, 0.45)
+PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=40)
+
+
+def case(**more):
+    views = {place: sampled(PLATE.truncated(n_modes=n), np.array([place])) for place, n in ((HERE, 30), (THERE, 20))}
+    return Case(views[HERE], fi.Striker.rigid(0.1), fi.Contact.linear(1e5), np.array(HERE), 1.0, views=views, **more)
+
+
+def test_another_strike_point_brings_the_body_as_seen_from_there():
+    moved = case().changed("at", THERE)
+    assert moved.modes.n_modes == 20 and moved.at.tolist() == list(THERE)
+    with pytest.raises(ValueError, match="at must lie on the body"):
+        case().changed("at", (0.1, 0.1))
+
+
+@pytest.mark.parametrize("names", [("target_mass", "at"), ("at", "target_mass")])
+def test_a_change_of_the_body_holds_at_every_strike_point(names):
+    values = {"target_mass": 0.4, "at": THERE}
+    changed = case().with_values({name: values[name] for name in names})
+    assert changed.modes.mass == 0.4 and changed.modes.n_modes == 20
+    assert_allclose(changed.modes.shape_at([THERE]), PLATE.truncated(n_modes=20).shape_at([THERE]) / 2**0.5)
+
+
+def test_frequencies_are_scaled_by_the_first_mode_even_if_no_vector_shows_it():
+    """Vectors that start where the first mode rests begin with another: here all are twice the first."""
+    known = case(first=50.0).changed("target_frequency", 75.0)
+    assert known.first_frequency == 75.0 and case().first_frequency == pytest.approx(100.0)
+    assert_allclose(known.modes.omega, 1.5 * PLATE.omega[:30])
+    assert_allclose(case().changed("target_frequency", 75.0).modes.omega, 0.75 * PLATE.omega[:30])
+
+
+def test_reduced_bodies_give_the_same_blow_and_keep_what_is_poorer():
+    whole = case()
+    reduced = whole.sampled(np.array([HERE, THERE]))
+    assert isinstance(reduced.changed("at", THERE).modes.shapes, SampledShapes)
+    hits = [fi.strike(one.modes, one.striker, one.contact, at=HERE, speed=1.0) for one in (whole, reduced)]
+    assert hits[0].restitution == pytest.approx(hits[1].restitution, abs=1e-12)
+    system = fi.assemble(
+        fi.mesh.rectangle(0.4, 0.3), fi.Plate(fi.Material(10e9, 0.3, 450.0), 3e-3), {"boundary": "hinged"}
+    )
+    seen = fi.ritz_modes(system, [(0.1, 0.1)], max_frequency=1e3, n_vectors=30)
+    small = sampled(seen, np.array([(0.1, 0.1)]))
+    assert small.poorer["truncation"].n_modes == seen.poorer["truncation"].n_modes == 24  # four fifths
+    assert isinstance(small.poorer["truncation"].shapes, SampledShapes)
