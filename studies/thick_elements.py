@@ -17,8 +17,8 @@ from scipy.optimize import brentq
 from scipy.sparse import block_diag, coo_matrix, csr_matrix
 from scipy.sparse.linalg import eigsh
 from scipy.special import ive, jv
-from skfem import Basis, BilinearForm, ElementTriN2, ElementTriP2, ElementTriP2B, ElementTriP4, ElementVector
-from skfem import MeshTri, MeshTri2
+from skfem import Basis, BilinearForm, ElementVector, MeshTri, MeshTri2
+from skfem.element import ElementTriN2, ElementTriP2, ElementTriP2B, ElementTriP4
 from skfem.quadrature import get_quadrature
 
 import fem_impact as fi

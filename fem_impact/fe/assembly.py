@@ -151,7 +151,8 @@ class System:
 
         On a thick plate it is the mean over the disk on which a force at the point acts, see `thick`.
         """
-        return _interpolation(self.space, self.element_dofs, self.expand, self.frame, self.section, points) @ self.expand
+        rows = _interpolation(self.space, self.element_dofs, self.expand, self.frame, self.section, points)
+        return rows @ self.expand
 
 
 @check.typed
@@ -229,8 +230,8 @@ def _made(
     elif isinstance(section, Plate) and element == "morley":
         made = _assemble_morley(mesh, section, supports, masses)
     elif mesh.dimension == 2 and isinstance(section, Plate):
-        thicker = element not in ELEMENTS["kirchhoff"]
-        allowed = (*KINDS, SOFT) if thicker else KINDS
+        thicker = element in ELEMENTS["mindlin"]
+        allowed = support_words("mindlin" if thicker else None)
         stated = _kinds(support_of_facets(mesh, supports, allowed))
         order, unresolved, fine = around_corners(mesh, stated, section.material.nu)
         fine = fine if graded else mesh
@@ -275,6 +276,11 @@ def reassemble(system: System, mesh: Mesh, near: np.ndarray | None = None, layer
 def notes_on(mesh: Mesh, section: Plate | Beam) -> tuple[str, ...]:
     """What a mesh assumed, and numbers of the body that are probably a slip of a unit."""
     return plausible.together(mesh.notes, plausible.body(np.ptp(mesh.points, axis=0), section))
+
+
+def support_words(theory: str | None) -> tuple[str, ...]:
+    """Words for the support of an edge, besides `Elastic`."""
+    return (*KINDS, SOFT) if theory == "mindlin" else KINDS
 
 
 def support_of_facets(mesh: Mesh, supports: dict, allowed: tuple[str, ...] = KINDS) -> list[str | Elastic]:
@@ -451,9 +457,7 @@ def _assemble_timoshenko(mesh: Mesh, section: Beam, supports: dict, masses: list
     )  # fmt: skip
 
 
-def _assemble_beam(
-    mesh: Mesh, section: Beam, supports: dict, masses: list, marked: np.ndarray, element: str
-) -> System:
+def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, masses: list, marked: np.ndarray, element: str) -> System:
     """Assemble a beam; ``marked`` are places (n,) [m] where the shear force jumps."""
     centre, length, points = _centred(mesh)
 
@@ -581,7 +585,7 @@ def _assemble_thick(mesh: Mesh, section: Plate, supports: dict, masses: list) ->
     fields = thick.Fields(
         x, dx, MASS_ORDER, stiffness * dx[..., None, None], shear * dx[..., None, None], inertia * dx, rotary * dx
     )
-    held = support_of_facets(mesh, supports, (*KINDS, SOFT))
+    held = support_of_facets(mesh, supports, support_words("mindlin"))
     if section.tension and "free" in held:
         raise ValueError("tension needs every edge supported, because a free edge cannot be pulled; add supports")
     kinds, elastic = _kinds(held), edge_springs(held, frame)
@@ -593,8 +597,8 @@ def _assemble_thick(mesh: Mesh, section: Plate, supports: dict, masses: list) ->
     springs = _scatter(pulled, dofs, n_all)
     on = np.flatnonzero(elastic.any(axis=1))
     if on.size:
-        cells, sides = cells_of_facets(mesh.facets[on], space.vertices)
-        pushed = thick.edge_springs(space, mesh.facets[on], cells, sides, elastic[on])
+        cells = cells_of_facets(mesh.facets[on], space.vertices)[0]
+        pushed = thick.edge_springs(space, mesh.facets[on], cells, elastic[on])
         springs = springs + _scatter(pushed, dofs[:, cells], n_all)
     matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), springs
     area = np.abs(np.linalg.det(space.jacobian))

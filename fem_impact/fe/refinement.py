@@ -25,7 +25,8 @@ WAVE_PER_ELEMENT = {
     "argyris": 1.8, "hermite": 30.0, "morley": 0.2, "argyris and shear": 1.8, "hermite and shear": 30.0,
 }  # fmt: skip
 ERROR_OF_WAVE = (8e-7, 3.3)  # [-] a smooth frequency's error is at most 8e-7 (kh)**8, growing slower above kh = 3.3
-EDGE_TERM = {"clamped": 1.76, "hinged": 1.0, "soft hinged": 1.0, "free": -1.71}  # [-] factor of the edge length in Weyl's law for plates
+# [-] factor of the edge length in Weyl's law for plates
+EDGE_TERM = {"clamped": 1.76, "hinged": 1.0, "soft hinged": 1.0, "free": -1.71}
 MORLEY_ERROR = 0.2  # [-] relative frequency error of Morley elements, divided by (kh)**2
 CLAIMED = 2.0  # [-] factor on error estimates, which are 0.3 to 4 times the true error; test_residual.py
 ROUNDED = 3.0  # [-] factor on the rounding error of K, estimated as a random walk
@@ -165,8 +166,7 @@ def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarr
 def _compared(system: System, omega: np.ndarray) -> np.ndarray:
     """Estimated errors (n_modes,) [rad/s] of frequencies of a thick plate, from those on larger or smaller triangles.
 
-    `COMPARED` is about what halves the error of the first mesh of a clamped plate with singular corners, and less than
-    the eighth power that smooth plates reach: errors are stated two to five times too large there.
+    The order assumed is less than that of smooth plates, whose errors are stated some three times too large.
     """
     mesh, n_modes = system.mesh, len(omega)
     if mesh.recipe is None:

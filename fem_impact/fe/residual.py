@@ -19,6 +19,7 @@ import numpy as np
 from ..mesh.facets import powers
 from . import beam_elements, timoshenko
 from .assembly import System, beam_fields
+from .section import Beam
 from .springs import along_facets
 from .supports import SIDES, cells_of_facets
 from .timoshenko import TimoshenkoSpace
@@ -207,6 +208,7 @@ def energy_errors(
     space: Any = system.space
     frame = system.frame
     if isinstance(space, TimoshenkoSpace):
+        assert isinstance(system.section, Beam)
         pushed = [
             (frame.local(point[None])[0, 0], mass / frame.mass * np.asarray(system.interpolate(point[None]) @ loads)[0])
             for point, mass in system.point_masses

@@ -5,8 +5,9 @@ section, and a deflection s by shear:
 
     w = W + s,     U = 1/2 int (E I W''^2 + kappa G A s'^2),     T = 1/2 int (rho A w'^2 + rho I W'^2)  (rates)
 
-Written so, nothing locks and no digit is lost however slender the beam; at a step of the section s may have a kink. The
-elements of W are those of `beam_elements`; s has the same degree. It is zero at the left end, because only W + s counts.
+Written so, nothing locks and no digit is lost however slender the beam; at a step of the section s may have a kink.
+The elements of W are those of `beam_elements`; s has the same degree, and is zero at the left end, because only W + s
+counts.
 
 References
 ----------
