@@ -235,11 +235,10 @@ def _made(
         stated = _kinds(support_of_facets(mesh, supports, allowed))
         order, unresolved, fine = around_corners(mesh, stated, section.material.nu)
         fine = fine if graded else mesh
-        least: Any = 0.0
         if thicker:
             fine = thick.layered(fine, section, _kinds(support_of_facets(fine, supports, allowed)), layer)
-            least = thick.PATCH * evaluate("thickness", section.thickness, marked, "m")
         if len(marked):
+            least = thick.PATCH * evaluate("thickness", section.thickness, marked, "m") if thicker else 0.0
             held = np.array([kind != "free" for kind in support_of_facets(fine, supports, allowed)])
             fine = towards_points(fine, marked, held, least)
         assembled = _assemble_thick if thicker else _assemble_plate

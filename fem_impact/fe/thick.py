@@ -62,9 +62,9 @@ CHUNK = 128  # [-] triangles whose matrices are computed together, to limit memo
 FINE, ROUGH = (6, 24), (2, 8)  # [-] points on that disk, radial and around: error 3e-5 of a compliance at h/L = 0.2
 FEW = 64  # [-] at more points, as for a picture, the rough ones do: their error is 1e-6 of a mode of h k = 1
 LOOSE = "free", SOFT  # supports with a layer
-LAYER = 3.0  # [-] size of triangles in this layer over the thickness h: errors of 1e-3 h / L of a frequency
+LAYER = 2.0  # [-] size of triangles in this layer over the thickness h: errors of some 2e-4 h / L of a frequency
 MOST_LAYER = 120.0  # [-] most triangles along these edges; a plate that needs more keeps larger ones
-SEEN, UNSEEN = 5.0, 9.0  # [-] sides over the thickness below which they resolve the layer, above which they miss it
+SEEN, UNSEEN = 4.0, 9.0  # [-] sides over the thickness below which they resolve the layer, above which they miss it
 EVEN = 1.5  # [-] longest side of a triangle over the size asked for
 
 
