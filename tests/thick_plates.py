@@ -41,8 +41,8 @@ def spread_compliance(length, width, h, E, nu, at, radius, n=3000):
 def ritz(h, nu, sides, degree, n_modes):
     """First omega [rad/s] of a unit square, E = rho = 1, by Legendre polynomials in the conditions of its edges.
 
-    ``sides`` are "clamped", "hinged", "soft hinged" or "free" for left, right, bottom, top. Liew, Xiang and Kitipornchai (1993),
-    Int. J. Solids Struct. 30, 3357-3379, used the same space.
+    ``sides`` are "clamped", "hinged", "soft hinged" or "free" for left, right, bottom, top. Liew, Xiang and
+    Kitipornchai (1993), Int. J. Solids Struct. 30, 3357-3379, used the same space.
     """
     D, S = h**3 / 12.0 / (1.0 - nu**2), KAPPA * h / 2.0 / (1.0 + nu)
     node, weight = legendre.leggauss(degree + 4)

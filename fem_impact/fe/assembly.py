@@ -11,16 +11,16 @@ from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, eye_array, v
 from .._base import check
 from ..mesh.facets import Curves
 from ..mesh.meshes import Mesh, aligned
-from . import beam_elements, plausible, thick, timoshenko
+from . import beam_elements, plausible, shear_beam, thick
 from .beam_elements import HermiteSpace
 from .corners import around_corners
 from .elements import ArgyrisSpace, Bent, BentMapping, MorleySpace, numbering, quadrature, triangles
 from .section import KINDS, SOFT, Beam, Elastic, Plate, evaluate
+from .shear_beam import TimoshenkoSpace
 from .splitting import towards_points
 from .springs import beam_springs, check_masses, edge_springs, plate_springs
 from .supports import Rim, cells_of_facets, constrain
 from .thick import MindlinSpace, ThickStrain
-from .timoshenko import TimoshenkoSpace
 
 THEORIES = {2: ("kirchhoff", "mindlin"), 1: ("euler", "timoshenko")}  # by dimension; the first is the default
 ELEMENTS = {
@@ -423,10 +423,10 @@ def _centred(mesh: Mesh) -> tuple[np.ndarray, float, np.ndarray]:
     return centre, length, (mesh.points - centre) / length
 
 
-def beam_fields(mesh: Mesh, section: Beam, frame: Frame) -> list[timoshenko.Field]:
+def beam_fields(mesh: Mesh, section: Beam, frame: Frame) -> list[shear_beam.Field]:
     """Bending and shear stiffness, mass and rotary inertia per length at places (n,), all in the frame."""
 
-    def field(of: Callable, unit: float) -> timoshenko.Field:
+    def field(of: Callable, unit: float) -> shear_beam.Field:
         def at(x: np.ndarray) -> np.ndarray:
             place = (frame.centre + frame.length * x[:, None]).clip(mesh.points.min(), mesh.points.max())
             return of(place) / unit
@@ -442,15 +442,15 @@ def _assemble_timoshenko(mesh: Mesh, section: Beam, supports: dict, masses: list
     """Assemble a Timoshenko beam on the elements ``line``."""
     space, fields = TimoshenkoSpace(line), beam_fields(mesh, section, frame)
     dofs, n_all = space.numbering(numbering(line, space.bend))
-    bending, shear, inertia, rotary = timoshenko.integrals(space, fields)
+    bending, shear, inertia, rotary = shear_beam.integrals(space, fields)
     left = mesh.points[mesh.facets[:, 0], 0] <= mesh.points.min()
-    maps, sprung = timoshenko.constrain(list(zip(left, support_of_facets(mesh, supports))), dofs, n_all)
+    maps, sprung = shear_beam.constrain(list(zip(left, support_of_facets(mesh, supports))), dofs, n_all)
     units = np.array([frame.length**3, frame.length]) / frame.stiffness
     K, M = _scatter(bending + shear, dofs, n_all), _scatter(inertia + rotary, dofs, n_all)
     x, dx = beam_elements.quadrature(space)
     stiff, _, heavy, _ = (field(x.ravel()).reshape(x.shape) for field in fields)
     return _supported(
-        masses, (K, M, timoshenko.springs(sprung, units, n_all)), maps, mesh=mesh, section=section, supports=supports,
+        masses, (K, M, shear_beam.springs(sprung, units, n_all)), maps, mesh=mesh, section=section, supports=supports,
         element="hermite and shear", mass=float((heavy * dx).sum()) * frame.mass, frame=frame, element_dofs=dofs,
         space=space, softness=float((heavy / stiff).max()),
     )  # fmt: skip

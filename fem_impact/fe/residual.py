@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from ..mesh.facets import powers
-from . import beam_elements, timoshenko
+from . import beam_elements, shear_beam
 from .assembly import System, beam_fields
 from .section import Beam
+from .shear_beam import TimoshenkoSpace
 from .springs import along_facets
 from .supports import SIDES, cells_of_facets
-from .timoshenko import TimoshenkoSpace
 
 CALIBRATION = 33.0  # [-] weighted squares over the energy error: 20 to 45 for 20 kinds of plates; test_residual.py
 DEGREE = 5  # [-] polynomial degree of the elements
@@ -215,7 +215,7 @@ def energy_errors(
         ]
         if forced is not None:
             pushed += list(zip(frame.local(forced)[:, 0], np.eye(len(forced))))
-        errors = timoshenko.energy_errors(
+        errors = shear_beam.energy_errors(
             space, beam_fields(system.mesh, system.section, frame), _of_cells(system, vectors),
             _of_cells(system, loads), pushed,
         )  # fmt: skip

@@ -48,15 +48,15 @@ class Stoutness:
         p = p[:, None]
         result = np.empty((len(p), len(x), 4, 4))
         c, s, turn = np.cos(k * x), np.sin(k * x), (k**2 - p * self.S) / k
-        result[..., 0] = np.stack([c, -turn * s, -turn * k * c, (turn - k) * s / self.S], axis=-1)
-        result[..., 1] = np.stack([s, turn * c, -turn * k * s, (k - turn) * c / self.S], axis=-1)
+        result[..., 0] = np.stack([c, -turn * s, -turn * k * c, -p / k * s], axis=-1)
+        result[..., 1] = np.stack([s, turn * c, -turn * k * s, p / k * c], axis=-1)
         q = np.sqrt(np.maximum(square, STEEP**2))
         turn = (q**2 + p * self.S) / q
         down, up = np.exp(-q * x), np.exp(q * (x - 1.0))
         exponential = np.stack(
             [
-                np.stack([down, -turn * down, turn * q * down, (turn - q) * down / self.S], axis=-1),
-                np.stack([up, turn * up, turn * q * up, (q - turn) * up / self.S], axis=-1),
+                np.stack([down, -turn * down, turn * q * down, p / q * down], axis=-1),
+                np.stack([up, turn * up, turn * q * up, -p / q * up], axis=-1),
             ],
             axis=-1,
         )
@@ -119,9 +119,9 @@ class Stoutness:
     def weights(self, ends: tuple[str, str], p: np.ndarray) -> np.ndarray:
         """Weights (n, 4) of the four solutions in the modes of unit mass; positive next to the left end."""
         at = self.fields(p, np.array([0.0, 1.0]))
+        at = at / np.abs(at).max(axis=(1, 3), keepdims=True)
+        size = np.abs(at).max(axis=(1, 2))[:, None]  # (n, 1, 4), of any field: one that only turns has no w
         rows = np.concatenate([at[:, i][:, list(ENDS[ends[i]])] for i in range(2)], axis=1)
-        rows = rows / np.abs(rows).max(axis=2, keepdims=True)
-        size = np.abs(rows).max(axis=1, keepdims=True)
         found = np.linalg.svd(rows / size)[2][:, 3] / size[:, 0]
         for block in np.array_split(np.arange(len(p)), max(1, -(-len(p) // BLOCK))):
             k = self.waves(p[block])[0].max()

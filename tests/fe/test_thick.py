@@ -99,7 +99,7 @@ def test_thin_curved_plates_become_kirchhoff_plates(edge):
 
 
 def test_a_layer_too_thin_for_the_mesh_is_told_as_an_error():
-    """The edge layer of a free disk is a hundredth of its radius, a facet a quarter; first-order theory tells its cost."""
+    """The layer of a free disk is a hundredth of its radius, a facet a quarter; first-order theory tells its cost."""
     exact = elements().disk_frequencies(0.02, "free", 5)
     system = fi.assemble(fi.mesh.disk(1.0, size=0.4), fi.Plate(UNIT, 0.02), {}, theory="mindlin")
     found = refinement.solve(reassemble(system, system.mesh, layer=100.0), 8, None)

@@ -1,4 +1,4 @@
-"""Timoshenko beams by elements: the hinged beam, steps, springs, error estimates; all ends in modes/test_timoshenko."""
+"""Timoshenko beams by elements: the hinged beam, steps, springs, error estimates; all ends in test_timoshenko."""
 
 import numpy as np
 import pytest
@@ -42,8 +42,8 @@ def test_hinged_beams_from_stout_to_slender_have_both_kinds_of_modes(height):
     section = fi.Beam.rectangular(ALUMINIUM, width=0.03, height=height)
     system = fi.assemble(fi.mesh.line(0.4), section, HINGED, theory="timoshenko")
     found = fi.find_modes(system, n_modes=40)
-    assert_allclose(found.omega, hinged(0.4, *sizes(section), 40), rtol=1e-11)
-    assert found.frequency_error.max() < 1e-11
+    assert_allclose(found.omega, hinged(0.4, *sizes(section), 40), rtol=1e-9)
+    assert found.frequency_error.max() < 1e-9
 
 
 def test_a_step_of_the_section_is_a_node_with_a_kink():
@@ -73,11 +73,11 @@ def test_springs_and_a_mass_at_the_ends():
 
 
 def test_the_error_estimate_is_that_of_a_beam_too_coarse_for_its_modes():
-    """One element of degree 32 for 26 modes: the last are off by up to 1e-2, and the estimate says so."""
+    """One element of degree 32 for 20 modes: the last are off by up to 1e-2, and the estimate says so."""
     section = fi.Beam.rectangular(ALUMINIUM, width=0.03, height=0.02)
     system = fi.assemble(fi.mesh.line(0.4, size=0.4), section, HINGED, theory="timoshenko")
-    found = fi.find_modes(system, n_modes=26)
-    true = np.abs(found.omega / hinged(0.4, *sizes(section), 26) - 1.0)
+    found = fi.find_modes(system, n_modes=20)
+    true = np.abs(found.omega / hinged(0.4, *sizes(section), 20) - 1.0)
     wrong = true > 1e-10
     assert wrong.sum() > 3 and true.max() > 1e-6
     ratio = found.frequency_error[wrong] / true[wrong]
@@ -86,7 +86,7 @@ def test_the_error_estimate_is_that_of_a_beam_too_coarse_for_its_modes():
 
 def test_compliance_of_both_theories_differs_by_the_shear():
     at = np.array([[0.13]])
-    bending, shear = sizes(STOUT)[:2]
+    shear = sizes(STOUT)[1]
     found = [
         fi.find_modes(fi.assemble(fi.mesh.line(0.4), STOUT, HINGED, theory=theory), n_modes=2).shapes.compliance(at)
         for theory in ("euler", "timoshenko")
