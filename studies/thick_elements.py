@@ -29,8 +29,8 @@ KAPPA = 5.0 / 6.0  # [-]
 N_MODES = 6
 THICKNESSES = 0.2, 0.1, 0.01, 1e-3, 1e-4  # [m] of a disk of radius 1 m and a square of side 1 m
 CHOSEN = "Argyris and shear"
-REFERENCE = 0.1  # [m] triangles of the reference for the clamped square
-SIZES = {"P2": (0.1, 0.05), "P4": (0.4, 0.2), "MITC7": (0.1, 0.05), "Argyris and shear": (0.4, 0.2)}  # [m]
+REFERENCE = 0.05  # [m] triangles of the reference for the clamped square
+SIZES = {"P2": (0.1,), "P4": (0.2, 0.1), "MITC7": (0.1,), "Argyris and shear": (0.2, 0.1)}  # [m]
 
 
 def rigidities(h: float) -> tuple[float, float, float, float]:
