@@ -44,7 +44,7 @@ def test_hinged_polygons_follow_wangs_relation_from_our_own_thin_frequencies(nam
     found = modes_of(mesh, h, held, 5, tolerance=5e-6)
     assert_allclose(found.omega, elements().hinged_polygon(thin.omega, h), rtol=1e-5)
     if h == 0.1:  # the thin frequencies themselves are far off
-        assert (thin.omega > 1.03 * found.omega).all()
+        assert (thin.omega > 1.02 * found.omega).all()
 
 
 @pytest.mark.parametrize("h", [0.2, pytest.param(0.05, marks=pytest.mark.slow)])
