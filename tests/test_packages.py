@@ -14,7 +14,7 @@ ORDER = [
 ]  # fmt: skip
 OWNERS = {
     "numba": ("impact/compiled/",),
-    "skfem": ("fe/elements.py", "fe/beam_elements.py"),
+    "skfem": ("fe/elements.py", "fe/beam_elements.py", "fe/thick.py", "fe/shear_beam.py"),
     "matplotlib": ("show/figures.py", "show/plots.py"),
 }
 MODULES = sorted(path for path in HOME.rglob("*.py") if path.name != "__init__.py")

@@ -1,30 +1,39 @@
 """Assemble the stiffness and mass matrices of a body from its mesh, section and supports."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, eye_array
+from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, eye_array, vstack
 
 from .._base import check
 from ..mesh.facets import Curves
 from ..mesh.meshes import Mesh, aligned
-from . import beam_elements, plausible
+from . import beam_elements, plausible, shear_beam, thick
 from .beam_elements import HermiteSpace
 from .corners import around_corners
 from .elements import ArgyrisSpace, Bent, BentMapping, MorleySpace, numbering, quadrature, triangles
-from .section import KINDS, Beam, Elastic, Plate
+from .section import KINDS, SOFT, Beam, Elastic, Plate, evaluate
+from .shear_beam import TimoshenkoSpace
 from .splitting import towards_points
 from .springs import beam_springs, check_masses, edge_springs, plate_springs
 from .supports import Rim, cells_of_facets, constrain
+from .thick import MindlinSpace, ThickStrain
 
+THEORIES = {2: ("kirchhoff", "mindlin"), 1: ("euler", "timoshenko")}  # by dimension; the first is the default
+THICK = ("mindlin", "timoshenko")  # theories with shear and rotary inertia
+ELEMENTS = {
+    "kirchhoff": ("argyris", "morley"), "mindlin": ("argyris and shear",),
+    "euler": ("hermite",), "timoshenko": ("hermite and shear",),
+}  # fmt: skip
 MORLEY_ORDER = 4  # [-] order of the quadrature on Morley elements; exact for products of quadratics
 MASS_ORDER = 10  # [-] order of the quadrature on Argyris elements; exact for products of quintics
 UNEVEN = 20.0  # [-] above this ratio of triangle sizes, eigenvalues are computed from the strain energy
 TINY = 4e-3  # [-] the same if the smallest triangle is below this fraction of the extent
 CHUNK = 256  # [-] triangles whose strain is computed together, to limit memory
+RESTS = 1e-12  # [-] a point moves if some unknown moves it by more than this; rounding leaves 1e-15
 RIGID = 1e-9  # [-] a rigid motion is free if supports suppress less than this share of it, which is rounding
 
 
@@ -104,7 +113,7 @@ class System:
     M: csc_matrix = field(repr=False)  # (n_dofs, n_dofs) [-]
     expand: csr_matrix = field(repr=False)  # (n_all, n_dofs) from these unknowns to all unknowns of the elements
     element_dofs: np.ndarray = field(repr=False)  # (n_local, n_cells) unknowns of each cell, among all
-    space: ArgyrisSpace | HermiteSpace | MorleySpace = field(repr=False)  # shape functions
+    space: ArgyrisSpace | HermiteSpace | MorleySpace | MindlinSpace | TimoshenkoSpace = field(repr=False)
     rigid: np.ndarray = field(repr=False)  # (n_dofs, n_rigid) [-] mass-normalised rigid motions
     held: np.ndarray = field(repr=False)  # (n_rigid,) unknowns that, when fixed, just prevent rigid motion
     graded: bool = True  # whether rings of shrinking triangles surround singular corners
@@ -112,11 +121,17 @@ class System:
     order: float = np.inf  # [-] power of the element size with which corners let the frequency error fall
     softness: float = 1.0  # [-] largest inertia over stiffness on the body, in the frame; sets the shortest waves
     point_masses: tuple = ()  # pairs of point [m] and mass [kg]
-    strain: Strain | None = field(default=None, repr=False)
+    strain: Strain | ThickStrain | None = field(default=None, repr=False)
     near: np.ndarray | None = None  # (n_points, 2) [m] points towards which the triangles shrink
+    layer: float = 1.0  # [-] size of triangles along free edges of a thick plate, over the usual one
     unresolved: float = 0.0  # [-] approximate relative error that singular corners leave on any mesh
 
     __repr__ = check.brief
+
+    @property
+    def theory(self) -> str:
+        """The theory: "kirchhoff" or "mindlin" of a plate, "euler" or "timoshenko" of a beam."""
+        return next(theory for theory, elements in ELEMENTS.items() if self.element in elements)
 
     @property
     def n_dofs(self) -> int:
@@ -133,10 +148,12 @@ class System:
         return self.space.locate(self.frame.local(points))[1]
 
     def interpolate(self, points: np.ndarray) -> csr_matrix:
-        """Matrix (n_points, n_dofs) [-] from the unknowns to the deflection at points (n_points, dimension) [m]."""
-        return (
-            _interpolation(self.space, self.element_dofs, self.expand.shape[0], self.frame.local(points)) @ self.expand
-        )
+        """Matrix (n_points, n_dofs) [-] from the unknowns to the deflection at points (n_points, dimension) [m].
+
+        On a thick plate it is the mean over the disk on which a force at the point acts, see `thick`.
+        """
+        rows = _interpolation(self.space, self.element_dofs, self.expand, self.frame, self.section, points)
+        return rows @ self.expand
 
 
 @check.typed
@@ -146,6 +163,7 @@ def assemble(
     supports: dict | None = None,
     element: str | None = None,
     *,
+    theory: str | None = None,
     point_masses: Sequence = (),
     near: Any = None,
     graded: bool = True,
@@ -157,10 +175,15 @@ def assemble(
     mesh : Mesh
     section : Plate on a plane mesh, Beam on a line
     supports : dict, name of an edge -> "clamped", "hinged", "free" or an Elastic
-        Edges not named are free. "boundary" means all edges; a support of a part overrides that of the whole.
+        Edges not named are free. "boundary" means all edges; a support of a part overrides that of the whole. On a
+        thick plate "hinged" also holds the rotation along the edge; "soft hinged" does not, nor does an Elastic.
     element : str, optional
-        For a plate "argyris" (the default; frequencies from above) or "morley" (from below, straight edges only, as
-        a check); for a beam "hermite".
+        For a thin plate "argyris" (the default; frequencies from above) or "morley" (from below, straight edges only,
+        as a check). Otherwise there is one for each theory.
+    theory : str, optional
+        For a plate "kirchhoff" (the default; thin) or "mindlin" (with shear and rotary inertia); for a beam "euler" or
+        "timoshenko". A thick plate takes some five times as long. A force, a mass or an observed point acts on it over
+        a disk of radius 0.325 times the thickness, because under a point it would give way without limit.
     point_masses : sequence of (point [m], mass [kg])
         Masses without extent that move with the plate or beam.
     near : array_like, shape (n_points, dimension) [m], optional
@@ -184,28 +207,44 @@ def assemble(
     >>> round(system.mass, 6)  # kg
     0.188325
     """
-    kinds = ("argyris", "morley") if mesh.dimension == 2 else ("hermite",)
+    theories = THEORIES[mesh.dimension]
+    theory = theories[0] if theory is None else check.one_of("theory", theory, theories)
+    kinds = ELEMENTS[theory]
     element = kinds[0] if element is None else check.one_of("element", element, kinds)
     supports = {} if supports is None else supports
     if callable(getattr(section, "thickness", None)):
         mesh = aligned(mesh)
     masses = check_masses(point_masses, mesh.dimension)
     near = None if near is None else check.array("near", near, (None, mesh.dimension), "m", lift=True)
-    near = None if near is None or not len(near) else near
+    return _made(mesh, section, supports, element, masses, None if near is None or not len(near) else near, graded)
+
+
+def _made(
+    mesh: Mesh, section: Any, supports: dict, element: str, masses: list, near: np.ndarray | None, graded: bool,
+    layer: float = 1.0,
+) -> System:  # fmt: skip
+    """`assemble` with checked arguments, and `System.layer`."""
     none = np.zeros((0, mesh.dimension))
     marked = np.vstack([none if near is None else near, none, *(point for point, _ in masses)])  # forces act here
     if mesh.dimension == 1 and isinstance(section, Beam):
-        made = _assemble_beam(mesh, section, supports, masses, marked[:, 0])
+        made = _assemble_beam(mesh, section, supports, masses, marked[:, 0], element)
     elif isinstance(section, Plate) and element == "morley":
         made = _assemble_morley(mesh, section, supports, masses)
     elif mesh.dimension == 2 and isinstance(section, Plate):
-        order, unresolved, fine = around_corners(mesh, _kinds(support_of_facets(mesh, supports)), section.material.nu)
+        thicker = element in ELEMENTS["mindlin"]
+        allowed = support_words("mindlin" if thicker else None)
+        stated = _kinds(support_of_facets(mesh, supports, allowed))
+        order, unresolved, fine = around_corners(mesh, stated, section.material.nu)
         fine = fine if graded else mesh
+        if thicker:
+            fine = thick.layered(fine, section, _kinds(support_of_facets(fine, supports, allowed)), layer)
         if len(marked):
-            held = np.array([kind != "free" for kind in support_of_facets(fine, supports)])
-            fine = towards_points(fine, marked, held)
-        made = _assemble_plate(fine, section, supports, masses)
-        made = replace(made, mesh=mesh, graded=graded, order=order, unresolved=unresolved)
+            least = thick.PATCH * evaluate("thickness", section.thickness, marked, "m") if thicker else 0.0
+            held = np.array([kind != "free" for kind in support_of_facets(fine, supports, allowed)])
+            fine = towards_points(fine, marked, held, least)
+        assembled = _assemble_thick if thicker else _assemble_plate
+        made = assembled(fine, section, supports, masses)
+        made = replace(made, mesh=mesh, graded=graded, order=order, unresolved=unresolved, layer=layer)
     else:
         wanted = "Plate" if mesh.dimension == 2 else "Beam"
         raise ValueError(
@@ -224,12 +263,14 @@ def _check_on(space: Any, frame: Frame, name: str, points: np.ndarray) -> None:
         raise ValueError(f"{name} must lie on the body, got ({where}) m")
 
 
-def reassemble(system: System, mesh: Mesh) -> System:
-    """Assemble the same body on another mesh."""
-    section, supports, masses = system.section, system.supports, system.point_masses
-    return assemble(
-        mesh, section, supports, system.element, point_masses=masses, near=system.near, graded=system.graded
-    )
+def reassemble(system: System, mesh: Mesh, near: np.ndarray | None = None, layer: float | None = None) -> System:
+    """Assemble the same body on another mesh.
+
+    ``near`` (n_points, dimension) [m] and ``layer`` replace those of the system.
+    """
+    near, layer = system.near if near is None else near, system.layer if layer is None else layer
+    rest = list(system.point_masses), near, system.graded, layer
+    return _made(mesh, system.section, system.supports, system.element, *rest)
 
 
 def notes_on(mesh: Mesh, section: Plate | Beam) -> tuple[str, ...]:
@@ -237,8 +278,13 @@ def notes_on(mesh: Mesh, section: Plate | Beam) -> tuple[str, ...]:
     return plausible.together(mesh.notes, plausible.body(np.ptp(mesh.points, axis=0), section))
 
 
-def support_of_facets(mesh: Mesh, supports: dict) -> list[str | Elastic]:
-    """The support of each facet."""
+def support_words(theory: str | None) -> tuple[str, ...]:
+    """Words for the support of an edge, besides `Elastic`."""
+    return (*KINDS, SOFT) if theory == "mindlin" else KINDS
+
+
+def support_of_facets(mesh: Mesh, supports: dict, allowed: tuple[str, ...] = KINDS) -> list[str | Elastic]:
+    """The support of each facet; ``allowed`` are the words besides `Elastic`."""
     if not isinstance(supports, dict):
         raise ValueError(f"supports must be a dict of edge name -> support, got {check.shown(supports)}")
     for name, kind in supports.items():
@@ -248,7 +294,7 @@ def support_of_facets(mesh: Mesh, supports: dict) -> list[str | Elastic]:
                 + check.nearest(name, mesh.edges)
             )
         if not isinstance(kind, Elastic):
-            check.one_of(f"supports[{name!r}]", kind, KINDS)
+            check.one_of(f"supports[{name!r}]", kind, allowed)
     kinds: list[str | Elastic] = ["free"] * len(mesh.facets)
     stated: dict[int, str] = {}
     for name in sorted(supports, key=lambda name: -len(mesh.edges[name])):
@@ -277,8 +323,27 @@ def _scatter(local: np.ndarray, element_dofs: np.ndarray, n_all: int) -> csc_mat
     return coo_matrix((local[held], (rows[held], columns[held])), shape=(n_all, n_all)).tocsc()
 
 
-def _interpolation(space: Any, element_dofs: np.ndarray, n_all: int, local: np.ndarray) -> csr_matrix:
-    """Matrix (n_points, n_all) from all unknowns to the deflection at points (n_points, dimension) in the frame."""
+def _interpolation(
+    space: Any, element_dofs: np.ndarray, expand: csr_matrix, frame: Frame, section: Any, points: np.ndarray
+) -> csr_matrix:
+    """Matrix (n_points, n_all) from all unknowns to the deflection at points (n_points, dimension) [m]."""
+    n_all, local = expand.shape[0], frame.local(points)
+    rows = _plain(space, element_dofs, n_all, local)
+    if not isinstance(space, MindlinSpace):
+        return rows
+    radius = thick.PATCH * evaluate("thickness", section.thickness, points, "m") / frame.length
+    moves = np.flatnonzero(abs(rows @ expand).max(axis=1).toarray()[:, 0] > RESTS)
+    found = [rows[np.setdiff1d(np.arange(len(local)), moves)]]  # on a support, so at rest
+    for some in np.array_split(moves, max(1, -(-len(moves) // CHUNK))):
+        if some.size:
+            places, weights = thick.spread(space, local[some], radius[some])
+            found.append(weights @ _plain(space, element_dofs, n_all, places))
+    order = np.concatenate([np.setdiff1d(np.arange(len(local)), moves), moves])
+    return vstack(found, format="csr")[np.argsort(order)]
+
+
+def _plain(space: Any, element_dofs: np.ndarray, n_all: int, local: np.ndarray) -> csr_matrix:
+    """`_interpolation` at points in the frame, exactly there."""
     cells = space.locate(local)[0]
     values = space.functions(cells, local[:, None, :], (0,))[0][:, 0]  # (n_points, n_local)
     dofs = element_dofs[:, cells].T
@@ -298,7 +363,7 @@ def _supported(masses: list[tuple[np.ndarray, float]], matrices: tuple, maps: tu
         points, weights = (np.array(column) for column in zip(*masses))
         for i, point in enumerate(points):
             _check_on(space, frame, f"point of point_masses[{i}]", point[None])
-        rows = _interpolation(space, dofs, n_all, frame.local(points))
+        rows = _interpolation(space, dofs, expand, frame, known["section"], points)
         M = M + rows.T @ diags(weights / frame.mass) @ rows
         known["mass"] += float(weights.sum())
     across = _across(space.origin[:, 0], dofs, expand)
@@ -359,7 +424,40 @@ def _centred(mesh: Mesh) -> tuple[np.ndarray, float, np.ndarray]:
     return centre, length, (mesh.points - centre) / length
 
 
-def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, masses: list, marked: np.ndarray) -> System:
+def beam_fields(mesh: Mesh, section: Beam, frame: Frame) -> list[shear_beam.Field]:
+    """Bending and shear stiffness, mass and rotary inertia per length at places (n,), all in the frame."""
+
+    def field(of: Callable, unit: float) -> shear_beam.Field:
+        def at(x: np.ndarray) -> np.ndarray:
+            place = (frame.centre + frame.length * x[:, None]).clip(mesh.points.min(), mesh.points.max())
+            return of(place) / unit
+
+        return at
+
+    bend, heavy, square = frame.stiffness, frame.inertia, frame.length**2
+    kinds = (section.stiffness, bend), (section.shear, bend / square), (section.inertia, heavy)
+    return [field(*kind) for kind in (*kinds, (section.rotary, heavy * square))]
+
+
+def _assemble_timoshenko(mesh: Mesh, section: Beam, supports: dict, masses: list, line: Any, frame: Frame) -> System:
+    """Assemble a Timoshenko beam on the elements ``line``."""
+    space, fields = TimoshenkoSpace(line), beam_fields(mesh, section, frame)
+    dofs, n_all = space.numbering(numbering(line, space.bend))
+    bending, shear, inertia, rotary = shear_beam.integrals(space, fields)
+    left = mesh.points[mesh.facets[:, 0], 0] <= mesh.points.min()
+    maps, sprung = shear_beam.constrain(list(zip(left, support_of_facets(mesh, supports))), dofs, n_all)
+    units = np.array([frame.length**3, frame.length]) / frame.stiffness
+    K, M = _scatter(bending + shear, dofs, n_all), _scatter(inertia + rotary, dofs, n_all)
+    x, dx = beam_elements.quadrature(space)
+    stiff, _, heavy, _ = (field(x.ravel()).reshape(x.shape) for field in fields)
+    return _supported(
+        masses, (K, M, shear_beam.springs(sprung, units, n_all)), maps, mesh=mesh, section=section, supports=supports,
+        element="hermite and shear", mass=float((heavy * dx).sum()) * frame.mass, frame=frame, element_dofs=dofs,
+        space=space, softness=float((heavy / stiff).max()),
+    )  # fmt: skip
+
+
+def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, masses: list, marked: np.ndarray, element: str) -> System:
     """Assemble a beam; ``marked`` are places (n,) [m] where the shear force jumps."""
     centre, length, points = _centred(mesh)
 
@@ -375,6 +473,8 @@ def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, masses: list, mark
     space = HermiteSpace(line)
     K, M, stiffness, inertia, dx = beam_elements.integrals(space, fields)
     frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
+    if element == "hermite and shear":
+        return _assemble_timoshenko(mesh, section, supports, masses, line, frame)
     dofs, n_all = numbering(line, space)
     fixed = np.zeros(n_all, bool)
     sprung: list[tuple[tuple[int, int], Elastic]] = []
@@ -469,6 +569,45 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict, masses: list) ->
         masses, matrices, (expand, project), mesh=mesh, section=section, supports=supports, element="argyris",
         mass=float(weighted[1].sum()) * frame.mass, frame=frame, element_dofs=dofs, space=space, softness=softness,
         rim=rim, strain=Strain(x, weighted[0], springs.tocsc()) if uneven else None,
+    )  # fmt: skip
+
+
+def _assemble_thick(mesh: Mesh, section: Plate, supports: dict, masses: list) -> System:
+    centre, length, points = _centred(mesh)
+    plane = triangles(points, mesh.cells)
+    bent = _bent(mesh, centre, length, points, plane)
+    space = MindlinSpace(plane, bent)
+    x, dx = quadrature(plane, space, MASS_ORDER, None if bent is None else BentMapping(plane, bent))
+    frame, stiffness, inertia, softness = _plate_fields(section, x, centre, length)
+    flat = centre + length * x.reshape(-1, 2)
+    shear = section.shear(flat).reshape(*dx.shape, 2, 2) * length**2 / frame.stiffness
+    rotary = section.rotary(flat).reshape(dx.shape) / (frame.inertia * length**2)
+    fields = thick.Fields(
+        x, dx, MASS_ORDER, stiffness * dx[..., None, None], shear * dx[..., None, None], inertia * dx, rotary * dx
+    )
+    held = support_of_facets(mesh, supports, support_words("mindlin"))
+    if section.tension and "free" in held:
+        raise ValueError("tension needs every edge supported, because a free edge cannot be pulled; add supports")
+    kinds, elastic = _kinds(held), edge_springs(held, frame)
+    thin = [thick.held_as_thin(kind) for kind in kinds]
+    rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, thin, elastic)
+    expand, project, dofs = thick.constrain(space, rim, kinds, plane, numbering(plane, space.flat))
+    n_all = expand.shape[0]
+    K, M, pulled = thick.matrices(space, fields, section.tension * length**2 / frame.stiffness)
+    springs = _scatter(pulled, dofs, n_all)
+    on = np.flatnonzero(elastic.any(axis=1))
+    if on.size:
+        cells = cells_of_facets(mesh.facets[on], space.vertices)[0]
+        pushed = thick.edge_springs(space, mesh.facets[on], cells, elastic[on])
+        springs = springs + _scatter(pushed, dofs[:, cells], n_all)
+    matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), springs
+    area = np.abs(np.linalg.det(space.jacobian))
+    uneven = area.min() < max(area.max() / UNEVEN**2, TINY**2)
+    return _supported(
+        masses, matrices, (expand, project), mesh=mesh, section=section, supports=supports,
+        element="argyris and shear", mass=float(fields.inertia.sum()) * frame.mass, frame=frame, element_dofs=dofs,
+        space=space, softness=softness, rim=replace(rim, kinds=kinds),
+        strain=ThickStrain(fields, springs.tocsc()) if uneven else None,
     )  # fmt: skip
 
 

@@ -137,7 +137,7 @@ def integrals(space: HermiteSpace, fields: Callable[[np.ndarray], tuple[np.ndarr
     return K, M, stiffness, inertia, dx
 
 
-def quadrature(space: HermiteSpace) -> tuple[np.ndarray, np.ndarray]:
+def quadrature(space: Any) -> tuple[np.ndarray, np.ndarray]:
     """Gauss points of every element and their weights, both (n_cells, n_q)."""
     node, weight = np.polynomial.legendre.leggauss(QUADRATURE)
     return space.start[:, None] + 0.5 * (node + 1.0) * space.length[:, None], 0.5 * weight * space.length[:, None]
@@ -209,7 +209,7 @@ def energy_errors(
     moments : ndarray, shape (n_cells, n_q, n), of point forces: each force times the distance beyond its point
     """
     x, dx = quadrature(space)
-    half, upto = 0.5 * space.length[:, None, None], _running_integral()
+    half, upto = 0.5 * space.length[:, None, None], running_integral()
     each = np.einsum("eq,eqk->ek", dx, load)
     before = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)[:-1]])
     shear = before[:, None] + half * (upto @ load)
@@ -224,7 +224,7 @@ def energy_errors(
     return (rest**2).sum(axis=0)
 
 
-def _running_integral() -> np.ndarray:
+def running_integral() -> np.ndarray:
     """Matrix (n_q, n_q) from values at the Gauss points to the integral of their polynomial from -1 to each point."""
     node, weight = np.polynomial.legendre.leggauss(QUADRATURE)
     values = np.polynomial.legendre.legvander(node, QUADRATURE)

@@ -124,6 +124,17 @@ class Triangles:
             result.append(stacked if order else raw[0])
         return result
 
+    def along(self, cells: np.ndarray, area: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points of cells (n,) at area coordinates (n, n_q, 3), and their derivatives along ``step``, both (n, n_q, 2).
+
+        ``step`` (n, 1, 3) is a change of the area coordinates.
+        """
+        x, gradient = area @ self.corners[cells], self.corners[cells].transpose(0, 2, 1)[:, None]
+        if self.bent is not None:
+            moved, turned = self.bent.shift(cells, area)
+            x, gradient = x + moved, gradient + turned
+        return x, np.broadcast_to((gradient @ step[..., None])[..., 0], x.shape)
+
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cell that holds each point (n, 2), or else the nearest one, and whether the point lies in it."""
         count = min(CANDIDATES, len(self.origin))

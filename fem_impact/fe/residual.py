@@ -17,8 +17,10 @@ from typing import Any
 import numpy as np
 
 from ..mesh.facets import powers
-from . import beam_elements
-from .assembly import System
+from . import beam_elements, shear_beam
+from .assembly import System, beam_fields
+from .section import Beam
+from .shear_beam import TimoshenkoSpace
 from .springs import along_facets
 from .supports import SIDES, cells_of_facets
 
@@ -205,6 +207,19 @@ def energy_errors(
         return Residual(system).errors(vectors, loads)
     space: Any = system.space
     frame = system.frame
+    if isinstance(space, TimoshenkoSpace):
+        assert isinstance(system.section, Beam)
+        pushed = [
+            (frame.local(point[None])[0, 0], mass / frame.mass * np.asarray(system.interpolate(point[None]) @ loads)[0])
+            for point, mass in system.point_masses
+        ]
+        if forced is not None:
+            pushed += list(zip(frame.local(forced)[:, 0], np.eye(len(forced))))
+        errors = shear_beam.energy_errors(
+            space, beam_fields(system.mesh, system.section, frame), _of_cells(system, vectors),
+            _of_cells(system, loads), pushed,
+        )  # fmt: skip
+        return np.stack([errors, np.zeros_like(errors)])
     x, _ = beam_elements.quadrature(space)
     place = (frame.centre + frame.length * x.reshape(-1, 1)).clip(system.mesh.points.min(), system.mesh.points.max())
     stiffness = system.section.stiffness(place).reshape(x.shape) / frame.stiffness

@@ -10,6 +10,8 @@ from .._base import check
 from . import plausible
 
 KINDS = ("clamped", "hinged", "free")  # supports of an edge besides `Elastic`
+SOFT = "soft hinged"  # support of a thick plate that leaves the rotation along the edge free
+SHEAR = 5.0 / 6.0  # [-] shear coefficient of plates: shear stress is parabolic over the thickness (Reissner 1945)
 Varying = float | Callable[[np.ndarray], Any]
 
 
@@ -31,6 +33,9 @@ class Material:
         Direction of the grain, anticlockwise from the x axis.
     yield_strength : float [Pa], optional
         Stress at which it yields in tension; tells whether a contact dents it (`Response.assumptions`).
+    G_xz, G_yz : float [Pa], optional
+        Shear moduli of an orthotropic material through the thickness, along and across the grain; only thick plates
+        and beams use them. By default both are G.
 
     Examples
     --------
@@ -46,6 +51,8 @@ class Material:
     G: float | None = None
     angle: float = 0.0
     yield_strength: float | None = None
+    G_xz: float | None = None
+    G_yz: float | None = None
 
     def __post_init__(self) -> None:
         nu = check.number("nu", self.nu)
@@ -60,6 +67,11 @@ class Material:
             check.settle(self, yield_strength=check.positive("yield_strength", self.yield_strength, "Pa"))
         if (self.E_across is None) != (self.G is None):
             raise ValueError("E_across and G must be given together; use Material.orthotropic, or give neither")
+        for name in ("G_xz", "G_yz"):
+            if getattr(self, name) is not None:
+                if self.G is None:
+                    raise ValueError(f"{name} needs an orthotropic material; give E_across and G, or leave it out")
+                check.settle(self, **{name: check.positive(name, getattr(self, name), "Pa")})
         if self.E_across is None or self.G is None:
             if not -1.0 < nu < 0.5 and nu != 0.5:
                 raise ValueError(f"nu must be above -1 and at most 0.5, got {nu:g}")
@@ -74,7 +86,9 @@ class Material:
             )
 
     @classmethod
-    def orthotropic(cls, *, E_along, E_across, nu, G, rho, angle=0.0, yield_strength=None) -> "Material":
+    def orthotropic(
+        cls, *, E_along, E_across, nu, G, rho, angle=0.0, yield_strength=None, G_xz=None, G_yz=None
+    ) -> "Material":
         """Orthotropic material such as tonewood.
 
         Parameters
@@ -90,6 +104,9 @@ class Material:
             Direction of the grain, anticlockwise from the x axis.
         yield_strength : float [Pa], optional
             Across the thickness.
+        G_xz, G_yz : float [Pa], optional
+            Shear moduli through the thickness, along and across the grain, for thick plates and beams. By default both
+            are G; spruce cut on the quarter has about G_xz = G, but G_yz (rolling shear) only G / 10 or less.
 
         Examples
         --------
@@ -99,7 +116,7 @@ class Material:
         """
         for name, value in (("E_along", E_along), ("E_across", E_across), ("G", G)):
             check.positive(name, value, "Pa")
-        return cls(E_along, nu, rho, E_across, G, angle, yield_strength)
+        return cls(E_along, nu, rho, E_across, G, angle, yield_strength, G_xz, G_yz)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -119,6 +136,15 @@ class Material:
         c, s = np.cos(self.angle), np.sin(self.angle)
         turn = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
         return turn.T @ local @ turn
+
+    @property
+    def through(self) -> np.ndarray:
+        """Shear stiffness through the thickness (2, 2) [Pa] on shear strains (xz, yz), in the axes of the plate."""
+        plain = self.E / (2.0 * (1.0 + self.nu)) if self.G is None else self.G
+        along, across = (plain if given is None else given for given in (self.G_xz, self.G_yz))
+        c, s = np.cos(self.angle), np.sin(self.angle)
+        turn = np.array([[c, s], [-s, c]])
+        return turn.T @ np.diag([along, across]) @ turn
 
 
 def evaluate(name: str, value: Varying, points: np.ndarray, unit: str) -> np.ndarray:
@@ -170,6 +196,14 @@ class Plate:
     def inertia(self, points: np.ndarray) -> np.ndarray:
         """Mass per area (n_points,) [kg/m^2]."""
         return self.material.rho * evaluate("thickness", self.thickness, points, "m")
+
+    def shear(self, points: np.ndarray) -> np.ndarray:
+        """Shear stiffness (n_points, 2, 2) [N/m] on mean shear strains (xz, yz), for a thick plate."""
+        return SHEAR * evaluate("thickness", self.thickness, points, "m")[:, None, None] * self.material.through
+
+    def rotary(self, points: np.ndarray) -> np.ndarray:
+        """Rotary inertia per area (n_points,) [kg], for a thick plate."""
+        return self.material.rho * evaluate("thickness", self.thickness, points, "m") ** 3 / 12.0
 
 
 @dataclass(frozen=True)
@@ -263,5 +297,30 @@ class Beam:
 
     def inertia(self, points: np.ndarray) -> np.ndarray:
         """Mass per length (n_points,) [kg/m]."""
+        return self.material.rho * self._area(points)
+
+    def _area(self, points: np.ndarray) -> np.ndarray:
         area = evaluate("height", self.height, points, "m") * evaluate("width", self.width, points, "m")
-        return self.material.rho * area * (np.pi / 4.0 if self.round else 1.0)
+        return area * (np.pi / 4.0 if self.round else 1.0)
+
+    @property
+    def shear_coefficient(self) -> float:
+        """Share [-] of the section that carries shear in a Timoshenko beam.
+
+        References
+        ----------
+        Cowper (1966), J. Appl. Mech. 33, 335-340; for isotropic materials. Wood gets that of nu = 0, 5/6 or 6/7.
+        """
+        nu = self.material.nu if self.material.E_across is None else 0.0
+        return 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu) if self.round else 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu)
+
+    def shear(self, points: np.ndarray) -> np.ndarray:
+        """Shear stiffness (n_points,) [N] on the mean shear strain, for a Timoshenko beam."""
+        material = self.material
+        plain = material.E / (2.0 * (1.0 + material.nu)) if material.G is None else material.G
+        G = plain if material.G_xz is None else material.G_xz
+        return self.shear_coefficient * G * self._area(points)
+
+    def rotary(self, points: np.ndarray) -> np.ndarray:
+        """Rotary inertia per length (n_points,) [kg m], for a Timoshenko beam."""
+        return self.material.rho / self.material.E * self.stiffness(points)

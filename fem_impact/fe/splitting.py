@@ -17,21 +17,22 @@ TIES = 1e-9  # [-] sides equal to this relative accuracy are ranked by number, s
 ROUNDS = 400  # [-] most passes over the mesh; about 30 reach a millionth of the extent
 
 
-def towards_points(mesh: Mesh, points: np.ndarray, held: np.ndarray) -> Mesh:
+def towards_points(mesh: Mesh, points: np.ndarray, held: np.ndarray, least: Any = 0.0) -> Mesh:
     """Make the triangles of a mesh shrink towards points (n_points, 2) [m] anywhere on the body.
 
     ``held`` (n_facets,) says which facets are supported. A point near them hardly moves, so the triangles around it
     shrink to a fraction of its distance to the edge. Triangles that are too large are divided across their longest
-    side, together with their neighbours, so that no angle falls below half of the smallest original angle.
+    side, together with their neighbours, so that no angle falls below half of the smallest original angle. None becomes
+    smaller than ``least`` [m], a number or one for each point.
     """
     extent = float(np.ptp(mesh.points, axis=0).max())
     breadth = mesh.area / mesh.perimeter
     for _ in range(ROUNDS):
-        size = np.array([_wanted(mesh, held, point, breadth, extent) for point in points])
+        size = np.maximum([_wanted(mesh, held, point, breadth, extent) for point in points], least)
         tall = _too_large(mesh, points, size)
         if not tall.any():
             return mesh
-        mesh, parent = _divided_across(mesh, tall)
+        mesh, parent = divided_across(mesh, tall)
         held = held[parent]
     return mesh
 
@@ -68,7 +69,7 @@ def _too_large(mesh: Mesh, points: np.ndarray, size: np.ndarray) -> np.ndarray:
     return tall
 
 
-def _divided_across(mesh: Mesh, tall: np.ndarray) -> tuple[Mesh, np.ndarray]:
+def divided_across(mesh: Mesh, tall: np.ndarray) -> tuple[Mesh, np.ndarray]:
     """The mesh with the triangles ``tall`` (n_cells,) divided across their longest sides; each facet's old number."""
     cells, n = mesh.cells, len(mesh.points)
     pairs = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2), axis=2)  # (n_cells, 3, 2)

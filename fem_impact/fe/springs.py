@@ -7,7 +7,6 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from .._base import check
-from .elements import REFERENCE
 from .section import Elastic
 
 FACET_POINTS = 8  # [-] Gauss points on a boundary facet; exact for products of quintics
@@ -15,18 +14,18 @@ FACET_POINTS = 8  # [-] Gauss points on a boundary facet; exact for products of 
 
 def along_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Gauss points on boundary facets (n, 2) of cells (n,), and outward normals times ds, both (n, n_q, 2)."""
+    return at_facets(space, facets, cells)[1:]
+
+
+def at_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same, after the area coordinates (n, n_q, 3) of the points."""
     node, weight = np.polynomial.legendre.leggauss(FACET_POINTS)
     s = 0.5 * (node + 1.0)[:, None]
     corner = space.vertices[cells][:, None]  # (n, 1, 3)
     first, last = (np.equal(corner, facets[:, end, None, None]).astype(float) for end in (0, 1))
     area = (1.0 - s) * first + s * last  # (n, n_q, 3)
-    corners = space.origin[cells, None] + REFERENCE @ space.jacobian[cells].transpose(0, 2, 1)
-    x, gradient = area @ corners, corners.transpose(0, 2, 1)[:, None]
-    if space.bent is not None:
-        moved, turned = space.bent.shift(cells, area)
-        x, gradient = x + moved, gradient + turned
-    tangent = (gradient @ (last - first)[..., None])[..., 0]
-    return x, np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * 0.5 * weight[:, None]
+    x, tangent = space.inner.along(cells, area, last - first)
+    return area, x, np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * 0.5 * weight[:, None]
 
 
 def edge_springs(supports: Sequence[Any], frame: Any) -> np.ndarray:

@@ -37,11 +37,15 @@ VERIFYING = 8.0  # [-] the verifying run divides the tolerance by this
 FINEST = 1e-10  # [-] lowest tolerance of a verifying run
 CAUTION = 2.0  # [-] safety factor on the mode error: costs a quarter more modes, but seldom needs a second run
 MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by source: takes about 2 GB and some minutes
-SHORT_WAVES = {"argyris": 1e-5, "hermite": 1e-9}  # [-] frequency error for which `find_modes` chooses the mesh
+SHORT_WAVES = {  # [-] frequency error for which `find_modes` chooses the mesh
+    "argyris": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
+}  # fmt: skip
 PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}  # that a user may set
 ARGUMENTS = tuple(signature(collision.strike).parameters)[3:]  # after modes, striker and contact
 TARGETS = ("rigid", "infinite", "vectors", "modal")
-DOFS_PER_AREA = {"argyris": 10.4, "hermite": 2.0}  # [-] unknowns per square, or length, of the element size
+DOFS_PER_AREA = {  # [-] unknowns per square, or length, of the element size
+    "argyris": 10.4, "hermite": 2.0, "argyris and shear": 47.0, "hermite and shear": 4.0,
+}  # fmt: skip
 DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow
 FAINTEST = 8.0  # [-] frequency up to which a force has the fraction FAINT of its impulse, times the contact's duration
 TOLD_AT = 200  # [-] times at which the motion of Ritz vectors is judged
@@ -438,6 +442,10 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
 def _idealised(asked: _Asked, target: str | None, stages: Stages) -> Plan | None:
     """The plan with a rigid or infinite target, if that is accurate enough or the user asks for it; else None."""
     blow, values = asked.blow, asked.values
+    if blow.target.thick:
+        if target is not None:
+            raise ValueError(f"{blow.name}target = {target!r} is known for thin bodies only; use target = 'modal'")
+        return None
     pressed = values.get("striker_force") or values.get("target_force") or blow.contact.gap < 0.0
     if target is None and (pressed or asked.moving or not values.get("residual", True)):
         return None
@@ -542,8 +550,8 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     if not fits:
         if target == "vectors":
             raise ValueError(
-                f"{blow.name}target = 'vectors' needs a plate by elements that can be meshed again, its residual, no "
-                "n_modes or max_frequency, and no damping ratios given mode by mode; use target = 'modal'"
+                f"{blow.name}target = 'vectors' needs a thin plate by elements that can be meshed again, its residual, "
+                "no n_modes or max_frequency, and no damping ratios given mode by mode; use target = 'modal'"
             )
         return None
     band = asked.quantities.get("sound")

@@ -11,7 +11,7 @@ import numpy as np
 
 from .._base import check
 from ..fe import plausible, refinement
-from ..fe.assembly import System, assemble, notes_on, reassemble
+from ..fe.assembly import THEORIES, THICK, System, assemble, notes_on, reassemble
 from ..fe.section import Beam, Plate
 from ..mesh.meshes import Mesh
 from ..modes import analytic, modal
@@ -60,15 +60,18 @@ class Target:
     scale: Mapping[str, float] = field(default_factory=dict)  # mass [kg], first_frequency [Hz] to scale to
     damping_ratio: Damping | None = None  # None keeps that of the modes
     source: str = "auto"  # "fe", "analytic" or "auto": closed formulas if there are any and no size is stated
+    theory: str | None = None  # "kirchhoff", "mindlin", "euler", "timoshenko"; None is the thin one
     system: System | None = None  # assembled by the user
     modes: Modes | None = None  # found by the user
     blame: Blame = _nobody
 
     def __post_init__(self) -> None:
+        if self.theory is not None and self.mesh is not None:
+            check.one_of("theory", self.theory, THEORIES[self.mesh.dimension])
         if self.source == "analytic" and self.closed is None:
             raise ValueError(
-                "source = 'analytic' covers beams of constant section, rectangles hinged all round and disks without "
-                "a hole held alike all round, isotropic and without springs or masses; use source = 'fe'"
+                "source = 'analytic' covers beams of constant section, thin rectangles hinged all round and thin disks "
+                "without a hole held alike all round, isotropic and without springs or masses; use source = 'fe'"
             )
 
     @classmethod
@@ -77,14 +80,19 @@ class Target:
         if isinstance(body, Modes):
             return cls(modes=body, damping_ratio=damping_ratio)
         held, masses = body.supports, body.point_masses
-        return cls(body.mesh, body.section, held, masses, {}, damping_ratio, "fe", body)
+        return cls(body.mesh, body.section, held, masses, {}, damping_ratio, "fe", body.theory, body)
 
     @cached_property
     def closed(self) -> Callable[..., Modes] | None:
         """Closed formulas for this body, see `analytic.closed_form`; None if there are none."""
         if self.mesh is None or self.section is None or self.point_masses:
             return None
-        return analytic.closed_form(self.mesh, self.section, dict(self.supports))
+        return analytic.closed_form(self.mesh, self.section, dict(self.supports), self.theory)
+
+    @property
+    def thick(self) -> bool:
+        """Whether shear and rotary inertia count."""
+        return self.theory in THICK
 
     @property
     def kind(self) -> str:
@@ -234,7 +242,8 @@ class Target:
         if self.system is not None:
             return self.system if size is None else reassemble(self.system, mesh)
         with stages("assembly"), self.blame("supports"), np.errstate(all="ignore"):
-            return assemble(mesh, self.section, dict(self.supports), point_masses=self.point_masses)
+            held = dict(self.supports)
+            return assemble(mesh, self.section, held, theory=self.theory, point_masses=self.point_masses)
 
 
 def _squared_wave(bending: Any, tension: float, inertia: Any, frequency: float) -> Any:

@@ -40,7 +40,7 @@ def of_target(struck: Struck) -> Assumption:
         remedy = NO_SECTION if unknown else THICKER if plate else SLENDER
         return Assumption("thin target", value, LIMIT, effect, quantities, remedy, NUMBER, unknown)
 
-    if struck.hit.bodies[-1].dimension == 0:
+    if struck.hit.bodies[-1].dimension == 0 or struck.hit.bodies[-1].thick:
         return Assumption("thin target", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
     if body is None or body.thickness is None:
         return told(None, dict.fromkeys(quantities), "the thickness of the body")
@@ -107,7 +107,7 @@ def of_striker(struck: Struck) -> Assumption:
     """A flexible striker: its own section, or if that is not known a trial with lower frequencies."""
     hit, quantities = struck.hit, struck.quantities
     flexible = hit.bodies[0].omega > 0.0
-    if not hit.bodies[0].dimension or not flexible.any():
+    if not hit.bodies[0].dimension or not flexible.any() or hit.bodies[0].thick:
         return Assumption("thin striker", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
     body, omega = struck.striker, hit.history.omega.copy()
     columns = hit.body_slice(0)

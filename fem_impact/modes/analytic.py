@@ -14,6 +14,7 @@ from ..fe import plausible
 from ..fe.assembly import support_of_facets
 from ..fe.section import KINDS, Beam, Plate
 from ..mesh.meshes import Mesh
+from . import timoshenko
 from .modal import Damping, Modes, Shapes, damping_ratios
 
 IMAGES = 6  # [-] image forces beyond each shorter side of a hinged plate; the n-th contributes exp(-2 pi n)
@@ -27,15 +28,22 @@ DISK_TERMS = 100_000  # [-] most terms summed at the edge of a disk, where they 
 MOST_MODES = 1_000_000  # [-] largest number of modes of a rectangle or beam; they take a few seconds
 MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a root search
 MOST_PAIRS = 4 * MOST_MODES  # [-] half-wave number pairs tried on a rectangle; MOST_MODES never needs half of them
+SHEAR_RATIO = 2.6  # [-] E / G of an isotropic material with nu = 0.3
+ROUND = 0.886  # [-] shear coefficient of a round section, nu = 0.3 (Cowper 1966); 0.857 at nu = 0, 0.9 at 0.5
+LIMIT = 1e5  # [-] largest slenderness of a Timoshenko beam: beyond, shear is below rounding
 DISK_SCAN = 0.5  # [-] step in z = k radius when scanning for roots; roots of one order are about pi apart
 
 
-def closed_form(mesh: Mesh, section: Plate | Beam, supports: dict[str, Any]) -> Callable[..., Modes] | None:
+def closed_form(
+    mesh: Mesh, section: Plate | Beam, supports: dict[str, Any], theory: str | None = None
+) -> Callable[..., Modes] | None:
     """Function of ``n_modes`` or ``max_frequency`` [Hz] that finds the modes of this body; None if no formula does.
 
-    There are formulas for beams of constant section, and for isotropic plates of constant thickness without tension
-    that are rectangles hinged all round or disks with the same support all round.
+    There are formulas for beams of constant section, and for thin isotropic plates of constant thickness without
+    tension that are rectangles hinged all round or disks with the same support all round.
     """
+    if theory == "mindlin":
+        return None
     kinds, (form, *sizes) = support_of_facets(mesh, supports), mesh.form or ("",)
     held = {kind if isinstance(kind, str) else "elastic" for kind in kinds}
     if "elastic" in held:
@@ -43,7 +51,7 @@ def closed_form(mesh: Mesh, section: Plate | Beam, supports: dict[str, Any]) -> 
     if isinstance(section, Beam):
         uniform = form == "line" and not callable(section.width) and not callable(section.height)
         ends = str(kinds[0]), str(kinds[-1])
-        return partial(beam, *sizes, ends=ends, section=section) if uniform else None
+        return partial(beam, *sizes, ends=ends, section=section, theory=theory or "euler") if uniform else None
     if callable(section.thickness) or section.material.E_across is not None or section.tension or len(held) > 1:
         return None
     if form == "rectangle" and held == {"hinged"}:
@@ -421,8 +429,11 @@ def beam(
     n_modes: int | None = None,
     max_frequency: float | None = None,
     damping_ratio: Damping = 0.0,
+    theory: str = "euler",
+    slenderness: float | None = None,
+    shear_ratio: float = SHEAR_RATIO,
 ) -> Modes:
-    """Modes of a uniform Euler-Bernoulli beam from x = 0 to x = length [m], including rigid motions.
+    """Modes of a uniform beam from x = 0 to x = length [m], including rigid motions.
 
     Parameters
     ----------
@@ -433,10 +444,16 @@ def beam(
     section : Beam of constant section
     n_modes : int (rigid motions included), or max_frequency : float [Hz]
     damping_ratio : float, array (n_modes,) or function of frequency [Hz]
+    theory : "euler" (slender) or "timoshenko" (with shear and rotary inertia, see `timoshenko`)
+    slenderness : float [-], only for "timoshenko" without a section
+        Length over the diameter of a round beam, at least 1.
+    shear_ratio : float [-], goes with slenderness
+        E / G: 2.6 if isotropic with nu = 0.3, some 10 to 20 for wood along the grain.
 
     Returns
     -------
-    Modes, with frequencies exact to rounding; at a free end the squared shape is 4 / mass for every bending mode
+    Modes, with frequencies exact to rounding; at a free end of a slender beam the squared shape is 4 / mass for every
+    bending mode
 
     Raises
     ------
@@ -445,7 +462,7 @@ def beam(
 
     References
     ----------
-    Bishop and Johnson (1960), The mechanics of vibration, ch. 7.
+    Bishop and Johnson (1960), The mechanics of vibration, ch. 7; Huang (1961), J. Appl. Mech. 28, 579-584.
 
     Examples
     --------
@@ -457,8 +474,14 @@ def beam(
     if not isinstance(ends, (list, tuple)) or len(ends) != 2:
         raise ValueError(f"ends must be two words, one for each end, got {check.shown(ends)}")
     pair = (check.one_of("ends", ends[0], KINDS), check.one_of("ends", ends[1], KINDS))
-    rigid = _beam_rigid(pair)
     physical = _physical(section, Beam, mass, first_frequency, length)
+    stout = _stoutness(theory, section, length, slenderness, shear_ratio)
+    notes = plausible.body((length,), section)
+    if stout is not None:
+        found = _timoshenko(stout, pair, length, n_modes, max_frequency, physical, first_frequency)
+        modes = _finished(*found, mass, first_frequency, physical, damping_ratio, notes, section)
+        return replace(modes, thick=True)
+    rigid = _beam_rigid(pair)
     first = float(_beam_roots(pair, 1)[0] ** 2)
     count, reach = _enough(n_modes, max_frequency, physical, first_frequency, first)
     if np.isfinite(reach):
@@ -470,8 +493,50 @@ def beam(
     weights = np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), _beam_weights(pair, k)])
     shapes = BeamShapes(length, pair, np.concatenate([np.zeros(len(rigid)), k]), weights)
     values = np.concatenate([np.zeros(len(rigid)), k**4])
-    notes = plausible.body((length,), section)
     return _finished(shapes, values, mass, first_frequency, physical, damping_ratio, notes, section)
+
+
+def _stoutness(
+    theory: str, section: Any, length: float, slenderness: float | None, shear_ratio: float
+) -> timoshenko.Stoutness | None:
+    """What tells a Timoshenko beam from a slender one; None for the latter."""
+    if check.one_of("theory", theory, ("euler", "timoshenko")) == "euler":
+        if slenderness is not None:
+            raise ValueError("slenderness needs theory = 'timoshenko'")
+        return None
+    if (slenderness is None) == (section is None):
+        raise ValueError("slenderness must be given if there is no section, and only then")
+    if section is not None:
+        point = np.zeros((1, 1))
+        bend, mass = section.stiffness(point)[0], section.inertia(point)[0]
+        square = length**2
+        stout = timoshenko.Stoutness(section.rotary(point)[0] / mass / square, bend / section.shear(point)[0] / square)
+    else:
+        square = 1.0 / (16.0 * check.between("slenderness", slenderness, 1.0, LIMIT) ** 2)
+        ratio = check.between("shear_ratio", shear_ratio, 2.0, 1e3)
+        stout = timoshenko.Stoutness(square, square * ratio / ROUND)
+    if not min(stout.R, stout.S) >= LIMIT**-2 / 16.0:
+        raise ValueError(f"length must be at most {LIMIT:g} times the height for theory = 'timoshenko'; use 'euler'")
+    return stout
+
+
+def _timoshenko(
+    stout: timoshenko.Stoutness, ends: tuple[str, str], length: float, n_modes: int | None,
+    max_frequency: float | None, physical: tuple[float, float] | None, first_frequency: float | None,
+) -> tuple[timoshenko.TimoshenkoShapes, np.ndarray]:  # fmt: skip
+    """Shapes and omega**2 of a Timoshenko beam at unit mass and rigidity."""
+    rigid = timoshenko.rigid(ends, stout)
+    first = float(np.sqrt(stout.values(ends, len(rigid), 1)[0]))
+    count, reach = _enough(n_modes, max_frequency, physical, first_frequency, first, timoshenko.MOST)
+    if np.isfinite(reach):
+        count = int(stout.count(ends, np.array([reach**2]))[0])
+        _check_number(count, timoshenko.MOST)
+    if count <= len(rigid):
+        raise ValueError(f"n_modes must exceed the {len(rigid)} rigid motions; max_frequency must reach a bending mode")
+    p = stout.values(ends, len(rigid), count - len(rigid))
+    weights = np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), stout.weights(ends, p)])
+    values = np.concatenate([np.zeros(len(rigid)), p])
+    return timoshenko.TimoshenkoShapes(length, ends, stout, values, weights), values
 
 
 def _beam_weights(ends: tuple[str, str], k: np.ndarray) -> np.ndarray:

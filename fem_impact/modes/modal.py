@@ -10,7 +10,7 @@ import numpy as np
 from .._base import check, markup
 from .._base.remembered import Remembered
 from ..fe import plausible, point_load, refinement
-from ..fe.assembly import System
+from ..fe.assembly import THICK, System
 from ..fe.eigenvalues import Flexibility
 from ..fe.section import Beam, Plate
 from . import universal_files
@@ -174,6 +174,7 @@ class Modes:
     # The same body described less well, by the part of `Error` that a blow with it tells: "truncation", "mesh"
     poorer: Mapping[str, "Modes"] = field(default_factory=dict, repr=False)
     section: Plate | Beam | None = field(default=None, repr=False)  # None if not known, as that of a scaled body
+    thick: bool = field(default=False, repr=False)  # whether shear and rotary inertia are in them
 
     __repr__ = check.brief
 
@@ -607,4 +608,14 @@ def find_modes(
         )
     in_hertz = None if enclosed is None else enclosed / (2.0 * np.pi)
     notes = plausible.together(system.notes, damping_notes(damping, found.omega))
-    return Modes(found.omega, damping, shapes, system.mass, found.error, in_hertz, notes, section=system.section)
+    return Modes(
+        found.omega,
+        damping,
+        shapes,
+        system.mass,
+        found.error,
+        in_hertz,
+        notes,
+        section=system.section,
+        thick=system.theory in THICK,
+    )

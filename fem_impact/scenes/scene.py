@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
-from ..fe.assembly import System, support_of_facets
+from ..fe.assembly import THICK, System, support_of_facets, support_words
 from ..fe.section import Beam, Material, Plate
 from ..impact import collision, promise
 from ..impact.contact import Contact
@@ -209,7 +209,7 @@ class Scene:
         section = self.make_section("beam" if mesh.dimension == 1 else "plate")
         supports = supports_of(self.supports.values)
         with self.blame("supports"):
-            support_of_facets(mesh, supports)
+            support_of_facets(mesh, supports, support_words(self.target.values.get("theory")))
         with self.blame("target"):
             told = target_values(**self.target.values)
             told.pop("nu")
@@ -375,6 +375,8 @@ def _check_whole(scene: Scene) -> None:
         raise fault(scene.path, f"[{missing}] is missing; [{there}] needs it")
     if scene.section is None and not {"mass", "first_frequency"} <= set(target):
         raise fault(scene.path, "[target] needs mass and first_frequency if there is no [material]")
+    if scene.section is None and target.get("theory") in THICK:
+        raise fault(scene.path, "[target] theory needs [material] and [section]: shear depends on the thickness")
     for table in ("observe", "map"):
         part = getattr(scene, table)
         if part is not None:

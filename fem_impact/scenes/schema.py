@@ -16,8 +16,8 @@ import numpy as np
 
 from .. import mesh
 from .._base import check
-from ..fe.assembly import assemble
-from ..fe.section import KINDS, Beam, Elastic, Material, Plate
+from ..fe.assembly import THEORIES, assemble
+from ..fe.section import KINDS, SOFT, Beam, Elastic, Material, Plate
 from ..impact import collision
 from ..impact.contact import Contact
 from ..impact.striker import Striker
@@ -57,20 +57,22 @@ def _sphere(*, radius: float, E: float, nu: float, rho: float, yield_strength: f
 
 def _bar(
     *, E: float, rho: float, length: float, width: Any = None, height: Any = None, diameter: Any = None,
-    left: str = "free", right: str = "free", at: float, nu: float = 0.3,
+    left: str = "free", right: str = "free", at: float, nu: float = 0.3, theory: str = "euler",
 ) -> Striker:  # fmt: skip
     section = _beam(Material(E=E, nu=nu, rho=rho), width=width, height=height, diameter=diameter)
     body, held = mesh.line(length), {"left": left, "right": right}
-    find = closed_form(body, section, held) or partial(find_modes, assemble(body, section, held))
+    known = closed_form(body, section, held, check.one_of("theory", theory, THEORIES[1]))
+    find = known or partial(find_modes, assemble(body, section, held, theory=theory))
     return replace(Striker.flexible(find(n_modes=BAR_MODES), at=at), fixed=False)
 
 
 def target_values(
-    *, mass=None, first_frequency=None, nu=0.3, damping_ratio=0.0, point_masses=(), source="auto"
+    *, mass=None, first_frequency=None, nu=0.3, damping_ratio=0.0, point_masses=(), source="auto", theory=None
 ) -> dict[str, Any]:
     """Check the table [target].
 
-    It has mass and first frequency to scale to, nu without a material, damping, point masses and the source of modes.
+    It has mass and first frequency to scale to, nu without a material, damping, point masses, the source of modes and
+    the theory.
     """
     check.between("nu", nu, LOWEST_NU, 0.5)
     scale = {"mass": (mass, "kg"), "first_frequency": (first_frequency, "Hz")}
@@ -81,6 +83,7 @@ def target_values(
         "damping_ratio": over_frequency("damping_ratio", damping_ratio),
         "point_masses": tuple(_weight(i, entry) for i, entry in enumerate(point_masses)),
         "source": check.one_of("source", source, SOURCES),
+        "theory": None if theory is None else check.one_of("theory", theory, [*THEORIES[2], *THEORIES[1]]),
     }
 
 
@@ -226,10 +229,9 @@ def read_part(path: Path, table: str, values: dict[str, Any], folder: Path) -> P
                     Elastic(**support)
                 except ValueError as error:
                     raise wrong(f"{edge}: {error}") from None
-            elif support not in KINDS:
-                raise wrong(
-                    f"{edge} must be one of {', '.join(KINDS)} or {{ stiffness, rotation }}, got {check.shown(support)}"
-                )
+            elif support not in (*KINDS, SOFT):
+                words = ", ".join((*KINDS, SOFT))
+                raise wrong(f"{edge} must be one of {words} or {{ stiffness, rotation }}, got {check.shown(support)}")
         return Part("", MappingProxyType(values))
     selector, makers = MAKERS[table]
     values = dict(values)

@@ -132,7 +132,7 @@ def test_damping_over_frequency():
         ("rotation = 40.0", "rotations = 40.0", r"\[supports\] left: rotations is not a key.*'rotation'"),
         ("stiffness = 2e5, ", "", r"\[supports\] left: stiffness is missing"),
         ("stiffness = 2e5", "stiffness = -1.0", r"\[supports\] left: stiffness must not be negative"),
-        ('right = "hinged"', "right = 3", r"\[supports\] right must be one of clamped, hinged, free or"),
+        ('right = "hinged"', "right = 3", r"\[supports\] right must be one of clamped, hinged, free, soft hinged or"),
         ("ratio = [0.01, 0.002]", "ratio = [0.01]", r"\[target\] damping_ratio.ratio must have shape"),
         ("ratio = [0.01, 0.002]", "ratio = [0.01, -1.0]", r"\[target\] damping_ratio.ratio must not be negative"),
         ("frequency = [100.0, 1000.0]", "hertz = [1.0]", r"\[target\] damping_ratio must be a number or have"),
@@ -165,3 +165,23 @@ def test_what_a_file_holds_is_what_data_gives_back(load):
     given = tomllib.loads(HEAD + PLATE)
     told = scene.data()
     assert {name: told[name] for name in given} == given
+
+
+def test_a_scene_says_that_its_plate_is_thick(load):
+    stout = HEAD + PLATE.replace('right = "hinged"', 'right = "soft hinged"').replace("e-3]", "e-2]")
+    thin = load(stout.replace("soft hinged", "hinged")).built.target.find(3, tolerance=1e-3)
+    target = load(stout.replace("[target]", '[target]\ntheory = "mindlin"')).built.target
+    assert target.theory == "mindlin" and target.thick and target.closed is None
+    assert (target.find(3, tolerance=1e-3).omega < thin.omega).all()
+
+
+@pytest.mark.parametrize(
+    "theory, text",
+    [
+        ("timoshenko", r"\[target\] theory must be one of kirchhoff, mindlin"),
+        ("thick", r"\[target\] theory must be one"),
+    ],
+)
+def test_a_theory_that_does_not_fit_is_told(load, theory, text):
+    with pytest.raises(ValueError, match=text):
+        _ = load((HEAD + PLATE).replace("[target]", f'[target]\ntheory = "{theory}"')).built

@@ -1,0 +1,168 @@
+"""Timoshenko beams: elements of high degree for the deflection by bending, and for that by shear.
+
+The deflection of a beam of a stout section is that of an Euler-Bernoulli beam, W, whose slope W' is the rotation of the
+section, and a deflection s by shear:
+
+    w = W + s,     U = 1/2 int (E I W''^2 + kappa G A s'^2),     T = 1/2 int (rho A w'^2 + rho I W'^2)  (rates)
+
+Written so, nothing locks and no digit is lost however slender the beam; at a step of the section s may have a kink.
+The elements of W are those of `beam_elements`; s has the same degree, and is zero at the left end, because only W + s
+counts.
+
+References
+----------
+Timoshenko (1921), Phil. Mag. 41, 744-746; Cowper (1966), J. Appl. Mech. 33, 335-340 (kappa).
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.sparse import coo_matrix, csc_matrix, csr_matrix
+from skfem import MeshLine
+
+from .beam_elements import DEGREE, HermiteSpace, quadrature, running_integral
+from .section import Elastic
+
+BENT = DEGREE + 1  # [-] shape functions of W on an element
+LOCAL = 2 * BENT  # [-] of both
+Field = Callable[[np.ndarray], np.ndarray]
+
+
+class TimoshenkoSpace:
+    """Shape functions of the elements of one line: `HermiteSpace` for W, then two hats and bubbles for s."""
+
+    def __init__(self, mesh: MeshLine) -> None:
+        self.bend = HermiteSpace(mesh)
+        self.start, self.length, self.origin = self.bend.start, self.bend.length, self.bend.origin
+        self.vertices = mesh.t  # (2, n_cells)
+
+    def shears(self, cells: np.ndarray, points: np.ndarray, order: int) -> np.ndarray:
+        """Shape functions of s (n, n_q, DEGREE + 1), or their derivatives, of cells (n,) at points (n, n_q, 1)."""
+        h = self.length[cells][:, None]
+        place = (points[..., 0] - self.start[cells][:, None]) / h
+        legendre = np.polynomial.legendre.legvander(2.0 * place - 1.0, DEGREE)
+        j = np.arange(1, DEGREE)
+        if order:
+            ends, bubbles = np.stack([-np.ones_like(place), np.ones_like(place)], axis=-1), 2.0 * legendre[..., j]
+        else:
+            ends = np.stack([1.0 - place, place], axis=-1)
+            bubbles = (legendre[..., j + 1] - legendre[..., j - 1]) / (2 * j + 1)
+        return np.concatenate([ends, np.sqrt(j + 0.5) * bubbles], axis=-1) / h[..., None] ** order
+
+    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+        """Derivatives of the deflection w, as in `HermiteSpace.functions`, of order 0 or 1."""
+        bent = self.bend.functions(cells, points, orders)
+        return [np.concatenate([b, self.shears(cells, points, k)], axis=-1) for b, k in zip(bent, orders)]
+
+    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cell that holds each point (n, 1), or else the nearest one, and whether the point lies in it."""
+        return self.bend.locate(points)
+
+    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+        """Unknowns (n_all, 2) of the deflections 1 and x, which have no shear strain."""
+        return self.bend.linear(element_dofs, n_all)
+
+    def numbering(self, bent: tuple[np.ndarray, int]) -> tuple[np.ndarray, int]:
+        """Numbers of the unknowns of each element (LOCAL, n_cells), from those of W, and how many there are."""
+        dofs, n_bent = bent
+        n_nodes, n_cells = int(self.vertices.max()) + 1, self.vertices.shape[1]
+        inside = n_bent + n_nodes + np.arange(n_cells * (DEGREE - 1)).reshape(n_cells, -1).T
+        return np.vstack([dofs, n_bent + self.vertices, inside]), n_bent + n_nodes + inside.size
+
+
+def integrals(space: TimoshenkoSpace, fields: list[Field]) -> tuple[np.ndarray, ...]:
+    """Stiffness by bending, by shear, mass and rotary inertia of each element, (n_cells, LOCAL, LOCAL) each.
+
+    ``fields`` are bending stiffness, shear stiffness, mass and rotary inertia per length at places (n,).
+    """
+    x, dx = quadrature(space)
+    bending, shear, inertia, rotary = (field(x.ravel()).reshape(x.shape) * dx for field in fields)
+    cells = np.arange(len(x))
+    none = np.zeros((*x.shape, BENT))
+    slope, curve = (np.concatenate([b, none], axis=-1) for b in space.bend.functions(cells, x[..., None], (1, 2)))
+    strain = np.concatenate([none, space.shears(cells, x[..., None], 1)], axis=-1)
+    value = space.functions(cells, x[..., None], (0,))[0]
+    pairs = (curve, bending), (strain, shear), (value, inertia), (slope, rotary)
+    return tuple(part.transpose(0, 2, 1) @ (part * weight[..., None]) for part, weight in pairs)
+
+
+def constrain(
+    ends: list[tuple[bool, str | Elastic]], dofs: np.ndarray, n_all: int
+) -> tuple[tuple[csr_matrix, csr_matrix], list[tuple[dict[int, float], int, Elastic]]]:
+    """Maps from the unknowns left free to all and back, and the springs.
+
+    ``ends`` are pairs of whether the end is the left one, and its support. Each spring comes with the unknowns that
+    make up the deflection there, the one that is the rotation, and its `Elastic`.
+    """
+    left, right = int(dofs[BENT, 0]), int(dofs[BENT + 1, -1])
+    fixed, tied, sprung = np.zeros(n_all, bool), False, []
+    fixed[left] = True
+    for at_left, kind in ends:
+        bent, turned = (dofs[:2, 0] if at_left else dofs[2:4, -1]).tolist()
+        if isinstance(kind, Elastic):
+            sprung.append(({bent: 1.0} if at_left else {bent: 1.0, right: 1.0}, turned, kind))
+        elif kind != "free":
+            fixed[turned] |= kind == "clamped"
+            fixed[bent if at_left else right] = True
+            tied |= not at_left
+    kept = np.flatnonzero(~fixed)
+    rows, columns, values = kept, np.arange(len(kept)), np.ones(len(kept))
+    project = csr_matrix((values, (columns, rows)), shape=(len(kept), n_all))
+    if tied:  # s = -W at the right end
+        rows = np.append(rows, right)
+        columns, values = np.append(columns, np.searchsorted(kept, dofs[2, -1])), np.append(values, -1.0)
+    return (csr_matrix((values, (rows, columns)), shape=(n_all, len(kept))), project), sprung
+
+
+def springs(sprung: list[tuple[dict[int, float], int, Elastic]], units: np.ndarray, n_all: int) -> csc_matrix:
+    """Stiffness (n_all, n_all) of elastic supports; ``units`` (2,) turn theirs into those of the frame."""
+    total = csc_matrix((n_all, n_all))
+    for deflection, turned, kind in sprung:
+        for along, stiffness in ((deflection, kind.stiffness * units[0]), ({turned: 1.0}, kind.rotation * units[1])):
+            row = csc_matrix(coo_matrix((list(along.values()), ([0] * len(along), list(along))), shape=(1, n_all)))
+            total = total + stiffness * row.T @ row
+    return total
+
+
+def energy_errors(
+    space: TimoshenkoSpace, fields: list[Field], unknowns: np.ndarray, loads: np.ndarray, forces: list
+) -> np.ndarray:
+    """Error (n,) of the squared energy norm of solutions, from moments and shear forces in equilibrium with the loads.
+
+    As `beam_elements.energy_errors`; here the shear force must agree, too.
+
+    Parameters
+    ----------
+    space : TimoshenkoSpace
+    fields : list, as in `integrals`
+    unknowns : ndarray, shape (n_cells, LOCAL, n), of the solutions
+    loads : ndarray, shape (n_cells, LOCAL, n), fields whose inertia drives them
+    forces : list of pairs of place and force (n,)
+    """
+    x, dx = quadrature(space)
+    bending, shear, inertia, rotary = (field(x.ravel()).reshape(x.shape)[..., None] for field in fields)
+    cells, at = np.arange(len(x)), x[..., None]
+    curve = space.bend.functions(cells, at, (2,))[0] @ unknowns[:, :BENT]
+    strain = space.shears(cells, at, 1) @ unknowns[:, BENT:]
+    load = inertia * (space.functions(cells, at, (0,))[0] @ loads)
+    turning = rotary * (space.bend.functions(cells, at, (1,))[0] @ loads[:, :BENT])
+    carried = _integral(space, load)
+    moment, push = _integral(space, carried - turning), -carried
+    for place, force in forces:
+        moment = moment + (at - place).clip(0.0) * force
+        push = push - (at > place) * force
+    weight = np.sqrt(dx)[..., None]
+    missed = [(bending * curve - moment) * weight / np.sqrt(bending), (shear * strain - push) * weight / np.sqrt(shear)]
+    rest = np.concatenate([part.reshape(x.size, -1) for part in missed])
+    one, none = np.ones((x.size, 1)), np.zeros((x.size, 1))
+    scale = np.concatenate([(weight / np.sqrt(field)).reshape(-1, 1) for field in (bending, shear)])
+    free = scale * np.block([[-x.reshape(-1, 1), one], [one, none]])  # the constants of equilibrium
+    rest -= free @ np.linalg.lstsq(free, rest, rcond=None)[0]
+    return (rest**2).sum(axis=0)
+
+
+def _integral(space: TimoshenkoSpace, values: np.ndarray) -> np.ndarray:
+    """Integral from the left end of values (n_cells, n_q, n) at the Gauss points, at the same points."""
+    each = np.einsum("eq,eqk->ek", quadrature(space)[1], values)
+    before = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)[:-1]])
+    return before[:, None] + 0.5 * space.length[:, None, None] * (running_integral() @ values)

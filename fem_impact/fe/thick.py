@@ -1,0 +1,402 @@
+"""Reissner-Mindlin plates: deflection by Argyris triangles, shear strain by scikit-fem's quartic ones.
+
+A thick plate has a deflection w and rotations beta of its normals. Its energy is that of bending, with the curvatures
+of beta, and of shear, with the shear strain gamma = grad w - beta:
+
+    U = 1/2 int (kappa(beta) D kappa(beta) + gamma S gamma),     S = 5/6 h (G_xz, G_yz)
+    T = 1/2 int (rho h w'^2 + rho h^3/12 |beta'|^2)
+
+The unknowns here are w and gamma, and beta = grad w - gamma. That removes locking by construction: as the plate becomes
+thin, gamma vanishes and what remains is the Kirchhoff plate on the same triangles, on curved edges too. With w and beta
+as unknowns, the shear energy is a difference of nearly equal numbers, (L/h)^2 times as large as that of bending; here
+no digit is lost at h/L = 1e-6 (``studies/thick_elements.py`` compares four elements). The price is that w has no kinks:
+where the thickness jumps, w of a thick plate has one, and the frequencies converge slowly.
+
+Edges, on the true curve (n outward, t along it):
+
+    free         nothing
+    soft hinged  w = 0
+    hinged       w = 0 and beta_t = 0, as gamma_t = 0: a "hard" hinge; for polygons Wang's relation holds
+    clamped      w = 0 and beta = 0, as gamma_t = 0, gamma_n = w_n
+
+Free and soft edges let beta_t relax within a layer of width h / sqrt(12 kappa), about h/3. `towards_edges` makes the
+triangles shrink to a thickness there. If that takes too many, `layer_energy` tells what an unresolved layer misses: the
+twisting moment M_nt of the thin plate does work on the relaxation, to first order M_nt^2 width / (2 G h^3/12) per
+length.
+
+A point force sinks into a Mindlin plate without limit, as log(1/r). The real force acts through the thickness; its
+stress at the bottom is that of a thin plate under a load spread evenly over a disk of radius 0.325 h (Westergaard).
+So forces, point masses and the deflection at a point are all spread over this disk (`patch`), cut at the edge and
+weighted so that its centre is the point. This keeps reciprocity and rigid motions exact, and the contact law alone
+stands for the indentation below the striker.
+
+References
+----------
+Mindlin (1951), J. Appl. Mech. 18, 31-38; Beirao da Veiga, Hughes, Kiendl, Lovadina, Niiranen, Reali and Speleers
+(2015), Math. Models Methods Appl. Sci. 25, 1519-1551 (deflection and shear as unknowns); Arnold and Falk (1989), SIAM
+J. Math. Anal. 20, 1-26 (the layer); Westergaard (1926), Public Roads 7, 25-35, and Timoshenko and Woinowsky-Krieger,
+Theory of plates and shells, art. 19 (0.325 h).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import block_diag, coo_matrix, csc_matrix, csr_matrix
+from scipy.sparse.linalg import spsolve
+from scipy.spatial import cKDTree
+from skfem import Dofs, ElementTriP4, MeshTri
+from skfem.quadrature import get_quadrature
+
+from .._base import check
+from ..mesh.meshes import Mesh
+from . import splitting, supports
+from .elements import ArgyrisSpace, Bent
+from .section import SOFT, Plate, evaluate
+from .springs import at_facets
+
+SHEAR = 15  # [-] shape functions of one component of the shear strain on a triangle
+LOCAL = 21 + 2 * SHEAR  # [-] unknowns of a triangle: w, gamma_x, gamma_y
+PATCH = 0.325  # [-] radius over which a point force is spread, over the thickness
+CHUNK = 128  # [-] triangles whose matrices are computed together, to limit memory
+FINE, ROUGH = (6, 24), (2, 8)  # [-] points on that disk, radial and around: error 3e-5 of a compliance at h/L = 0.2
+FEW = 64  # [-] at more points, as for a picture, the rough ones do: their error is 1e-6 of a mode of h k = 1
+LOOSE = "free", SOFT  # supports with a layer
+LAYER = 2.0  # [-] size of triangles in this layer over the thickness h: errors of some 2e-4 h / L of a frequency
+MOST_LAYER = 120.0  # [-] most triangles along these edges; a plate that needs more keeps larger ones
+SEEN, UNSEEN = 4.0, 9.0  # [-] sides over the thickness below which they resolve the layer, above which they miss it
+EVEN = 1.5  # [-] longest side of a triangle over the size asked for
+
+
+def reference(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Quartic shape functions (n_q, 15) and their gradients (2, n_q, 15) at points (2, n_q) of the unit triangle."""
+    element = ElementTriP4()
+    found = [element.lbasis(X, i) for i in range(SHEAR)]
+    values = np.stack([np.broadcast_to(value, X[0].shape) for value, _ in found], axis=-1)
+    gradients = [np.stack([np.broadcast_to(part, X[0].shape) for part in gradient]) for _, gradient in found]
+    return values, np.stack(gradients, axis=-1)
+
+
+class MindlinSpace:
+    """Shape functions of one mesh: 21 of the deflection, then 15 for each component of the shear strain."""
+
+    element = ElementTriP4
+
+    def __init__(self, mesh: MeshTri, bent: Bent | None = None) -> None:
+        self.flat = ArgyrisSpace(mesh, bent)
+        self.origin, self.jacobian, self.inverse = self.flat.origin, self.flat.jacobian, self.flat.inverse
+        self.vertices, self.bent, self.inner = self.flat.vertices, bent, self.flat.inner
+
+    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+        """The same as `ArgyrisSpace.functions`, with zeros for the shear strain, which moves no point."""
+        found = self.flat.functions(cells, points, orders)
+        return [np.concatenate([f, np.zeros((*f.shape[:-1], 2 * SHEAR))], axis=-1) for f in found]
+
+    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cell that holds each point (n, 2), or else the nearest one, and whether the point lies in it."""
+        return self.flat.locate(points)
+
+    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+        """Unknowns (n_all, 3) of the deflections 1, x and y, which have no shear strain."""
+        return self.flat.linear(element_dofs, n_all)
+
+    def inverses(self, X: np.ndarray) -> np.ndarray:
+        """Inverse Jacobians (n_cells, n_q, 2, 2) of the map from the reference triangle at its points (2, n_q)."""
+        J = np.broadcast_to(self.jacobian[:, None], (len(self.origin), X.shape[1], 2, 2)).copy()
+        if self.bent is not None:
+            cells = self.bent.cells
+            area = np.broadcast_to(np.stack([1.0 - X[0] - X[1], *X], axis=1), (len(cells), X.shape[1], 3))
+            gradient = self.bent.shift(cells, area)[1]
+            # a triangle with two curved sides is listed twice, each time with the whole shift
+            J[cells] = self.jacobian[cells][:, None] + gradient[..., 1:] - gradient[..., :1]
+        return np.linalg.inv(J)
+
+
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """A plate at the quadrature points, in the frame; all but the points are times the weights."""
+
+    x: np.ndarray  # (n_cells, n_q, 2)
+    area: np.ndarray  # (n_cells, n_q)
+    order: int  # of scikit-fem's quadrature, whose points ``x`` are
+    stiffness: np.ndarray  # (n_cells, n_q, 3, 3)
+    shear: np.ndarray  # (n_cells, n_q, 2, 2)
+    inertia: np.ndarray  # (n_cells, n_q)
+    rotary: np.ndarray  # (n_cells, n_q)
+
+
+def strains(space: MindlinSpace, fields: Fields, cells: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Deflection (n, n_q, 51), rotation, shear strain (n, n_q, 2, 51) and curvature (n, n_q, 3, 51) of cells (n,)."""
+    X = get_quadrature(space.element.refdom, fields.order)[0]
+    value, slope, hessian = space.flat.functions(cells, fields.x[cells], (0, 1, 2))
+    shape, gradient = reference(X)
+    n, n_q = value.shape[:2]
+    gradient = np.einsum("eqji,jqk->eqik", space.inverses(X)[cells], gradient)  # of gamma's shapes in x and y
+    deflection, rotation = np.zeros((n, n_q, LOCAL)), np.zeros((n, n_q, 2, LOCAL))
+    shear, curvature = np.zeros((n, n_q, 2, LOCAL)), np.zeros((n, n_q, 3, LOCAL))
+    first, second = slice(21, 21 + SHEAR), slice(21 + SHEAR, LOCAL)
+    deflection[..., :21] = value
+    shear[:, :, 0, first] = shear[:, :, 1, second] = shape
+    rotation[..., :21] = slope.transpose(0, 2, 1, 3)
+    rotation -= shear
+    curvature[..., :21] = hessian[:, [0, 2, 1]].transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]
+    curvature[:, :, 0, first] = curvature[:, :, 2, second] = -gradient[:, :, 0]
+    curvature[:, :, 1, second] = curvature[:, :, 2, first] = -gradient[:, :, 1]
+    return deflection, rotation, shear, curvature
+
+
+def matrices(space: MindlinSpace, fields: Fields, tension: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Stiffness, mass and stiffness by tension of each triangle, (n_cells, 51, 51); ``tension`` [-] in the frame."""
+    n = len(fields.x)
+    K, M, T = (np.zeros((n, LOCAL, LOCAL)) for _ in range(3))
+    for cells in _blocks(n):
+        deflection, rotation, shear, curvature = strains(space, fields, cells)
+        K[cells] = _gram(curvature, fields.stiffness[cells]) + _gram(shear, fields.shear[cells])
+        M[cells] = _gram(deflection[:, :, None], fields.inertia[cells][..., None, None])
+        M[cells] += _gram(rotation, fields.rotary[cells][..., None, None] * np.eye(2))
+        if tension:
+            T[cells] = _gram(rotation + shear, tension * fields.area[cells][..., None, None] * np.eye(2))
+    return K, M, T
+
+
+def _gram(parts: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Sum over quadrature points of parts (n, n_q, m, k), transposed, times weight (n, n_q, m, m) times parts."""
+    n, _, _, k = parts.shape
+    return parts.reshape(n, -1, k).transpose(0, 2, 1) @ (weight @ parts).reshape(n, -1, k)
+
+
+def _blocks(n: int) -> list[np.ndarray]:
+    """Numbers of n triangles in blocks, to limit memory."""
+    return np.array_split(np.arange(n), max(1, -(-n // CHUNK)))
+
+
+@dataclass(frozen=True, eq=False)
+class ThickStrain:
+    """What `assembly.Strain` is for a thin plate: the strain energy from curvatures and shear strains."""
+
+    fields: Fields
+    springs: csc_matrix  # (n_all, n_all) stiffness of elastic supports and tension
+
+    __repr__ = check.brief
+
+    def energy(self, system: Any, vectors: np.ndarray) -> np.ndarray:
+        """Twice the strain energy (n_modes,) of vectors (n_dofs, n_modes)."""
+        return self._sum(system, vectors, "nqik,nqik->k")
+
+    def products(self, system: Any, vectors: np.ndarray) -> np.ndarray:
+        """Twice the mutual strain energy (n, n) of all pairs of vectors (n_dofs, n)."""
+        return self._sum(system, vectors, "nqik,nqil->kl")
+
+    def _sum(self, system: Any, vectors: np.ndarray, pairs: str) -> np.ndarray:
+        moved = system.expand @ vectors
+        total = np.einsum(pairs.replace("nqi", "n"), moved, self.springs @ moved)
+        for cells in _blocks(len(self.fields.x)):
+            _, _, shear, curvature = strains(system.space, self.fields, cells)
+            mine = moved[system.element_dofs[:, cells].T][:, None]
+            for part, weight in ((curvature, self.fields.stiffness), (shear, self.fields.shear)):
+                found = part @ mine
+                total += np.einsum(pairs, weight[cells] @ found, found)
+        return total
+
+
+def held_as_thin(kind: str) -> str:
+    """The support of a thin plate that holds the deflection as this one does: rotations are held apart."""
+    return "free" if kind == "free" else "hinged"
+
+
+def constrain(
+    space: MindlinSpace, rim: supports.Rim, kinds: list[str], mesh: MeshTri, flat: tuple[np.ndarray, int]
+) -> tuple[csr_matrix, csr_matrix, np.ndarray]:
+    """Remove the unknowns that the supports fix; the same results as `supports.constrain`.
+
+    Parameters
+    ----------
+    space : MindlinSpace
+    rim : Rim, with ``kinds`` as in `held_as_thin`
+    kinds : list of the supports, (n_facets,)
+    mesh : MeshTri
+    flat : numbers of the Argyris unknowns (21, n_cells), and how many there are
+    """
+    expand, project, dofs = supports.constrain(rim, space.vertices, *flat)
+    cells, sides = supports.cells_of_facets(rim.facets, space.vertices)
+    held = np.array([kind != "free" for kind in rim.kinds])
+    if space.bent is not None:
+        slips = np.flatnonzero(held & (space.bent.of_side[cells, sides] >= 0))
+        if slips.size:
+            expand, project = _without_slip(space, rim, slips, cells[slips], sides[slips], dofs, expand, project)
+    n_flat, own = expand.shape[0], Dofs(mesh, ElementTriP4())
+    n_shear = own.N
+    dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + n_shear + own.element_dofs])
+    local, x, normal = _nodes(space, rim.facets, cells, sides)
+    slope = space.flat.functions(cells, x, (1,))[0].transpose(0, 2, 1, 3)  # (n_facets, 5, 2, 21)
+    at: dict[int, list[tuple[int, int]]] = {}
+    for facet, kind in enumerate(kinds):
+        if kind in ("hinged", "clamped"):
+            for k in range(local.shape[1]):
+                at.setdefault(int(own.element_dofs[local[facet, k], cells[facet]]), []).append((facet, k))
+    tied: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # rows, columns and values of gamma_n = w_n
+    single = []  # nodes where gamma has only a normal part, and the normal
+    for node, facets in at.items():
+        clamped = next((place for place in facets if kinds[place[0]] == "clamped"), None)
+        if clamped is not None:
+            n = normal[clamped]
+            row = n @ slope[clamped]  # (21,)
+            mine = dofs[:21, cells[clamped[0]]]
+            for i in range(2):
+                tied.append((np.full(21, node + i * n_shear), mine, n[i] * row))
+            continue
+        first = normal[facets[0]]
+        turn = max(abs(first[0] * normal[other][1] - first[1] * normal[other][0]) for other in facets)
+        if turn < supports.SMOOTH:
+            single.append((node, first))
+    free = np.setdiff1d(np.arange(n_shear), list(at))
+    rows = np.concatenate([free, free + n_shear, *[[node, node + n_shear] for node, _ in single]]).astype(int)
+    columns = np.concatenate([np.arange(2 * len(free)), np.repeat(2 * len(free) + np.arange(len(single)), 2)])
+    entries = np.concatenate([np.ones(2 * len(free)), *[n for _, n in single]])
+    loose = csr_matrix((entries, (rows, columns)), shape=(2 * n_shear, 2 * len(free) + len(single)))
+    whole = block_diag([expand, loose], format="csr")
+    if tied:
+        row, column, value = (np.concatenate(part) for part in zip(*tied))
+        tie = coo_matrix((value, (row, column)), shape=(2 * n_shear, n_flat)).tocsr() @ expand
+        lower = block_diag([csr_matrix((n_flat, 0)), tie], format="csr")
+        lower.resize(whole.shape)
+        whole = (whole + lower).tocsr()
+    return whole, block_diag([project, loose.T], format="csr"), dofs
+
+
+def _without_slip(
+    space: MindlinSpace, rim: supports.Rim, slips: np.ndarray, cells: np.ndarray, sides: np.ndarray, dofs: np.ndarray,
+    expand: csr_matrix, project: csr_matrix,
+) -> tuple[csr_matrix, csr_matrix]:  # fmt: skip
+    """Make the slope across curved held edges ``slips`` (n,) cubic along them, by their mid-side unknowns.
+
+    The supports hold w to the second derivative at both ends of a facet. In between, on the curve, w is the part of
+    fourth degree of this slope times the height over the chord. A thin plate is too stiff to use that; a thick one
+    would slip there, and its error would only fall as size**3.
+    """
+    x, normal = _nodes(space, rim.facets[slips], cells, sides)[1:]
+    slope = space.flat.functions(cells, x, (1,))[0]  # (n, 2, 5, 21)
+    fourth = np.einsum("ni,niqk,q->nk", normal[:, 3], slope, np.array([1.0, 1.0, -4.0, 6.0, -4.0]))
+    rows = np.repeat(np.arange(len(slips)), 21)
+    whole = csc_matrix((fourth.ravel(), (rows, dofs[:21, cells].T.ravel())), shape=(len(slips), expand.shape[0]))
+    middle = dofs[18 + sides, cells]
+    gone = expand[middle].indices  # each is an unknown of its own
+    kept = np.setdiff1d(np.arange(expand.shape[1]), gone)
+    expand, project = expand[:, kept], project[kept]
+    solved = csr_matrix(spsolve(whole[:, middle], csc_matrix(-whole @ expand)))
+    place = csr_matrix((np.ones(len(middle)), (middle, np.arange(len(middle)))), shape=(expand.shape[0], len(middle)))
+    return (expand + place @ solved).tocsr(), project.tocsr()
+
+
+def _nodes(
+    space: MindlinSpace, facets: np.ndarray, cells: np.ndarray, sides: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The nodes of the shear strain on facets: local numbers (n, 5), places and outward normals (n, 5, 2)."""
+    pairs = np.array(supports.SIDES)[sides]  # (n, 2) corners
+    local = np.column_stack([pairs, 3 + 3 * sides[:, None] + np.arange(3)])
+    s = np.array([0.0, 1.0, 0.25, 0.5, 0.75])[:, None]
+    first, last = (np.eye(3)[pairs[:, end]][:, None] for end in range(2))  # (n, 1, 3)
+    area = (1.0 - s) * first + s * last
+    x, step = space.flat.inner.along(cells, area, last - first)
+    backward = space.vertices[cells, pairs[:, 0]] != facets[:, 0]
+    step = np.where(backward[:, None, None], -step, step)
+    normal = np.stack([step[..., 1], -step[..., 0]], axis=-1)
+    return local, x, normal / np.linalg.norm(normal, axis=2)[..., None]
+
+
+def spread(space: MindlinSpace, points: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, csr_matrix]:
+    """Places (n, 2) over which forces at points (n_points, 2) are spread, and their weights (n_points, n).
+
+    Each disk, of its ``radius`` (n_points,), is cut at the edge of the body. A weight linear in the place moves its
+    centre back to the point, so that a rigid motion is seen exactly.
+    """
+    rings, spokes = FINE if len(points) <= FEW else ROUGH
+    node, weight = np.polynomial.legendre.leggauss(rings)
+    turn = 2.0 * np.pi * np.arange(spokes) / spokes
+    away = np.sqrt(0.5 * (node + 1.0))  # Gauss points in the radius squared
+    disk = (away[:, None, None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)).reshape(-1, 2)
+    offset = radius[:, None, None] * disk  # (n_points, n_disk, 2)
+    places = points[:, None] + offset
+    share = np.repeat(weight, spokes) * space.locate(places.reshape(-1, 2))[1].reshape(offset.shape[:2])
+    bare = share.sum(axis=1) == 0.0  # all off the body, as around a spike: the point itself
+    places[bare], offset[bare], share[bare] = points[bare, None], 0.0, 1.0
+    share = share / share.sum(axis=1, keepdims=True)
+    centre = np.einsum("pk,pki->pi", share, offset)
+    about = offset - centre[:, None]
+    spread_out = np.einsum("pk,pki,pkj->pij", share, about, about)
+    lean = np.einsum("pij,pj->pi", np.linalg.pinv(spread_out, hermitian=True), centre)
+    share = share * (1.0 - np.einsum("pki,pi->pk", about, lean))
+    row = np.repeat(np.arange(len(points)), share.shape[1])
+    weights = csr_matrix((share.ravel(), (row, np.arange(share.size))), shape=(len(points), share.size))
+    return places.reshape(-1, 2), weights
+
+
+def towards_edges(mesh: Mesh, loose: np.ndarray, size: float) -> Mesh:
+    """Make the triangles of a mesh shrink to a ``size`` [m] towards the facets ``loose`` (n_facets,) bool."""
+    for _ in range(splitting.ROUNDS):
+        ends = mesh.points[mesh.facets[loose]]
+        steps = np.ceil(2.0 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / size).astype(int)
+        along = [np.linspace(0.0, 1.0, n + 1)[:, None] * (b - a) + a for (a, b), n in zip(ends, steps)]
+        corner = mesh.points[mesh.cells]
+        away = cKDTree(np.concatenate(along)).query(corner)[0].min(axis=1)
+        longest = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1)
+        tall = longest > np.maximum(size, splitting.GROWTH * away) * EVEN
+        if not tall.any():
+            return mesh
+        mesh, parent = splitting.divided_across(mesh, tall)
+        loose = loose[parent]
+    return mesh
+
+
+def layered(mesh: Mesh, section: Plate, kinds: list[str], coarser: float) -> Mesh:
+    """The mesh with triangles that resolve the layer along free and soft edges, if `MOST_LAYER` of them suffice.
+
+    ``kinds`` (n_facets,) are the supports; ``coarser`` [-] multiplies the size of the triangles there.
+    """
+    loose = np.isin(kinds, LOOSE)
+    if not loose.any():
+        return mesh
+    ends = mesh.points[mesh.facets[loose]]
+    length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+    thin = float(evaluate("thickness", section.thickness, mesh.middles[loose], "m").min())
+    return towards_edges(mesh, loose, coarser * max(LAYER * thin, length / MOST_LAYER))
+
+
+def missed_by_layers(system: Any, vectors: np.ndarray) -> np.ndarray:
+    """Twice the strain energy (n,) that vectors (n_dofs, n) keep as triangles are too large for the edge layers."""
+    space, rim, frame = system.space, system.rim, system.frame
+    loose = np.flatnonzero(np.isin(rim.kinds, LOOSE))
+    if not loose.size:
+        return np.zeros(vectors.shape[1])
+    cells = supports.cells_of_facets(rim.facets[loose], space.vertices)[0]
+    _, x, normal = at_facets(space, rim.facets[loose], cells)
+    ds = np.linalg.norm(normal, axis=2)
+    nx, ny = np.moveaxis(normal / ds[..., None], 2, 0)
+    place = frame.centre + frame.length * x.reshape(-1, 2)
+    stiffness = system.section.stiffness(place).reshape(*ds.shape, 3, 3) / frame.stiffness
+    shear = system.section.shear(place).reshape(*ds.shape, 2, 2) * frame.length**2 / frame.stiffness
+    along = np.stack([-ny, nx], axis=-1)
+    turn = np.stack([-nx * ny, nx * ny, nx**2 - ny**2], axis=-1)  # the moment M_nt from M_xx, M_yy, M_xy
+    twist = np.stack([-2.0 * nx * ny, 2.0 * nx * ny, nx**2 - ny**2], axis=-1)  # strains of a unit 2 kappa_nt
+    rigidity = np.einsum("fqi,fqij,fqj->fq", 0.5 * twist * [1.0, 1.0, 2.0], stiffness, 0.5 * twist * [1.0, 1.0, 2.0])
+    width = np.sqrt(rigidity / np.einsum("fqi,fqij,fqj->fq", along, shear, along))
+    thin = evaluate("thickness", system.section.thickness, place, "m").reshape(ds.shape) / frame.length
+    coarse = ds.sum(axis=1)[:, None] / thin
+    share = np.where(coarse > SEEN, np.minimum(1.0, (coarse / UNSEEN) ** 2), 0.0)
+    hessian = space.flat.functions(cells, x, (2,))[0][:, [0, 2, 1]] * np.array([1.0, 1.0, 2.0])[:, None, None]
+    unknowns = (system.expand @ vectors)[system.element_dofs[:21, cells]].transpose(1, 0, 2)
+    moment = np.einsum("fqi,fqij,fjqk->fqk", turn, stiffness, hessian, optimize=True) @ unknowns
+    return np.einsum("fqk,fq->k", moment**2, share * width / rigidity * ds)
+
+
+def edge_springs(space: MindlinSpace, facets: np.ndarray, cells: np.ndarray, springs: np.ndarray) -> np.ndarray:
+    """Stiffness (n, 51, 51) that springs (n, 2) against w and beta_n of facets (n, 2) add to their cells (n,)."""
+    area, x, normal = at_facets(space, facets, cells)
+    ds = np.linalg.norm(normal, axis=2)
+    value, slope = space.functions(cells, x, (0, 1))
+    shape = reference(area[..., 1:].reshape(-1, 2).T)[0].reshape(*x.shape[:2], SHEAR)
+    slope[:, 0, :, 21 : 21 + SHEAR] = slope[:, 1, :, 21 + SHEAR :] = -shape
+    turned = np.einsum("nqi,niqk->nqk", normal / ds[..., None], slope)
+    push, turn = springs.T
+    pushed = (value * (push[:, None] * ds)[..., None]).transpose(0, 2, 1) @ value
+    return pushed + (turned * (turn[:, None] * ds)[..., None]).transpose(0, 2, 1) @ turned

@@ -1,0 +1,235 @@
+"""Mindlin plates against Wang's relation, disks, Navier's series, Ritz, beams and solids; their error estimates."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from test_studies import study
+from thick_plates import block, navier, ritz, spread_compliance
+
+import fem_impact as fi
+from fem_impact.fe import refinement
+from fem_impact.fe.assembly import reassemble
+
+UNIT = fi.Material(E=1.0, nu=0.3, rho=1.0)
+ALUMINIUM = fi.Material(E=70e9, nu=0.3, rho=2700.0)
+POLYGONS = {
+    "rectangle": [(0, 0), (1.55, 0), (1.55, 1), (0, 1)], "triangle": [(0, 0), (1, 0), (0, 1)],
+    "quadrilateral": [(0, 0), (1.3, 0.1), (1.1, 0.9), (0.2, 1.0)],
+}  # fmt: skip
+
+
+@cache
+def elements():
+    """The study, which has the exact equations."""
+    return study("thick_elements")
+
+
+def modes_of(mesh, h, supports, n, *, material=UNIT, **options):
+    """Modes of a thick plate."""
+    plate = h if isinstance(h, fi.Plate) else fi.Plate(material, h)
+    return fi.find_modes(fi.assemble(mesh, plate, supports, theory="mindlin"), n_modes=n, **options)
+
+
+@pytest.mark.parametrize("h", [0.1, 1e-3])
+@pytest.mark.parametrize("name", ["triangle", "quadrilateral", pytest.param("rectangle", marks=pytest.mark.slow)])
+def test_hinged_polygons_follow_wangs_relation_from_our_own_thin_frequencies(name, h):
+    mesh, held = fi.mesh.polygon(POLYGONS[name]), {"boundary": "hinged"}
+    thin = fi.find_modes(fi.assemble(mesh, fi.Plate(UNIT, h), held), n_modes=5, tolerance=2e-6)
+    found = modes_of(mesh, h, held, 5, tolerance=5e-6)
+    assert_allclose(found.omega, elements().hinged_polygon(thin.omega, h), rtol=1e-5)
+    if h == 0.1:  # the thin frequencies themselves are far off
+        assert (thin.omega > 1.02 * found.omega).all()
+
+
+@pytest.mark.parametrize("h", [0.2, pytest.param(0.05, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("edge", ["clamped", "hinged", "soft hinged", "free"])
+def test_disks_follow_their_characteristic_equations(edge, h):
+    """Curved edges; the estimated error is neither below half of the true error nor 30 times as large."""
+    exact = elements().disk_frequencies(h, edge, 6)
+    found = modes_of(fi.mesh.disk(1.0), h, {"boundary": edge}, 6 + 3 * (edge == "free"))
+    flexible = found.omega > 0.0
+    true = np.abs(found.omega[flexible] / exact - 1.0)
+    assert true.max() < 3e-5  # the edge layers of the free one; 5e-6 if clamped or hinged
+    claimed = found.frequency_error[flexible]
+    assert (2.0 * claimed > true).all() and claimed.max() < 30.0 * true.max()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edge", ["clamped", "hinged"])
+def test_the_order_on_thick_curved_plates_is_that_of_the_elements(edge):
+    """Held edges once slipped between the vertices: order 3, 3e-4 on the first of these meshes."""
+    exact, errors = elements().disk_frequencies(0.2, edge, 5), []
+    for size in (0.2, 0.1):
+        system = fi.assemble(fi.mesh.disk(1.0, size=size), fi.Plate(UNIT, 0.2), {"boundary": edge}, theory="mindlin")
+        errors.append(np.abs(refinement.solve(system, 5, None).omega / exact - 1.0).max())
+    assert errors[0] < 1e-5  # 6e-6 if clamped
+    assert np.log2(errors[0] / errors[1]) > 4.0  # 4.5 clamped; the size at the edge shrinks by less than 2
+
+
+@pytest.mark.parametrize("sides", [("clamped",) * 4, ("soft hinged",) * 4, ("clamped", "free", "hinged", "free")])
+def test_squares_agree_with_a_ritz_solution(sides):
+    """Liew's method computed anew; 14th degree is converged to 1e-6 with singular corners, else to 1e-9."""
+    held = dict(zip(("left", "right", "bottom", "top"), sides))
+    found = modes_of(fi.mesh.rectangle(1.0, 1.0), 0.2, held, 6)
+    assert_allclose(found.omega, ritz(0.2, 0.3, sides, 14, 6), rtol=2e-5)  # 1e-5 at free edges next to clamped ones
+
+
+@pytest.mark.parametrize("ratio", [1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("size", [0.5, 0.25])
+def test_thin_plates_become_kirchhoff_plates_on_any_mesh(ratio, size):
+    """Nothing locks: on the same coarse triangles, both differ by what Wang's relation says, for each mode."""
+    mesh, plate, held = fi.mesh.rectangle(1.55, 1.0, size=size), fi.Plate(UNIT, ratio), {"boundary": "hinged"}
+    thin = refinement.solve(fi.assemble(mesh, plate, held), 6, None)
+    found = refinement.solve(fi.assemble(mesh, plate, held, theory="mindlin"), 6, None)
+    expected = elements().hinged_polygon(thin.omega, ratio) / thin.omega - 1.0  # -1e-10 ... -6e-6
+    assert_allclose(found.omega / thin.omega - 1.0, expected, rtol=0.1, atol=3e-11)  # rounding 1e-11
+
+
+@pytest.mark.parametrize("edge", ["clamped", "hinged"])
+def test_thin_curved_plates_become_kirchhoff_plates(edge):
+    exact = fi.analytic.disk(1.0, edge=edge, section=fi.Plate(UNIT, 1e-5), n_modes=6)
+    found = modes_of(fi.mesh.disk(1.0), 1e-5, {"boundary": edge}, 6)
+    assert_allclose(found.omega, exact.omega, rtol=5e-6)  # 1e-6; the theories differ by 1e-9
+
+
+def test_a_layer_too_thin_for_the_mesh_is_told_as_an_error():
+    """The layer of a free disk is a hundredth of its radius, a facet a quarter; first-order theory tells its cost."""
+    exact = elements().disk_frequencies(0.02, "free", 5)
+    system = fi.assemble(fi.mesh.disk(1.0, size=0.4), fi.Plate(UNIT, 0.02), {}, theory="mindlin")
+    found = refinement.solve(reassemble(system, system.mesh, layer=100.0), 8, None)
+    true = found.omega[3:] / exact - 1.0
+    assert true.max() > 1e-4
+    assert (found.error[3:] > 0.5 * np.abs(true)).all() and found.error.max() < 30.0 * np.abs(true).max()
+
+
+def test_orthotropic_plates_under_tension_follow_naviers_solution():
+    """Wood with all its shear moduli; by hand, three unknowns for each pair of half waves."""
+    E1, E2, nu, G, G1, G2, rho, h, pull = 11e9, 0.8e9, 0.37, 0.7e9, 0.6e9, 0.04e9, 430.0, 0.02, 2e6
+    wood = fi.Material.orthotropic(E_along=E1, E_across=E2, nu=nu, G=G, rho=rho, G_xz=G1, G_yz=G2)
+    inner, cube = 1.0 - nu**2 * E2 / E1, h**3 / 12.0
+    constants = [E1 / inner * cube, E2 / inner * cube, nu * E2 / inner * cube, G * cube]
+    constants += [5.0 / 6.0 * G1 * h, 5.0 / 6.0 * G2 * h, rho]
+    plate = fi.Plate(wood, h, tension=pull)
+    found = modes_of(fi.mesh.rectangle(0.4, 0.3), plate, {"boundary": "hinged"}, 6)
+    assert_allclose(found.omega, navier(0.4, 0.3, h, constants, 6, pull), rtol=1e-5)
+    without = navier(0.4, 0.3, h, constants, 6)
+    assert (found.omega > 1.1 * without).any()  # the tension matters here
+
+
+def test_the_grain_turns_with_its_angle():
+    wood = {"E_along": 11e9, "E_across": 0.8e9, "nu": 0.37, "G": 0.7e9, "rho": 430.0, "G_xz": 0.6e9, "G_yz": 0.04e9}
+    turn = 0.4
+    corners = np.array([(0, 0), (0.4, 0), (0.35, 0.3), (0, 0.25)])
+    turned = corners @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    found = [
+        modes_of(
+            fi.mesh.polygon(place, size=0.1),
+            0.03,
+            {"edge0": "clamped"},
+            4,
+            material=fi.Material.orthotropic(**wood, angle=angle),
+        )
+        for place, angle in ((corners, 0.0), (turned, turn))
+    ]
+    assert_allclose(found[0].omega, found[1].omega, rtol=1e-5)
+
+
+def test_a_tapered_strip_with_springs_and_a_mass_is_a_timoshenko_beam():
+    """Without Poisson's contraction a strip bends like a beam; both have shear coefficient 5/6 then."""
+    plain, width = fi.Material(E=70e9, nu=0.0, rho=2700.0), 0.05
+    height = lambda x: 0.04 + 0.05 * x[:, 0]  # noqa: E731
+    springs = {"left": (3e7, 2e4), "right": (1e7, 0.0)}
+    strip = fi.assemble(
+        fi.mesh.rectangle(0.4, width), fi.Plate(plain, height),
+        {name: fi.Elastic(push / width, turn / width) for name, (push, turn) in springs.items()}, theory="mindlin",
+    )  # fmt: skip
+    bar = fi.assemble(
+        fi.mesh.line(0.4), fi.Beam.rectangular(plain, width=width, height=height),
+        {name: fi.Elastic(*both) for name, both in springs.items()}, theory="timoshenko",
+    )  # fmt: skip
+    exact = fi.find_modes(bar, n_modes=3).omega
+    every = fi.find_modes(strip, n_modes=6).omega  # some twist
+    nearest = np.abs(every[:, None] / exact - 1.0).min(axis=0)
+    assert nearest.max() < 1e-6
+
+
+def test_the_deflection_under_a_spread_force_follows_its_series():
+    """The force, and the deflection, are spread over the disk of radius 0.325 h; under a point it would be infinite."""
+    at, h = np.array([[0.15, 0.17]]), 0.08
+    modes = modes_of(fi.mesh.rectangle(0.5, 0.4), h, {"boundary": "hinged"}, 10, material=ALUMINIUM)
+    exact = spread_compliance(0.5, 0.4, h, 70e9, 0.3, at[0], 0.325 * h)
+    error = abs(modes.shapes.compliance(at)[0, 0] / exact - 1.0)
+    assert error < 1e-4  # 2.5e-5; the bending part alone is 28 % less
+    assert modes.shapes.compliance_error(at)[0] > error
+    thin = fi.analytic.rectangle(0.5, 0.4, section=fi.Plate(ALUMINIUM, h), n_modes=1).shapes
+    assert modes.shapes.compliance(at)[0, 0] > 1.2 * thin.compliance(at)[0, 0]
+    carried = [modes.truncated(n_modes=n).modal_compliance(at)[0, 0] for n in (1, 4, 10)]
+    assert np.all(np.diff(carried) >= 0.0) and carried[-1] < exact
+
+
+def test_rigid_motions_are_exact_under_a_spread_force_at_edge_and_corner():
+    modes = modes_of(fi.mesh.rectangle(0.5, 0.4), 0.05, {}, 6, material=ALUMINIUM)
+    assert modes.n_rigid == 3 and modes.mass == pytest.approx(0.5 * 0.4 * 0.05 * 2700.0, rel=1e-12)
+    places = np.array([[0.0, 0.0], [0.25, 0.0], [0.5, 0.4], [0.2, 0.2], [0.499, 0.1]])
+    motion = modes.shape_at(places)[:, :3]
+    plane = np.column_stack([np.ones(5), places])
+    assert np.abs(motion - plane @ np.linalg.lstsq(plane, motion, rcond=None)[0]).max() < 1e-9  # linear in the place
+    inertia = np.diag([1.0, 0.5**2 / 12.0 + 0.05**2 / 12.0, 0.4**2 / 12.0 + 0.05**2 / 12.0]) * modes.mass
+    centred = np.column_stack([np.ones(5), places - [0.25, 0.2]])
+    factor = np.linalg.lstsq(centred, motion, rcond=None)[0]
+    assert_allclose(factor.T @ inertia @ factor, np.eye(3), atol=1e-9)
+
+
+def test_points_on_a_support_do_not_move():
+    modes = modes_of(fi.mesh.rectangle(0.5, 0.4), 0.05, {"left": "clamped"}, 3, material=ALUMINIUM)
+    assert np.abs(modes.shape_at([(0.0, 0.2)])).max() < 1e-9
+    assert modes.shapes.compliance(np.array([[0.0, 0.2]]))[0, 0] == pytest.approx(0.0, abs=1e-20)
+
+
+def test_a_point_mass_adds_its_mass():
+    plate, mesh = fi.Plate(ALUMINIUM, 0.03), fi.mesh.rectangle(0.5, 0.4)
+    bare = fi.assemble(mesh, plate, {"left": "clamped"}, theory="mindlin")
+    loaded = fi.assemble(mesh, plate, {"left": "clamped"}, theory="mindlin", point_masses=[((0.4, 0.2), 0.5)])
+    assert loaded.mass - bare.mass == pytest.approx(0.5)
+    first = fi.find_modes(bare, n_modes=1)
+    shape = first.shape_at([(0.4, 0.2)])[0, 0]
+    rayleigh = first.omega[0] / np.sqrt(1.0 + 0.5 * shape**2)
+    assert fi.find_modes(loaded, n_modes=1).omega[0] == pytest.approx(rayleigh, rel=2e-3)  # Rayleigh's is from above
+
+
+def test_a_blow_on_a_thick_plate_is_complete():
+    """Few modes and their residual compliance give the blow that many modes give."""
+    modes = modes_of(fi.mesh.rectangle(0.5, 0.4), 0.03, {"boundary": "hinged"}, 60, material=ALUMINIUM)
+    law, ball = fi.Contact.hertz(1e9), fi.Striker.rigid(0.5)
+    hits = [
+        fi.strike(modes.truncated(n_modes=n), ball, law, at=(0.15, 0.17), speed=1.0, tolerance=1e-2) for n in (30, 60)
+    ]
+    assert hits[0].restitution == pytest.approx(hits[1].restitution, abs=2e-3)
+    assert hits[0].impulse == pytest.approx(hits[1].impulse, rel=2e-3)
+
+
+def test_refusals():
+    plate, mesh = fi.Plate(UNIT, 0.1), fi.mesh.rectangle(1.0, 1.0)
+    with pytest.raises(ValueError, match="theory must be one of kirchhoff, mindlin"):
+        fi.assemble(mesh, plate, theory="timoshenko")
+    with pytest.raises(ValueError, match="must be one of clamped, hinged, free, got 'soft hinged'"):
+        fi.assemble(mesh, plate, {"boundary": "soft hinged"})
+    with pytest.raises(ValueError, match="element must be"):
+        fi.assemble(mesh, plate, element="morley", theory="mindlin")
+    with pytest.raises(ValueError, match="tension needs every edge supported"):
+        fi.assemble(mesh, fi.Plate(UNIT, 0.1, tension=1.0), {"left": "hinged"}, theory="mindlin")
+    with pytest.raises(ValueError, match="G_xz needs an orthotropic material"):
+        fi.Material(E=1.0, nu=0.3, rho=1.0, G_xz=0.1)
+    assert fi.assemble(mesh, plate).theory == "kirchhoff"
+
+
+@pytest.mark.slow
+def test_a_free_block_of_one_to_five_is_a_mindlin_plate_within_a_hundredth():
+    """Where the thin theory is 10 to 40 % off. The solid is converged to 1e-3."""
+    exact = block((1.0, 1.0, 0.2), (8, 8, 2), 0.3, 6)
+    thick_one = modes_of(fi.mesh.rectangle(1.0, 1.0), 0.2, {}, 9).omega[3:]
+    thin = fi.find_modes(fi.assemble(fi.mesh.rectangle(1.0, 1.0), fi.Plate(UNIT, 0.2), {}), n_modes=9).omega[3:]
+    assert_allclose(thick_one, exact, rtol=0.01)
+    assert (thin > 1.05 * exact).all()
