@@ -5,7 +5,7 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -34,12 +34,19 @@ AXES = {  # name: unit, what it is, its name in a scene file
     "exponent": ("", "exponent of the contact", "contact.exponent"),
     "loss": ("s/m", "loss factor of the contact", "contact.loss"),
     "gap": ("m", "distance the striker travels before contact", "contact.gap"),
+    "depth": ("m", "approach at which the hard layer is reached", "contact.depth"),
+    "hard_stiffness": ("N/m**hard_exponent", "stiffness of the hard layer", "contact.hard_stiffness"),
+    "hard_exponent": ("", "exponent of the hard layer", "contact.hard_exponent"),
+    "yield_approach": ("m", "approach at first yield", "contact.yield_approach"),
+    "hysteresis": ("", "share of the force that felt loses", "contact.hysteresis"),
+    "relaxation": ("s", "relaxation time of felt", "contact.relaxation"),
     "speed": ("m/s", "speed of the striker's contact point", "strike.speed"),
     "at": ("m", "strike point", "strike.at"),
     "target_mass": ("kg", "mass of the struck body", "target.mass"),
     "target_frequency": ("Hz", "first flexible frequency of the struck body", "target.first_frequency"),
     "damping_ratio": ("", "damping ratio of the struck body", "target.damping_ratio"),
 }
+LAW = [field.name for field in fields(Contact)]  # the axes that change the contact
 ALIASES = {alias: name for name, (_, _, alias) in AXES.items()}
 FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  # each value needs new kernels
 REACH = 1e30  # [SI] speeds, masses and frequencies lie between 1/REACH and REACH: beyond, the kernels never finish
@@ -81,7 +88,7 @@ class Case:
             return replace(self, at=self.modes.point("at", value)[0])
         if name == "speed":
             return replace(self, speed=check.positive("speed", value, "m/s", reach=REACH))
-        if name in ("stiffness", "exponent", "loss", "gap"):
+        if name in LAW:
             return replace(self, contact=replace(self.contact, **{name: float(value)}))
         if name in ("mass", "striker_frequency"):
             key = "mass" if name == "mass" else "first_frequency"
@@ -115,7 +122,7 @@ class Grid:
     @property
     def lossy(self) -> bool:
         """Whether any contact loses energy."""
-        return bool(self.base.contact.loss or "loss" in self.axes)
+        return bool(self.base.contact.lossy or {"loss", "yield_approach", "hysteresis"} & set(self.axes))
 
     @property
     def layers(self) -> list[str]:
@@ -158,8 +165,8 @@ class Grid:
         def value(name: str, shared: float) -> np.ndarray:
             return along(name, self.axes.get(name, [shared]))
 
-        stiffness, exponent, loss = (
-            value(name, getattr(base.contact, name)) for name in ("stiffness", "exponent", "loss")
+        stiffness, exponent, loss, share = (
+            value(name, getattr(base.contact, name)) for name in ("stiffness", "exponent", "loss", "hysteresis")
         )
         speed = value("speed", base.speed)
         weight = value("mass", base.striker.mass) / base.striker.mass
@@ -181,7 +188,9 @@ class Grid:
             above = np.minimum(1.0, omega / (modes.omega[-1] * ratio))
             total = total + accuracy.left_out_error(soft, above, exponent, modes.dimension)
             softness = softness + soft
-        return np.where(softness <= RESOLVABLE, total * np.where(loss > 0.0, accuracy.LOSSY, 1.0), np.inf)
+        return np.where(
+            softness <= RESOLVABLE, total * np.where((loss > 0.0) | (share > 0.0), accuracy.LOSSY, 1.0), np.inf
+        )
 
     def scene(self) -> dict[str, Any]:
         """The blow that all cells share, as plain numbers."""
@@ -207,7 +216,10 @@ class Grid:
     def without_speed(self) -> "Grid | None":
         """The grid at one speed if every contact is linear, so that speed only scales the forces; otherwise None."""
         exponents = self.axes.get("exponent", np.array([self.base.contact.exponent]))
-        if "speed" not in self.axes or (exponents != 1.0).any() or self.lossy or self.base.contact.gap or self.extra:
+        law = self.base.contact
+        if "speed" not in self.axes or (exponents != 1.0).any() or self.lossy or law.gap or self.extra:
+            return None
+        if law.hard_stiffness or "hard_stiffness" in self.axes:
             return None
         return replace(self, axes={**self.axes, "speed": self.axes["speed"][:1]})
 
@@ -254,7 +266,8 @@ def sweep(
         the mean frequency of a pulse grows without limit as the band widens.
     layers : mapping of name to function of a Response, optional
         Additional scalars to compute; the functions run in threads. Every cell is then computed alone, which is about
-        a hundred times slower (``studies/map_speed.py``); so are cells with an exponent below 1.
+        a hundred times slower (``studies/map_speed.py``); so are cells with an exponent below 1, and contacts of two
+        layers, that yield or are felt.
     residual : bool
         As in `strike`.
     workers : int, optional
@@ -375,6 +388,8 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
         for name, value in base.items()
     }
     quick = (column["exponent"] >= 1.0) & (column["gap"] >= 0.0) & (not grid.extra)
+    for name in ("hard_stiffness", "yield_approach", "hysteresis"):
+        quick &= column[name] == 0.0
     cells = np.flatnonzero(quick)
     if cells.size:
         kind = np.zeros(stop - start, int)
@@ -428,7 +443,7 @@ def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
             axes[name] = check.array(f"over[{given!r}]", values, (None,), AXES[name][0])
         if not len(axes[name]):
             raise ValueError(f"over[{given!r}] must contain at least one value")
-        if name in ("stiffness", "exponent", "loss", "gap"):
+        if name in LAW:
             for value in axes[name]:
                 base.changed(name, value)
         elif name != "at":
