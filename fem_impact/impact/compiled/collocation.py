@@ -537,6 +537,9 @@ def run_collocation(
         corner = -1
         if special:
             corner, which, root = first_corner(now, law, y, rate, after, h, False, bracket)
+        if corner >= 0 and which == 4:
+            law[corner, MEMORY] = abs(law[corner, MEMORY])
+            continue
         if corner >= 0:
             target = -1
             if misfit > limit and level < LEVELS - 2 and root > 0.25 * h and root < 0.9 * h:

@@ -247,6 +247,7 @@ def run_energy(
     ready = -1  # slot of the table with which the coming step is predicted already
     reset = 0.0
     which = 0
+    fresh = True  # whether what the contacts remember is still to be brought up to the state
     pause = 0.0  # until when events are passed, not located
     respite = base  # how long the next such time will be
     time = 0.0
@@ -277,6 +278,7 @@ def run_energy(
             if elapsed > 0.0:
                 n_steps += 1
                 time += elapsed
+            fresh = True
             if found == 0:
                 events += 1
             if found == 3:
@@ -303,7 +305,7 @@ def run_energy(
             predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, end)
         ready = -1
         for i in range(m):
-            if special:
+            if special and fresh:
                 meet(law, i, now[0, i], now[4, i])
                 deeper = harden(law, i, now[0, i])
                 offset[i] -= deeper
@@ -314,6 +316,7 @@ def run_energy(
             now[1, i] = point.compression
             now[2, i] = point.force
             now[3, i] = point.energy
+        fresh = False
         fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
         if special:
             keep_in_mind(h, law, now, y, f, s, rate, ramp and fine, after)
@@ -357,6 +360,9 @@ def run_energy(
         corner = -1
         if cornered and not blind:
             corner, which, guess = first_corner(now, law, y, rate, after, h, True, bracket)
+        if corner >= 0 and which == 4:
+            law[corner, MEMORY] = abs(law[corner, MEMORY])
+            continue
         if corner >= 0:
             target = -1
             slot = odd
@@ -379,6 +385,7 @@ def run_energy(
             break
         record(steps[n_steps], law, time, h, blind, all_sums[slot], now, pressed, end, y, f, s, done)
         n_steps += 1
+        fresh = True
         if special:
             for i in range(m):
                 law[i, MEMORY] = after[i]

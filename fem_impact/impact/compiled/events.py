@@ -33,6 +33,7 @@ from .law import (
 LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
 LET_GO = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to this
 TURNED = 1e-8  # [-] of the rates about a turn: so far from zero, the approach there errs by the square of it
+AT_ONCE = 1e-3  # [-] of a step: a body that parts from its felt and meets it again within that has not parted
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
 EVENT_LIMIT = 64  # [-] events within one step's time: chatter, passed with unlocated steps, each time for twice as long
 
@@ -191,6 +192,8 @@ def corner_value(law, i, which, d, v, memory):
 def first_corner(now, law, y, rate, after, h, lossy, out_bracket):
     """The first corner within a step: contact, which (see `corner_value`), and when; -1, 0 and h where there is none.
 
+    4 stands for felt that its body meets again at once: the step is to be taken pressed.
+
     ``out_bracket`` receives two times with the corner in between and, for secants, a third time and the value there
     and at the start. ``after`` (n_contacts,) is what they remember at the end. Loss is left out unless ``lossy``.
     """
@@ -218,7 +221,10 @@ def first_corner(now, law, y, rate, after, h, lossy, out_bracket):
             if least > 0.0 and (end > least if apart else end < -least):
                 start = min(start, -least) if apart else max(start, least)
                 root = h * start / (start - end)
-                if root < at:
+                if root < AT_ONCE * h:
+                    if apart:
+                        return i, 4, h
+                elif root < at:
                     at, target, kind = root, i, 3
                     out_bracket[1], out_bracket[3], out_bracket[4], out_bracket[5] = h, h, end, start
             continue

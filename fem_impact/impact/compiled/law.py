@@ -68,7 +68,9 @@ def spring_of(law, i):
     The three are depth, stiffness and exponent of the hard layer; compression at first yield; share and time of felt.
     Felt from which the body has parted carries a minus before its memory: a spring without stiffness.
     """
-    return spring_with(law, i, law[i, MEMORY] if law.shape[1] == WIDTH else 0.0)
+    if law.shape[1] < WIDTH or law[i, KIND] == POWER:
+        return simple(law[i, 0], law[i, 1], law[i, 2], law[i, 3])
+    return spring_with(law, i, law[i, MEMORY])
 
 
 @inner()
