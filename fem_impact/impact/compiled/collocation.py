@@ -145,13 +145,13 @@ def sides(law, now, out_beyond):
 
 
 @inner()
-def turned_over(law, now, y, rate, h, pressed, beyond):
+def turned_over(law, now, y, rate, after, h, pressed, beyond):
     """Change the side of contacts that left theirs from the corner at once; whether any did."""
     again = False
     for i in range(y.size):
         if pressed[i]:
             side = 1.0 if beyond[i] else -1.0
-            if strayed(law, now, y, rate, h, i, side) == 1:
+            if strayed(law, now, y, rate, after, h, i, side) == 1:
                 beyond[i] = not beyond[i]
                 again = True
     return again
@@ -487,11 +487,11 @@ def run_collocation(
                     again = True
                 elif dipped(now, pressed, y, rate, h, i) and (pressed[i] or level < LEVELS - 2):
                     shorter = 1
-                if special and pressed[i] and strayed(law, now, y, rate, h, i, 1.0 if beyond[i] else -1.0) == 2:
+                if special and pressed[i] and strayed(law, now, y, rate, after, h, i, 1.0 if beyond[i] else -1.0) == 2:
                     shorter = 1
             target, root = first_crossing(now, pressed, y, rate, h, depth, still)
             if special and not again:
-                again = turned_over(law, now, y, rate, h, pressed, beyond)
+                again = turned_over(law, now, y, rate, after, h, pressed, beyond)
         if again:
             continue
         if shorter > 0:

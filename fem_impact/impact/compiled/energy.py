@@ -329,7 +329,11 @@ def run_energy(
                         shorter = max(shorter, 3 if level == 0 else 1)
                 elif dipped(now, pressed, y, rate, h, i):
                     shorter = max(shorter, 1)
-                if special and pressed[i] and strayed(law, now, y, rate, h, i, 1.0 if now[4, i] > 0.0 else -1.0) == 2:
+                if (
+                    special
+                    and pressed[i]
+                    and strayed(law, now, y, rate, after, h, i, 1.0 if now[4, i] > 0.0 else -1.0) == 2
+                ):
                     shorter = max(shorter, 1)
             if shorter > 0:
                 level += shorter

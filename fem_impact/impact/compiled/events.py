@@ -33,6 +33,7 @@ from .law import (
 LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
 LET_GO = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to this
 TURNED = 1e-8  # [-] of the rates about a turn: so far from zero, the approach there errs by the square of it
+DIPPED = 1e-6  # [-] of what makes it push: a body that leaves its felt by less within a step has not left it
 AT_ONCE = 1e-3  # [-] of a step: a body that parts from its felt and meets it again within that has not parted
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
 EVENT_LIMIT = 64  # [-] events within one step's time: chatter, passed with unlocated steps, each time for twice as long
@@ -256,11 +257,25 @@ def first_corner(now, law, y, rate, after, h, lossy, out_bracket):
 
 
 @inner()
-def strayed(law, now, y, rate, h, i, side):
+def dipped_felt(law, now, y, rate, after, h, i):
+    """Whether a body left its felt and met it again within a step, by the cubic of what makes it push."""
+    share, time, z0, z1 = law[i, 5], law[i, 6], law[i, MEMORY], after[i]
+    if z0 < 0.0 or y[i] <= 0.0 or now[0, i] <= 0.0:
+        return False
+    g0, g1 = parting(law, i, now[0, i], z0), parting(law, i, y[i], z1)
+    r0 = law[i, 1] * (g0 + share * z0) / now[0, i] * now[4, i] - share * (g0 + (share - 1.0) * z0) / time
+    r1 = law[i, 1] * (g1 + share * z1) / y[i] * rate[i] - share * (g1 + (share - 1.0) * z1) / time
+    return r0 < 0.0 < r1 and g0 > 0.0 and g1 > 0.0 and lowest(g0, r0, g1, r1, h) < -DIPPED * max(g0, g1)
+
+
+@inner()
+def strayed(law, now, y, rate, after, h, i, side):
     """Whether contact i began its step at the corner of its law and ends it beyond (side 1) or before it (side -1).
 
     0 it stayed, 1 it left the side at once, 2 after a way in which the step must be shorter.
     """
+    if law.shape[1] == WIDTH and law[i, KIND] == FELT:
+        return 2 if dipped_felt(law, now, y, rate, after, h, i) else 0
     if law.shape[1] < WIDTH or (law[i, KIND] != LAYERS and law[i, KIND] != PLASTIC):
         return 0
     spring = spring_of(law, i)
