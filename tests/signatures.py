@@ -158,6 +158,16 @@ def table() -> dict[str, dict[str, Any]]:
         "Contact.power": {"stiffness": 1e6, "exponent": 2.0, "loss": 0.1, "gap": 1e-4},
         "Contact.restituting": {"stiffness": 1e6, "exponent": 1.5, "restitution": 0.8, "speed": 1.0, "gap": 1e-4},
         "Contact.between": {"sphere": t["sphere"], "plate": t["plate"], "loss": 0.1, "gap": 1e-4},
+        "Contact.between yields": {"sphere": t["sphere"], "plate": t["plate"], "yield_strength": 1e9, "gap": 1e-4},
+        "Contact.layers": {
+            "stiffness": 1e5, "exponent": 1.2, "depth": 1e-3, "hard_stiffness": 1e8, "hard_exponent": 1.5, "loss": 0.1,
+            "gap": 1e-4,
+        },
+        "Contact.elastic_plastic": {
+            "stiffness": 1e8, "exponent": 1.5, "yield_speed": 0.1, "mass": 0.1, "gap": 1e-4,
+        },
+        "Contact.elastic_plastic by approach": {"stiffness": 1e8, "yield_approach": 1e-5},
+        "Contact.felt": {"stiffness": 1e8, "exponent": 2.0, "hysteresis": 0.5, "relaxation": 1e-3, "gap": 1e-4},
         "Contact.force": {"self": t["law"], "approach": [1e-4, 2e-4], "rate": 0.1},
         "assemble": {
             "mesh": t["square"], "section": t["plate"], "supports": {"boundary": "hinged"}, "element": "argyris",
@@ -213,6 +223,7 @@ def table() -> dict[str, dict[str, Any]]:
         "Striker.rigid": {"mass": 0.03},
         "Striker.sphere": {"material": t["metal"], "radius": 0.01},
         "Striker.stick": {"mass": 0.1, "first_frequency": 1e3, "n_modes": 3},
+        "Striker.hammer": {"head": 0.03, "handle": 0.05, "stiffness": 1e4, "damping": 2.0},
         "Striker.flexible": {"modes": t["free"], "at": None},
         "Response.displacement": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "body": -1, "residual": True},
         "Response.velocity": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "body": -1, "residual": True},

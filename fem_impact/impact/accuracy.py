@@ -8,7 +8,7 @@ import numpy as np
 
 from .._base import check
 from ..modes.modal import Modes
-from .contact import Contact, wall_time
+from .contact import Contact, acting_stiffness, wall_time
 
 SMOOTH = 1.5, 3.0  # [-] the error falls as (omega_0 / omega_c)**min(1.5 + exponent, 3): fitted, see `left_out_error`
 FACTOR = 1.0, 2.0  # [-] factor of that error, linear and from Hertz on: 90 % of random blows on plates err less
@@ -19,9 +19,13 @@ BAND = 4.0  # [-] kept modes reach at least this multiple of the contact frequen
 
 @check.typed
 def contact_duration(contact: Contact, mass: float, speed: float) -> float:
-    """Contact duration [s] of a rigid mass [kg] that hits a rigid wall at a speed [m/s], without loss or gap."""
+    """Contact duration [s] of a rigid mass [kg] that hits a rigid wall at a speed [m/s], without loss or gap.
+
+    Of a head of two layers, a contact that yields or felt, that of a power law which stands for it.
+    """
     mass, speed = check.positive("mass", mass, "kg"), check.positive("speed", speed, "m/s")
-    return float(wall_time(contact.stiffness, contact.exponent, 1.0 / mass, speed))
+    stiffness = acting_stiffness(contact.numbers, 1.0 / mass, speed)
+    return float(wall_time(stiffness, contact.exponent, 1.0 / mass, speed))
 
 
 def contact_resonance(contact: Contact, mass: float, speed: float) -> float:

@@ -15,7 +15,8 @@ from . import accuracy, force_spectrum, promise
 from .compiled import build, record
 from .compiled.collocation import run_collocation
 from .compiled.energy import run_energy
-from .contact import Contact, wall_time
+from .compiled.law import FELT
+from .contact import Contact, acting_stiffness, wall_time
 from .quantities import asked_for
 from .response import Dip, Error, History, Response
 from .striker import Striker
@@ -287,7 +288,7 @@ def _dip(part: _Part, system: _System) -> Dip | None:
     """Where the left-out modes of a body deflect; a constant force counts only if a series spring replaces them."""
     if not part.rest.any():
         return None
-    series = len(part.touched) == 1 and system.law[part.touched[0][0], 2] == 0.0
+    series = len(part.touched) == 1 and not _rated(system.law)[part.touched[0][0]]
     return Dip(part.points, part.touched, part.force if series else 0.0)
 
 
@@ -357,7 +358,8 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
     A series spring is exact only for a body with one lossless contact. Otherwise each eigenvector of the residual
     compliance becomes a mode above the last kept one, so that loss and other contacts act on it too.
     """
-    law = np.array([[t.law.stiffness, t.law.exponent, t.law.loss, 0.0] for t in contacts])
+    law = np.array([touch.law.numbers for touch in contacts])
+    rated = _rated(law)
     offset = np.array([-t.law.gap for t in contacts])
     n_modes = sum(len(part.omega) for part in parts)
     shape = np.zeros((len(contacts), n_modes))
@@ -370,11 +372,11 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
         if not part.rest.any():
             continue
         first, sign = part.touched[0]
-        if len(part.touched) == 1 and law[first, 2] == 0.0:
+        if len(part.touched) == 1 and not rated[first]:
             law[first, 3] += part.rest[0, 0]
             offset[first] += sign * part.rest[0, 0] * part.force
             continue
-        above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], bool((law[:, 2] > 0.0).any()))
+        above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], bool(rated.any()))
         size, vectors = np.linalg.eigh(part.rest)
         for value, vector in zip(size, vectors.T):
             if value > REST_FLOOR * size[-1]:
@@ -389,6 +391,11 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
         lists = [[*one, np.array(more)] for one, more in zip(lists, added)]
     omega, zeta, bias, q, p = (np.concatenate(one) for one in lists)
     return _System(omega, zeta, shape, offset, bias, law, q, p)
+
+
+def _rated(law: np.ndarray) -> np.ndarray:
+    """Whether the force of each contact depends on more than the approach itself, (n_contacts,)."""
+    return (law[:, 2] > 0.0) | (law[:, 4] == FELT)
 
 
 def _poorer(part: _Part, modes: Modes) -> _Part:
@@ -471,7 +478,8 @@ def _pace(system: _System) -> tuple[float, float]:
     last = np.concatenate([omega[1:] > omega[:-1], [True]])  # the last mode of each distinct frequency
     beyond = np.concatenate([omega[last][1:], [np.inf]])
     shortest, fastest = np.inf, 0.0
-    for i, (k, exponent, _, compliance) in enumerate(system.law):
+    for i, law in enumerate(system.law):
+        k, exponent, compliance = law[0], law[1], law[3]
         mobile = np.cumsum(system.shape[i, order] ** 2)[last]  # [1/kg] sum over the modes up to each
         above, mobile = beyond[mobile > 0.0], mobile[mobile > 0.0]
         if not mobile.size:
@@ -485,7 +493,7 @@ def _pace(system: _System) -> tuple[float, float]:
             speed = max(speed, approach * np.sqrt(k * approach ** (exponent - 1.0) * mobile[-1]))
         if speed == 0.0:
             continue
-        free = wall_time(k, exponent, mobile, speed, compliance)
+        free = wall_time(acting_stiffness(law, mobile, speed), exponent, mobile, speed, compliance)
         shortest = min(shortest, float(free[np.argmax(np.pi / free < above)]))
         fastest = max(fastest, float(speed))
     if not np.isfinite(shortest):
@@ -527,7 +535,7 @@ def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance
     """
     modes = striker.modes
     law: dict[str, Any] = {"contact": contact, "mass": striker.felt_mass, "speed": speed}
-    allowed = STRIKER_SHARE * tolerance / (LOSSY_STRIKER if contact.loss else 1.0)
+    allowed = STRIKER_SHARE * tolerance / (LOSSY_STRIKER if contact.rated else 1.0)
     omega_0 = 2.0 * np.pi * accuracy.contact_resonance(**law)
     whole = modes.truncated(n_modes=modes.n_rigid).residual_compliance(striker.at[None])[0, 0]
     if striker.felt_mass * omega_0**2 * whole <= allowed:
@@ -542,7 +550,7 @@ def striker_error(striker: Striker, n_modes: int, *, contact: Contact, speed: fl
     highest = float(striker.modes.frequencies[max(n_modes - 1, 1)])
     law: dict[str, Any] = {"contact": contact, "mass": striker.felt_mass, "speed": speed}
     return accuracy.truncation_error(striker.modes, striker.at, highest, **law) * (
-        LOSSY_STRIKER if contact.loss else 1.0
+        LOSSY_STRIKER if contact.rated else 1.0
     )
 
 
@@ -747,7 +755,7 @@ def _grazes(history: History, least: float) -> bool:
     """
     if not 0 < len(history.contacts) <= FEW or history.bias.any():
         return False
-    return record.nearest_turn(history.steps, history.now, 3 + history.n_coefficients) < least
+    return record.nearest_turn(history.steps, history.now, history.law, history.n_coefficients) < least
 
 
 def _force_missed(history: History) -> float:

@@ -118,7 +118,7 @@ def _modes_needed(hit: "Response", body: int, tolerance: float, softer: float = 
         speed = float(np.abs(h._column(1)[:, i]).max(initial=0.0))
         if not inverse or not speed:
             continue
-        share = allowed * CAUTION[not hit.error.resolvable] / (accuracy.LOSSY if law.loss else 1.0)
+        share = allowed * CAUTION[not hit.error.resolvable] / (accuracy.LOSSY if law.rated else 1.0)
         at: dict[str, Any] = {"contact": law, "mass": 1.0 / inverse, "speed": speed}
         needed = max(needed, accuracy.cutoff_frequency(modes, point, tolerance=share, **at))
         if hit.error.resolvable and hit.error.truncation > allowed:

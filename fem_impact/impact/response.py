@@ -86,13 +86,15 @@ class History:
     shape: np.ndarray  # (n_contacts, n_modes) [kg**-0.5] signed: the approach is offset + shape @ q
     offset: np.ndarray  # (n_contacts,) [m]
     bias: np.ndarray  # (n_modes,) [N kg**-0.5] constant modal forces
-    law: np.ndarray  # (n_contacts, 4) stiffness, exponent, loss, series compliance [m/N]
+    law: (
+        np.ndarray
+    )  # (n_contacts, 9 or 4) as `law.spring_of` reads it: stiffness, exponent, loss, series compliance, ..
     start_q: np.ndarray  # (n_modes,) [m kg**0.5]
     start_p: np.ndarray  # (n_modes,) [m kg**0.5/s]
-    steps: np.ndarray  # (n_steps, 3 + (3 + n_coefficients) n_contacts), see `energy.run_energy`
+    steps: np.ndarray  # (n_steps, 3 + (4 + n_coefficients) n_contacts), see `energy.run_energy`
     end_q: np.ndarray  # (n_modes,)
     end_p: np.ndarray  # (n_modes,)
-    now: np.ndarray  # (5, n_contacts) at the end; row 0 approach [m], row 4 rate [m/s]
+    now: np.ndarray  # (6, n_contacts) at the end; row 0 approach [m], row 4 rate [m/s], row 5 memory
     work: np.ndarray  # (n_contacts,) [J] integral of force times approach rate
     end_time: float  # [s]
     status: int  # why the run ended, see `record`
@@ -107,10 +109,11 @@ class History:
     @property
     def n_coefficients(self) -> int:
         """Number of coefficients of each step's force polynomial, per contact."""
-        return (self.steps.shape[1] - 3) // self.n_contacts - 3
+        return (self.steps.shape[1] - 3) // self.n_contacts - 4
 
     def _column(self, first: int) -> np.ndarray:
-        return self.steps[:, 3 + first :: 3 + self.n_coefficients]
+        width = 3 + self.n_coefficients
+        return self.steps[:, 3 + first : 3 + width * self.n_contacts : width]
 
     @cached_property
     def impulses(self) -> np.ndarray:
@@ -123,67 +126,40 @@ class History:
         return len(self.offset)
 
     @cached_property
-    def ends(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Approach [m] and rate [m/s] at the start and at the end of every step, four arrays (n_steps, n_contacts)."""
-        d0, v0 = self._column(0), self._column(1)
-        d1 = np.vstack([d0[1:], self.now[:1]])
-        v1 = np.vstack([v0[1:], self.now[4:5]])
-        return d0, v0, d1, v1
-
-    @cached_property
     def pressed(self) -> np.ndarray:
         """True where a contact carries force in a step, (n_steps, n_contacts)."""
         return self._column(2) > 0.0
 
-    def approach(self, steps: np.ndarray, contact: int, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Approach [m] and rate [m/s] at fractions of steps, (n_steps, n_parts), from cubics through both ends."""
-        d0, v0, d1, v1 = (end[steps, contact][:, None] for end in self.ends)
-        h = self.steps[steps, 1][:, None]
-        a = 2.0 * (d0 - d1) + h * (v0 + v1)
-        b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
-        return d0 + part * (h * v0 + part * (b + part * a)), v0 + part * (2.0 * b + 3.0 * a * part) / h
-
     def force(self, steps: np.ndarray, contact: int, part: np.ndarray) -> np.ndarray:
         """Contact force [N] at fractions of steps, (n_steps, n_parts)."""
-        if self.n_coefficients > 2:
-            first = 6 + contact * (3 + self.n_coefficients)
-            terms = self.steps[steps, first : first + self.n_coefficients]
-            return np.maximum(np.polynomial.polynomial.polyval(part[0], terms.T), 0.0)
-        approach, rate = self.approach(steps, contact, part)
-        k, exponent, loss, c = self.law[contact]
-        pressed = np.maximum(approach, 0.0)
-        if c:
-            pressed = law.compressions(pressed.ravel(), k, exponent, c).reshape(pressed.shape)
-        return np.maximum(k * pressed**exponent * (1.0 + loss * rate), 0.0)
+        rows, parts = np.broadcast_arrays(steps[:, None], part)
+        return self._force(rows.ravel(), contact, parts.ravel())[0].reshape(rows.shape)
+
+    def _force(self, steps: np.ndarray, contact: int, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Contact force [N] and its rate [N/s] at a fraction of each of some steps, (n,) each."""
+        force, rate = np.empty(len(steps)), np.empty(len(steps))
+        rows, parts = np.array(steps, np.int64), np.array(part, float)
+        record.forces(self.steps, self.now, self.law, self.n_coefficients, rows, contact, parts, force, rate)
+        return force, rate
 
     def force_at(self, times: np.ndarray, contact: int) -> tuple[np.ndarray, np.ndarray]:
         """Contact force [N] and its rate [N/s] at any times, (n_times,) each; zero after the end."""
         if not len(self.steps):
             return np.zeros(len(times)), np.zeros(len(times))
         rows = np.clip(np.searchsorted(self.steps[:, 0], times, side="right") - 1, 0, None)
-        h = self.steps[rows, 1]
-        part = np.clip((times - self.steps[rows, 0]) / h, 0.0, 1.0)
-        if self.n_coefficients > 2:
-            first = 6 + contact * (3 + self.n_coefficients)
-            terms = self.steps[rows, first : first + self.n_coefficients]  # (n_times, n_coefficients)
-            order = np.arange(self.n_coefficients)
-            force = (terms * part[:, None] ** order).sum(axis=1)
-            rate = (terms[:, 1:] * order[1:] * part[:, None] ** order[:-1]).sum(axis=1) / h
-        else:
-            approach, speed = (x[:, 0] for x in self.approach(rows, contact, part[:, None]))
-            d0, v0, d1, v1 = (end[rows, contact] for end in self.ends)
-            turn = (
-                6.0 * (d1 - d0) * (1.0 - 2.0 * part) - h * (v0 * (4.0 - 6.0 * part) + v1 * (2.0 - 6.0 * part))
-            ) / h**2
-            k, exponent, loss, c = self.law[contact]
-            x = np.maximum(approach, 1e-300)
-            x = law.compressions(x, k, exponent, c) if c else x
-            tangent = exponent * k * x ** (exponent - 1.0)
-            force = k * x**exponent * (1.0 + loss * speed)
-            rate = tangent / (1.0 + c * tangent) * speed * (1.0 + loss * speed) + k * x**exponent * loss * turn
-            force = np.where(approach > 0.0, force, 0.0)
+        part = np.clip((times - self.steps[rows, 0]) / self.steps[rows, 1], 0.0, 1.0)
+        force, rate = self._force(rows, contact, part)
         acts = self.pressed[rows, contact] & (force > 0.0) & (times <= self.end_time)
         return np.where(acts, force, 0.0), np.where(acts, rate, 0.0)
+
+    @cached_property
+    def end_law(self) -> np.ndarray:
+        """The law with what the contacts remember at the end."""
+        if self.law.shape[1] < law.WIDTH:
+            return self.law
+        found = np.column_stack([self.law[:, : law.MEMORY], self.now[5]])
+        found.setflags(write=False)  # or numba would compile the kernels again for writable arrays
+        return found
 
     def states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Modal displacements and velocities (n_times, n_modes) at ascending times; free motion after the end."""
@@ -651,18 +627,19 @@ class Response:
     def _balance(self) -> dict[str, float]:
         h = self.history
 
-        def stored(d: np.ndarray) -> float:
-            return float(law.stored(d, h.law))
-
-        start_contact = stored(h.offset + h.shape @ h.start_q)
-        end_contact = stored(np.atleast_1d(h.now[0]))
+        start_contact = float(law.stored(h.offset + h.shape @ h.start_q, h.law))
+        end_contact = float(law.stored(h.now[0] - law.dents(h.end_law), h.end_law))
         start, end = h.energy(h.start_q, h.start_p), h.energy(h.end_q, h.end_p)
         work = float(h.work.sum())
+        yielded = contact_loss = work - (end_contact - start_contact)
+        if not any(contact.rated for contact in self.contacts):
+            yielded = law.yielded(h.end_law) - law.yielded(h.law)
         return {
             "start": start + start_contact,
             "end": end + end_contact,
             "contact": end_contact,
-            "contact_loss": work - (end_contact - start_contact),
+            "contact_loss": contact_loss,
+            "yielded": yielded,  # what the laws say is lost, if they can
             "modal_loss": -(end - start) - work,
             "scale": max(
                 0.5 * float(h.start_p @ h.start_p), 0.5 * float(h.end_p @ h.end_p), start_contact, abs(start), abs(end)
@@ -686,7 +663,7 @@ class Response:
     @property
     def dissipated(self) -> dict[str, float]:
         """Energy [J] lost to modal damping and to the contacts; exactly zero without damping or contact loss."""
-        lossy = bool((self.history.law[:, 2] > 0.0).any())
+        lossy = any(contact.lossy for contact in self.contacts)
         damped = bool(((self.history.zeta > 0.0) & (self.history.omega > 0.0)).any())
         return {
             "modes": self._balance["modal_loss"] if damped else 0.0,
@@ -699,6 +676,7 @@ class Response:
         balance, lost = self._balance, self.dissipated
         unexplained = [balance["modal_loss"] - lost["modes"], balance["contact_loss"] - lost["contact"]]
         unexplained += [min(0.0, value) for value in lost.values()]
+        unexplained += [balance["contact_loss"] - balance["yielded"] if lost["contact"] else 0.0]
         return float(sum(abs(value) for value in unexplained) / balance["scale"]) if balance["scale"] else 0.0
 
     @property

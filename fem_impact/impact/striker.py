@@ -120,6 +120,40 @@ class Striker:
         return cls(modes, np.ones(1), fixed=n_modes is not None)
 
     @classmethod
+    def hammer(cls, head: float, handle: float, *, stiffness: float, damping: float = 0.0) -> "Striker":
+        """Two masses with a spring and a damper in between: head and handle, or head and hand; the head strikes.
+
+        Parameters
+        ----------
+        head, handle : float [kg]
+            The handle's mass is that felt at the joint.
+        stiffness : float [N/m]
+        damping : float [N s/m]
+
+        Examples
+        --------
+        >>> mallet = fi.Striker.hammer(head=0.03, handle=0.06, stiffness=2e4, damping=5.0)
+        >>> round(mallet.mass, 3), mallet.modes.frequencies.round(1).tolist()  # kg, Hz
+        (0.09, [0.0, 159.2])
+        """
+        head, handle = check.positive("head", head, "kg"), check.positive("handle", handle, "kg")
+        stiffness, damping = (
+            check.positive("stiffness", stiffness, "N/m"),
+            check.non_negative("damping", damping, "N s/m"),
+        )
+        mass, reduced = head + handle, head * (handle / (head + handle))
+        omega = float(np.sqrt(stiffness / reduced))
+        apart = np.sqrt(handle / head / mass), -np.sqrt(head / handle / mass)
+        modes = Modes.from_arrays(
+            [0.0, omega / (2.0 * np.pi)],
+            [[mass**-0.5, apart[0]], [mass**-0.5, apart[1]]],
+            points=[[0.0], [1.0]],  # head and handle
+            mass=mass,
+            damping_ratio=[0.0, 0.5 * damping / (reduced * omega)],
+        )
+        return cls(modes, np.zeros(1))
+
+    @classmethod
     def flexible(cls, modes: Modes, *, at: Any) -> "Striker":
         """Any body that can move rigidly; it strikes with its point ``at`` [m].
 

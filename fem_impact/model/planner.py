@@ -253,7 +253,7 @@ class _Asked:
     @property
     def left_out(self) -> float:
         """Error [-] allowed for the modes left out."""
-        return SHARE * self.tolerance / CAUTION / (accuracy.LOSSY if self.blow.contact.loss else 1.0)
+        return SHARE * self.tolerance / CAUTION / (accuracy.LOSSY if self.blow.contact.rated else 1.0)
 
     @property
     def law(self) -> dict[str, Any]:
@@ -523,7 +523,7 @@ def _fewer(asked: _Asked, first: Modes, banded: bool) -> str:
     if "max_frequency" in asked.pieces or banded:
         name = "max_frequency" if "max_frequency" in asked.pieces else "a band of the quantity"
         return f"give {name} of at most {float(f'{0.9 * reach:.1e}'):g} Hz"
-    loss = accuracy.LOSSY if contact.loss else 1.0
+    loss = accuracy.LOSSY if contact.rated else 1.0
 
     def fits(tolerance: float, contact: Contact = contact) -> bool:
         allowed = SHARE * tolerance / (CAUTION * NOTCH * loss)  # with room for a second, finer run

@@ -222,7 +222,7 @@ class Bench:
         tables.pop("map", None)
         tables["mesh"] |= {key: str(Path(tables["mesh"][key]).resolve()) for key in PATHS if key in tables["mesh"]}
         law = self.law(settings)
-        tables["contact"] = {"kind": "power", "stiffness": law.stiffness, "exponent": law.exponent, "loss": law.loss}
+        tables["contact"] = law.table
         tables["contact"]["gap"] = law.gap
         stick = {"first_frequency": settings.bending} if settings.bending is not None else {}
         tables["striker"] = {"kind": "stick" if stick else "rigid", "mass": settings.mass, **stick}

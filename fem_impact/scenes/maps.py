@@ -21,6 +21,8 @@ from ..sweeps.cells import ALIASES, AXES, Case
 from .scene import Scene
 from .schema import MAKERS, Part
 
+SLOW = {"loss", "hard_stiffness", "yield_approach", "hysteresis"}  # axes of the contact that take longer per blow
+SLOW |= {f"contact.{name}" for name in SLOW}
 FORMATS = ("nc", "zarr")
 FILES = (".nc", ".zarr", ".csv", ".png")  # a folder name must not end like this
 MOST_ROWS = 10**6  # [-] a larger map gets no CSV file
@@ -87,7 +89,7 @@ def map_scene(
     law = scene.make_contact()
     grid.admit(
         math.prod(len(values) for values in over.values()), len(grid.LAYERS), wanted.pop("max_cells", grid.MOST_CELLS),
-        quick=law.loss == 0.0 and law.exponent >= 1.0 and not {"loss", "contact.loss"} & set(over),
+        quick=not law.lossy and not law.hard_stiffness and law.exponent >= 1.0 and not SLOW & set(over),
         tell=wanted.pop("tell", None),
     )  # fmt: skip
     pieces = []

@@ -144,10 +144,14 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
     "material": ("", {"": Material}),
     "section": ("kind", {"plate": _plate, "beam": _beam}),
     "target": ("", {"": target_values}),
-    "striker": ("kind", {"rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick, "bar": _bar}),
+    "striker": ("kind", {
+        "rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick, "hammer": Striker.hammer,
+        "bar": _bar,
+    }),
     "contact": ("kind", {
         "linear": Contact.linear, "hertz": Contact.hertz, "power": Contact.power,
-        "restituting": Contact.restituting, "between": Contact.between,
+        "restituting": Contact.restituting, "layers": Contact.layers, "elastic_plastic": Contact.elastic_plastic,
+        "felt": Contact.felt, "between": Contact.between,
     }),
     "strike": ("", {"": collision.strike}),
     "observe": ("", {"": _observe}),

@@ -84,6 +84,7 @@ def words(scene: Scene, response: Response) -> list[str]:
         "stick": f"a stick of {si(striker.mass, 'kg')}, hinged at its far end",
         "sphere": f"a ball of {si(striker.mass, 'kg')}",
         "rigid": f"a rigid mass of {si(striker.mass, 'kg')}",
+        "hammer": f"a hammer of {si(striker.mass, 'kg')} in two parts",
         "bar": f"a flexible bar of {si(striker.mass, 'kg')}",
     }[scene.striker.kind]
     if scene.striker.kind == "stick":
@@ -94,6 +95,14 @@ def words(scene: Scene, response: Response) -> list[str]:
     stiffness = si(law.stiffness, "N/m") + raised
     contact = f"The contact is a spring that only pushes, with a force of {stiffness} × indentation{raised}"
     contact += f", with loss {law.loss:.3g} s/m." if law.loss else "."
+    if law.hard_stiffness:
+        contact += f" Beyond {si(law.depth, 'm')} it meets a hard layer."
+    if law.yield_approach:
+        contact += f" Beyond {si(law.yield_approach, 'm')} it yields and keeps a dent."
+    if law.hysteresis:
+        contact += (
+            f" It is felt: held pressed, it loses {law.hysteresis:.0%} of its force in some {si(law.relaxation, 's')}."
+        )
     return [body, blow, contact, _single_or_multiple(response, law)]
 
 

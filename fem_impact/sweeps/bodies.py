@@ -273,7 +273,7 @@ class Sized:
             needed = []
             for values in self.ends:
                 case = self.at(modes, point, values)
-                loss = accuracy.LOSSY if case.contact.loss else 1.0
+                loss = accuracy.LOSSY if case.contact.rated else 1.0
                 allowed = planner.SHARE * self.tolerance / (planner.CAUTION * loss * margin)
                 law: dict[str, Any] = {"contact": case.contact, "mass": case.striker.felt_mass, "speed": case.speed}
                 limit = accuracy.tail_cutoff(case.modes, point[None], tolerance=allowed, **law)

@@ -1,7 +1,7 @@
 """The cells of a map: one blow, and the parameters along which a map may vary it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -19,12 +19,19 @@ AXES = {  # name: unit, what it is, its name in a scene file
     "exponent": ("", "exponent of the contact", "contact.exponent"),
     "loss": ("s/m", "loss factor of the contact", "contact.loss"),
     "gap": ("m", "distance the striker travels before contact", "contact.gap"),
+    "depth": ("m", "approach at which the hard layer is reached", "contact.depth"),
+    "hard_stiffness": ("N/m**hard_exponent", "stiffness of the hard layer", "contact.hard_stiffness"),
+    "hard_exponent": ("", "exponent of the hard layer", "contact.hard_exponent"),
+    "yield_approach": ("m", "approach at first yield", "contact.yield_approach"),
+    "hysteresis": ("", "share of the force that felt loses", "contact.hysteresis"),
+    "relaxation": ("s", "relaxation time of felt", "contact.relaxation"),
     "speed": ("m/s", "speed of the striker's contact point", "strike.speed"),
     "at": ("m", "strike point", "strike.at"),
     "target_mass": ("kg", "mass of the struck body", "target.mass"),
     "target_frequency": ("Hz", "first flexible frequency of the struck body", "target.first_frequency"),
     "damping_ratio": ("", "damping ratio of the struck body", "target.damping_ratio"),
 }
+LAW = [field.name for field in fields(Contact)]  # the axes that change the contact
 ALIASES = {alias: name for name, (_, _, alias) in AXES.items()}
 FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  # each value needs new kernels
 REACH = 1e30  # [SI] speeds, masses and frequencies lie between 1/REACH and REACH: beyond, the kernels never finish
@@ -60,7 +67,7 @@ class Case:
             return replace(self, at=seen.point("at", value)[0], modes=seen)
         if name == "speed":
             return replace(self, speed=check.positive("speed", value, "m/s", reach=REACH))
-        if name in ("stiffness", "exponent", "loss", "gap"):
+        if name in LAW:
             return replace(self, contact=replace(self.contact, **{name: float(value)}))
         if name in ("mass", "striker_frequency"):
             key = "mass" if name == "mass" else "first_frequency"
@@ -126,7 +133,7 @@ def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
             axes[name] = check.array(f"over[{given!r}]", values, (None,), AXES[name][0])
         if not len(axes[name]):
             raise ValueError(f"over[{given!r}] must contain at least one value")
-        if name in ("stiffness", "exponent", "loss", "gap"):
+        if name in LAW:
             for value in axes[name]:
                 base.changed(name, value)
         elif name != "at":

@@ -75,13 +75,14 @@ class Grid:
     @property
     def lossy(self) -> bool:
         """Whether any contact loses energy."""
-        return bool(self.base.contact.loss or "loss" in self.axes)
+        return bool(self.base.contact.lossy or {"loss", "yield_approach", "hysteresis"} & set(self.axes))
 
     @property
     def quick(self) -> bool:
         """Whether all cells are computed together."""
         exponents = self.axes.get("exponent", [self.base.contact.exponent])
-        return not (self.lossy or self.extra) and min(exponents) >= 1.0
+        layered = self.base.contact.hard_stiffness or "hard_stiffness" in self.axes
+        return not (self.lossy or layered or self.extra) and min(exponents) >= 1.0
 
     @property
     def layers(self) -> list[str]:
@@ -142,8 +143,8 @@ class Grid:
         def value(name: str, shared: float) -> np.ndarray:
             return along(name, self.axes.get(name, [shared]))
 
-        stiffness, exponent, loss = (
-            value(name, getattr(base.contact, name)) for name in ("stiffness", "exponent", "loss")
+        stiffness, exponent, loss, share = (
+            value(name, getattr(base.contact, name)) for name in ("stiffness", "exponent", "loss", "hysteresis")
         )
         speed = value("speed", base.speed)
         weight = value("mass", base.striker.mass) / base.striker.mass
@@ -167,7 +168,9 @@ class Grid:
             above = np.minimum(1.0, omega / (edge * ratio))
             total = total + accuracy.left_out_error(soft, above, exponent, modes.dimension)
             softness = softness + soft
-        return np.where(softness <= RESOLVABLE, total * np.where(loss > 0.0, accuracy.LOSSY, 1.0), np.inf)
+        return np.where(
+            softness <= RESOLVABLE, total * np.where((loss > 0.0) | (share > 0.0), accuracy.LOSSY, 1.0), np.inf
+        )
 
     def model_error(self) -> tuple[np.ndarray, str]:
         """The model's own error [-] in the shape of the grid, and what of it is not known.
@@ -208,7 +211,10 @@ class Grid:
     def without_speed(self) -> "Grid | None":
         """The grid at one speed if every contact is linear, so that speed only scales the forces; otherwise None."""
         exponents = self.axes.get("exponent", np.array([self.base.contact.exponent]))
-        if "speed" not in self.axes or (exponents != 1.0).any() or self.lossy or self.base.contact.gap or self.extra:
+        law = self.base.contact
+        if "speed" not in self.axes or (exponents != 1.0).any() or self.lossy or law.gap or self.extra:
+            return None
+        if law.hard_stiffness or "hard_stiffness" in self.axes:
             return None
         return replace(self, axes={**self.axes, "speed": self.axes["speed"][:1]})
 
@@ -254,7 +260,8 @@ def sweep(
         Damping of a system, which has none of its own.
     layers : mapping of name to function of a Response, optional
         Additional scalars to compute; the functions run in threads. Every cell is then computed alone, which is about
-        a hundred times slower (``studies/map_speed.py``); so are cells with an exponent below 1.
+        a hundred times slower (``studies/map_speed.py``); so are cells with an exponent below 1, and contacts of two
+        layers, that yield or are felt.
     residual : bool
         As in `strike`.
     workers : int, optional
@@ -455,6 +462,8 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
         for name, value in base.items()
     }
     quick = (column["exponent"] >= 1.0) & (column["gap"] >= 0.0) & (not grid.extra)
+    for name in ("hard_stiffness", "yield_approach", "hysteresis"):
+        quick &= column[name] == 0.0
     cells = np.flatnonzero(quick)
     if cells.size:
         kind = np.zeros(stop - start, int)

@@ -122,7 +122,7 @@ def pair(striker: Body, target: Body, contact: Contact) -> Pair:
     n, m = len(striker.omega), len(target.omega)
     omega, zeta = np.append(striker.omega, target.omega), np.append(striker.zeta, target.zeta)
     shape, motion = np.append(striker.row, -target.row), np.append(striker.motion, np.zeros(m))
-    law = np.array([[contact.stiffness, contact.exponent, contact.loss, 0.0]])
+    law = np.array([contact.numbers])
     for body, sign in ((striker, 1.0), (target, -1.0)):
         if body.rest <= 0.0:
             continue

@@ -38,7 +38,7 @@ def tables(found: Found, scene: Scene | None = None) -> tuple[dict[str, Any], li
         made.pop("map", None)
         strike = dict(made.pop("strike")) | strike
     made["striker"] = {"kind": "rigid", "mass": hammer.felt_mass}
-    made["contact"] = {"kind": "power", "stiffness": law.stiffness, "exponent": law.exponent, "loss": law.loss}
+    made["contact"] = law.table
     made["strike"] = strike
     return made, notes
 

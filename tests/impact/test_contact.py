@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.impact.contact import loss_number
+from fem_impact.impact.contact import acting_stiffness, loss_number
 
 
 def test_power_law_force_in_numbers():
@@ -61,3 +61,68 @@ def test_no_loss_for_a_perfect_rebound():
 def test_errors_name_argument_rule_and_value(make, text):
     with pytest.raises(ValueError, match=text):
         make()
+
+
+def test_a_sphere_yields_first_at_johnsons_speed():
+    """Contact Mechanics, 11.5: m v**2 / 2 = 53 R**3 Y**5 / E***4 for a sphere on a half space; his 53 is rounded."""
+    steel, strength, radius = fi.Material(E=210e9, nu=0.3, rho=7850.0), 1e9, 5e-3
+    ball = fi.Striker.sphere(steel, radius)
+    law = fi.Contact.between(ball, steel, yield_strength=strength)
+    energy = law.stiffness * law.yield_approach**2.5 / 2.5
+    modulus = 0.5 * 210e9 / (1.0 - 0.09)
+    assert_allclose(energy, 53.0 * radius**3 * strength**5 / modulus**4, rtol=0.01)
+    speed = np.sqrt(2.0 * energy / ball.mass)
+    again = fi.Contact.elastic_plastic(law.stiffness, yield_speed=speed, mass=ball.mass)
+    assert_allclose(again.yield_approach, law.yield_approach, rtol=1e-14)
+
+
+def test_forces_have_no_jump_where_the_law_changes():
+    for law, bend, slope in (
+        (fi.Contact.layers(1e5, 1.2, depth=1e-3, hard_stiffness=1e7), 1e-3, 1.2e5 * 1e-3**0.2),
+        (fi.Contact.elastic_plastic(1e9, yield_approach=1e-4), 1e-4, 1.5e9 * 1e-4**0.5),
+    ):
+        below, at, above = law.force(bend * np.array([1.0 - 1e-6, 1.0, 1.0 + 1e-6]))
+        assert_allclose([at - below, above - at], slope * bend * 1e-6, rtol=2e-2)  # (1e-6)**1.5 of a hard layer
+
+
+@pytest.mark.parametrize("numbers, text", [
+    ({"loss": 0.1, "hysteresis": 0.5, "relaxation": 1e-3}, "loss and hysteresis"),
+    ({"yield_approach": 1e-4, "hard_stiffness": 1e9}, "yield_approach and hard_stiffness"),
+    ({"hysteresis": 0.5}, "relaxation must be positive"),
+    ({"exponent": 0.7, "yield_approach": 1e-4}, "exponent must be at least 1"),
+    ({"hysteresis": 1.5, "relaxation": 1e-3}, "hysteresis"),
+])  # fmt: skip
+def test_laws_that_do_not_go_together_are_refused(numbers, text):
+    with pytest.raises(ValueError, match=text):
+        fi.Contact(**{"stiffness": 1e6, "exponent": 1.5, **numbers})
+
+
+@pytest.mark.parametrize("told", [{}, {"yield_speed": 0.1}, {"yield_speed": 0.1, "mass": 1.0, "yield_approach": 1e-4}])
+def test_first_yield_is_told_in_one_way(told):
+    with pytest.raises(ValueError, match="yield_approach must be given, or yield_speed and mass"):
+        fi.Contact.elastic_plastic(1e9, **told)
+
+
+@pytest.mark.parametrize("law", [
+    fi.Contact.power(1e6, 2.0, loss=0.1),
+    fi.Contact.layers(1e5, 1.2, depth=1e-3, hard_stiffness=1e9, loss=0.2),
+    fi.Contact.elastic_plastic(1e9, yield_approach=1e-4),
+    fi.Contact.felt(1e9, 2.5, hysteresis=0.4, relaxation=1e-3),
+])  # fmt: skip
+def test_a_scenes_table_makes_the_law_again(law):
+    table = dict(law.table)
+    kind = table.pop("kind")
+    assert getattr(fi.Contact, kind)(**table) == law
+
+
+@pytest.mark.parametrize("law", [
+    fi.Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e9),
+    fi.Contact.elastic_plastic(1e9, yield_speed=0.1, mass=0.02),
+])  # fmt: skip
+def test_the_power_law_that_stands_for_a_contact_stores_as_much_as_deep(law):
+    """At the deepest approach of a mass on a wall, found from the force itself."""
+    speed, mass = 1.0, 0.02
+    stands = float(acting_stiffness(law.numbers, 1.0 / mass, speed))
+    deepest = ((law.exponent + 1.0) * 0.5 * mass * speed**2 / stands) ** (1.0 / (law.exponent + 1.0))
+    x, weight = np.polynomial.legendre.leggauss(4000)
+    assert_allclose(0.5 * deepest * weight @ law.force(0.5 * deepest * (x + 1.0)), 0.5 * mass * speed**2, rtol=1e-6)

@@ -12,18 +12,18 @@ LAWS = [(1e5, 1.0, 0.0), (1e7, 1.5, 0.0), (3e6, 1.3, 0.0), (1e5, 1.0, 3e-6), (1e
 
 @njit
 def at(d, k, a, c):
-    return law.at(d, law.Spring(k, a, 0.0, c))
+    return law.at(d, law.simple(k, a, 0.0, c))
 
 
 @njit
 def slopes(d0, d1, k, a, c):
-    spring = law.Spring(k, a, 0.0, c)
+    spring = law.simple(k, a, 0.0, c)
     return law.slopes(law.at(d0, spring), law.at(d1, spring), spring)
 
 
 @njit
 def smooth_force(x, v, k, a, loss):
-    return law.smooth_force(x, v, law.Spring(k, a, loss, 0.0))
+    return law.smooth_force(x, v, law.simple(k, a, loss, 0.0))
 
 
 @pytest.mark.parametrize("k, a, c", LAWS)

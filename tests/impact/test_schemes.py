@@ -15,7 +15,7 @@ MASS = 0.01  # [kg]
 @njit
 def constant(h, d0, v0, k, a, loss, c):
     """Scheme A: approach, rate and energies after a step of a mass pressed by its motion, and whether it settled."""
-    spring = law.Spring(k, a, loss, c)
+    spring = law.simple(k, a, loss, c)
     start = law.at(d0, spring)
     end, f = schemes.solve_constant(start, d0 + h * v0, 0.5 * h * h / MASS, loss / h, spring)
     return end.approach, v0 - h * f / MASS, start.energy, end.energy, True
@@ -24,7 +24,7 @@ def constant(h, d0, v0, k, a, loss, c):
 @njit
 def ramp(h, d0, v0, k, a, loss, c):
     """The same by scheme A4: a rigid mass answers a unit of the force t/h - 1/2 with these six numbers."""
-    spring = law.Spring(k, a, loss, c)
+    spring = law.simple(k, a, loss, c)
     start = law.at(d0, spring)
     b = h * h / MASS
     free = schemes.Free(d0 + h * v0, d0 + 0.5 * h * v0, v0)

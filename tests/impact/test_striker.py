@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
 
 import fem_impact as fi
 
@@ -55,3 +56,29 @@ def test_errors_name_argument_rule_and_value(make, text):
 def test_a_sphere_larger_than_any_is_refused():
     with pytest.raises(ValueError, match="radius must lie between 1e-09 and 1e\\+09 m, got 1e\\+300 m"):
         fi.Striker.sphere(fi.Material(E=1e9, nu=0.3, rho=1e3), 1e300)
+
+
+def test_a_hammer_of_two_masses_moves_as_its_two_equations_say():
+    """Head and handle with spring and damper against a wall, by scipy; modes with damping proportional to stiffness."""
+    head, handle, joint, damper, k = 0.03, 0.06, 2e4, 15.0, 1e6
+
+    def rates(t, state):
+        x, y, u, v = state
+        pull = joint * (x - y) + damper * (u - v)
+        return [u, v, (-pull - k * max(x, 0.0)) / head, pull / handle]
+
+    hammer = fi.Striker.hammer(head, handle, stiffness=joint, damping=damper)
+    hit = fi.strike(fi.Modes.rigid(1e9), hammer, fi.Contact.linear(k), at=None, speed=1.0, tolerance=1e-9)
+    times = np.linspace(0.0, hit.impacts[0].end, 40)
+    found = solve_ivp(rates, (0.0, times[-1]), [0.0, 0.0, 1.0, 1.0], "DOP853", times, rtol=1e-12, atol=1e-16)
+    assert hit.n_impacts > 1  # the handle pushes the head back
+    motion = hit.displacement([[0.0], [1.0]], times, body=0)
+    assert_allclose(motion, found.y[:2].T, atol=1e-8 * np.abs(found.y[0]).max())
+    assert hit.dissipated["modes"] > 0.0
+    assert hit.energy_error < 1e-9
+
+
+@pytest.mark.parametrize("wrong, text", [({"head": 0.0}, "head"), ({"stiffness": -1.0}, "stiffness")])
+def test_a_hammer_needs_masses_and_a_spring(wrong, text):
+    with pytest.raises(ValueError, match=text):
+        fi.Striker.hammer(**({"head": 0.1, "handle": 0.1, "stiffness": 1e3} | wrong))

@@ -19,7 +19,8 @@ from fem_impact.impact.contact import Contact
 from fem_impact.impact.striker import Striker
 from fem_impact.model import planner
 from fem_impact.modes import analytic, modal
-from fem_impact.scenes import scene
+from fem_impact.scenes import maps, scene
+from fem_impact.scenes.sentences import words
 
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 TEXT = """
@@ -87,6 +88,38 @@ def test_scene_strikes_what_the_public_functions_strike(tmp_path):
     # the same calls with the same numbers, up to rounding of the scale: 1e-9 of the peak after some 1e3 rad
     assert_allclose(hit.force, again.force, rtol=0, atol=1e-9 * again.peak_force)
     assert hit.n_impacts == again.n_impacts
+
+
+@pytest.mark.parametrize("text, law", [
+    (
+        'kind = "layers"\nstiffness = 1e5\nexponent = 1.2\ndepth = 2e-4\nhard_stiffness = 1e7',
+        Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e7),
+    ),
+    (
+        'kind = "elastic_plastic"\nstiffness = 695e3\nyield_speed = 0.1\nmass = 0.03',
+        Contact.elastic_plastic(695e3, yield_speed=0.1, mass=0.03),
+    ),
+    (
+        'kind = "felt"\nstiffness = 695e3\nexponent = 1.5\nhysteresis = 0.2\nrelaxation = 1e-3',
+        Contact.felt(695e3, 1.5, hysteresis=0.2, relaxation=1e-3),
+    ),
+])  # fmt: skip
+def test_contacts_that_lose_and_a_hammer_in_a_scene(tmp_path, text, law):
+    """The scene strikes, tells, and maps the new keys by their names."""
+    hammer = 'kind = "hammer"\nhead = 0.03\nhandle = 0.05\nstiffness = 1e4\ndamping = 2.0'
+    told = TEXT.replace('kind = "hertz"\nstiffness = 695e3', text).replace('kind = "rigid"\nmass = 0.03', hammer)
+    loaded = scene.load_scene(write(tmp_path, told))
+    hit = loaded.strike()
+    assert hit.contact == law
+    assert hit.striker.mass == pytest.approx(0.08)
+    assert hit.tolerance_met
+    assert (hit.dissipated["contact"] > 0.0) == law.lossy
+    assert hit.energy_error < 1e-12
+    assert "g" in words(loaded, hit)[1]
+    key = {"layers": "depth", "elastic_plastic": "yield_approach", "felt": "relaxation"}[law.table["kind"]]
+    values = [0.5 * getattr(law, key), getattr(law, key)]
+    table = maps.map_scene(loaded, over={f"contact.{key}": values}, tolerance=1e-2)
+    assert float(table.restitution[1]) == pytest.approx(hit.restitution, abs=2e-2)
 
 
 def test_finite_elements_and_formulas_agree_to_the_tolerance(tmp_path):

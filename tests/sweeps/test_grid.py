@@ -85,6 +85,39 @@ def test_every_axis_gives_the_single_blow(name, law):
         assert_allclose(float(cell.centroid), hit.spectral_centroid(3e3), rtol=2e-3)  # 1e-3 each of the two
 
 
+LOSING = {  # axis: its values, and the contact whose number they replace
+    "depth": ([1e-4, 1e-3], fi.Contact.layers(1e5, 1.2, depth=5e-4, hard_stiffness=1e8)),
+    "hard_stiffness": ([0.0, 1e8], fi.Contact.layers(1e5, 1.2, depth=1e-4, hard_stiffness=1e8)),
+    "hard_exponent": ([1.0, 2.0], fi.Contact.layers(1e5, 1.2, depth=1e-4, hard_stiffness=1e7)),
+    "yield_approach": ([0.0, 1e-4], fi.Contact.elastic_plastic(2e6, yield_approach=1e-4)),
+    "hysteresis": ([0.0, 0.4], fi.Contact.felt(2e6, 1.5, hysteresis=0.2, relaxation=1e-3)),
+    "relaxation": ([1e-4, 1e-2], fi.Contact.felt(2e6, 1.5, hysteresis=0.2, relaxation=1e-3)),
+}
+
+
+@pytest.mark.parametrize("name", LOSING)
+def test_contacts_that_lose_vary_by_name(name):
+    values, law = LOSING[name]
+    striker = fi.Striker.rigid(0.03)
+    table = fi.sweep(plate(), striker, law, at=AT, speed=1.0, over={f"contact.{name}": values})
+    for i, value in enumerate(values):
+        hit = fi.strike(plate(), striker, replace(law, **{name: value}), at=AT, speed=1.0, tolerance=1e-3)
+        cell = table.isel({name: i})
+        assert int(cell.n_impacts) == hit.n_impacts
+        assert_allclose(float(cell.restitution), hit.restitution, atol=1e-3)
+        assert_allclose(float(cell.impulse), hit.impulse, rtol=1e-3)
+    assert abs(float(table.restitution[0]) - float(table.restitution[1])) > 2e-3  # the number does matter
+    assert (table.failure == "").all()
+
+
+def test_speed_matters_under_a_hard_layer():
+    """A linear contact scales with the speed; not one that bottoms."""
+    law = fi.Contact.layers(1e5, 1.0, depth=2e-4, hard_stiffness=1e7, hard_exponent=1.0)
+    table = fi.sweep(plate(), fi.Striker.rigid(0.03), law, at=AT, speed=1.0, over={"speed": [0.1, 2.0]})
+    force = table.peak_force.values
+    assert force[1] > 1.5 * 20.0 * force[0]
+
+
 def test_random_cells_of_a_map_are_the_single_blows():
     rng = np.random.default_rng(3)
     over = {"stiffness": np.geomspace(1e4, 1e6, 12), "mass": np.linspace(0.01, 0.2, 11), "target_mass": [0.2, 0.5, 5.0]}

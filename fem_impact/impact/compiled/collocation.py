@@ -9,14 +9,46 @@ import numpy as np
 
 from .build import LOOSE, ZERO, inner, outer
 from .energy import LEVELS
-from .events import EVENT_LIMIT, LOCATE_LIMIT, begin, dipped, enclose, first_crossing, land, narrow, settle
+from .events import (
+    EVENT_LIMIT,
+    LOCATE_LIMIT,
+    begin,
+    dipped,
+    enclose,
+    first_corner,
+    first_crossing,
+    land,
+    narrow,
+    nearer,
+    remember,
+    remembered,
+    settle,
+    strayed,
+)
 from .flight import (
     GLIDES,
     any_of,
     find_onset,
     restore,
 )
-from .law import at, smooth_force, spring_of
+from .law import (
+    FELT,
+    KIND,
+    MEMORY,
+    NEAR,
+    PLASTIC,
+    WIDTH,
+    at,
+    corner_approach,
+    harden,
+    lags,
+    meet,
+    near_side,
+    power,
+    smooth_force,
+    special_of,
+    spring_of,
+)
 from .propagation import N_LANE, mode_moments
 from .record import EXHAUSTED, FAILED, FINISHED, HORIZON, IMPACTS, SETTLED, resized, total_energy
 from .schemes import solve_linear
@@ -92,9 +124,83 @@ def free_approach(shape, offset, bias, free, q, p, out_d, out_v):
             out_v[a, i] = v
 
 
+@inner()
+def side_of(law, i, beyond):
+    """The spring of contact i on the side of its corner where the step runs."""
+    spring = spring_of(law, i)
+    return spring if beyond[i] or spring.corner == np.inf else near_side(spring)
+
+
+@inner()
+def sides(law, now, out_beyond):
+    """Whether each contact begins its step beyond the corner of its law; one that yields only on its way in."""
+    for i in range(now.shape[1]):
+        spring = spring_of(law, i)
+        bend = corner_approach(spring)
+        d, rate = now[0, i], now[4, i]
+        if spring.kind == PLASTIC:
+            out_beyond[i] = d >= (1.0 - NEAR) * bend and rate > 0.0
+        else:
+            out_beyond[i] = d > (1.0 + NEAR) * bend or (d >= (1.0 - NEAR) * bend and rate >= 0.0)
+
+
+@inner()
+def turned_over(law, now, y, rate, after, h, pressed, beyond):
+    """Change the side of contacts that left theirs from the corner at once; whether any did."""
+    again = False
+    for i in range(y.size):
+        if pressed[i]:
+            side = 1.0 if beyond[i] else -1.0
+            if strayed(law, now, y, rate, after, h, i, side) == 1:
+                beyond[i] = not beyond[i]
+                again = True
+    return again
+
+
+@inner()
+def weight_of(inner, mobility, h, i):
+    """What turns a misfit of contact i's force at a step's end into a speed [s/kg]."""
+    s = inner.shape[1]
+    return min(mobility[i] * h, inner[1, s - 1, s - 1, i, i] * 4.0 + 1e-3 * mobility[i] * h)
+
+
+@inner()
+def lag_table(law, i, nodes, powers, h, out_lag):
+    """What felt i remembers at nodes and end per ``x**a`` at a node, (s + 1, s), then what is left of before."""
+    s = nodes.size - 1
+    for a in range(s + 1):
+        x = nodes[a] * h / law[i, 6]
+        j0, j1, j2, j3, j4 = lags(x)
+        weights = j0, j1, j2, j3, j4
+        out_lag[a, s] = 1.0 - j0
+        for b in range(s):
+            total = 0.0
+            scale = 1.0
+            for k in range(s):
+                total += powers[b, k] * scale * weights[k]
+                scale *= nodes[a]
+            out_lag[a, b] = total
+
+
+@inner()
+def memory_at(lag, a, x, f, i, spring):
+    """What felt remembers at node a, or at the end, of a step with compressions x (s, n_contacts)."""
+    s = f.shape[0]
+    z = lag[a, s] * spring.memory
+    for b in range(s):
+        size = abs(x[b, i])
+        if size > 0.0:
+            g = power(size, spring.exponent)
+            z += lag[a, b] * (g if x[b, i] > 0.0 else -g)
+    return z
+
+
 @inner(allocates=True)
-def solve_collocation(inner, law, pressed, free_d, free_v, matrix, vector, out_f):
-    """Forces at the nodes (s, n_contacts) by Newton's method from those in out_f; False where it does not settle."""
+def solve_collocation(inner, law, pressed, beyond, lag, free_d, free_v, matrix, vector, out_f, out_x):
+    """Forces at the nodes (s, n_contacts) by Newton's method from those in out_f; False where it does not settle.
+
+    out_x (s, n_contacts) receives the compressions there.
+    """
     s, m = out_f.shape
     active = np.empty(m, np.int64)
     count = 0
@@ -119,7 +225,8 @@ def solve_collocation(inner, law, pressed, free_d, free_v, matrix, vector, out_f
                         d -= inner[0, a, b, i, j] * out_f[b, j]
                         v -= inner[1, a, b, i, j] * out_f[b, j]
                 x = d - law[i, 3] * out_f[a, i]
-                f, fx, fv = smooth_force(x, v, spring_of(law, i))
+                f, fx, fv = smooth_force(x, v, side_of(law, i, beyond))
+                out_x[a, i] = x
                 row = a * count + r
                 vector[row] = out_f[a, i] - f
                 for b in range(s):
@@ -128,6 +235,20 @@ def solve_collocation(inner, law, pressed, free_d, free_v, matrix, vector, out_f
                         matrix[row, b * count + c] = fx * inner[0, a, b, i, j] + fv * inner[1, a, b, i, j]
                 matrix[row, row] += 1.0 + fx * law[i, 3]
                 scale = max(scale, abs(out_f[a, i]), abs(f))
+        for r in range(count):
+            i = active[r]
+            spring = spring_of(law, i)
+            if spring.kind != FELT:
+                continue
+            for a in range(s):
+                row = a * count + r
+                vector[row] += spring.hard * memory_at(lag[i], a, out_x, out_f, i, spring)
+                for e in range(s):
+                    _, fx, _ = smooth_force(out_x[e, i], 0.0, spring)
+                    share = lag[i, a, e] * fx * spring.hard / spring.stiffness
+                    for b in range(s):
+                        for c in range(count):
+                            matrix[row, b * count + c] -= share * inner[0, e, b, i, active[c]]
         if not scale < 1e300:
             return False
         if not solve_linear(matrix, vector, s * count):
@@ -172,8 +293,8 @@ def collocation_end(shape, offset, bias, free, last, f, q, p, out_q, out_p, out_
 
 @inner()
 def collocate(
-    shape, offset, bias, law, pressed, now, nodes, edges, free, last, inner, q, p, guess, small,
-    free_d, free_v, f, matrix, vector, out_q, out_p, out_y, out_rate,
+    shape, offset, bias, law, pressed, beyond, now, nodes, powers, edges, h, free, last, inner, q, p, guess, small,
+    lag, x, free_d, free_v, f, matrix, vector, out_q, out_p, out_y, out_rate, out_after,
 ):  # fmt: skip
     """One collocation step: node forces in f, the end state, and the force polynomial's largest misfit at both ends.
 
@@ -184,7 +305,14 @@ def collocate(
     for a in range(s):
         for i in range(m):
             f[a, i] = guess[a, i]
-    if not solve_collocation(inner, law, pressed, free_d, free_v, matrix, vector, f):
+    for i in range(m):
+        out_after[i] = law[i, MEMORY] if law.shape[1] == WIDTH else 0.0
+        if law.shape[1] == WIDTH and law[i, KIND] == FELT:
+            if pressed[i] and law[i, MEMORY] >= 0.0:
+                lag_table(law, i, nodes, powers, h, lag[i])
+            else:
+                out_after[i] = -abs(law[i, MEMORY]) * np.exp(-(1.0 - law[i, 5]) * h / law[i, 6])
+    if not solve_collocation(inner, law, pressed, beyond, lag, free_d, free_v, matrix, vector, f, x):
         return np.inf
     collocation_end(shape, offset, bias, free, last, f, q, p, out_q, out_p, out_y, out_rate)
     worst = 0.0
@@ -192,9 +320,13 @@ def collocate(
         if not abs(out_y[i]) < 1e300:
             return np.inf
         if pressed[i]:
-            spring = spring_of(law, i)
+            spring = side_of(law, i, beyond)
             f0, _, _ = smooth_force(max(0.0, at(now[0, i], spring).compression), now[4, i], spring)
             f1, _, _ = smooth_force(max(0.0, at(out_y[i], spring).compression), out_rate[i], spring)
+            if spring.kind == FELT:
+                out_after[i] = memory_at(lag[i], s, x, f, i, spring)
+                f0 -= spring.hard * spring.memory
+                f1 -= spring.hard * out_after[i]
             for b in range(s):
                 f0 -= edges[0, b] * f[b, i]
                 f1 -= edges[1, b] * f[b, i]
@@ -204,7 +336,7 @@ def collocate(
 
 @outer()
 def run_collocation(
-    omega, zeta, shape, offset, bias, law, start_q, start_p, nodes, powers, base, speed, tolerance, depth, still,
+    omega, zeta, shape, start, bias, laws, start_q, start_p, nodes, powers, base, speed, tolerance, depth, still,
     horizon, max_impacts, max_steps,
 ):  # fmt: skip
     """Follow bodies in contact with exponential Gauss collocation of the contact forces; the reference scheme.
@@ -216,6 +348,8 @@ def run_collocation(
     """
     m, n_modes = shape.shape
     s = nodes.size - 1
+    offset = start.copy()
+    law = laws.copy()
     q = start_q.copy()
     p = start_p.copy()
     new_q = np.empty(n_modes)
@@ -238,9 +372,12 @@ def run_collocation(
     for i in range(m):
         for n in range(n_modes):
             mobility[i] += shape[i, n] * shape[i, n]
-    now = np.zeros((5, m))
+    now = np.zeros((6, m))
     y = np.empty(m)
     rate = np.empty(m)
+    after = np.zeros(m)
+    lag = np.zeros((m, s + 1, s + 1))
+    x = np.zeros((s, m))
     f = np.zeros((s, m))
     guess = np.zeros((s, m))
     free_d = np.empty((s + 1, m))
@@ -248,12 +385,15 @@ def run_collocation(
     matrix = np.empty((s * m, s * m))
     vector = np.empty(s * m)
     pressed = np.zeros(m, np.bool_)
+    beyond = np.zeros(m, np.bool_)
+    which = 0
+    fresh = True  # whether the sides are still to be found
     flights = np.empty((GLIDES + 1, N_LANE, n_modes))
     flown = np.zeros(GLIDES + 1)
     done = np.zeros(m)
     coefficients = np.empty(s)
     stride = 3 + s
-    steps = np.zeros((64, 3 + stride * m))
+    steps = np.zeros((64, 3 + (stride + 1) * m))
     n_steps = ZERO
     n_released = 0
     n_tries = 0
@@ -265,6 +405,7 @@ def run_collocation(
     status = EXHAUSTED
     limit = tolerance * speed
     quiet = not any_of(bias)
+    special, _ = special_of(law)
     begin(shape, offset, q, p, now, pressed)
     start_energy = total_energy(omega, bias, law, q, p, now)
     while n_steps < max_steps:
@@ -283,7 +424,7 @@ def run_collocation(
             if found == 1:
                 status = FINISHED
                 break
-            land(shape, offset, time, elapsed, first, found, steps[n_steps], stride, now, pressed, q, p)
+            land(shape, offset, law, time, elapsed, first, found, steps[n_steps], stride, now, pressed, q, p)
             if elapsed > 0.0:
                 n_steps += 1
                 time += elapsed
@@ -294,7 +435,16 @@ def run_collocation(
                 events += 1
                 level = min(LEVELS - 2, level + 4)
                 guess[:] = 0.0
+            fresh = True
             continue
+        if special and fresh:
+            for i in range(m):
+                meet(law, i, now[0, i], now[4, i])
+                deeper = harden(law, i, now[0, i])
+                offset[i] -= deeper
+                now[0, i] -= deeper
+            sides(law, now, beyond)
+            fresh = False
         n_tries += 1
         if n_tries > 64 * LEVELS or events > 64 * EVENT_LIMIT:
             status = FAILED
@@ -313,10 +463,10 @@ def run_collocation(
         last = odd_last if odd else table_last[level]
         inner = odd_inner if odd else table_inner[level]
         for i in range(m):
-            small[i] = min(mobility[i] * h, inner[1, s - 1, s - 1, i, i] * 4.0 + 1e-3 * mobility[i] * h)
+            small[i] = weight_of(inner, mobility, h, i)
         misfit = collocate(
-            shape, offset, bias, law, pressed, now, nodes, edges, free, last, inner, q, p, guess, small,
-            free_d, free_v, f, matrix, vector, new_q, new_p, y, rate,
+            shape, offset, bias, law, pressed, beyond, now, nodes, powers, edges, h, free, last, inner, q, p, guess,
+            small, lag, x, free_d, free_v, f, matrix, vector, new_q, new_p, y, rate, after,
         )  # fmt: skip
         shorter = 0
         again = False
@@ -337,7 +487,11 @@ def run_collocation(
                     again = True
                 elif dipped(now, pressed, y, rate, h, i) and (pressed[i] or level < LEVELS - 2):
                     shorter = 1
+                if special and pressed[i] and strayed(law, now, y, rate, after, h, i, 1.0 if beyond[i] else -1.0) == 2:
+                    shorter = 1
             target, root = first_crossing(now, pressed, y, rate, h, depth, still)
+            if special and not again:
+                again = turned_over(law, now, y, rate, after, h, pressed, beyond)
         if again:
             continue
         if shorter > 0:
@@ -362,12 +516,12 @@ def run_collocation(
                 h = root
                 collocation_table(omega, zeta, shape, h, nodes, powers, odd_free, odd_last, odd_inner)
                 for i in range(m):
-                    small[i] = min(mobility[i] * h, inner[1, s - 1, s - 1, i, i] * 4.0 + 1e-3 * mobility[i] * h)
+                    small[i] = weight_of(inner, mobility, h, i)
                     for a in range(s):
                         guess[a, i] = max(0.0, f[a, i])
                 misfit = collocate(
-                    shape, offset, bias, law, pressed, now, nodes, edges, free, last, inner, q, p, guess, small,
-                    free_d, free_v, f, matrix, vector, new_q, new_p, y, rate,
+                    shape, offset, bias, law, pressed, beyond, now, nodes, powers, edges, h, free, last, inner, q, p,
+                    guess, small, lag, x, free_d, free_v, f, matrix, vector, new_q, new_p, y, rate, after,
                 )  # fmt: skip
                 if misfit == np.inf:
                     break
@@ -375,6 +529,42 @@ def run_collocation(
                 if root == 0.0:
                     break
             if misfit == np.inf or not abs(y[target]) <= 1e-9 * bracket[2]:
+                level += 1
+                if level >= LEVELS:
+                    status = FAILED
+                    break
+                continue
+        corner = -1
+        if special:
+            corner, which, root = first_corner(now, law, y, rate, after, h, False, bracket)
+        if corner >= 0 and which == 4:
+            law[corner, MEMORY] = abs(law[corner, MEMORY])
+            continue
+        if corner >= 0:
+            target = -1
+            if misfit > limit and level < LEVELS - 2 and root > 0.25 * h and root < 0.9 * h:
+                level += 1
+                continue
+            free = odd_free
+            last = odd_last
+            inner = odd_inner
+            for _ in range(LOCATE_LIMIT):
+                h = root
+                collocation_table(omega, zeta, shape, h, nodes, powers, odd_free, odd_last, odd_inner)
+                for i in range(m):
+                    small[i] = weight_of(inner, mobility, h, i)
+                    for a in range(s):
+                        guess[a, i] = max(0.0, f[a, i])
+                misfit = collocate(
+                    shape, offset, bias, law, pressed, beyond, now, nodes, powers, edges, h, free, last, inner, q, p,
+                    guess, small, lag, x, free_d, free_v, f, matrix, vector, new_q, new_p, y, rate, after,
+                )  # fmt: skip
+                if misfit == np.inf:
+                    break
+                root = nearer(law, corner, which, h, y[corner], rate[corner], after[corner], bracket)
+                if root == 0.0:
+                    break
+            if misfit == np.inf:
                 level += 1
                 if level >= LEVELS:
                     status = FAILED
@@ -390,8 +580,7 @@ def run_collocation(
         steps[n_steps, 0] = time
         steps[n_steps, 1] = h
         for i in range(m):
-            steps[n_steps, 3 + stride * i] = now[0, i]
-            steps[n_steps, 4 + stride * i] = now[4, i]
+            remember(law, i, steps[n_steps], stride, m, now)
             if pressed[i]:
                 steps[n_steps, 5 + stride * i] = 1.0
                 for k in range(s):
@@ -410,19 +599,25 @@ def run_collocation(
                 done[i] += weight * h * f[a, i] * v
         n_steps += 1
         time += h
+        fresh = True
+        if special:
+            for i in range(m):
+                law[i, MEMORY] = after[i]
         restore(new_q, new_p, q, p)
         for i in range(m):
             for a in range(s):
                 ahead = 0.0
-                if pressed[i] and target < 0:
+                if pressed[i] and target < 0 and corner < 0:
                     position = 1.0 + nodes[a]
                     for k in range(s - 1, -1, -1):
                         ahead = ahead * position + coefficients[k] if m == 1 else f[s - 1, i]
                 guess[a, i] = max(0.0, ahead)
-        n_released += settle(now, pressed, y, rate, target, depth, still)
+        if corner >= 0 and which == 3 and law[corner, MEMORY] > 0.0:
+            n_released += 1
+        n_released += settle(law, now, pressed, y, rate, target, depth, still)
         if target >= 0:
             events += 1
-        if target < 0 and level > 0 and misfit < limit * 0.25 * 0.5**s:
+        if target < 0 and corner < 0 and level > 0 and misfit < limit * 0.25 * 0.5**s:
             level -= 1
         if time - reset > base:
             reset = time
@@ -431,4 +626,5 @@ def run_collocation(
         if quiet and n_looks % 512 == 0 and total_energy(omega, bias, law, q, p, now) <= 1e-24 * start_energy:
             status = SETTLED
             break
+    remembered(law, now)
     return resized(steps, n_steps, n_steps), q, p, now, done, time, status, 0, 0

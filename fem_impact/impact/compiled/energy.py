@@ -11,22 +11,25 @@ from . import arrays
 from .build import LOOSE, WHOLE, ZERO, inner, outer
 from .events import (
     EVENT_LIMIT,
-    LET_GO,
     LOCATE_LIMIT,
     begin,
     dipped,
     enclose,
+    first_corner,
     first_crossing,
-    first_letting_go,
     land,
     narrow,
+    nearer,
+    remember,
+    remembered,
     settle,
+    strayed,
 )
 from .flight import GLIDES, find_onset
-from .law import at, spring_of
+from .law import FELT, KIND, MEMORY, at, harden, meet, special_of, spring_of
 from .propagation import N_LANE, any_of, commit, lane_table
 from .record import EXHAUSTED, FAILED, FINISHED, HORIZON, IMPACTS, SETTLED, resized, total_energy
-from .schemes import Free, Own, linear_guess, point_of, solve_constants, solve_ramp, solve_ramps
+from .schemes import Free, Own, linear_guess, point_of, remembers, solve_constants, solve_ramp, solve_ramps
 
 LEVELS = 40  # [-] halvings of the step that may be cached
 
@@ -159,14 +162,27 @@ def solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate):
 
 
 @inner()
-def record(row, time, h, blind, sums, now, pressed, end, y, f, s, done):
+def keep_in_mind(h, law, now, y, f, s, rate, ramped, out_after):
+    """What every contact remembers after a step of A4 (ramped) or A."""
+    for i in range(y.size):
+        out_after[i] = law[i, MEMORY]
+        if law[i, KIND] == FELT:
+            if law[i, MEMORY] < 0.0:
+                out_after[i] *= np.exp(-(1.0 - law[i, 5]) * h / law[i, 6])
+            else:
+                spring = spring_of(law, i)
+                smooth = ramped and (f[i] != 0.0 or s[i] != 0.0)
+                out_after[i] = remembers(h, point_of(now, i), at(y[i], spring), now[4, i], rate[i], smooth, spring)
+
+
+@inner()
+def record(row, law, time, h, blind, sums, now, pressed, end, y, f, s, done):
     """Write a step of the energy-exact schemes to a row of the steps, and add up its work."""
     row[0] = time
     row[1] = h
     row[2] = 1.0 if blind else 0.0
     for i in range(y.size):
-        row[3 + 5 * i] = now[0, i]
-        row[4 + 5 * i] = now[4, i]
+        remember(law, i, row, 5, y.size, now)
         row[5 + 5 * i] = 1.0 if f[i] > 0.0 or pressed[i] else 0.0
         row[6 + 5 * i] = f[i] - 0.5 * s[i]
         row[7 + 5 * i] = s[i]
@@ -178,21 +194,24 @@ def record(row, time, h, blind, sums, now, pressed, end, y, f, s, done):
 
 @outer()
 def run_energy(
-    omega, zeta, shape, offset, bias, law, start_q, start_p, ramp, base, depth, still, horizon, max_impacts, max_steps
+    omega, zeta, shape, start, bias, laws, start_q, start_p, ramp, base, depth, still, horizon, max_impacts, max_steps
 ):
     """Follow bodies in contact with the energy-exact schemes A (ramp 0) or A4 (ramp 1).
 
     Parameters: omega, zeta, bias, start_q, start_p (n_modes,); shape (n_contacts, n_modes), the signed shapes at the
-    contacts; offset (n_contacts,) approach at zero state; law (n_contacts, 4): stiffness, exponent, loss, compliance;
-    base: the longest step in contact; depth [m] and still [m/s]: approaches and speeds that are rounding;
-    horizon: where to stop at the latest; max_impacts: stop after so many releases.
+    contacts; start (n_contacts,) approach at zero state; laws (n_contacts, 9 or 4), see `law.spring_of`; base: the
+    longest step in contact; depth [m] and still [m/s]: approaches and speeds that are rounding; horizon: where to stop
+    at the latest; max_impacts: stop after so many releases.
 
     Returns (steps, q, p, now, done, time, status, n_fallback, n_blind). Each row of steps is a step or a flight:
-    start, length, blind; then per contact start approach, start rate, whether it is closed, and the force as powers of
-    the fraction of the step. now (5, n_contacts) ends with the last approach, .., rate; done (n_contacts,) is the
-    integral of force times rate [J]. A finished run ends at the last separation.
+    start, length, blind; then per contact start approach, start rate, whether it is closed, and the force as powers
+    of the fraction of the step; then what each contact remembers. now (6, n_contacts) ends with the last approach, ..,
+    rate and memory; done (n_contacts,) is the integral of force times rate [J]. A finished run ends at the last
+    separation.
     """
     m, n_modes = shape.shape
+    offset = start.copy()  # grows less as a contact is dented
+    law = laws.copy()
     q = start_q.copy()
     p = start_p.copy()
     free_q = np.empty(n_modes)
@@ -204,19 +223,20 @@ def run_energy(
     all_sums = np.empty((LEVELS + 1, 6, m, m))
     known = np.zeros(LEVELS + 1)
     odd = known.size - 1  # where the table of a step of any other length is kept
-    now = np.zeros((5, m))
+    now = np.zeros((6, m))
     end = np.empty((3, m))
     work = np.zeros((5, max(4, 2 * m), max(4, 2 * m)))
     y = np.empty(m)
     f = np.empty(m)
     s = np.empty(m)
     rate = np.empty(m)
+    after = np.zeros(m)
     pressed = np.zeros(m, np.bool_)
     bracket = np.empty(6)
     flights = np.empty((GLIDES + 1, N_LANE, n_modes))
     flown = np.zeros(GLIDES + 1)
     done = np.zeros(m)
-    steps = np.zeros((64, 3 + 5 * m))
+    steps = np.zeros((64, 3 + 6 * m))
     n_steps = ZERO
     n_fallback = 0
     n_blind = 0
@@ -226,15 +246,14 @@ def run_energy(
     events = 0
     ready = -1  # slot of the table with which the coming step is predicted already
     reset = 0.0
+    which = 0
+    fresh = True  # whether what the contacts remember is still to be brought up to the state
     pause = 0.0  # until when events are passed, not located
     respite = base  # how long the next such time will be
     time = 0.0
     status = EXHAUSTED
     quiet = not any_of(bias)
-    lossy = False
-    for i in range(m):
-        if law[i, 2] > 0.0:
-            lossy = True
+    special, cornered = special_of(law)
     begin(shape, offset, q, p, now, pressed)
     start_energy = total_energy(omega, bias, law, q, p, now)
     while n_steps < max_steps:
@@ -255,10 +274,11 @@ def run_energy(
                 status = FINISHED
             if found == 1 or found == 4:
                 break
-            land(shape, offset, time, elapsed, first, found, steps[n_steps], 5, now, pressed, q, p)
+            land(shape, offset, law, time, elapsed, first, found, steps[n_steps], 5, now, pressed, q, p)
             if elapsed > 0.0:
                 n_steps += 1
                 time += elapsed
+            fresh = True
             if found == 0:
                 events += 1
             if found == 3:
@@ -285,11 +305,21 @@ def run_energy(
             predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, end)
         ready = -1
         for i in range(m):
+            if special and fresh:
+                meet(law, i, now[0, i], now[4, i])
+                deeper = harden(law, i, now[0, i])
+                offset[i] -= deeper
+                now[0, i] -= deeper
+                end[0, i] -= deeper
+                end[1, i] -= deeper
             point = at(now[0, i], spring_of(law, i))
             now[1, i] = point.compression
             now[2, i] = point.force
             now[3, i] = point.energy
+        fresh = False
         fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
+        if special:
+            keep_in_mind(h, law, now, y, f, s, rate, ramp and fine, after)
         target = -1
         if not blind:
             shorter = 0
@@ -298,6 +328,12 @@ def run_energy(
                     if now[4, i] > still:
                         shorter = max(shorter, 3 if level == 0 else 1)
                 elif dipped(now, pressed, y, rate, h, i):
+                    shorter = max(shorter, 1)
+                if (
+                    special
+                    and pressed[i]
+                    and strayed(law, now, y, rate, after, h, i, 1.0 if now[4, i] > 0.0 else -1.0) == 2
+                ):
                     shorter = max(shorter, 1)
             if shorter > 0:
                 level += shorter
@@ -314,6 +350,8 @@ def run_energy(
                 contact_sums(shape, tables[slot], h, all_sums[slot])
                 predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, end)
                 fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
+                if special:
+                    keep_in_mind(h, law, now, y, f, s, rate, ramp and fine, after)
                 target, guess = narrow(now, pressed, y, rate, h, depth, still, target, bracket)
                 if guess == 0.0:
                     break
@@ -323,49 +361,49 @@ def run_energy(
                     continue
                 target = -1
                 blind = True
-        letting, guess = -1, h
-        if lossy and not blind:
-            letting, guess = first_letting_go(now, law, y, rate, h)
-        if letting >= 0:
+        corner = -1
+        if cornered and not blind:
+            corner, which, guess = first_corner(now, law, y, rate, after, h, True, bracket)
+        if corner >= 0 and which == 4:
+            law[corner, MEMORY] = abs(law[corner, MEMORY])
+            continue
+        if corner >= 0:
             target = -1
             slot = odd
-            bracket[0] = 0.0
-            bracket[1] = h
-            bracket[3] = h
-            bracket[4] = 1.0 + law[letting, 2] * rate[letting]
-            start = 1.0 + law[letting, 2] * now[4, letting]
             for _ in range(LOCATE_LIMIT):
                 h = guess
                 lane_table(omega, zeta, h, WHOLE, tables[slot])
                 contact_sums(shape, tables[slot], h, all_sums[slot])
                 predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, end)
                 fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
-                miss = 1.0 + law[letting, 2] * rate[letting]
-                if abs(miss) <= 0.1 * LET_GO or bracket[1] - bracket[0] <= 1e-9 * bracket[1]:
+                if special:
+                    keep_in_mind(h, law, now, y, f, s, rate, ramp and fine, after)
+                guess = nearer(law, corner, which, h, y[corner], rate[corner], after[corner], bracket)
+                if guess == 0.0:
                     break
-                bracket[0 if miss * start > 0.0 else 1] = h
-                guess = h - miss * (h - bracket[3]) / (miss - bracket[4]) if miss != bracket[4] else 0.0
-                bracket[3] = h
-                bracket[4] = miss
-                if not bracket[0] < guess < bracket[1]:
-                    guess = 0.5 * (bracket[0] + bracket[1])
         total = 0.0
         for i in range(m):
             total += abs(y[i]) + abs(rate[i]) + f[i]
         if not total < 1e300:
             status = FAILED
             break
-        record(steps[n_steps], time, h, blind, all_sums[slot], now, pressed, end, y, f, s, done)
+        record(steps[n_steps], law, time, h, blind, all_sums[slot], now, pressed, end, y, f, s, done)
         n_steps += 1
+        fresh = True
+        if special:
+            for i in range(m):
+                law[i, MEMORY] = after[i]
         if ramp and fine == 0:
             n_fallback += 1
         if blind:
             n_blind += 1
         time += h
-        n_released += settle(now, pressed, y, rate, target, depth, still)
+        if corner >= 0 and which == 3 and law[corner, MEMORY] > 0.0:
+            n_released += 1
+        n_released += settle(law, now, pressed, y, rate, target, depth, still)
         if target >= 0:
             events += 1
-        elif level > 0 and letting < 0:
+        elif level > 0 and corner < 0:
             level -= 1
         if m == 1 and slot == level and pressed[0] and time + h <= horizon:
             advance(shape, tables, slot, h, twice, offset, bias, f, s, q, p, free_q, free_p, end)
@@ -379,4 +417,5 @@ def run_energy(
         if quiet and n_looks % 512 == 0 and total_energy(omega, bias, law, q, p, now) <= 1e-24 * start_energy:
             status = SETTLED
             break
+    remembered(law, now)
     return resized(steps, n_steps, n_steps), q, p, now, done, time, status, n_fallback, n_blind

@@ -3,17 +3,38 @@
 The cubic through approach and rate at both ends of a step shows whether a contact opened, closed or did both. The step
 is then repeated with a length that ends at the event: Newton's method on the approach at the step's end, corrected by
 the change the last two lengths really made, and kept inside a bracket by bisection. A contact with loss lets go before
-it opens, where ``1 + loss d'`` passes zero; that is located in the same way. Events that pile up within the time of one
-step (chatter) are passed with full steps that need no location, because scheme A conserves energy across them.
+it opens, where ``1 + loss d'`` passes zero; felt stays behind and is met again; a head of two layers changes its law
+where the hard one is reached; a contact that yields does so where it turns back and where it is pressed deeper than
+ever before. These corners of the force are located by secants. Events that pile up within the time of one step
+(chatter) are passed with full steps that need no location, because scheme A conserves energy across them.
 """
 
 import numpy as np
 
 from .build import inner
 from .flight import approach
+from .law import (
+    FELT,
+    KIND,
+    LAYERS,
+    MEMORY,
+    NEAR,
+    PLASTIC,
+    POWER,
+    WIDTH,
+    corner_approach,
+    dent,
+    harden,
+    parting,
+    rest_of,
+    spring_of,
+)
 
 LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
 LET_GO = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to this
+TURNED = 1e-8  # [-] of the rates about a turn: so far from zero, the approach there errs by the square of it
+DIPPED = 1e-6  # [-] of what makes it push: a body that leaves its felt by less within a step has not left it
+AT_ONCE = 1e-3  # [-] of a step: a body that parts from its felt and meets it again within that has not parted
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
 EVENT_LIMIT = 64  # [-] events within one step's time: chatter, passed with unlocated steps, each time for twice as long
 
@@ -145,25 +166,161 @@ def letting_go(loss, d0, v0, d1, v1, h):
 
 
 @inner()
-def first_letting_go(now, law, y, rate, h):
-    """The closed contact that stops or begins to push first within a step, and when; -1 and h where none does."""
-    target = -1
-    at = h
-    for i in range(y.size):
-        loss = law[i, 2]
-        start = 1.0 + loss * now[4, i]
-        end = 1.0 + loss * rate[i]
-        if loss > 0.0 and now[0, i] > 0.0 and (end < -LET_GO < LET_GO < start or start < -LET_GO < LET_GO < end):
-            root = h * letting_go(loss, now[0, i], now[4, i], y[i], rate[i], h)
-            if 0.0 < root < at:
-                at = root
-                target = i
-    return target, at
+def turn_of(d0, v0, d1, v1, h):
+    """When the cubic through both ends, rising at first and falling at last, turns back, and how high it is there."""
+    a = 2.0 * (d0 - d1) + h * (v0 + v1)
+    b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
+    c = h * v0
+    root = np.sqrt(max(0.0, b * b - 3.0 * a * c))
+    t = c / (root - b) if b <= 0.0 else -(b + root) / (3.0 * a)
+    return t * h, d0 + t * (c + t * (b + t * a))
 
 
 @inner()
-def settle(now, pressed, y, rate, target, depth, still):
-    """Take over approaches and rates at a step's end; the number of contacts that opened."""
+def corner_value(law, i, which, d, v, memory):
+    """What changes its sign at a corner of contact i's force.
+
+    0 it lets go or pushes again by its rate, 1 the bend, 2 the turn, 3 it parts from its felt or meets it.
+    """
+    if which == 0:
+        return 1.0 + law[i, 2] * v
+    if which == 3:
+        return parting(law, i, d, memory)
+    return -v if which == 2 else d - corner_approach(spring_of(law, i))
+
+
+@inner()
+def first_corner(now, law, y, rate, after, h, lossy, out_bracket):
+    """The first corner within a step: contact, which (see `corner_value`), and when; -1, 0 and h where there is none.
+
+    4 stands for felt that its body meets again at once: the step is to be taken pressed.
+
+    ``out_bracket`` receives two times with the corner in between and, for secants, a third time and the value there
+    and at the start. ``after`` (n_contacts,) is what they remember at the end. Loss is left out unless ``lossy``.
+    """
+    target = -1
+    kind = 0
+    at = h
+    for i in range(y.size):
+        d0, v0, d1, v1 = now[0, i], now[4, i], y[i], rate[i]
+        loss = law[i, 2]
+        if lossy and loss > 0.0 and d0 > 0.0:
+            start = 1.0 + loss * v0
+            end = 1.0 + loss * v1
+            if end < -LET_GO < LET_GO < start or start < -LET_GO < LET_GO < end:
+                root = h * letting_go(loss, d0, v0, d1, v1, h)
+                if 0.0 < root < at:
+                    at, target, kind = root, i, 0
+                    out_bracket[1], out_bracket[3], out_bracket[4], out_bracket[5] = h, h, end, start
+        if law.shape[1] < WIDTH or law[i, KIND] == POWER:
+            continue
+        if law[i, KIND] == FELT:
+            apart = law[i, MEMORY] < 0.0
+            start = parting(law, i, d0, law[i, MEMORY])
+            end = parting(law, i, d1, after[i])
+            least = NEAR * law[i, 5] * abs(after[i])
+            if least > 0.0 and (end > least if apart else end < -least):
+                start = min(start, -least) if apart else max(start, least)
+                root = h * start / (start - end)
+                if root < AT_ONCE * h:
+                    if apart:
+                        return i, 4, h
+                elif root < at:
+                    at, target, kind = root, i, 3
+                    out_bracket[1], out_bracket[3], out_bracket[4], out_bracket[5] = h, h, end, start
+            continue
+        bend = corner_approach(spring_of(law, i))
+        near = NEAR * bend
+        if bend == np.inf or near <= 0.0:
+            continue
+        late, high = h, d1
+        if v1 < 0.0 < v0:
+            late, high = turn_of(d0, v0, d1, v1, h)
+        if law[i, KIND] == PLASTIC and d0 >= bend - near:
+            if v1 < 0.0 < v0 and high > bend + near and 0.0 < late < at:
+                at, target, kind = late, i, 2
+                out_bracket[1], out_bracket[3], out_bracket[4], out_bracket[5] = h, h, -v1, -v0
+        elif d0 < bend - near and high > bend + near:
+            root = hermite_root(d0 - bend, v0, d1 - bend, v1, h) if d1 > bend else -1.0
+            if root <= 0.0 or root > late:
+                root = late * (bend - d0) / (high - d0)
+            if root < at:
+                at, target, kind = root, i, 1
+                out_bracket[1], out_bracket[3], out_bracket[4], out_bracket[5] = late, late, high - bend, d0 - bend
+        elif law[i, KIND] != PLASTIC and d0 > bend + near and d1 < bend - near:
+            root = hermite_root(d0 - bend, v0, d1 - bend, v1, h)
+            if root < at:
+                at, target, kind = root, i, 1
+                out_bracket[1], out_bracket[3], out_bracket[4], out_bracket[5] = h, h, d1 - bend, d0 - bend
+    out_bracket[0] = 0.0
+    return target, kind, at
+
+
+@inner()
+def dipped_felt(law, now, y, rate, after, h, i):
+    """Whether a body left its felt and met it again within a step, by the cubic of what makes it push."""
+    share, time, z0, z1 = law[i, 5], law[i, 6], law[i, MEMORY], after[i]
+    if z0 < 0.0 or y[i] <= 0.0 or now[0, i] <= 0.0:
+        return False
+    g0, g1 = parting(law, i, now[0, i], z0), parting(law, i, y[i], z1)
+    r0 = law[i, 1] * (g0 + share * z0) / now[0, i] * now[4, i] - share * (g0 + (share - 1.0) * z0) / time
+    r1 = law[i, 1] * (g1 + share * z1) / y[i] * rate[i] - share * (g1 + (share - 1.0) * z1) / time
+    return r0 < 0.0 < r1 and g0 > 0.0 and g1 > 0.0 and lowest(g0, r0, g1, r1, h) < -DIPPED * max(g0, g1)
+
+
+@inner()
+def strayed(law, now, y, rate, after, h, i, side):
+    """Whether contact i began its step at the corner of its law and ends it beyond (side 1) or before it (side -1).
+
+    0 it stayed, 1 it left the side at once, 2 after a way in which the step must be shorter.
+    """
+    if law.shape[1] == WIDTH and law[i, KIND] == FELT:
+        return 2 if dipped_felt(law, now, y, rate, after, h, i) else 0
+    if law.shape[1] < WIDTH or (law[i, KIND] != LAYERS and law[i, KIND] != PLASTIC):
+        return 0
+    spring = spring_of(law, i)
+    bend = corner_approach(spring)
+    near = NEAR * bend
+    d0, v0, d1, v1 = side * (now[0, i] - bend), side * now[4, i], side * (y[i] - bend), side * rate[i]
+    yields = spring.kind == PLASTIC and side > 0.0
+    if bend == np.inf or abs(d0) > near or (d1 >= -near and not (yields and v1 < 0.0)):
+        return 0
+    high = 0.0
+    if v1 < 0.0 < v0:
+        _, high = turn_of(d0, v0, d1, v1, h)
+    if high <= near:
+        return 1
+    return 0 if yields else 2
+
+
+@inner()
+def nearer(law, i, which, h, d, v, memory, bracket):
+    """Next length of a step that is to end at a corner, from a try of length h; 0 where the try was good.
+
+    By secants inside a bracket as from `first_corner`.
+    """
+    miss = corner_value(law, i, which, d, v, memory)
+    good = 0.1 * LET_GO
+    if which == 1:
+        good = 0.1 * NEAR * corner_approach(spring_of(law, i))
+    elif which == 3:
+        good = 0.1 * NEAR * law[i, 5] * abs(memory)
+    elif which == 2:
+        good = TURNED * (abs(bracket[4]) + abs(bracket[5]))
+    if abs(miss) <= good or bracket[1] - bracket[0] <= 1e-9 * bracket[1]:
+        return 0.0
+    bracket[0 if miss * bracket[5] > 0.0 else 1] = h
+    guess = h - miss * (h - bracket[3]) / (miss - bracket[4]) if miss != bracket[4] else 0.0
+    bracket[3] = h
+    bracket[4] = miss
+    if not bracket[0] < guess < bracket[1]:
+        guess = 0.5 * (bracket[0] + bracket[1])
+    return guess
+
+
+@inner()
+def settle(law, now, pressed, y, rate, target, depth, still):
+    """Take over approaches and rates at a step's end; the number of contacts that opened, but for felt left before."""
     opened = 0
     for i in range(y.size):
         was = pressed[i]
@@ -178,7 +335,7 @@ def settle(now, pressed, y, rate, target, depth, still):
             pressed[i] = rate[i] > still or (was and rate[i] >= -still)
         else:
             pressed[i] = y[i] > 0.0
-        if was and not pressed[i]:
+        if was and not pressed[i] and not (law.shape[1] == WIDTH and law[i, KIND] == FELT and law[i, MEMORY] < 0.0):
             opened += 1
     return opened
 
@@ -192,16 +349,35 @@ def begin(shape, offset, q, p, now, pressed):
 
 
 @inner()
-def land(shape, offset, time, elapsed, first, found, row, stride, now, pressed, q, p):
+def remember(law, i, row, stride, n_contacts, now):
+    """Write approach, rate and memory of contact i to a row of the steps; the approach counts from no dent."""
+    memory = law[i, MEMORY] if law.shape[1] == WIDTH else 0.0
+    row[3 + stride * i] = now[0, i] + dent(law, i, memory)
+    row[4 + stride * i] = now[4, i]
+    row[3 + stride * n_contacts + i] = memory
+
+
+@inner()
+def remembered(law, now):
+    """Count the approaches at the end of a run from no dent, and add the memory: row 5 of ``now``."""
+    if law.shape[1] == WIDTH:
+        for i in range(now.shape[1]):
+            harden(law, i, now[0, i])
+            now[5, i] = law[i, MEMORY]
+            now[0, i] += dent(law, i, law[i, MEMORY])
+
+
+@inner()
+def land(shape, offset, law, time, elapsed, first, found, row, stride, now, pressed, q, p):
     """Write a free flight to a row of the steps and take over the contacts' state at its end."""
     row[:] = 0.0
     row[0] = time
     row[1] = elapsed
     for i in range(offset.size):
-        row[3 + stride * i] = now[0, i]
-        row[4 + stride * i] = now[4, i]
+        remember(law, i, row, stride, offset.size, now)
         now[0, i], now[4, i] = approach(shape, offset, i, q, p)
         now[0, i] = min(0.0, now[0, i])
+        rest_of(law, i, elapsed)
     if found == 0:
         now[0, first] = 0.0
         pressed[first] = True

@@ -9,7 +9,7 @@ through both ends can miss prove that no touch was passed, or mark the blow as d
 import numpy as np
 
 from .build import LOOSE, inner, outer
-from .law import Point, Spring, at
+from .law import Point, at, simple
 from .schemes import Free, Own, solve_constant, solve_ramp
 
 END, END_RAMP, RATE, RATE_RAMP, MEAN, MEAN_RAMP = (np.uintp(row) for row in range(6))  # rows of a kernel
@@ -125,7 +125,7 @@ def opening(d0, free, own, spring, loss):
     k, c = spring.stiffness, spring.compliance + swift
     if spring.exponent == 1.0:  # the two springs in series as one: no division below
         k, c = k / (1.0 + k * c), 0.0
-    soft = Spring(k, spring.exponent, 0.0, c)
+    soft = simple(k, spring.exponent, 0.0, c)
     fast = 6.0 * (own.mean - swift) - 2.0 * (own.end - swift)
     slow = 3.0 * (own.end - swift) - 6.0 * (own.mean - swift)
     dt = 1.0 / PIECES
@@ -415,7 +415,7 @@ def run(
     contacts = np.zeros((n_steps + 1, 2))
     for cell in cells:
         k, a, c, loss = law[0, cell], law[1, cell], law[2, cell], law[3, cell]
-        spring = Spring(k, a, loss, c)
+        spring = simple(k, a, loss, c)
         share, mine = shares[0, cell], shares[1, cell]
         known = min(32, n_steps)
         combine(target[:, :known], striker[:, :known], share, mine, 0, rows[:, n_steps - known :])

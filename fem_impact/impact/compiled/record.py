@@ -1,8 +1,8 @@
 """What a run leaves behind, and the impacts read from it.
 
 A row of ``steps`` is a step or a flight: start, length, whether events were passed; then for each contact approach and
-rate at its start, whether it is closed, and the force as powers of the fraction of the step. Between the ends the
-approach is the cubic through both.
+rate at its start, whether it is closed, and the force as powers of the fraction of the step; then what each contact
+remembers. Between the ends the approach is the cubic through both.
 """
 
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 
 from .build import ZERO, inner, outer
 from .events import hermite_root, letting_go, lowest
-from .law import at, spring_of, stored
+from .law import FELT, KIND, WIDTH, at, dent, growth, soaked, spring_with, steepness, stored
 
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = 0, 1, 2, 3, 4, 5  # why a run ended
 
@@ -36,27 +36,72 @@ def total_energy(omega, bias, law, q, p, now):
 
 
 @inner()
+def memory_of(steps, law, n_coefficients, row, i):
+    """What contact i remembers in a step."""
+    return steps[row, 3 + (3 + n_coefficients) * law.shape[0] + i]
+
+
+@inner()
+def ends_of(steps, now, law, n_coefficients, row, i):
+    """Approach from the dent and its rate at both ends of a step."""
+    first = 3 + (3 + n_coefficients) * i
+    last = row + 1 == steps.shape[0]
+    low = dent(law, i, memory_of(steps, law, n_coefficients, row, i))
+    d0 = steps[row, first] - low
+    v0 = steps[row, first + 1]
+    d1 = (now[0, i] if last else steps[row + 1, first]) - low
+    v1 = now[4, i] if last else steps[row + 1, first + 1]
+    return d0, v0, d1, v1
+
+
+@inner()
 def force_within(steps, now, law, n_coefficients, row, i, part):
     """Force of contact i at a fraction of a step: the law on the cubic through both ends, or a higher polynomial."""
+    return force_and_rate(steps, now, law, n_coefficients, row, i, part)[0]
+
+
+@inner()
+def force_and_rate(steps, now, law, n_coefficients, row, i, part):
+    """That force and its rate [N/s]; never negative."""
     first = 3 + (3 + n_coefficients) * i
+    h = steps[row, 1]
     if n_coefficients > 2:
         value = 0.0
+        slope = 0.0
         for k in range(n_coefficients - 1, -1, -1):
+            slope = slope * part + value
             value = value * part + steps[row, first + 3 + k]
-        return max(value, 0.0)
-    last = row + 1 == steps.shape[0]
-    h = steps[row, 1]
-    d0 = steps[row, first]
-    v0 = steps[row, first + 1]
-    d1 = now[0, i] if last else steps[row + 1, first]
-    v1 = now[4, i] if last else steps[row + 1, first + 1]
+        return max(value, 0.0), slope / h if value > 0.0 else 0.0
+    d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
     a = 2.0 * (d0 - d1) + h * (v0 + v1)
     b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
     d = d0 + part * (h * v0 + part * (b + part * a))
     if d <= 0.0:
-        return 0.0
+        return 0.0, 0.0
     rate = v0 + part * (2.0 * b + 3.0 * a * part) / h
-    return max(at(d, spring_of(law, i)).force * (1.0 + law[i, 2] * rate), 0.0)
+    spring = spring_with(law, i, memory_of(steps, law, n_coefficients, row, i))
+    point = at(d, spring)
+    factor = 1.0 + spring.loss * rate
+    if not point.force * factor > 0.0:
+        return 0.0, 0.0
+    turn = (2.0 * b + 6.0 * a * part) / (h * h)
+    steep = steepness(point.compression, point.force, spring)
+    if spring.kind == FELT:
+        g0, r0, _ = growth(at(d0, spring), v0, spring)
+        g1, r1, _ = growth(at(d1, spring), v1, spring)
+        z = soaked(h, part, g0, g1, r0, r1, spring)[0]
+        fade = (point.force / spring.stiffness - z) / spring.relaxation
+        return max(0.0, point.force - spring.hard * z), steep * rate - spring.hard * fade
+    return point.force * factor, steep / (
+        1.0 + spring.compliance * steep
+    ) * rate * factor + point.force * spring.loss * turn
+
+
+@outer()
+def forces(steps, now, law, n_coefficients, rows, i, part, out_force, out_rate):
+    """Force of contact i [N] and its rate [N/s] at fractions (n,) of steps (n,)."""
+    for n in range(rows.size):
+        out_force[n], out_rate[n] = force_and_rate(steps, now, law, n_coefficients, rows[n], i, part[n])
 
 
 @inner()
@@ -68,18 +113,19 @@ def pushing(steps, now, law, n_coefficients, row, i):
     first = 3 + (3 + n_coefficients) * i
     if steps[row, first + 2] == 0.0:
         return 0.0, 0.0
-    final = row + 1 == steps.shape[0]
     h = steps[row, 1]
-    d0 = steps[row, first]
-    v0 = steps[row, first + 1]
-    d1 = now[0, i] if final else steps[row + 1, first]
-    v1 = now[4, i] if final else steps[row + 1, first + 1]
+    d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
     lower = 0.0
     upper = 1.0
     if d0 < 0.0 < d1:
         lower = hermite_root(d0, v0, d1, v1, h) / h
     elif d1 < 0.0 < d0:
         upper = hermite_root(d0, v0, d1, v1, h) / h
+    if law.shape[1] == WIDTH and law[i, KIND] == FELT:  # steps end where the body parts from the felt or meets it
+        for k in range(n_coefficients):
+            if steps[row, first + 3 + k] != 0.0:
+                return lower, upper
+        return 0.0, 0.0
     loss = law[i, 2]
     start = 1.0 + loss * v0
     end = 1.0 + loss * v1
@@ -95,23 +141,13 @@ def pushing(steps, now, law, n_coefficients, row, i):
 
 
 @outer()
-def nearest_turn(steps, now, width):
-    """How near to zero an approach turns back, over the farthest it ever turns; infinity where none does.
-
-    ``width`` numbers of a step belong to each contact, the approach and its rate first.
-    """
+def nearest_turn(steps, now, law, n_coefficients):
+    """How near to zero an approach turns back, over the farthest it ever turns; infinity where none does."""
     nearest = np.inf
     farthest = 0.0
     for i in range(now.shape[1]):
-        first = 3 + width * i
         for row in range(steps.shape[0]):
-            d0 = steps[row, first]
-            v0 = steps[row, first + 1]
-            d1 = now[0, i]
-            v1 = now[4, i]
-            if row + 1 < steps.shape[0]:
-                d1 = steps[row + 1, first]
-                v1 = steps[row + 1, first + 1]
+            d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
             if (v0 < 0.0 < v1) or (v1 < 0.0 < v0):
                 side = 1.0 if v0 < 0.0 else -1.0
                 turn = side * lowest(side * d0, side * v0, side * d1, side * v1, steps[row, 1])

@@ -11,7 +11,8 @@ work ``f (y - d0) + s ((d0 + y)/2 - mean approach)`` is again ``V1 - V0``: order
 where the step is long against the contact; such a step goes to scheme A.
 
 With loss (Hunt and Crossley 1975, J. Appl. Mech. 42, 440) the force is ``F(d) (1 + loss d')``: its mean gains
-``loss (V1 - V0) / h`` and its slope ``loss (F1 v1 - F0 v0)``, so that no step creates energy.
+``loss (V1 - V0) / h`` and its slope ``loss (F1 v1 - F0 v0)``, so that no step creates energy. Felt takes from the mean
+what it remembers in the mean, and from the slope how that changes, with the compression a cubic over the step.
 """
 
 from typing import NamedTuple
@@ -19,9 +20,22 @@ from typing import NamedTuple
 import numpy as np
 
 from .build import inner
-from .law import Point, at, compressed, slopes, spring_of
+from .law import (
+    FELT,
+    Point,
+    at,
+    compressed,
+    growth,
+    memory_energy,
+    power,
+    slopes,
+    soaked,
+    spring_of,
+    steepness,
+)
 
 SOLVES = 30  # [-] iterations of the equation of a step at most
+ROUNDED = 1e-14  # [-] of the elastic energies: rounding of what a step of felt loses
 WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it
 
 
@@ -46,7 +60,7 @@ class Own(NamedTuple):
 
 @inner()
 def point_of(now, i):
-    """Where contact i stands: ``now`` (5, n_contacts) holds approach, compression, force, energy and rate."""
+    """Where contact i stands: ``now`` (6, n_contacts) holds approach, compression, force, energy and rate."""
     return Point(now[0, i], now[1, i], now[2, i], now[3, i])
 
 
@@ -57,6 +71,8 @@ def solve_constant(start, e, b, loss, spring):
     ``loss`` is the Hunt-Crossley factor over the step length [1/m].
     """
     d0, v0 = start.approach, start.energy
+    if spring.stiffness == 0.0:
+        return at(e, spring), 0.0
     k, a, c = spring.stiffness, spring.exponent, spring.compliance
     if d0 <= 0.0 and e <= 0.0:
         return at(e, spring), 0.0
@@ -66,7 +82,7 @@ def solve_constant(start, e, b, loss, spring):
         gap = 0.5 * (root - free) if free <= 0.0 else 2.0 * b * v0 / (root + free)
         f = v0 / gap - loss * v0 if gap > 0.0 else 0.0
         return (at(d0 - gap, spring), f) if f > 0.0 else (at(e, spring), 0.0)
-    if a == 1.0 and loss == 0.0:
+    if a == 1.0 and loss == 0.0 and spring.corner == np.inf:
         half = 0.5 * b * k / (1.0 + k * c)
         if d0 >= 0.0:
             y = (e - half * d0) / (1.0 + half)
@@ -106,11 +122,110 @@ def solve_constant(start, e, b, loss, spring):
 
 
 @inner()
+def felt_mean(start, y, h, spring):
+    """Scheme A for felt: mean force, its slope over the approach y at the end, and the memory there.
+
+    The memory takes up the middle compression u: ``z1 - z0 = (1 - exp(-h/tau)) (u**a - z0)``, and takes the force
+    ``k share (z0 + z1) / 2``. So the step loses ``k share (z1 - z0) (u - mean of z**(1/a))``, never less than nothing.
+    """
+    end = at(y, spring)
+    g, d = slopes(start, end, spring)
+    a = spring.exponent
+    middle = 0.5 * (max(0.0, start.compression) + max(0.0, end.compression))
+    taken = -np.expm1(-h / spring.relaxation)
+    aim = power(middle, a) if middle > 0.0 else 0.0
+    memory = spring.memory + taken * (aim - spring.memory)
+    f = g - 0.5 * spring.hard * (spring.memory + memory)
+    if f <= 0.0:
+        left = spring.hard / spring.stiffness
+        return 0.0, 0.0, spring.memory * np.exp(-(1.0 - left) * h / spring.relaxation)
+    span = y - start.approach
+    turn = (end.force - g) / span if abs(span) > 1e-6 * (abs(y) + abs(start.approach)) else 0.5 * d
+    if end.compression > 0.0:
+        turn -= 0.25 * spring.hard * taken * a * aim / middle
+    return f, turn, memory
+
+
+@inner()
+def solve_felt(start, e, b, h, spring):
+    """Scheme A for one felt contact: as `solve_constant`, by regula falsi between bounds (Illinois)."""
+    f, _, _ = felt_mean(start, e, h, spring)
+    if f == 0.0:
+        return at(e, spring), 0.0
+    high = e
+    low = e - b * f
+    above = b * f
+    below = low - e + b * felt_mean(start, low, h, spring)[0]
+    y = low
+    side = 0
+    for _ in range(200):
+        if below == above or high - low <= 4e-16 * max(abs(high), abs(low)):
+            break
+        y = (low * above - high * below) / (above - below)
+        f, _, _ = felt_mean(start, y, h, spring)
+        r = y - e + b * f
+        if r == 0.0:
+            break
+        if r > 0.0:
+            high, above = y, r
+            below *= 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            low, below = y, r
+            above *= 0.5 if side == -1 else 1.0
+            side = -1
+    return at(y, spring), f
+
+
+@inner()
+def lossy_terms(h, start, end, rate0, free_rate, spring):
+    """What loss or memory adds to mean force and slope at the free end rate, and takes of each per unit less of it."""
+    if spring.kind == FELT:
+        g0, r0, _ = growth(start, rate0, spring)
+        g1, r1, per = growth(end, free_rate, spring)
+        z, mean, per_end, per_mean = soaked(h, 1.0, g0, g1, r0, r1, spring)
+        k = spring.hard
+        return -k * mean, -k * (z - spring.memory), -k * per_mean * per, -k * per_end * per
+    loss = spring.loss
+    add = loss * (end.energy - start.energy) / h
+    return add, loss * (end.force * free_rate - start.force * rate0), 0.0, loss * end.force
+
+
+@inner()
+def remembers(h, start, end, rate0, rate1, ramped, spring):
+    """What felt remembers after a step of scheme A4 or A."""
+    if not ramped:
+        return felt_mean(start, end.approach, h, spring)[2]
+    g0, r0, _ = growth(start, rate0, spring)
+    g1, r1, _ = growth(end, rate1, spring)
+    return max(0.0, soaked(h, 1.0, g0, g1, r0, r1, spring)[0])
+
+
+@inner()
+def gained(start, end, memory, spring):
+    """What a contact stores more at the end of a step [J]."""
+    more = end.energy - start.energy
+    if spring.kind == FELT:
+        more += memory_energy(max(0.0, end.compression), memory, spring)
+        more -= memory_energy(max(0.0, start.compression), spring.memory, spring)
+    return more
+
+
+@inner()
+def fair(lost, start, end, spring):
+    """Whether a step loses neither less than nothing nor, without loss, more than its rounding."""
+    if spring.kind == FELT:
+        return lost >= -ROUNDED * (start.energy + end.energy)
+    slack = WORK_ERROR * (start.energy + end.energy)
+    return lost >= 0.0 if spring.loss > 0.0 else -slack <= lost <= slack
+
+
+@inner()
 def linear_guess(start, free, own, spring):
     """Compression at the end of a step if the spring were linear from its start on."""
     if start.approach <= 0.0:
         return 0.5 * free.end
-    steep = spring.exponent * start.force / start.compression
+    steep = steepness(start.compression, start.force, spring)
     tangent = steep / (1.0 + spring.compliance * steep)
     half = 0.5 * own.end * tangent
     y = (free.end - own.end * start.force + half * start.approach) / (1.0 + half)
@@ -126,8 +241,8 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
     The unknown is the compression at the end, from ``guess``, by Newton's method; with loss by secants. Not settled
     where that fails, the force would pull or the contact would give energy.
     """
-    d0, loss = start.approach, spring.loss
-    a, c = spring.exponent, spring.compliance
+    d0, c = start.approach, spring.compliance
+    lossy = spring.loss > 0.0 or spring.kind == FELT
     scale = max(abs(free.end), abs(d0))
     x = guess if guess > -scale else 0.5 * free.end
     old_x = 0.0
@@ -145,23 +260,27 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
         right = g + d * (free.mean - middle)
         s = end.force - start.force
         stiffening = 1.0 + d * own.mean
-        if loss == 0.0:
+        if not lossy:
             f = (right - d * own.mean_ramp * s) / stiffening
         else:  # mean and slope depend on each other through the rate at the end: two equations
-            right += loss * (end.energy - start.energy) / h
-            top = s + loss * (end.force * free.rate - start.force * rate0)
-            part = loss * end.force
+            add, tilt, held_back, part = lossy_terms(h, start, end, rate0, free.rate, spring)
+            right += add
+            top = s + tilt
+            one = stiffening + held_back * own.rate
+            cross = d * own.mean_ramp + held_back * own.rate_ramp
             two = 1.0 + part * own.rate_ramp
-            f = (right * two - d * own.mean_ramp * top) / (stiffening * two - d * own.mean_ramp * part * own.rate)
+            f = (right * two - cross * top) / (one * two - cross * part * own.rate)
             s = (top - part * own.rate * f) / two
         r = y - free.end + own.end * f + own.end_ramp * s
         if last or r == 0.0 or (close and abs(r) <= 1e-15 * max(scale, abs(y))):
             work = f * (y - d0) + s * (middle - (free.mean - own.mean * f - own.mean_ramp * s))
-            lost = work - (end.energy - start.energy)
-            slack = 0.0 if loss > 0.0 else WORK_ERROR * (start.energy + end.energy)
-            return f >= 0.0 and -slack <= lost and (loss > 0.0 or lost <= slack), end, f, s
-        if loss == 0.0 or iteration == 0:
-            steep = a * end.force / x if x > 0.0 else 0.0  # dF/dx; over the approach it is less
+            memory = 0.0
+            if spring.kind == FELT:
+                memory = remembers(h, start, end, rate0, free.rate - own.rate * f - own.rate_ramp * s, True, spring)
+            lost = work - gained(start, end, memory, spring)
+            return f >= 0.0 and fair(lost, start, end, spring), end, f, s
+        if not lossy or iteration == 0:
+            steep = steepness(x, end.force, spring) if x > 0.0 else 0.0  # dF/dx; over the approach it is less
             tangent = steep / (1.0 + c * steep)
             span = y - d0
             turn = 0.5 * d
@@ -218,6 +337,9 @@ def solve_linear(matrix, vector, n):
 def mean_force(h, y, now, law, i):
     """Mean force of scheme A for one contact ending at approach y, and its slope; the force never pulls."""
     spring = spring_of(law, i)
+    if spring.kind == FELT:
+        f, slope, _ = felt_mean(point_of(now, i), y, h, spring)
+        return f, slope
     start, end = point_of(now, i), at(y, spring)
     g, d = slopes(start, end, spring)
     loss = spring.loss / h
@@ -240,7 +362,11 @@ def sweep_constants(h, now, law, e, sums, out_y, out_f):
             if j != i:
                 rest -= sums[0, i, j] * out_f[j]
         old = out_f[i]
-        end, out_f[i] = solve_constant(point_of(now, i), rest, sums[0, i, i], law[i, 2] / h, spring_of(law, i))
+        spring = spring_of(law, i)
+        if spring.kind == FELT:
+            end, out_f[i] = solve_felt(point_of(now, i), rest, sums[0, i, i], h, spring)
+        else:
+            end, out_f[i] = solve_constant(point_of(now, i), rest, sums[0, i, i], law[i, 2] / h, spring)
         out_y[i] = end.approach
         if out_f[i] != old:
             change = max(change, abs(out_f[i] - old) / max(abs(out_f[i]), abs(old)))
@@ -325,16 +451,16 @@ def ramp_forces(h, y, now, law, e, ea, vf, sums, work, out_f, out_s, out_r):
         spring = spring_of(law, i)
         start, end = point_of(now, i), at(y[i], spring)
         g, d = slopes(start, end, spring)
-        loss, f1 = spring.loss, end.force
+        add, tilt, held_back, part = lossy_terms(h, start, end, now[4, i], vf[i], spring)
         for j in range(m):
-            matrix[i, j] = d * sums[2, i, j]
-            matrix[i, m + j] = d * sums[3, i, j]
-            matrix[m + i, j] = loss * f1 * sums[4, i, j]
-            matrix[m + i, m + j] = loss * f1 * sums[5, i, j]
+            matrix[i, j] = d * sums[2, i, j] + held_back * sums[4, i, j]
+            matrix[i, m + j] = d * sums[3, i, j] + held_back * sums[5, i, j]
+            matrix[m + i, j] = part * sums[4, i, j]
+            matrix[m + i, m + j] = part * sums[5, i, j]
         matrix[i, i] += 1.0
         matrix[m + i, m + i] += 1.0
-        vector[i] = g + d * (ea[i] - 0.5 * (start.approach + y[i])) + loss * (end.energy - start.energy) / h
-        vector[m + i] = f1 - start.force + loss * (f1 * vf[i] - start.force * now[4, i])
+        vector[i] = g + d * (ea[i] - 0.5 * (start.approach + y[i])) + add
+        vector[m + i] = end.force - start.force + tilt
     if not solve_linear(matrix, vector, 2 * m):
         return False
     for i in range(m):
@@ -393,14 +519,15 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
     for i in range(m):
         if not out_f[i] >= 0.0:
             return False
-        v1 = at(out_y[i], spring_of(law, i)).energy
+        spring = spring_of(law, i)
+        start, end = point_of(now, i), at(out_y[i], spring)
         mean = ea[i]
+        v1 = vf[i]
         for j in range(m):
             mean -= sums[2, i, j] * out_f[j] + sums[3, i, j] * out_s[j]
+            v1 -= sums[4, i, j] * out_f[j] + sums[5, i, j] * out_s[j]
+        memory = remembers(h, start, end, now[4, i], v1, True, spring) if spring.kind == FELT else 0.0
         work_done = out_f[i] * (out_y[i] - now[0, i]) + out_s[i] * (0.5 * (now[0, i] + out_y[i]) - mean)
-        lost = work_done - (v1 - now[3, i])
-        if lost < (0.0 if law[i, 2] > 0.0 else -WORK_ERROR * (v1 + now[3, i])):
-            return False
-        if law[i, 2] == 0.0 and lost > WORK_ERROR * (v1 + now[3, i]):
+        if not fair(work_done - gained(start, end, memory, spring), start, end, spring):
             return False
     return True

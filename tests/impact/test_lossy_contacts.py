@@ -1,0 +1,189 @@
+"""Contacts that yield, have two layers or are felt: against scipy, closed forms, and their own energy balance."""
+
+import warnings
+
+import numpy as np
+import pytest
+from lossy_blow import blow
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.impact.accuracy import contact_duration
+
+PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20)
+WALL, AT = fi.Modes.rigid(1e6), (0.45, 0.3)
+LAWS = {  # the law, and the same for `lossy_blow`
+    "layers": (fi.Contact.layers(1e5, 1.3, depth=2e-4, hard_stiffness=1e8), ("layers", 1e5, 1.3, 2e-4, 1e8, 1.5)),
+    "straight layers": (
+        fi.Contact.layers(1e5, 1.0, depth=2e-4, hard_stiffness=1e6, hard_exponent=1.0),
+        ("layers", 1e5, 1.0, 2e-4, 1e6, 1.0),
+    ),
+    "plastic": (fi.Contact(1e8, 1.5, yield_approach=3e-5), ("plastic", 1e8, 1.5, 3e-5)),
+    "slow felt": (fi.Contact.felt(1e9, 2.2, hysteresis=0.6, relaxation=2e-4), ("felt", 1e9, 2.2, 0.6, 2e-4)),
+    "quick felt": (fi.Contact.felt(1e9, 2.2, hysteresis=0.9, relaxation=2e-5), ("felt", 1e9, 2.2, 0.9, 2e-5)),
+}
+
+
+def struck(law, target, tolerance, speed=1.0, **wanted):
+    at = None if target.dimension == 0 else AT
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fi.ToleranceWarning)  # 20 modes do not resolve the stiff contacts
+        return fi.strike(
+            target, fi.Striker.rigid(0.02), law, at=at, speed=speed, tolerance=tolerance, residual=False, **wanted
+        )
+
+
+def truth(hit, told):
+    h = hit.history
+    return blow(h.omega, h.zeta, h.shape[0], h.start_p, told, 1.001 * max(h.end_time, hit.impacts[-1].end))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("target", [WALL, PLATE], ids=["wall", "plate"])
+def test_both_schemes_agree_with_runge_kutta(name, target):
+    """Collocation to 1e-8; A4 within its tolerance, and neither errs by more than ten times what it claims."""
+    law, told = LAWS[name]
+    fine, usual = struck(law, target, 1e-9), struck(law, target, 1e-4)
+    assert (fine.scheme, usual.scheme) == ("collocation", "A4")
+    wanted = truth(fine, told)
+    momentum = np.linalg.norm(fine.history.start_p)
+    for hit, limit in ((fine, 1e-8), (usual, 1e-4)):
+        missed = [
+            abs(hit.history.end_p[0] - wanted.speeds[0]) / momentum,
+            abs(hit.impulse / wanted.impulse - 1.0),
+            abs(hit.contact_time / wanted.contact_time - 1.0),
+        ]
+        assert max(missed) < limit
+        assert max(missed) < 10.0 * hit.error.step + 1e-11  # 1e-11: what Runge-Kutta itself errs by
+        assert hit.peak_force == pytest.approx(wanted.peak, rel=max(limit, 1e-6))  # the truth is sampled 4000 times
+        energies = hit.energies
+        assert energies["contact"] + energies["dissipated"] == pytest.approx(
+            wanted.lost, abs=4.0 * limit * 0.5 * momentum**2
+        )
+        assert energies["dissipated"] >= 0.0
+        assert hit.energy_error < 1e-10  # of collocation; A4 keeps it to rounding, see below
+
+
+@pytest.mark.parametrize("ratio", [1.1, 2.0, 16.0, 256.0])
+def test_yielding_contacts_rebound_by_thorntons_formula(ratio):
+    """Thornton (1997), eq. 41, speed over that of first yield; the formula is exact for this law."""
+    law = fi.Contact.elastic_plastic(1e10, yield_speed=0.1, mass=0.02)
+    r = 1.0 / ratio
+    wanted = np.sqrt(1.2 * np.sqrt(3.0) * (1.0 - r * r / 6.0)) * (r / (r + 2.0 * np.sqrt(1.2 - 0.2 * r * r))) ** 0.25
+    assert struck(law, WALL, 1e-6, 0.1 * ratio).restitution == pytest.approx(wanted, abs=1e-6)
+
+
+def test_restitution_falls_as_the_fourth_root_of_the_speed():
+    law = fi.Contact.elastic_plastic(1e10, yield_speed=1e-3, mass=0.02)
+    slow, fast = (struck(law, WALL, 1e-6, speed).restitution for speed in (10.0, 160.0))
+    assert slow / fast == pytest.approx(2.0, rel=2e-4)  # the deviation falls with the speed over that of first yield
+
+
+def test_nothing_yields_below_the_speed_of_first_yield():
+    law = fi.Contact.elastic_plastic(1e10, yield_speed=0.1, mass=0.02)
+    hit = struck(law, WALL, 1e-6, 0.0999)
+    assert hit.dissipated["contact"] == pytest.approx(0.0, abs=1e-15 * 0.5 * 0.02 * 0.1**2 * 10.0)
+    assert hit.restitution == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("scheme", ["A", "A4", "collocation"])
+def test_a_dent_stays_and_what_it_took_is_known(scheme):
+    """A ball dropped again and again: second impacts begin at the dent and lose only where they press deeper."""
+    law = fi.Contact.elastic_plastic(1e9, yield_speed=0.05, mass=0.02)
+    floor = [fi.Touch(law, 0, None)]
+    hit = fi.collide(
+        [fi.Modes.rigid(0.02)], floor, speeds=[1.0], forces=[0.02 * 9.81], max_impacts=3, scheme=scheme,
+        tolerance={"A": 1e-3, "A4": 1e-4, "collocation": 1e-8}[scheme],
+    )  # fmt: skip
+    assert hit.n_impacts == 3
+    first, second, third = (
+        abs(hit.velocity(None, [t], body=0)[0, 0]) for t in (hit.impacts[0].end, hit.impacts[1].end, hit.impacts[2].end)
+    )
+    assert first < 0.8
+    assert second == pytest.approx(first, rel=1e-3)  # slower than before: elastic, but for the work of the weight
+    assert third == pytest.approx(first, rel=1e-3)
+    deepest = hit.history.now[5, 0]
+    dent = hit.history.offset[0] + hit.displacement(None, [hit.impacts[2].end], body=0)[0, 0]
+    assert 0.1 * deepest < dent < deepest  # it leaves the floor at the dent
+    assert hit.energy_error < (1e-9 if scheme == "collocation" else 1e-13)  # the loss is that of the law in closed form
+
+
+def test_felt_held_pressed_relaxes_to_its_share():
+    """A weight on felt: it sinks until the relaxed stiffness carries it."""
+    law = fi.Contact.felt(1e6, 1.5, hysteresis=0.75, relaxation=2e-3)
+    weight = 0.02 * 9.81
+    hit = fi.collide([fi.Modes.rigid(0.02)], [fi.Touch(law, 0, None)], speeds=[1e-2], forces=[weight], duration=3.0)
+    depth = hit.displacement(None, [3.0], body=0)[0, 0]
+    assert depth == pytest.approx((weight / (0.25 * 1e6)) ** (1.0 / 1.5), rel=1e-4)
+    assert hit.force[-1] == pytest.approx(weight, rel=1e-4)
+
+
+def test_felt_that_does_not_relax_is_a_power_law_and_fast_felt_a_softer_one():
+    plain = struck(fi.Contact.power(1e9, 2.0), WALL, 1e-6)
+    stiff = struck(fi.Contact.felt(1e9, 2.0, hysteresis=0.5, relaxation=1e3), WALL, 1e-6)
+    soft = struck(fi.Contact.power(5e8, 2.0), WALL, 1e-6)
+    quick = fi.Contact.felt(1e9, 2.0, hysteresis=0.5, relaxation=1e-10)
+    assert stiff.peak_force == pytest.approx(plain.peak_force, rel=2e-6)  # relaxation time over contact time: 2e6
+    assert struck(quick, WALL, 1e-6).peak_force == pytest.approx(soft.peak_force, rel=3e-6)
+
+
+def test_felt_hit_again_at_once_is_harder_and_thinner():
+    """A force brings the mass back before the felt has recovered: it meets the surface where that is by then."""
+    share, time = 0.9, 1e-3
+    law = fi.Contact.felt(1e8, 2.0, hysteresis=share, relaxation=time)
+    touch, about = [fi.Touch(law, 0, None)], {"speeds": [0.5], "forces": [0.5], "max_impacts": 2}
+    for tolerance in (1e-5, 1e-9):
+        hit = fi.collide([fi.Modes.rigid(0.02)], touch, tolerance=tolerance, **about)
+        assert hit.n_impacts == 2
+        first, second = hit.impacts
+        left, met = hit.displacement(None, [first.end, second.start], body=0)[:, 0]
+        wanted = left * np.exp(-0.5 * (1.0 - share) * (second.start - first.end) / time)  # z falls so, d is its root
+        assert left > 1e-5 and met > 0.1 * left
+        assert met == pytest.approx(wanted, rel=100.0 * tolerance)  # its way since then is 100 times as long
+        assert hit.energy_error < 1e-12
+
+
+def test_two_contacts_of_other_kinds_at_once_agree_with_the_reference_scheme():
+    """Three balls in a row through felt and a yielding contact: A4 against collocation."""
+    balls = [fi.Modes.rigid(m) for m in (0.02, 0.01, 0.03)]
+    felt = fi.Contact.felt(1e8, 2.0, hysteresis=0.5, relaxation=1e-4)
+    soft = fi.Contact.elastic_plastic(1e8, yield_speed=0.05, mass=0.01)
+    touches = [fi.Touch(felt, 0, 1), fi.Touch(soft, 1, 2)]
+    usual, fine = (fi.collide(balls, touches, speeds=[1.0, 0.0, 0.0], tolerance=t) for t in (1e-5, 1e-9))
+    assert (usual.scheme, fine.scheme) == ("A4", "collocation")
+    assert_allclose(usual.speeds, fine.speeds, atol=1e-5)
+    assert_allclose(usual.impulse, fine.impulse, rtol=1e-5)
+    for hit in (usual, fine):
+        assert hit.energy_error < 1e-12
+        assert hit.momentum_error < 1e-12
+        assert hit.dissipated["contact"] > 0.01 * 0.5 * 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(24))
+def test_the_error_is_what_it_claims_for_random_blows(seed):
+    """A4 at 1e-3 or 1e-4 against collocation at 1e-8, on plates of random size with random laws."""
+    rng = np.random.default_rng(seed)
+    plate = fi.analytic.rectangle(1.0 + rng.random(), 1.0, mass=0.2, first_frequency=100.0, n_modes=30)
+    k, speed = 10.0 ** rng.uniform(7.0, 9.0), 10.0 ** rng.uniform(-1.0, 1.0)
+    mass = 10.0 ** rng.uniform(-2.5, -1.0)
+    time = contact_duration(fi.Contact.hertz(k), mass, speed)
+    law = [
+        fi.Contact.layers(1e-3 * k, 1.2, depth=0.1 * speed * time, hard_stiffness=k),
+        fi.Contact.elastic_plastic(k, yield_speed=speed * rng.uniform(0.05, 0.5), mass=mass),
+        fi.Contact.felt(k, 1.5, hysteresis=rng.uniform(0.2, 0.95), relaxation=time * 10.0 ** rng.uniform(-2.0, 1.0)),
+    ][seed % 3]
+    about = {"at": rng.uniform(0.2, 0.8, 2), "speed": speed, "residual": False}
+    tolerance = (1e-3, 1e-4)[seed % 2]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fi.ToleranceWarning)
+        usual = fi.strike(plate, fi.Striker.rigid(mass), law, tolerance=tolerance, **about)
+        fine = fi.strike(plate, fi.Striker.rigid(mass), law, tolerance=1e-8, scheme="collocation", **about)
+    missed = max(
+        abs(usual.restitution - fine.restitution),
+        *(abs(getattr(usual, name) / getattr(fine, name) - 1.0) for name in ("impulse", "contact_time", "peak_force")),
+    )
+    assert usual.n_impacts == fine.n_impacts
+    assert missed < tolerance
+    assert usual.energy_error < 1e-12
