@@ -106,8 +106,9 @@ def in_air(
     Returns
     -------
     Modes
-        With `frequency_error` from a second grid of cells, with which frequencies are extrapolated. Rigid motions and damping ratios given before stay; that
-        the added mass changes with frequency is kept in the frequencies, not in the amplitudes.
+        With `frequency_error` from a second grid of cells, with which frequencies are extrapolated. Rigid motions and
+        damping ratios given before stay; that the added mass changes with frequency is kept in the frequencies, not in
+        the amplitudes.
 
     Examples
     --------
@@ -142,9 +143,7 @@ def in_air(
     note = f"air of {density:g} kg/m^3 on {side}, with a rigid wall around the plate"
     if not baffled:
         doubt, radiated = doubt + 0.5 * (modes.omega[modes.n_rigid :] / omega - 1.0), np.zeros(len(omega))
-        note = (
-            f"air of {density:g} kg/m^3 on {side} adds half the mass that it would with a rigid wall around the plate"
-        )
+        note = f"air of {density:g} kg/m^3 on {side} adds half the mass that it would with a rigid wall around"
     order = np.argsort(omega, kind="stable")
     whole = block_diag(np.eye(modes.n_rigid), mix[:, order])
     rest = np.zeros(modes.n_rigid)
