@@ -10,6 +10,7 @@ _NAMES = {
     "fe.assembly": "assemble",
     "modes.modal": "Modes find_modes rayleigh",
     "modes.ritz": "ritz_modes",
+    "modes.air": "in_air",
     "impact.contact": "Contact",
     "impact.striker": "Striker",
     "impact.response": "Response Impact",

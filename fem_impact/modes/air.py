@@ -1,0 +1,276 @@
+"""Air around a plate: the mass that it adds to every mode, and the damping by the sound that it carries away.
+
+A plate in a rigid baffle presses on each side with the Rayleigh integral of its velocity. Between two mass-normalised
+shapes this is, on one side,
+
+    Z_jk = (rho / 2 pi) (omega**2 C_jk - i omega S_jk),   C_jk - i S_jk = double integral of w_j w_k exp(-i k R) / R,
+
+with k = omega / c: C makes the plate heavier and S takes energy away. The modes in air solve
+
+    (diag(omega_j**2) - Omega**2 (1 + M(Omega))) q = 0,   M = sides rho C / (2 pi),
+
+each at its own frequency, together with its neighbours. Their static deflections are those in vacuum, because still air
+carries no load. The power radiated adds sides rho q' S q / (4 pi) to the damping ratio of a mode.
+
+The integrals are convolutions on a grid of square cells, in which a shape counts by its mean (fast Fourier transforms,
+zero padding). The kernel between cells is exact for 1 / R, integrated over both cells, and takes the rest at their
+centres.
+
+References
+----------
+Rayleigh (1896), The Theory of Sound, sections 278 and 302; Wallace (1972), J. Acoust. Soc. Am. 51, 946-952 (radiation
+of hinged rectangles); Christian, Davis, Tubis, Anderson, Mills and Rossing (1984), J. Acoust. Soc. Am. 76, 1336-1345
+(drumheads, whose low frequencies the air sets).
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.fft import irfft2, next_fast_len, rfft2
+from scipy.linalg import block_diag, eigh
+
+from .._base import check
+from ..fe import plausible
+from .modal import Modes, Shapes
+
+DENSITY, SPEED = 1.204, 343.2  # [kg/m^3], [m/s] of air at 20 degrees C and 1013 hPa
+PER_WAVE = 8.0  # [-] cells per wavelength of the highest mode
+FEWEST = 24.0  # [-] cells across a square as large as the plate, at least
+SAMPLES = 2, 3  # [-] points across a cell over which a shape is averaged, in a fine and a coarse grid
+COARSER = SAMPLES[1] / SAMPLES[0]  # [-] cell size of the coarse grid, which tells the error, over that of the fine one
+BLOCK = 24  # [-] modes solved at the same few frequencies
+NEIGHBOURS = 24  # [-] modes on either side that air may mix into a block
+NODES = 4  # [-] frequencies per block between which the integrals are interpolated
+SAME = 1e-9  # [-] relative difference of frequencies between which nothing is interpolated
+TURNS = 3  # [-] the frequencies of a block are chosen anew from its modes in air so many times
+NEAR = 6  # [-] cells within which the kernel between two cells is integrated, not taken at their centres
+GAUSS = 12  # [-] points per half width of a cell in that integral
+
+
+@dataclass(frozen=True, eq=False)
+class MixedShapes(Shapes):
+    """Linear combinations of the shapes of a body; its static deflections stay."""
+
+    base: Shapes
+    mix: np.ndarray  # (n_base, n_modes) [-]
+
+    __repr__ = check.brief
+
+    @property
+    def dimension(self) -> int:
+        return self.base.dimension
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        return self.base.at(points) @ self.mix
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self.base.contains(points)
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        return self.base.compliance(points)
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return self.base.compliance_error(points)
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return self.base.deflection(loads, points)
+
+    def take(self, n_modes: int) -> "MixedShapes":
+        return replace(self, mix=self.mix[:, :n_modes].copy())
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.base.grid()
+
+
+@check.typed
+def in_air(
+    modes: Modes, *, density: float = DENSITY, speed: float = SPEED, sides: int = 2, baffled: bool = True
+) -> Modes:
+    """The modes of a plate surrounded by air: lower frequencies, and damping by the sound radiated.
+
+    Parameters
+    ----------
+    modes : Modes
+        In vacuum, with shapes known everywhere on a plate. Air mixes them; those left out get no air.
+    density : float [kg/m^3]
+    speed : float [m/s]
+        Of sound.
+    sides : {1, 2}
+        Sides of the plate that face open air; a box behind one of them is not modelled.
+    baffled : bool
+        Whether the plate fills a hole in a large rigid wall. Without the wall air flows around the edge: the added mass
+        lies between none and that with the wall. Half of it is taken, half of the shift becomes the error, and no
+        damping is added, because far less sound is radiated below coincidence.
+
+    Returns
+    -------
+    Modes
+        With `frequency_error` from a second grid of cells, with which frequencies are extrapolated. Rigid motions and
+        damping ratios given before stay; that the added mass changes with frequency is kept in the frequencies, not in
+        the amplitudes.
+
+    Examples
+    --------
+    >>> plate = fi.analytic.rectangle(0.465, 0.3, mass=0.19, first_frequency=105.0, n_modes=20)
+    >>> loud = fi.in_air(plate)
+    >>> bool(loud.frequencies[0] < 100.0), bool(loud.damping_ratio[0] > 0.001)
+    (True, True)
+    """
+    density, speed = check.positive("density", density, "kg/m^3"), check.positive("speed", speed, "m/s")
+    if sides not in (1, 2):
+        raise ValueError(f"sides must be 1 or 2, got {sides}")
+    points, cells = modes.shapes.grid()
+    if modes.dimension != 2 or cells.shape[1:] != (3,):
+        raise ValueError("in_air needs the modes of a plate whose shapes are known everywhere")
+    if modes.n_modes == modes.n_rigid:
+        return modes
+    how: dict[str, Any] = {"density": density, "speed": speed, "sides": sides, "baffled": baffled}
+    poorer = {cause: in_air(other, **how) for cause, other in modes.poorer.items()}
+    area = 0.5 * float(np.abs(np.linalg.det(points[cells[:, 1:]] - points[cells[:, :1]])).sum())
+    wave = np.sqrt(4.0 * np.pi * modes.n_modes / area)  # [1/m] of the highest mode, by Weyl's law
+    size = min(2.0 * np.pi / wave / PER_WAVE, np.sqrt(area) / FEWEST)
+    share = 1.0 if baffled else 0.5
+    samples, spacing = _sampled(modes.shapes, size / SAMPLES[0]), size / SAMPLES[0]
+    weight = density * sides * share / (2.0 * np.pi)
+    found, other = (_Air(modes, _strengths(samples, spacing, n), n * spacing, weight, speed) for n in SAMPLES)
+    omega, own = found.solved()
+    shift = other.solved()[0] / omega - 1.0
+    mix = _complete(own, modes.omega[modes.n_rigid :], omega)
+    omega *= 1.0 - shift / (COARSER**2 - 1.0)  # the error of square cells shrinks with their area
+    radiated = np.array([found.resistance(shape, x) / (2.0 * x) for shape, x in zip(own.T, omega)])
+    doubt, side = np.abs(shift), "both sides" if sides == 2 else "one side"
+    note = f"air of {density:g} kg/m^3 on {side}, with a rigid wall around the plate"
+    if not baffled:
+        doubt, radiated = doubt + 0.5 * (modes.omega[modes.n_rigid :] / omega - 1.0), np.zeros(len(omega))
+        note = f"air of {density:g} kg/m^3 on {side} adds half the mass that it would with a rigid wall around"
+    order = np.argsort(omega, kind="stable")
+    whole = block_diag(np.eye(modes.n_rigid), mix[:, order])
+    rest = np.zeros(modes.n_rigid)
+    return Modes(
+        np.concatenate([rest, omega[order]]),
+        modes.damping_ratio + np.concatenate([rest, radiated[order]]),
+        MixedShapes(modes.shapes, whole),
+        modes.mass,
+        (0.0 if modes.frequency_error is None else modes.frequency_error) + np.concatenate([rest, doubt[order]]),
+        notes=plausible.together(modes.notes, (note,)),
+        poorer=poorer,
+    )
+
+
+class _Air:
+    """Radiation integrals between the modes of a plate on a grid of square cells.
+
+    Parameters
+    ----------
+    modes : Modes
+    strength : ndarray, shape (n_modes, nx, ny) [m^2 kg**-0.5]
+        Integral of every shape over each cell.
+    size : float [m]
+        Side of a cell.
+    weight : float [kg/m^3]
+        Density times sides over 2 pi.
+    speed : float [m/s]
+    """
+
+    def __init__(self, modes: Modes, strength: np.ndarray, size: float, weight: float, speed: float) -> None:
+        self.old, self.strength = modes.omega[modes.n_rigid :], strength[modes.n_rigid :]
+        self.weight, self.speed = weight, speed
+        nx, ny = strength.shape[1:]
+        self.padded = next_fast_len(2 * nx - 1, True), next_fast_len(2 * ny - 1, True)
+        steps = np.meshgrid(*(np.minimum(np.arange(n), n - np.arange(n)) for n in self.padded), indexing="ij")
+        self.distance = size * np.hypot(*steps)  # (padded) [m]
+        self.inverse = _inverse_distance(steps[0], steps[1]) / size  # (padded) [1/m] mean of 1 / R between two cells
+
+    def added_mass(self, modes: slice, omega: float) -> np.ndarray:
+        """Mass [-] that air adds between some modes at a frequency [rad/s]."""
+        away = np.divide(1.0, self.distance, out=np.zeros_like(self.distance), where=self.distance > 0.0)
+        kernel = self.inverse - 2.0 * away * np.sin(0.5 * omega / self.speed * self.distance) ** 2
+        matrix = self._product(self.strength[modes], kernel)
+        return 0.5 * self.weight * (matrix + matrix.T)
+
+    def resistance(self, shape: np.ndarray, omega: float) -> float:
+        """Radiation resistance [1/s] of a mixture (n_flexible,) of the modes at a frequency [rad/s]."""
+        wave = omega / self.speed
+        strength = np.tensordot(shape, self.strength, 1)[None]
+        kernel = wave * np.sinc(wave / np.pi * self.distance)
+        return max(0.0, self.weight * omega * float(self._product(strength, kernel)[0, 0]))
+
+    def _product(self, strength: np.ndarray, kernel: np.ndarray) -> np.ndarray:
+        """Double integrals (n, n) of all pairs of sources (n, nx, ny) with a kernel (padded)."""
+        n, nx, ny = strength.shape
+        pressure = irfft2(rfft2(strength, self.padded) * rfft2(kernel), self.padded)[:, :nx, :ny]
+        return strength.reshape(n, -1) @ pressure.reshape(n, -1).T
+
+    def solved(self) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies [rad/s] of the flexible modes, and their mixture of the old ones (n_flexible, n_flexible) [-]."""
+        count = len(self.old)
+        omega, vectors = self.old.copy(), np.zeros((count, count))
+        for first in range(0, count, BLOCK):
+            block = slice(first, min(first + BLOCK, count))
+            window = slice(max(0, first - NEIGHBOURS), min(count, block.stop + NEIGHBOURS))
+            for _ in range(TURNS):
+                self._solve(block, window, omega, vectors)
+        return omega, vectors
+
+    def _solve(self, block: slice, window: slice, omega: np.ndarray, vectors: np.ndarray) -> None:
+        """Solve for the modes of a block with masses interpolated between the frequencies found so far, in place."""
+        low, high = omega[block].min(), omega[block].max()
+        nodes = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.pi * np.arange(NODES) / (NODES - 1))
+        if high - low < SAME * high:
+            nodes = np.array([high])
+        known = np.array([self.added_mass(window, node) for node in nodes])
+        stiffness = np.diag(self.old[window] ** 2)
+        for i in range(block.start, block.stop):
+            added = np.tensordot(_lagrange(nodes, omega[i]), known, 1)
+            value, vector = eigh(stiffness, np.eye(len(stiffness)) + added)
+            own = vector[:, i - window.start]
+            omega[i] = np.sqrt(value[i - window.start])
+            vectors[window, i] = own if own[np.abs(own).argmax()] > 0.0 else -own
+
+
+def _lagrange(nodes: np.ndarray, x: float) -> np.ndarray:
+    """Weights of the values at the nodes in the polynomial through them, at x."""
+    return np.array([np.prod((x - np.delete(nodes, i)) / (node - np.delete(nodes, i))) for i, node in enumerate(nodes)])
+
+
+def _complete(vectors: np.ndarray, old: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """The nearest mixtures (n, n) that together give the static deflections of the old modes."""
+    turned, _, back = np.linalg.svd(vectors * (old[:, None] / omega), full_matrices=False)
+    return (turned @ back) / old[:, None] * omega
+
+
+def _sampled(shapes: Shapes, spacing: float) -> np.ndarray:
+    """Every shape at points on a square lattice around the body, (n_modes, nx, ny) [kg**-0.5]; zero beside it."""
+    corner = shapes.grid()[0]
+    low, high = corner.min(axis=0), corner.max(axis=0)
+    period = SAMPLES[0] * SAMPLES[1]
+    count = period * np.ceil((high - low) / (period * spacing)).astype(int)
+    x, y = (0.5 * (low[i] + high[i] + spacing * (1.0 - count[i])) + spacing * np.arange(count[i]) for i in (0, 1))
+    places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    inside = shapes.contains(places)
+    values = shapes.at(places[inside])
+    samples = np.zeros((values.shape[1], len(places)))
+    samples[:, inside] = values.T
+    return samples.reshape(-1, *count)
+
+
+def _strengths(samples: np.ndarray, spacing: float, across: int) -> np.ndarray:
+    """Integral of every shape over each cell of some samples across, (n_modes, nx, ny) [m^2 kg**-0.5]."""
+    n, nx, ny = samples.shape
+    return samples.reshape(n, nx // across, across, ny // across, across).sum(axis=(2, 4)) * spacing**2
+
+
+def _inverse_distance(across: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Mean of 1 / R between the points of two unit squares whose centres lie integer steps apart, same shape."""
+    distance = np.hypot(across, along)
+    result = np.divide(1.0, distance, out=np.zeros(distance.shape), where=distance > 0.0)
+    node, weight = np.polynomial.legendre.leggauss(GAUSS)
+    half = 0.5 * (node + 1.0)
+    offset = np.concatenate([half - 1.0, half])  # difference of two coordinates, distributed as 1 - |offset|
+    share = np.concatenate([weight, weight]) * 0.5 * (1.0 - np.abs(offset))
+    for i, j in zip(*np.nonzero((distance <= NEAR) & (distance > 0.0))):
+        apart = np.hypot(across[i, j] + offset[:, None], along[i, j] + offset)
+        result[i, j] = share @ (1.0 / apart) @ share
+    result[distance == 0.0] = 4.0 * (np.arcsinh(1.0) + (1.0 - np.sqrt(2.0)) / 3.0)
+    return result

@@ -1,0 +1,105 @@
+"""Air around plates: pistons, Wallace's rectangles and a drumhead by independent integrals."""
+
+import numpy as np
+import pytest
+from scipy import integrate, special
+
+import fem_impact as fi
+from fem_impact.modes import air
+
+RHO, C = air.DENSITY, air.SPEED
+
+
+class Piston(air.Shapes):
+    """A disk that moves as one, with unit velocity."""
+
+    dimension = 2
+
+    def __init__(self, radius):
+        self.radius = radius
+
+    def at(self, points):
+        return np.ones((len(points), 1))
+
+    def contains(self, points):
+        return np.hypot(*points.T) <= self.radius
+
+    def grid(self):
+        turn = np.linspace(0.0, 2.0 * np.pi, 200)
+        return self.radius * np.stack([np.cos(turn), np.sin(turn)], axis=1), np.zeros((0, 3), int)
+
+
+@pytest.mark.parametrize("ka", [0.05, 0.5, 2.0, 5.0])
+def test_piston_has_the_impedance_of_the_textbook(ka):
+    """Rayleigh's piston: resistance 1 - J1(2 ka) / ka, reactance H1(2 ka) / ka, times rho c times the area."""
+    radius, omega = 0.1, ka / 0.1 * C
+    modes = fi.Modes(np.ones(1), np.zeros(1), Piston(radius), 1.0)
+    spacing = radius / 40.0
+    strength = air._strengths(air._sampled(modes.shapes, spacing), spacing, 2)
+    found = air._Air(modes, strength, 2.0 * spacing, RHO / (2.0 * np.pi), C)
+    area = np.pi * radius**2
+    heavy = RHO * C * area * special.struve(1, 2.0 * ka) / ka / omega
+    lost = RHO * C * area * (1.0 - special.jv(1, 2.0 * ka) / ka)
+    assert found.added_mass(slice(0, 1), omega)[0, 0] == pytest.approx(heavy, rel=0.01, abs=5e-3 * RHO * radius**3)
+    # 1 % and the absolute part: the edge is made of squares
+    assert found.resistance(np.ones(1), omega) == pytest.approx(lost, rel=0.01)
+
+
+def membrane_in_air(order, number, radius, weight, tension, sides=2):
+    """First frequencies [rad/s] and damping of the modes (order, 1...) of a baffled membrane, by Hankel transforms.
+
+    Christian et al. (1984), eq. 10 on: the Rayleigh integral in wave numbers, where the shapes are Bessel functions.
+    """
+    zero = special.jn_zeros(order, number)
+    alone = zero / radius * np.sqrt(tension / weight)
+    turn = 2.0 * np.pi if order == 0 else np.pi
+    norm = (weight * turn * 0.5 * (radius * special.jv(order + 1, zero)) ** 2) ** -0.5
+
+    def transform(j, kappa):
+        b = zero[j] / radius
+        return (
+            norm[j]
+            * radius
+            * b
+            * special.jv(order + 1, zero[j])
+            * special.jv(order, kappa * radius)
+            / (b**2 - kappa**2)
+        )
+
+    def integrals(k):
+        # the kernel exp(-i k R) / R is 2 pi / sqrt(kappa**2 - k**2) in wave numbers
+        u = np.linspace(0.0, 40.0 * zero[-1] / radius, 6001) + 1e-9
+        kappa = np.sqrt(k**2 + u**2)
+        outer = np.array([transform(j, kappa) for j in range(number)])
+        angle = (np.arange(2000) + 0.5) / 2000 * 0.5 * np.pi
+        inner = np.array([transform(j, k * np.sin(angle)) for j in range(number)])
+        near = k * np.sin(angle) * 0.5 * np.pi / 2000
+        mass = np.array([[integrate.simpson(a * b, x=u) for a in outer] for b in outer])
+        return 2.0 * np.pi * turn * mass, 2.0 * np.pi * turn * (inner * near) @ inner.T
+
+    found = []
+    for j in range(number):
+        omega = alone[j]
+        for _ in range(4):
+            added, lost = (sides * RHO / (2.0 * np.pi) * x for x in integrals(omega / C))
+            value, vector = air.eigh(np.diag(alone**2), np.eye(number) + added)
+            omega, q = np.sqrt(value[j]), vector[:, j]
+        found.append((omega, omega * (q @ lost @ q) / (2.0 * omega)))
+    return np.array(found).T
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_drumhead(order):
+    """A kettledrum's head of Mylar in a wall: the air halves the lowest frequency."""
+    radius, weight, tension = 0.328, 0.262, 3990.0
+    head = fi.Plate(fi.Material(E=5e9, nu=0.3, rho=weight / 1.9e-4), thickness=1.9e-4, tension=tension)
+    modes = fi.find_modes(fi.assemble(fi.mesh.disk(radius), head, {"outer": "hinged"}), n_modes=30)
+    loaded = fi.in_air(modes)
+    true, damping = membrane_in_air(order, 4, radius, weight, tension)
+    assert loaded.n_modes == 30 and (np.diff(loaded.omega) >= 0.0).all()
+    for omega, ratio in zip(true[:2], damping[:2]):
+        near = np.abs(loaded.omega / omega - 1.0).argmin()
+        assert loaded.omega[near] == pytest.approx(omega, rel=1.5 * loaded.frequency_error[near])
+        assert loaded.omega[near] == pytest.approx(omega, rel=5e-3)  # the air mass is up to twice the head's
+        assert loaded.damping_ratio[near] == pytest.approx(ratio, rel=0.1)
+    assert loaded.omega[0] < 0.7 * modes.omega[0]
