@@ -194,7 +194,7 @@ class Contact:
         >>> law = fi.Contact.elastic_plastic(1e10, yield_speed=0.1, mass=0.004)
         >>> wall, ball = fi.Modes.rigid(1e6), fi.Striker.rigid(0.004)
         >>> [round(fi.strike(wall, ball, law, at=None, speed=v).restitution, 3) for v in (0.1, 1.6, 25.6)]
-        [1.0, 0.57, 0.295]
+        [1.0, 0.588, 0.296]
         """
         if (yield_approach is None) == (yield_speed is None or mass is None):
             raise ValueError("yield_approach must be given, or yield_speed and mass")
