@@ -173,6 +173,7 @@ def table() -> dict[str, dict[str, Any]]:
             "mesh": t["square"], "section": t["plate"], "supports": {"boundary": "hinged"}, "element": "argyris",
             "point_masses": [((0.1, 0.1), 0.01)], "near": [(0.1, 0.1)], "graded": True,
         },
+        "in_air": {"modes": t["modes"], "density": 1.2, "speed": 343.0, "sides": 1, "baffled": False},
         "ritz_modes": {
             "system": t["system"], "points": [at], "max_frequency": 2e3, "n_vectors": 20, "damping_ratio": 0.01,
         },

@@ -394,7 +394,7 @@ def _ringing(asked: _Asked, keep: Any, response: Response) -> Modes:
     number = round(FIRST_LOOK * target.growth(target.finished(first).frequencies[-1], limit))
     most = MOST_MODES["fe"] if band else MOST_RINGING
     modes = first if number <= FIRST_LOOK else asked.find(min(number, most), first=first, keep=keep)
-    return target.finished(modes)
+    return target.surrounded(modes)
 
 
 def _within(tolerance: float, hit: Response, run: Callable[..., Response], values: Mapping[str, Any]) -> Response:
@@ -442,9 +442,11 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
 def _idealised(asked: _Asked, target: str | None, stages: Stages) -> Plan | None:
     """The plan with a rigid or infinite target, if that is accurate enough or the user asks for it; else None."""
     blow, values = asked.blow, asked.values
-    if blow.target.thick:
+    if blow.target.thick or blow.target.air:
         if target is not None:
-            raise ValueError(f"{blow.name}target = {target!r} is known for thin bodies only; use target = 'modal'")
+            raise ValueError(
+                f"{blow.name}target = {target!r} is known for thin bodies in a vacuum only; use target = 'modal'"
+            )
         return None
     pressed = values.get("striker_force") or values.get("target_force") or blow.contact.gap < 0.0
     if target is None and (pressed or asked.moving or not values.get("residual", True)):
@@ -753,7 +755,7 @@ def struck(plan: Plan, stages: Stages, keep: Any = None) -> Modes:
             modes = modes.truncated(n_modes=number)
         elif "max_frequency" in asked.pieces:
             modes = modes.truncated(max_frequency=plan.max_frequency / ratio)
-        return target.finished(modes)
+        return target.surrounded(modes)
 
 
 @check.typed

@@ -15,8 +15,10 @@ from ..fe.assembly import THEORIES, THICK, System, assemble, notes_on, reassembl
 from ..fe.section import Beam, Plate
 from ..mesh.meshes import Mesh
 from ..modes import analytic, modal
+from ..modes.air import in_air
 from ..modes.modal import Damping, FieldShapes, Modes
 
+AIR = {"one side": 1, "both sides": 2}  # sides of a plate in open air
 FIRST_LOOK = 20  # [-] modes found first: enough to scale the body and to predict the density of the others
 FIRST_FLEXIBLE = 4  # [-] modes that hold a flexible one: a plate has at most three rigid motions
 CLOSE = 1e-6  # [-] error of the first frequency to which a body is scaled: that of a blow is less
@@ -63,11 +65,14 @@ class Target:
     theory: str | None = None  # "kirchhoff", "mindlin", "euler", "timoshenko"; None is the thin one
     system: System | None = None  # assembled by the user
     modes: Modes | None = None  # found by the user
+    air: str | None = None  # which sides face open air in a rigid wall, of AIR; None is a vacuum
     blame: Blame = _nobody
 
     def __post_init__(self) -> None:
         if self.theory is not None and self.mesh is not None:
             check.one_of("theory", self.theory, THEORIES[self.mesh.dimension])
+        if self.air is not None and self.mesh is not None and self.mesh.dimension != 2:
+            raise ValueError("air is known around plates only; leave it out")
         if self.source == "analytic" and self.closed is None:
             raise ValueError(
                 "source = 'analytic' covers beams of constant section, thin rectangles hinged all round and thin disks "
@@ -118,9 +123,14 @@ class Target:
         return plausible.together(notes_on(self.mesh, self.section), damping)
 
     def finished(self, modes: Modes) -> Modes:
-        """The modes as struck: scaled and damped."""
+        """The modes scaled and damped."""
         modes = modes.scaled(**self.scale) if self.scale else modes
         return modes if self.damping_ratio is None else modes.damped(self.damping_ratio)
+
+    def surrounded(self, modes: Modes) -> Modes:
+        """The modes as struck: scaled, damped and in the air around."""
+        modes = self.finished(modes)
+        return modes if self.air is None else in_air(modes, sides=AIR[self.air])
 
     @cached_property
     def stretch(self) -> float:

@@ -34,10 +34,10 @@ MOST_VECTORS = 1500  # [-] limit on their number: dense matrices of this size ta
 
 
 def usable(target: Target) -> bool:
-    """Whether vectors can describe the target: a thin plate that can be meshed again."""
+    """Whether vectors can describe the target: a thin plate in a vacuum that can be meshed again."""
     if target.kind != "fe" or target.mesh is None or target.mesh.dimension != 2 or target.mesh.recipe is None:
         return False
-    if target.thick:
+    if target.thick or target.air:
         return False
     ratio = target.damping_ratio
     by_mode = not callable(ratio) and np.ndim(ratio if ratio is not None else 0.0) > 0

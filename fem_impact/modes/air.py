@@ -100,7 +100,7 @@ def in_air(
         Sides of the plate that face open air; a box behind one of them is not modelled.
     baffled : bool
         Whether the plate fills a hole in a large rigid wall. Without the wall air flows around the edge: the added mass
-        lies between none and that with the wall. Half of it is taken, half of the shift becomes the error, and no
+        lies between none and that with the wall. Half of it is taken, the shift becomes the error, and no
         damping is added, because far less sound is radiated below coincidence.
 
     Returns
@@ -136,13 +136,13 @@ def in_air(
     found, other = (_Air(modes, _strengths(samples, spacing, n), n * spacing, weight, speed) for n in SAMPLES)
     omega, own = found.solved()
     shift = other.solved()[0] / omega - 1.0
-    mix = _complete(own, modes.omega[modes.n_rigid :], omega)
+    mix = _complete(own, modes.omega[modes.n_rigid :], omega) * (1.0 - shift / (COARSER**2 - 1.0))
     omega *= 1.0 - shift / (COARSER**2 - 1.0)  # the error of square cells shrinks with their area
     radiated = np.array([found.resistance(shape, x) / (2.0 * x) for shape, x in zip(own.T, omega)])
     doubt, side = np.abs(shift), "both sides" if sides == 2 else "one side"
     note = f"air of {density:g} kg/m^3 on {side}, with a rigid wall around the plate"
     if not baffled:
-        doubt, radiated = doubt + 0.5 * (modes.omega[modes.n_rigid :] / omega - 1.0), np.zeros(len(omega))
+        doubt, radiated = doubt + (modes.omega[modes.n_rigid :] / omega - 1.0), np.zeros(len(omega))
         note = f"air of {density:g} kg/m^3 on {side} adds half the mass that it would with a rigid wall around"
     order = np.argsort(omega, kind="stable")
     whole = block_diag(np.eye(modes.n_rigid), mix[:, order])

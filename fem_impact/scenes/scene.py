@@ -71,7 +71,7 @@ class Scene:
         first = None
         if keep is not None and target.kind == "fe" and count > FIRST_LOOK:
             first = target.find(FIRST_LOOK, tolerance=tolerance)  # what is kept starts from its mesh
-        return target.finished(target.find(count, tolerance=tolerance, first=first, keep=keep))
+        return target.surrounded(target.find(count, tolerance=tolerance, first=first, keep=keep))
 
     @check.typed
     def plan(self, *, watch: Watch | None = None, **changes: Any) -> Plan:

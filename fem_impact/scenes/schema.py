@@ -21,6 +21,7 @@ from ..fe.section import KINDS, SOFT, Beam, Elastic, Material, Plate
 from ..impact import collision
 from ..impact.contact import Contact
 from ..impact.striker import Striker
+from ..model.target import AIR
 from ..modes.analytic import closed_form
 from ..modes.modal import find_modes
 from ..show import sound
@@ -67,12 +68,20 @@ def _bar(
 
 
 def target_values(
-    *, mass=None, first_frequency=None, nu=0.3, damping_ratio=0.0, point_masses=(), source="auto", theory=None
+    *,
+    mass=None,
+    first_frequency=None,
+    nu=0.3,
+    damping_ratio=0.0,
+    point_masses=(),
+    source="auto",
+    theory=None,
+    air=None,
 ) -> dict[str, Any]:
     """Check the table [target].
 
-    It has mass and first frequency to scale to, nu without a material, damping, point masses, the source of modes and
-    the theory.
+    It has mass and first frequency to scale to, nu without a material, damping, point masses, the source of modes, the
+    theory and the sides in air.
     """
     check.between("nu", nu, LOWEST_NU, 0.5)
     scale = {"mass": (mass, "kg"), "first_frequency": (first_frequency, "Hz")}
@@ -83,6 +92,7 @@ def target_values(
         "damping_ratio": over_frequency("damping_ratio", damping_ratio),
         "point_masses": tuple(_weight(i, entry) for i, entry in enumerate(point_masses)),
         "source": check.one_of("source", source, SOURCES),
+        "air": None if air is None else check.one_of("air", air, list(AIR)),
         "theory": None if theory is None else check.one_of("theory", theory, [*THEORIES[2], *THEORIES[1]]),
     }
 

@@ -72,7 +72,7 @@ def body_of(
             return seen, axes
     with stages("modes"):
         first = target.find(FIRST_LOOK, tolerance=tolerance, stages=stages)
-    case = _started(target.finished(first), striker, contact, at, speed)
+    case = _started(target.surrounded(first), striker, contact, at, speed)
     axes = checked_axes(case, over)
     with stages("modes"):
         return _by_modes(target, case, axes, tolerance, keep), axes
@@ -123,7 +123,7 @@ def _by_modes(target: Target, case: Case, axes: Axes, tolerance: float, keep: Pa
     if keep is not None and target.kind == "fe":
         first = target.find(LEAST_KEPT, tolerance=tolerance)  # what is kept starts from its mesh
     more = target.find(number, tolerance=tolerance, first=first, keep=keep)
-    return replace(case, modes=target.finished(more))
+    return replace(case, modes=target.surrounded(more))
 
 
 def _affordable(enough: float | None) -> str:

@@ -201,7 +201,7 @@ def choose_on(
 def _body(target: Target, at: Any, masses: np.ndarray, centre: float, stages: Stages) -> tuple[Modes, float | None]:
     """The body as the blows of all hammers need it; if by Ritz vectors, their highest contact resonance [Hz], too."""
     if target.modes is not None:
-        return target.finished(target.modes), None
+        return target.surrounded(target.modes), None
     if vectors.usable(target):
         outline = bodies.outline(target, stages)
         case = Case(outline, Striker.rigid(masses[0]), Contact.linear(1.0), outline.point("at", at)[0], 1.0)
@@ -219,7 +219,7 @@ def _body(target: Target, at: Any, masses: np.ndarray, centre: float, stages: St
         if views is not None:
             return next(iter(views.values())), hardest
     with stages("modes"):
-        return target.finished(target.find(MOST_MODES, tolerance=TOLERANCE, stages=stages)), None
+        return target.surrounded(target.find(MOST_MODES, tolerance=TOLERANCE, stages=stages)), None
 
 
 def _hammer(

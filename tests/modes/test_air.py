@@ -103,3 +103,69 @@ def test_drumhead(order):
         assert loaded.omega[near] == pytest.approx(omega, rel=5e-3)  # the air mass is up to twice the head's
         assert loaded.damping_ratio[near] == pytest.approx(ratio, rel=0.1)
     assert loaded.omega[0] < 0.7 * modes.omega[0]
+
+
+@pytest.fixture(scope="module")
+def plate():
+    return fi.analytic.rectangle(0.465, 0.3, mass=0.19, first_frequency=105.0, n_modes=40)
+
+
+def test_plate_keeps_its_static_deflection_and_order(plate):
+    """Still air carries no load; all that it does is to add inertia and to carry sound away."""
+    loud, at = fi.in_air(plate), [(0.1, 0.1)]
+    assert loud.modal_compliance(at) == pytest.approx(plate.modal_compliance(at), rel=1e-10)
+    assert (loud.omega < plate.omega).all() and (np.diff(loud.omega) > 0.0).all()
+    assert (loud.damping_ratio > 0.0).all() and loud.mass == plate.mass
+
+
+def test_low_modes_radiate_as_wallace_says(plate):
+    """Below ka = 1 the (1, 1) mode radiates like a monopole: Wallace's eq. 15 for one side of a baffled rectangle."""
+    a, b = 0.465, 0.3
+    omega = 0.3 * C / a
+    slow = plate.scaled(first_frequency=omega / (2.0 * np.pi))
+    ka, kb = omega / C * a, omega / C * b
+    sigma = 32.0 * ka * kb / np.pi**5 * (1.0 - ka * kb / 12.0 * ((1.0 - 8.0 / np.pi**2) * (a / b + b / a)))
+    loud = fi.in_air(slow.truncated(n_modes=1), density=1e-3, sides=1)  # so thin that the shift does not matter
+    found = loud.damping_ratio[0] * 2.0 * loud.omega[0] * slow.mass / (1e-3 * C * a * b)
+    assert found == pytest.approx(sigma, rel=0.02)  # Wallace's series has an error of (ka)**4
+
+
+def test_thin_air_changes_nothing_and_one_side_does_half(plate):
+    none = fi.in_air(plate, density=1e-9)
+    assert none.omega == pytest.approx(plate.omega, rel=1e-8)
+    one, two = (1.0 - (fi.in_air(plate, density=0.01, sides=n).omega / plate.omega) ** 2 for n in (1, 2))
+    assert two == pytest.approx(2.0 * one, rel=1e-2)  # to first order in the density
+
+
+def test_without_a_wall_the_shift_is_bounded(plate):
+    walled, free = fi.in_air(plate), fi.in_air(plate, baffled=False)
+    low, high = free.omega * (1.0 - free.frequency_error), free.omega * (1.0 + free.frequency_error)
+    assert (high >= plate.omega * (1.0 - 1e-3)).all() and (low <= walled.omega * 1.001).all()
+    assert (free.damping_ratio == plate.damping_ratio).all()
+
+
+def test_free_plate_keeps_its_rigid_motions():
+    aluminium = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), thickness=1e-3)
+    modes = fi.find_modes(fi.assemble(fi.mesh.rectangle(0.3, 0.2), aluminium, {}), n_modes=8)
+    loud = fi.in_air(modes)
+    assert loud.n_rigid == 3 and loud.rigid_motion((0.1, 0.1)) == pytest.approx(modes.rigid_motion((0.1, 0.1)))
+    assert (loud.frequencies[3:] < modes.frequencies[3:]).all()
+    hit = fi.strike(loud, fi.Striker.rigid(0.01), fi.Contact.linear(1e4), at=(0.1, 0.1), speed=1.0, tolerance=1e-2)
+    assert hit.energy_error < 1e-10
+
+
+def test_scene_in_air(tmp_path):
+    text = (
+        '[mesh]\nshape = "rectangle"\nlength = 0.465\nwidth = 0.3\n[material]\nE = 1e10\nnu = 0.3\nrho = 450.0\n'
+        '[section]\nkind = "plate"\nthickness = 3e-3\n[target]\nair = "both sides"\n[supports]\nboundary = "hinged"\n'
+        '[striker]\nkind = "rigid"\nmass = 0.01\n[contact]\nkind = "linear"\nstiffness = 1e5\n'
+        "[strike]\nat = [0.1, 0.1]\nspeed = 1.0\ntolerance = 1e-2\n"
+    )
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    heavy = fi.load_scene(path)
+    path.write_text(text.replace('air = "both sides"\n', ""))
+    light = fi.load_scene(path)
+    assert heavy.modes(20).omega == pytest.approx(fi.in_air(light.modes(20)).omega, rel=1e-6)
+    plan = heavy.plan()
+    assert plan.target == "modal" and any("air" in note for note in heavy.strike().notes)
