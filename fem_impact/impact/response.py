@@ -74,7 +74,7 @@ class Error:
         return max(parts.items(), key=lambda part: part[1])
 
     def __float__(self) -> float:
-        return self.total
+        return float(self.total)
 
 
 @dataclass(frozen=True, eq=False)

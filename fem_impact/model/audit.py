@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..fe.assembly import THEORIES
 from ..fe.section import Beam, Plate
 from ..impact import collision
 from ..impact.assumption import Assumption
@@ -23,6 +24,7 @@ from ..modes.ritz import RitzShapes
 from . import bending, deflection, local_contact, still_air, thinness, unstated_damping
 from .idealisation import Surroundings, unyielding
 from .restrike import Struck
+from .target import BOTH, Target
 
 EXAMINERS = (
     thinness.of_target, thinness.of_striker, deflection.of_target, local_contact.yielding, local_contact.small,
@@ -52,6 +54,22 @@ def examine(hit: Response, simplified: Simplified | None = None) -> tuple[Assump
     """Every assumption of a blow, in the order of `assumption.ALL`."""
     struck = _struck(hit, simplified)
     return tuple(examiner(struck) for examiner in EXAMINERS)
+
+
+def required(target: Target, hit: Response) -> tuple[Target, str] | None:
+    """The target with the better model that the tolerance of a blow requires, and why; None if it requires none."""
+    if target.model != "auto" or target.mesh is None:
+        return None
+    for each in hit.assumptions:
+        if each.worst <= hit.tolerance:
+            continue
+        because = f"because {each.name!r} would change the blow by {each.worst:.1g}"
+        if each.name == "thin target" and target.section is not None and not target.thick:
+            theory = THEORIES[target.mesh.dimension][1]
+            return replace(target, theory=theory), f"the target has shear and rotary inertia ({theory}), {because}"
+        if each.name == "still air" and target.mesh.dimension == 2 and target.air is None:
+            return replace(target, air=BOTH), f"the target moves air on both sides, {because}"
+    return None
 
 
 def foresee(

@@ -301,6 +301,20 @@ def make(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
 
 
 def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
+    """Run the plan, and then with the better model of the target that the tolerance requires, if it may be chosen."""
+    run = _carry_out(plan, stages, keep)
+    better = audit.required(plan.blow.target, run.response)
+    if better is None:
+        return run
+    target, why = better
+    try:
+        again = carry_out(make(replace(plan.blow, target=target), plan.changes, stages), stages)
+    except (check.SimulationError, ValueError) as error:
+        return replace(run, notes=(*run.notes, f"{why}; that was not computed: {error}"))
+    return replace(again, notes=(why, *again.notes))
+
+
+def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:
     """Run the plan; if the left-out modes turn out to matter, run it again with more modes.
 
     ``keep`` is a file that stores the modes of a costly plan.
@@ -346,7 +360,7 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
     fixed = blow.target.size_stated or "size" in asked.pieces
     seen = vectors.Seen(blow.target, values["at"], resonance, asked.tolerance, plan.size, fixed, stages)
     if seen.at_rest:
-        return carry_out(_modal(asked, stages), stages, keep)
+        return _carry_out(_modal(asked, stages), stages, keep)
 
     def cutoff(modes: Modes, margin: float) -> float:
         allowed = asked.left_out / margin
@@ -367,7 +381,7 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
     if not response.tolerance_met and "target" not in asked.pieces:
         other = _last_resort(asked, stages)
         if other is not None and other.error < response.error.total:
-            return carry_out(other, stages)
+            return _carry_out(other, stages, None)
     plan = replace(plan, n_modes=seen.count, size=seen.size, n_dofs=seen.fine.system.n_dofs)
     response = replace(response, rings=partial(_ringing, asked, keep), vectors=seen.whole)
     if "sound" in asked.quantities or (blow.moving and not _told(blow.points, response)):

@@ -18,7 +18,9 @@ from ..modes import analytic, modal
 from ..modes.air import in_air
 from ..modes.modal import Damping, FieldShapes, Modes
 
-AIR = {"one side": 1, "both sides": 2}  # sides of a plate in open air
+MODELS = ("stated", "auto")  # whether the theory and the air of a target are chosen
+BOTH = "both sides"
+AIR = {"one side": 1, BOTH: 2}  # sides of a plate in open air
 FIRST_LOOK = 20  # [-] modes found first: enough to scale the body and to predict the density of the others
 FIRST_FLEXIBLE = 4  # [-] modes that hold a flexible one: a plate has at most three rigid motions
 CLOSE = 1e-6  # [-] error of the first frequency to which a body is scaled: that of a blow is less
@@ -65,6 +67,7 @@ class Target:
     theory: str | None = None  # "kirchhoff", "mindlin", "euler", "timoshenko"; None is the thin one
     system: System | None = None  # assembled by the user
     modes: Modes | None = None  # found by the user
+    model: str = "stated"  # "auto" takes a thick theory and the air around where the tolerance requires them
     air: str | None = None  # which sides face open air in a rigid wall, of AIR; None is a vacuum
     blame: Blame = _nobody
 

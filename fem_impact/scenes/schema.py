@@ -21,7 +21,7 @@ from ..fe.section import KINDS, SOFT, Beam, Elastic, Material, Plate
 from ..impact import collision
 from ..impact.contact import Contact
 from ..impact.striker import Striker
-from ..model.target import AIR
+from ..model.target import AIR, MODELS
 from ..modes.analytic import closed_form
 from ..modes.modal import find_modes
 from ..show import sound
@@ -77,11 +77,12 @@ def target_values(
     source="auto",
     theory=None,
     air=None,
+    model="stated",
 ) -> dict[str, Any]:
     """Check the table [target].
 
-    It has mass and first frequency to scale to, nu without a material, damping, point masses, the source of modes, the
-    theory and the sides in air.
+    It has mass and first frequency to scale to, nu without a material, damping, point masses, the source of modes,
+    the theory, the sides in air and whether these two are chosen.
     """
     check.between("nu", nu, LOWEST_NU, 0.5)
     scale = {"mass": (mass, "kg"), "first_frequency": (first_frequency, "Hz")}
@@ -92,6 +93,7 @@ def target_values(
         "damping_ratio": over_frequency("damping_ratio", damping_ratio),
         "point_masses": tuple(_weight(i, entry) for i, entry in enumerate(point_masses)),
         "source": check.one_of("source", source, SOURCES),
+        "model": check.one_of("model", model, MODELS),
         "air": None if air is None else check.one_of("air", air, list(AIR)),
         "theory": None if theory is None else check.one_of("theory", theory, [*THEORIES[2], *THEORIES[1]]),
     }

@@ -162,3 +162,81 @@ def test_odd_blows_are_examined_too(case):
         assert hit.n_impacts == 0 and hit.model_error < 1e-6
     if case == "morley":
         assert named(hit.assumptions)["thin target"].state == "not known"
+
+
+AUTO = """
+[mesh]
+shape = "rectangle"
+length = {length}
+width = {width}
+[material]
+E = {E}
+nu = 0.3
+rho = {rho}
+[section]
+kind = "plate"
+thickness = {thickness}
+[target]
+damping_ratio = 0.01
+model = "{model}"
+[supports]
+boundary = "hinged"
+[striker]
+kind = "rigid"
+mass = {mass}
+[contact]
+kind = "linear"
+stiffness = {stiffness}
+[strike]
+at = [{at}, {at}]
+speed = 0.1
+tolerance = 1e-2
+"""
+THICK = {
+    "length": 0.3,
+    "width": 0.24,
+    "E": 210e9,
+    "rho": 7850.0,
+    "thickness": 0.03,
+    "mass": 0.1,
+    "stiffness": 3e8,
+    "at": 0.1,
+}
+LIGHT = {
+    "length": 0.465,
+    "width": 0.3,
+    "E": 10e9,
+    "rho": 450.0,
+    "thickness": 1e-3,
+    "mass": 0.05,
+    "stiffness": 2e3,
+    "at": 0.12,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("body", "name", "given"), [(THICK, "thin target", "theory"), (LIGHT, "still air", "air")])
+def test_a_scene_takes_the_better_model_that_its_tolerance_requires(tmp_path, body, name, given):
+    """The thin body in a vacuum, the same with the choice left open, and with the better model stated."""
+    path = tmp_path / "scene.toml"
+    stated = {"theory": 'theory = "mindlin"', "air": 'air = "both sides"'}[given]
+    hits, plans = [], []
+    for text in (AUTO.format(model="stated", **body), AUTO.format(model="auto", **body)):
+        path.write_text(text)
+        run = fi.load_scene(path).run()
+        hits.append(run.response)
+        plans.append(run.notes)
+    path.write_text(AUTO.format(model="stated", **body).replace("[supports]", f"{stated}\n[supports]"))
+    better = fi.load_scene(path).strike()
+    assert named(hits[0].assumptions)[name].worst > 1e-2
+    assert any(name in note for note in plans[1]) and not any(f"because '{name}'" in note for note in plans[0])
+    assert hits[1].restitution == pytest.approx(better.restitution, abs=1e-9)
+    assert abs(hits[0].restitution - better.restitution) > 1e-3
+
+
+def test_a_scene_keeps_the_simple_model_where_it_is_enough(tmp_path):
+    path = tmp_path / "scene.toml"
+    soft = {**THICK, "thickness": 3e-3, "stiffness": 1e4}
+    path.write_text(AUTO.format(model="auto", **soft))
+    run = fi.load_scene(path).run()
+    assert run.plan.blow.target.theory is None and run.plan.blow.target.air is None
