@@ -45,6 +45,7 @@ LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
 DOUBTED = {True: 10_000, False: 100}  # [-] cells struck again for the error of vectors, in a batch or alone
 MOST_CELLS = 10**8  # [-] default limit of a map: half an hour to two hours of work, 8 GB
 SECONDS = {True: 1e-5, False: 2e-3}  # [s] per blow, in a batch or alone: the slower plates of studies/map_speed.py
+MOST_MIDDLES = 4  # [-] axes whose middle is examined, too: 81 blows
 LEAST_MODEL_ERROR = 1e-12  # [-] smaller ones are rounding
 Watch = Callable[[int, int], Any]
 Tell = Callable[[str], Any]
@@ -175,9 +176,11 @@ class Grid:
     def model_error(self) -> tuple[np.ndarray, str]:
         """The model's own error [-] in the shape of the grid, and what of it is not known.
 
-        Examined at the ends and the middle of every axis, and interpolated in its logarithm; NaN where these fail.
+        Examined at the ends and the middle of every axis (at the ends of more than MOST_MIDDLES), and interpolated in its
+        logarithm; NaN where these fail.
         """
-        some = [np.unique([0, (n - 1) // 2, n - 1]) for n in self.shape]
+        middle = [] if len(self.shape) > MOST_MIDDLES else [0.5]
+        some = [np.unique([0, *(int(share * (n - 1)) for share in middle), n - 1]) for n in self.shape]
         found = np.empty([len(places) for places in some])
         unknown: dict[str, None] = {}
         for at in np.ndindex(*found.shape):
