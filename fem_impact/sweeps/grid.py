@@ -176,8 +176,8 @@ class Grid:
     def model_error(self) -> tuple[np.ndarray, str]:
         """The model's own error [-] in the shape of the grid, and what of it is not known.
 
-        Examined at the ends and the middle of every axis (at the ends of more than MOST_MIDDLES), and interpolated in its
-        logarithm; NaN where these fail.
+        Examined at the ends and the middle of every axis, at the ends of more than MOST_MIDDLES, and interpolated in
+        its logarithm; NaN where these fail.
         """
         middle = [] if len(self.shape) > MOST_MIDDLES else [0.5]
         some = [np.unique([0, *(int(share * (n - 1)) for share in middle), n - 1]) for n in self.shape]
