@@ -349,6 +349,11 @@ ADVICE = {  # what fails, the message, and what it advises
         r"must have an isotropic material .*; use Contact.hertz",
         lambda _: fi.Contact.hertz(1e9),
     ),
+    "a shear modulus of steel": (
+        lambda _: replace(STEEL, G_xz=1e9),
+        "needs an orthotropic material; give E_across and G, or leave it out",
+        lambda _: (replace(SPRUCE, G_xz=1e9), replace(STEEL, G_xz=None)),
+    ),
     "a force beyond numbers": (
         lambda _: fi.Contact.hertz(1e9).force(1e300),
         "check their units, m and m/s",

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 from test_advice import ADVICE
+from test_advice_of_assumptions import REMEDIES
 from test_advice_of_files import FILES
 
 TESTS = Path(__file__).parent
@@ -103,7 +104,7 @@ def messages(path):
 
 def covering():
     """Patterns of the messages that a test provokes and whose advice it follows."""
-    yield from (words for _, words, _ in [*ADVICE.values(), *FILES.values()])
+    yield from (words for _, words, _ in [*ADVICE.values(), *FILES.values(), *REMEDIES.values()])
     for name, patterns in ELSEWHERE.items():
         file, test = name.split("::")
         assert f"def {test}(" in (TESTS / file).read_text(), name

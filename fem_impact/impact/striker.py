@@ -1,6 +1,6 @@
 """Strikers: a rigid mass, a sphere, a stick or any body with modes, and its contact point."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -151,7 +151,7 @@ class Striker:
             mass=mass,
             damping_ratio=[0.0, 0.5 * damping / (reduced * omega)],
         )
-        return cls(modes, np.zeros(1))
+        return cls(replace(modes, thick=True), np.zeros(1))  # nothing bends: no shear is left out
 
     @classmethod
     def flexible(cls, modes: Modes, *, at: Any) -> "Striker":

@@ -27,6 +27,7 @@ from ..fe.section import Beam, Material, Plate, evaluate
 from ..fe.springs import along_facets
 from ..fe.supports import cells_of_facets
 from ..mesh.meshes import Mesh
+from ..modes.air import MixedShapes
 from ..modes.analytic import BeamShapes, DiskShapes, RectangleShapes
 from ..modes.modal import FieldShapes, Modes, ScaledShapes, Shapes
 from ..modes.ritz import RitzShapes
@@ -93,11 +94,23 @@ class Known:
 
 
 def unwrapped(shapes: Shapes) -> tuple[Shapes, float, float]:
-    """The shapes inside `ScaledShapes`, and the factors [-] of their amplitude and frequency."""
+    """The shapes inside `ScaledShapes` and `MixedShapes`, and the factors [-] of their amplitude and frequency."""
     amplitude, frequency = 1.0, 1.0
-    while isinstance(shapes, ScaledShapes):
-        amplitude, frequency, shapes = amplitude * shapes.amplitude, frequency * shapes.frequency, shapes.base
+    while isinstance(shapes, (ScaledShapes, MixedShapes)):
+        if isinstance(shapes, ScaledShapes):
+            amplitude, frequency = amplitude * shapes.amplitude, frequency * shapes.frequency
+        shapes = shapes.base
     return shapes, amplitude, frequency
+
+
+def _mixture(shapes: Shapes, low: slice) -> np.ndarray:
+    """What air leaves of the amplitude of some modes, (n_low,) [-]: it mixes them little, and makes them heavier."""
+    result = np.ones(low.stop - low.start)
+    while isinstance(shapes, (ScaledShapes, MixedShapes)):
+        if isinstance(shapes, MixedShapes):
+            result = result * np.linalg.norm(shapes.mix[:, low], axis=0)
+        shapes = shapes.base
+    return result
 
 
 def known(modes: Modes) -> Known | None:
@@ -157,6 +170,8 @@ def bending(body: Known) -> Bending:
     else:
         assert isinstance(shapes, BeamShapes)
         found = _beam_shapes(shapes, low, body, amplitude)
+    left = _mixture(modes.shapes, low)
+    found[:3] *= np.stack([left**2, left, left**2])
     return _extended(modes, low, found, body.per_extent, section is not None)
 
 

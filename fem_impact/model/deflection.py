@@ -28,7 +28,9 @@ FRONT = 2.0 * np.pi  # [-] radius squared of the bent region over rate times tim
 DENT = 0.7  # [-] stiffening of a wide plate under a point force over (deflection / thickness)**2, from the held disk
 SLOWER = 3.0  # [-] a mode that is slower or faster than bending waves by this rocks or is pulled; wood differs by less
 NUMBER = "deflection over thickness"
-REMEDY = "large deflections need the plate's stretching: a softer blow, a thicker body, or a nonlinear program"
+GONG = 1.0  # [-] deflection over thickness beyond which no first-order estimate of the stretching helps
+REMEDY = "take a softer blow or a thicker body: stretching is not modelled"
+A_GONG = "this is a gong: large deflections are not modelled"
 
 
 def of_target(struck: Struck) -> Assumption:
@@ -36,7 +38,7 @@ def of_target(struck: Struck) -> Assumption:
     body, quantities = struck.target, struck.quantities
 
     def told(value: float | None, effect: dict, unknown: str = "") -> Assumption:
-        remedy = "give material and section" if unknown else REMEDY
+        remedy = "give material and section" if unknown else A_GONG if value is not None and value > GONG else REMEDY
         return Assumption("small deflections", value, LIMIT, effect, quantities, remedy, NUMBER, unknown)
 
     if struck.hit.bodies[-1].dimension == 0:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..fe.section import Material
 from ..impact.assumption import Assumption
-from ..impact.contact import loss_number
+from ..impact.contact import Contact, loss_number
 from .restrike import Struck, softer
 
 YIELD = 1.6  # [-] largest pressure at first yield over the yield strength, nu = 0.3
@@ -24,15 +24,28 @@ SLOW = 0.2  # [-] longest period of the striker's own vibration over the contact
 HARDLY = 1e-6  # [-] loss times speed of a contact that loses nothing
 LAMB = 2.64  # [-] lowest spheroidal mode of a sphere, omega R / c_s, for nu = 0.25; 2.65 for 0.33
 LIVELY = 2.5  # [-] squared shape of that mode at its pole times the mass of the sphere
-SPHERE = "give the striker as a sphere with its material"
+EDGE = "contact radius over the distance to the edge"
+SPHERE = "give the striker as a sphere with its material, and the contact between the two"
+PLASTIC = "take a contact that yields (yield_strength of `Contact.between`, or elastic_plastic), or a slower blow"
 
 
 def _hertz(struck: Struck) -> tuple[float, float] | None:
     """Radius R [m] of the sphere and the modulus E* [Pa] of its contact; None if these are not known."""
     striker, law = struck.hit.striker, struck.hit.contact
-    if striker is None or striker.radius is None or law.exponent != 1.5:
+    if striker is None or striker.radius is None or law.exponent != 1.5 or law.hard_stiffness or law.hysteresis:
         return None
     return striker.radius, 0.75 * law.stiffness / striker.radius**0.5
+
+
+def contact_radius(law: Contact, radius: float, force: float) -> float:
+    """Radius [m] of the contact of a sphere under a force [N], also beyond first yield."""
+    first = law.yield_approach
+    beyond = force - law.stiffness * first**1.5
+    if first and beyond > 0.0:
+        approach = first + beyond / (1.5 * law.stiffness * first**0.5)
+    else:
+        approach = (force / law.stiffness) ** (2.0 / 3.0)
+    return (radius * approach) ** 0.5
 
 
 def yielding(struck: Struck) -> Assumption:
@@ -40,6 +53,8 @@ def yielding(struck: Struck) -> Assumption:
     hit, quantities = struck.hit, struck.quantities
     number = "contact pressure over that at first yield"
     still = dict.fromkeys(quantities, 0.0)
+    if hit.contact.yield_approach and hit.contact.exponent > 1.0:
+        return Assumption("no yielding", None, None, still, quantities, "", number)
     round_body = _hertz(struck)
     strengths = {"striker": _strength(struck, 0), "target": _strength(struck, -1)}
     missing = [name for name, strength in strengths.items() if strength is None]
@@ -50,7 +65,7 @@ def yielding(struck: Struck) -> Assumption:
     R, E = round_body
     weakest = min(strength for strength in strengths.values() if strength is not None)
     value = (6.0 * hit.peak_force * E**2 / (np.pi**3 * R**2)) ** (1.0 / 3.0) / (YIELD * weakest)
-    remedy = "a contact that yields is needed, or a harder body, or a slower blow"
+    remedy = PLASTIC
     if value <= 1.0 and missing:
         why, remedy = f"yield strength of the {missing[0]}", "state its yield_strength"
         return Assumption("no yielding", value, 1.0, dict.fromkeys(quantities), quantities, remedy, number, why)
@@ -95,10 +110,10 @@ def small(struck: Struck) -> Assumption:
     round_body = _hertz(struck)
     if round_body is None or body is None or body.section is None or body.thickness is None:
         why = "radius of the contact" if round_body is None else "thickness of the body"
-        remedy = SPHERE if round_body is None else "give material and section"
+        remedy = SPHERE if round_body is None else "give material and section of the body"
         return Assumption("local contact", None, SMALL, dict.fromkeys(quantities), quantities, remedy, number, why)
-    R, modulus = round_body
-    a, material, h = (0.75 * hit.peak_force * R / modulus) ** (1.0 / 3.0), body.section.material, body.thickness
+    a = contact_radius(hit.contact, round_body[0], hit.peak_force)
+    material, h = body.section.material, body.thickness
     E, nu = (material.E if material.E_across is None else material.E_across), material.nu
     # a half space sinks by this much at the depth of the middle plane, where the plate moves by bending instead
     compliance = (1.0 + nu) * (3.0 - 2.0 * nu) / (np.pi * E * h)
@@ -106,7 +121,7 @@ def small(struck: Struck) -> Assumption:
     if struck.clearance is not None:
         away = max(struck.clearance, a, NEAREST * h)
         compliance += (1.0 - nu**2) / (2.0 * np.pi * E * away)  # of the image beyond the edge
-        ratios["contact radius over the distance to the edge"] = a / away
+        ratios[EDGE] = a / away
     history, integrals = hit.history, struck.bending
     changed = softer(history, compliance)
     if integrals is not None and struck.energy.any():
@@ -116,7 +131,9 @@ def small(struck: Struck) -> Assumption:
         wave = float(np.sqrt(struck.energy @ integrals.wave**2 / struck.energy.sum()))
         ratios["contact radius times wavenumber"] = wave * a
     name = max(ratios, key=lambda each: ratios[each])
-    remedy = "Hertz's half space does not fit; give a measured contact stiffness"
+    remedy = "take a slower blow or a thicker body: Hertz's half space does not fit"
+    if name == EDGE:
+        remedy = "strike farther from the edge: Hertz's half space does not fit"
     return Assumption("local contact", ratios[name], SMALL, dict(struck.changes(**changed)), quantities, remedy, name)
 
 
@@ -136,5 +153,5 @@ def slow(struck: Struck) -> Assumption:
     own = LAMB * np.sqrt(E / (2.0 * (1.0 + nu) * rho)) / striker.radius
     late = LIVELY / (striker.mass * own**2) * (struck.omega / own) ** 2  # what inertia adds to the static give
     effect = struck.changes(**softer(hit.history, late))
-    remedy = "the striker needs its own modes: a bar, or a flexible striker"
+    remedy = "take a striker with its own modes: a bar, or a flexible one"
     return Assumption("quasi-static contact", 2.0 * struck.omega / own, SLOW, effect, quantities, remedy, number)

@@ -23,24 +23,28 @@ AIR = (1.204, 343.2)  # [kg/m^3], [m/s] density and speed of sound at 20 degrees
 LIMIT = 0.02  # [-] mass of the air over that of the body at which frequencies drop by 1 %
 ROUNDED = 0.1  # [-] of k**2: k**2 - k_0**2 does not get smaller, as the waves of a finite plate are not straight
 NUMBER = "mass of the air moved over that of the body"
+IN_AIR = "take the modes in air, from `fi.in_air`"
 
 
 def of_target(struck: Struck) -> Assumption:
     """The struck body."""
     body, quantities = struck.target, struck.quantities
+    plate = body is None or body.modes.dimension == 2
 
     def told(value: float | None, effect: dict, unknown: str = "") -> Assumption:
-        remedy = "give material and section" if unknown else "the air's mass and the sound have to be modelled"
+        remedy = "give material and section" if unknown else IN_AIR if plate else "the air around beams is not modelled"
         return Assumption("still air", value, LIMIT, effect, quantities, remedy, NUMBER, unknown)
 
+    if struck.hit.bodies[-1].air:
+        return Assumption("still air", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
     if struck.hit.bodies[-1].dimension == 0 or struck.ideal == "rigid":
         return told(None, dict.fromkeys(quantities, 0.0))
     history, mine = struck.hit.history, struck.mine
     if struck.ideal:
-        plate = None if body is None else body.plate
-        if plate is None or body is None:
+        section = None if body is None else body.plate
+        if section is None or body is None:
             return told(None, dict.fromkeys(quantities), "the waves of the body")
-        mass = 2.0 * AIR[0] / (body.per_extent * plane_wave(plate, struck.omega))
+        mass = 2.0 * AIR[0] / (body.per_extent * plane_wave(section, struck.omega))
         row = history.shape[:, mine] / (1.0 + mass) ** 0.25
         return told(mass, struck.changes(shape=struck.of_target(row, "shape")))
     found = None if body is None or struck.bending is None else loading(body, struck.bending)

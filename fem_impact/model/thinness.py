@@ -21,9 +21,10 @@ LIMIT = 0.23  # [-] thickness times wavenumber at which a wave is 1 % too fast f
 DENT = 2.0  # [-] thickness times wavenumber beyond which a force is local to the contact
 DOUBT = 0.2  # [-] drop of all frequencies by which a striker of unknown thickness is tried
 NUMBER = "thickness times wavenumber"
-THICKER = "a thick-plate theory is needed (Reissner and Mindlin), or a thinner body, or a softer contact"
-SLENDER = "a thick-beam theory is needed (Timoshenko), or a thinner body, or a softer contact"
+THICKER = 'take a thick plate, theory = "mindlin", or a softer contact'
+SLENDER = 'take a thick beam, theory = "timoshenko", or a softer contact'
 NO_SECTION = "the thickness is not stated; give material and section instead of mass and first frequency"
+NO_SLENDERNESS = "give the slenderness of a stick, or material and section of a bar"
 
 
 def lowered(thick: np.ndarray) -> np.ndarray:
@@ -118,8 +119,8 @@ def of_striker(struck: Struck) -> Assumption:
         if max(np.inf if x is None else x for x in effect.values()) <= hit.tolerance:
             return Assumption("thin striker", None, None, effect, quantities, "", NUMBER)
         unknown = "the thickness of the striker, and the blow depends on its bending modes"
-        remedy = "give it as a bar with material and section"
-        return Assumption("thin striker", None, LIMIT, dict.fromkeys(quantities), quantities, remedy, NUMBER, unknown)
+        effect = dict.fromkeys(quantities)
+        return Assumption("thin striker", None, LIMIT, effect, quantities, NO_SLENDERNESS, NUMBER, unknown)
     omega[columns] *= lowered(integrals.thick)
     h = hit.history
     end = h.states(np.array([max((impact.end for impact in hit.impacts), default=0.0)]))

@@ -155,6 +155,9 @@ def in_air(
         (0.0 if modes.frequency_error is None else modes.frequency_error) + np.concatenate([rest, doubt[order]]),
         notes=plausible.together(modes.notes, (note,)),
         poorer=poorer,
+        section=modes.section,
+        thick=modes.thick,
+        air=True,
     )
 
 

@@ -175,6 +175,7 @@ class Modes:
     poorer: Mapping[str, "Modes"] = field(default_factory=dict, repr=False)
     section: Plate | Beam | None = field(default=None, repr=False)  # None if not known, as that of a scaled body
     thick: bool = field(default=False, repr=False)  # whether shear and rotary inertia are in them
+    air: bool = field(default=False, repr=False)  # whether the air around the body is in them
 
     __repr__ = check.brief
 

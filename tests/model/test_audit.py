@@ -1,13 +1,14 @@
 import copy
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fem_impact as fi
-from fem_impact.impact import assumption
-from fem_impact.model import audit
+from fem_impact.impact import assumption, collision
+from fem_impact.model import audit, restrike
 
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0, yield_strength=2e9)
@@ -141,6 +142,27 @@ def test_distance_to_the_edge_is_that_of_the_body():
     system = fi.assemble(fi.mesh.disk(0.1), PLATE, {"boundary": "hinged"})
     modes = fi.find_modes(system, n_modes=3)
     assert audit._clearance(modes, None, np.array([0.06, 0.0])) == pytest.approx(0.04, rel=0.01)
+
+
+LAWS = {
+    "layers": fi.Contact.layers(1e5, 1.0, depth=1e-4, hard_stiffness=1e9),
+    "felt": fi.Contact.felt(1e9, 2.5, hysteresis=0.4, relaxation=1e-3),
+    "yields": fi.Contact.between(BALL, PLATE, yield_strength=1e9),
+}
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("scheme", ["A4", "collocation"])
+def test_contacts_that_lose_are_examined_and_struck_again_as_they_are(law, scheme):
+    hit = fi.strike(modal(), BALL, LAWS[law], at=(0.12, 0.1), speed=1.0, tolerance=1e-2, scheme=scheme)
+    found = named(hit.assumptions)
+    for name in ("thin target", "small deflections", "still air", "stated damping", "quasi-static contact"):
+        assert found[name].known and found[name].worst < 0.05, found[name].sentence
+    assert found["thin target"].worst > 0.0
+    again = collision.again(hit.history)  # the blow to compare with is the one found
+    before = restrike.Struck(replace(hit, audit=None), None, None).before
+    assert before.peak_force == pytest.approx(hit.peak_force, rel=2e-2)  # a coarse first run
+    assert len(again.contacts) == len(hit.history.contacts)
 
 
 @pytest.mark.parametrize("case", ["no touch", "at the edge", "pressed from rest", "morley"])

@@ -113,3 +113,36 @@ def test_a_large_soft_ball_struck_fast_is_not_quasi_static():
     slow, fast = (found(drop(speed), "quasi-static contact") for speed in (0.01, 20.0))
     assert fast.value / slow.value == pytest.approx(2000.0**0.2, rel=0.1)  # Hertz: time goes as speed**(-1/5)
     assert fast.worst > 5.0 * slow.worst
+
+
+def test_a_contact_that_yields_says_so_and_the_elastic_one_foretold_its_loss():
+    modes = fi.analytic.rectangle(0.3, 0.2, section=fi.Plate(STEEL, 0.2), n_modes=200)
+    ball = fi.Striker.sphere(STEEL, R)
+    laws = (fi.Contact.between(ball, STEEL, yield_strength=given) for given in (None, YIELD))
+    elastic, plastic = (fi.strike(modes, ball, law, at=(0.12, 0.09), speed=2.0 * first_yield()) for law in laws)
+    told = found(plastic, "no yielding")
+    assert told.value is None and told.known and told.worst == 0.0 and not told.remedy
+    true = elastic.restitution - plastic.restitution
+    assert true / 3.0 < found(elastic, "no yielding").effect["restitution"] < 3.0 * true
+    # a softer contact is wider under the same force, but its force is smaller
+    wide, hard = (found(hit, "local contact").value for hit in (plastic, elastic))
+    assert wide == pytest.approx(hard, rel=0.1)
+
+
+def test_radius_of_the_contact_goes_with_the_root_of_the_approach_beyond_yield():
+    law = fi.Contact.elastic_plastic(1e10, yield_approach=1e-6)
+    for approach in (0.5e-6, 1e-6, 4e-6):  # Johnson (1985), section 4.2; Thornton (1997), eq. 2
+        force = float(law.force(approach))
+        assert local_contact.contact_radius(law, R, force) == pytest.approx((R * approach) ** 0.5, rel=1e-12)
+
+
+@pytest.mark.parametrize("law", ["layers", "felt"])
+def test_a_contact_that_is_no_half_space_has_no_known_radius(law):
+    laws = {
+        "layers": fi.Contact.layers(1e7, 1.5, depth=1e-4, hard_stiffness=1e9),
+        "felt": fi.Contact.felt(1e8, 1.5, hysteresis=0.4, relaxation=1e-3),
+    }
+    modes = fi.analytic.rectangle(0.3, 0.2, section=fi.Plate(STEEL, 0.02), n_modes=50)
+    hit = fi.strike(modes, fi.Striker.sphere(STEEL, R), laws[law], at=(0.12, 0.09), speed=1.0, tolerance=1e-2)
+    for name in ("no yielding", "local contact"):
+        assert found(hit, name).state == "not known"

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -117,3 +119,40 @@ def test_a_beam_of_unknown_width_is_not_known():
     modes = fi.analytic.beam(0.4, ends=("free", "free"), mass=0.1, first_frequency=500.0, n_modes=8)
     hit = fi.strike(modes, fi.Striker.rigid(0.05), fi.Contact.hertz(1e8), at=0.2, speed=1.0)
     assert found(hit).state == "not known" and "width" in found(hit).sentence
+
+
+def test_modes_in_air_have_their_air_and_lose_nothing_else_that_is_known():
+    dry = fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(SPRUCE, 1e-3), n_modes=24)
+    wet = fi.in_air(dry)
+    how = {"at": (0.12, 0.1), "speed": 0.3, "tolerance": 1e-1}
+    before, after = (fi.strike(modes, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), **how) for modes in (dry, wet))
+    told = found(after)
+    assert told.value is None and told.known and told.worst == 0.0 and not told.remedy
+    true = abs(after.contact_time / before.contact_time - 1.0)
+    assert true / 3.0 < found(before).effect["contact_time"] < 3.0 * true
+    one, two = ({each.name: each for each in audit.examine(hit)} for hit in (before, after))
+    for name in ("thin target", "small deflections"):
+        assert two[name].known and two[name].value == pytest.approx(one[name].value, rel=0.3)  # lower, slower modes
+
+
+def test_the_air_stays_in_modes_that_are_cut_damped_or_scaled():
+    wet = fi.in_air(fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(SPRUCE, 2e-3), n_modes=6))
+    kept = (
+        wet.truncated(n_modes=3),
+        wet.damped(0.01),
+        wet.scaled(first_frequency=50.0),
+        wet.truncated(max_frequency=1e3),
+    )
+    assert all(modes.air for modes in kept) and wet.section is not None
+    assert not fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(SPRUCE, 2e-3), n_modes=3).air
+
+
+def test_slopes_in_air_are_those_of_the_mixed_shapes():
+    system = fi.assemble(fi.mesh.rectangle(0.4, 0.3), fi.Plate(SPRUCE, 1e-3), {"boundary": "hinged"})
+    dry = fi.find_modes(system, n_modes=16)
+    wet = fi.in_air(dry)
+    mixed = replace(dry, shapes=replace(dry.shapes, vectors=dry.shapes.vectors @ wet.shapes.mix))
+    found, true = (bending.bending(bending.known(modes)) for modes in (wet, mixed))
+    for name in ("slope", "rotary", "shear"):  # 1 mm of spruce: modes mix by some percent in amplitude
+        np.testing.assert_allclose(getattr(found, name), getattr(true, name), rtol=1e-2)
+    assert (found.slope[0] < 0.7 * bending.bending(bending.known(dry)).slope[0]) and (wet.shapes.mix**2).sum() < 16.0

@@ -61,7 +61,7 @@ def test_a_thick_block_speaks_up_about_its_thickness():
     assert told.value > 2.0 and told.doubtful and told.known
     assert told.worst < 1e-3  # so stiff a block hardly moves, thick or thin
     assert "thin target: thickness times wavenumber 2.2 (above 0.23)" in hit.summary()
-    assert "thick-plate theory" in hit.summary()
+    assert "take a thick plate" in hit.summary()
 
 
 def test_a_thick_high_mode_that_the_blow_hardly_excites_matters_little():
@@ -113,3 +113,34 @@ def test_what_is_not_known_is_not_known(modes):
         plate = fi.Modes.from_arrays(plate.frequencies, plate.shape_at([(0.1, 0.1)]), points=[(0.1, 0.1)], mass=0.2)
     told = found(fi.strike(plate, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), at=(0.1, 0.1), speed=1.0))
     assert told.state == "not known" and set(told.effect.values()) == {None}
+
+
+@pytest.mark.parametrize("which", ["plate", "beam"])
+def test_what_a_thick_theory_has_is_no_effect_and_what_it_changes_was_foretold(which):
+    if which == "plate":
+        section, mesh, at, theory = fi.Plate(STEEL, 0.01), fi.mesh.rectangle(*SIDES, size=0.1), (0.12, 0.09), "mindlin"
+        supports = {"boundary": "hinged"}
+    else:
+        section, mesh, at, theory = (
+            fi.Beam.rectangular(STEEL, width=0.03, height=0.02),
+            fi.mesh.line(0.3),
+            0.15,
+            "timoshenko",
+        )
+        supports = {"left": "hinged", "right": "hinged"}
+    thin, thick_one = (
+        blow(fi.find_modes(fi.assemble(mesh, section, supports, theory=each), n_modes=12), 0.1, 3e8, at)
+        for each in (None, theory)
+    )
+    told = found(thick_one)
+    assert told.value is None and told.known and told.worst == 0.0 and not told.remedy
+    true = abs(thick_one.contact_time / thin.contact_time - 1.0)
+    assert true / 3.0 < found(thin).effect["contact_time"] < 3.0 * true
+
+
+def test_a_stick_that_is_told_slender_or_stout_has_its_shear_and_a_hammer_has_none():
+    plate = fi.analytic.rectangle(*SIDES, section=fi.Plate(STEEL, 0.003), n_modes=60)
+    stick = fi.Striker.stick(mass=0.05, first_frequency=500.0, slenderness=20.0)
+    for striker in (stick, fi.Striker.hammer(head=0.03, handle=0.06, stiffness=2e4, damping=5.0)):
+        hit = fi.strike(plate, striker, fi.Contact.hertz(1e8), at=(0.1, 0.1), speed=1.0, tolerance=1e-2)
+        assert found(hit, "thin striker").known and found(hit, "thin striker").worst == 0.0
