@@ -233,7 +233,12 @@ def table() -> dict[str, dict[str, Any]]:
         "Response.modal_energy": {"self": t["hit"], "times": [0.0, 1e-3], "body": -1},
         "Response.spectral_centroid": {"self": t["hit"], "max_frequency": 5e3},
         "Response.spectrum": {"self": t["hit"], "frequencies": [0.0, 1e3]},
-        "mobility": {"modes": t["modes"], "at": at, "to": (0.2, 0.2), "frequencies": [50.0, 60.0]},
+        "mobility": {
+            "modes": t["modes"], "at": at, "to": (0.2, 0.2), "frequencies": [50.0, 60.0], "quantity": "mobility",
+        },
+        "mobility points": {
+            "modes": t["modes"], "at": [at, (0.2, 0.2)], "to": [at], "frequencies": [50.0], "quantity": "receptance",
+        },
         "spectra.half_sine_spectrum": {"frequencies": [50.0, 60.0], "contact_frequency": 100.0},
         "threshold_frequency": {"modes": t["modes"], "at": at, "mass": 0.03},
         "threshold.required_energy": {"modes": t["modes"], "at": at, "contact_frequency": 500.0},
