@@ -253,6 +253,7 @@ def table() -> dict[str, dict[str, Any]]:
             "states": None, "tolerance": 1e-2, "quantity": None, "residual": True, "duration": 0.1, "max_impacts": 3,
             "scheme": "A4", "dt": 1e-5, "forces": [0.0, 0.0],
         },
+        "Scene.changed": {"self": t["scene"], "values": {"contact.stiffness": 2e6}},
         "Scene.modes": {"self": t["scene"], "count": 5},
         "Scene.plan": {"self": t["scene"], "watch": None, "tolerance": 1e-1},
         "Scene.run": {"self": t["scene"], "watch": None, "plan": None, "before": None, "verify": False,
@@ -338,6 +339,10 @@ def table() -> dict[str, dict[str, Any]]:
         "update": {
             "build": lambda values: t["bar"].scaled(first_frequency=values["f"]), "measured": [110.0, 330.0],
             "unknown": {"f": (50.0, 200.0)}, "start": {"f": 90.0}, "points": None,
+        },
+        "update scene": {
+            "build": t["scene"], "measured": [110.0, 330.0], "unknown": {"target.first_frequency": (50.0, 200.0)},
+            "start": None, "points": None,
         },
         "report.read": {"path": t["path"]},
         "report.write": {"path": folder / "report.html", "scene": t["scene"], "run": t["run"]},
