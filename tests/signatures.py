@@ -181,6 +181,7 @@ def table() -> dict[str, dict[str, Any]]:
         "Modes.from_arrays": {
             "frequencies": [0.0, 10.0], "shapes": [[1.0, 0.5], [1.0, -0.5]], "points": [[0.0, 0.0], [0.1, 0.1]],
             "mass": 1.0, "damping_ratio": 0.01, "compliance": [[1e-3, 0.0], [0.0, 1e-3]],
+            "cells": [[0, 1, 1]],
         },
         "Modes.from_uff": {"path": t["uff"], "mass": 0.2, "direction": "z"},
         "Modes.rigid": {"mass": 1.0},
