@@ -181,6 +181,7 @@ def table() -> dict[str, dict[str, Any]]:
         "Modes.from_arrays": {
             "frequencies": [0.0, 10.0], "shapes": [[1.0, 0.5], [1.0, -0.5]], "points": [[0.0, 0.0], [0.1, 0.1]],
             "mass": 1.0, "damping_ratio": 0.01, "compliance": [[1e-3, 0.0], [0.0, 1e-3]],
+            "cells": [[0, 1, 1]],
         },
         "Modes.from_uff": {"path": t["uff"], "mass": 0.2, "direction": "z"},
         "Modes.rigid": {"mass": 1.0},
@@ -233,7 +234,12 @@ def table() -> dict[str, dict[str, Any]]:
         "Response.modal_energy": {"self": t["hit"], "times": [0.0, 1e-3], "body": -1},
         "Response.spectral_centroid": {"self": t["hit"], "max_frequency": 5e3},
         "Response.spectrum": {"self": t["hit"], "frequencies": [0.0, 1e3]},
-        "mobility": {"modes": t["modes"], "at": at, "to": (0.2, 0.2), "frequencies": [50.0, 60.0]},
+        "mobility": {
+            "modes": t["modes"], "at": at, "to": (0.2, 0.2), "frequencies": [50.0, 60.0], "quantity": "mobility",
+        },
+        "mobility points": {
+            "modes": t["modes"], "at": [at, (0.2, 0.2)], "to": [at], "frequencies": [50.0], "quantity": "receptance",
+        },
         "spectra.half_sine_spectrum": {"frequencies": [50.0, 60.0], "contact_frequency": 100.0},
         "threshold_frequency": {"modes": t["modes"], "at": at, "mass": 0.03},
         "threshold.required_energy": {"modes": t["modes"], "at": at, "contact_frequency": 500.0},
@@ -248,6 +254,7 @@ def table() -> dict[str, dict[str, Any]]:
             "states": None, "tolerance": 1e-2, "quantity": None, "residual": True, "duration": 0.1, "max_impacts": 3,
             "scheme": "A4", "dt": 1e-5, "forces": [0.0, 0.0],
         },
+        "Scene.changed": {"self": t["scene"], "values": {"contact.stiffness": 2e6}},
         "Scene.modes": {"self": t["scene"], "count": 5},
         "Scene.plan": {"self": t["scene"], "watch": None, "tolerance": 1e-1},
         "Scene.run": {"self": t["scene"], "watch": None, "plan": None, "before": None, "verify": False,
@@ -333,6 +340,10 @@ def table() -> dict[str, dict[str, Any]]:
         "update": {
             "build": lambda values: t["bar"].scaled(first_frequency=values["f"]), "measured": [110.0, 330.0],
             "unknown": {"f": (50.0, 200.0)}, "start": {"f": 90.0}, "points": None,
+        },
+        "update scene": {
+            "build": t["scene"], "measured": [110.0, 330.0], "unknown": {"target.first_frequency": (50.0, 200.0)},
+            "start": None, "points": None,
         },
         "report.read": {"path": t["path"]},
         "report.write": {"path": folder / "report.html", "scene": t["scene"], "run": t["run"]},

@@ -7,44 +7,57 @@ import numpy as np
 from .._base import check
 from ..modes.modal import Modes
 
+QUANTITIES = {"receptance": 0, "mobility": 1, "accelerance": 2}  # -> powers of i omega
+
 
 @check.typed
-def mobility(modes: Modes, at: Any, to: Any, frequencies: Any) -> np.ndarray:
-    """Velocity at ``to`` per unit force at ``at``, over frequency.
+def mobility(modes: Modes, at: Any, to: Any, frequencies: Any, quantity: str = "mobility") -> np.ndarray:
+    """Motion at ``to`` per unit force at ``at``, over frequency: by default the velocity.
 
     Parameters
     ----------
     modes : Modes
-    at, to : array_like, shape (dimension,) [m]
-        Points of the force and of the velocity.
+    at, to : array_like, shape (dimension,), or (n_forces, dimension) and (n_points, dimension) [m]
+        Points of the force and of the motion.
     frequencies : array_like, shape (n_frequencies,) [Hz]
         All positive.
+    quantity : "receptance", "mobility" or "accelerance"
+        Displacement, velocity or acceleration per force.
 
     Returns
     -------
-    mobility : ndarray, shape (n_frequencies,), complex [m/(N s)]
+    mobility : ndarray, complex [m/N], [m/(N s)] or [m/(N s^2)]
+        Shape (n_frequencies,) for one force and one point, else (n_frequencies, n_points, n_forces).
 
     Notes
     -----
-    The kept modes are summed; the others add i omega times their residual compliance. Reciprocal in ``at`` and ``to``.
-    Infinite at the frequency of an undamped mode. Valid below the last kept mode.
+    The kept modes are summed; the others act by their residual compliance. Reciprocal in ``at`` and ``to``. Infinite at
+    the frequency of an undamped mode, except at its nodes. Valid below the last kept mode.
 
     Examples
     --------
     >>> plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300, damping_ratio=0.01)
     >>> abs(fi.mobility(plate, (0.45, 0.3), (0.45, 0.3), [100.0, 150.0])).round(4).tolist()  # m/(N s)
     [0.6517, 0.0178]
+    >>> fi.mobility(plate, (0.45, 0.3), [(0.2, 0.2), (0.4, 0.5), (1.0, 0.7)], [100.0, 150.0], "accelerance").shape
+    (2, 3, 1)
     """
+    power = QUANTITIES[check.one_of("quantity", quantity, QUANTITIES)]
     frequency = check.array("frequencies", frequencies, (None,), "Hz", lift=True)
     if (frequency <= 0.0).any():
         raise ValueError(f"frequencies must be positive, got {frequency.min():g} Hz")
-    force, place = modes.point("at", at), modes.point("to", to)
-    product = modes.shape_at(force)[0] * modes.shape_at(place)[0]  # (n_modes,)
-    rest = modes.residual_compliance(np.vstack([force, place]))[0, 1]
+    forces, places = modes.points("at", at), modes.points("to", to)
+    struck, moved = modes.shape_at(forces), modes.shape_at(places)  # (n_forces, n_modes), (n_points, n_modes)
+    rest = modes.residual_compliance(np.vstack([forces, places]))[len(forces) :, : len(forces)]
     omega = 2.0 * np.pi * frequency[:, None]  # (n_frequencies, 1)
-    stiffness = modes.omega**2 - omega**2 + 2j * modes.damping_ratio * modes.omega * omega
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return (1j * omega * product / stiffness).sum(axis=1) + 1j * omega[:, 0] * rest
+    stiffness = modes.omega**2 - omega**2 + 2j * modes.damping_ratio * modes.omega * omega  # (n_frequencies, n_modes)
+    resonant = stiffness == 0.0
+    factor = np.where(resonant, 0.0, 1.0 / np.where(resonant, 1.0, stiffness))
+    motion = np.einsum("fm,pm,am->fpa", factor, moved, struck, optimize=True) + rest
+    motion = motion * (1j * omega[:, :, None]) ** power
+    for i, mode in zip(*resonant.nonzero()):
+        motion[i, np.outer(moved[:, mode], struck[:, mode]) != 0.0] = np.inf
+    return motion[:, 0, 0] if motion.shape[1:] == (1, 1) else motion
 
 
 def half_sine_spectrum(frequencies: Any, contact_frequency: float) -> np.ndarray:

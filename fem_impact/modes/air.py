@@ -121,7 +121,7 @@ def in_air(
     if sides not in (1, 2):
         raise ValueError(f"sides must be 1 or 2, got {sides}")
     points, cells = modes.shapes.grid()
-    if modes.dimension != 2 or cells.shape[1:] != (3,):
+    if modes.dimension != 2 or not modes.continuous:
         raise ValueError("in_air needs the modes of a plate whose shapes are known everywhere")
     if modes.n_modes == modes.n_rigid:
         return modes

@@ -121,6 +121,7 @@ class SampledShapes(Shapes):
     points: np.ndarray  # (n_points, dimension) [m]
     values: np.ndarray  # (n_points, n_modes) [kg**-0.5]
     static: np.ndarray  # (n_points, n_points) [m/N] static compliance of the complete body
+    cells: np.ndarray | None = None  # (n_cells, dimension + 1) lines or triangles between the points, for drawing
 
     __repr__ = check.brief
 
@@ -150,7 +151,17 @@ class SampledShapes(Shapes):
         return replace(self, values=self.values[:, :n_modes].copy())
 
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.points, np.arange(len(self.points))[:, None]
+        return self.points, np.arange(len(self.points))[:, None] if self.cells is None else self.cells
+
+
+def _connected(cells: Any, points: np.ndarray) -> np.ndarray | None:
+    """The cells as numbers of points, (n_cells, dimension + 1), checked."""
+    if cells is None:
+        return None
+    array = check.array("cells", cells, (None, points.shape[1] + 1))
+    if (array != np.round(array)).any() or array.min() < 0 or array.max() >= len(points):
+        raise ValueError(f"cells must be numbers of points from 0 to {len(points) - 1}, got {check.shown(cells)}")
+    return array.astype(int)
 
 
 Damping = float | np.ndarray | Callable[[np.ndarray], Any]
@@ -201,7 +212,9 @@ class Modes:
         return cls(np.zeros(1), np.zeros(1), RigidShapes(mass), mass)
 
     @classmethod
-    def from_arrays(cls, frequencies, shapes, *, points, mass, damping_ratio=0.0, compliance=None) -> "Modes":
+    def from_arrays(
+        cls, frequencies, shapes, *, points, mass, damping_ratio=0.0, compliance=None, cells=None
+    ) -> "Modes":
         """Modes known only at points, as from a modal test.
 
         Parameters
@@ -213,6 +226,8 @@ class Modes:
         damping_ratio : float, array (n_modes,) or function of frequency [Hz]
         compliance : array_like, shape (n_points, n_points) [m/N], optional
             Static compliance of the complete body; by default that of the given modes alone.
+        cells : array_like, shape (n_cells, dimension + 1), optional
+            Numbers of the points that lines or triangles connect, from 0; pictures need them.
 
         Raises
         ------
@@ -234,12 +249,14 @@ class Modes:
         else:
             static = check.array("compliance", compliance, (len(points), len(points)), "m/N")
         damping = damping_ratios(damping_ratio, omega)
-        sampled = SampledShapes(points, values, static)
+        sampled = SampledShapes(points, values, static, _connected(cells, points))
         return cls(omega, damping, sampled, check.positive("mass", mass, "kg"), notes=damping_notes(damping, omega))
 
     @classmethod
     def from_uff(cls, path: Any, *, mass: float, direction: str = "z") -> "Modes":
-        """Read measured modes from a universal file (nodes in data set 15 or 2411, shapes in 55); needs pyuff.
+        """Read measured modes from a universal file (nodes in data set 15 or 2411, shapes in 55, elements in 2412).
+
+        Needs pyuff.
 
         Parameters
         ----------
@@ -250,9 +267,12 @@ class Modes:
         Returns
         -------
         Modes
-            Known only at the measured points; shapes are divided by the root of the modal mass in the file.
+            Known only at the measured points, with the elements between them if the file has some; shapes are divided
+            by the root of the modal mass in the file.
         """
-        return cls.from_arrays(**universal_files.read(path, direction), mass=mass)
+        found = universal_files.read(path, direction)
+        cells = found.pop("cells")
+        return cls.from_arrays(**found, mass=mass, cells=cells if len(cells) else None)
 
     @property
     def n_modes(self) -> int:
@@ -272,6 +292,12 @@ class Modes:
     def dimension(self) -> int:
         """Number of coordinates of a point on the body: 2 on a plate, 1 on a beam, 0 for a rigid mass."""
         return self.shapes.dimension
+
+    @property
+    def continuous(self) -> bool:
+        """Whether the shapes are known between the points of their grid, too; those of a modal test are not."""
+        points, cells = self.shapes.grid()
+        return cells.shape[1] > 1 and bool(self.shapes.contains(points[cells[:1]].mean(axis=1)).all())
 
     def _repr_html_(self) -> str:
         """Table of the first modes, for notebooks."""

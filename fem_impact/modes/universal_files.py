@@ -10,6 +10,8 @@ from .._base import check, isolated
 NORMAL_MODE, DISPLACEMENT, STRUCTURAL, REAL = 2, 8, 1, 2  # codes of data set 55
 CELL_CODE = {2: 11, 3: 91, 4: 94}  # nodes of a cell -> rod, thin shell triangle, thin shell quadrilateral
 WANTED = (15, 55, 2411)  # data sets to read: nodes, shapes, nodes in double precision
+LINES, SHELLS = (11, 21, 22), range(41, 97)  # codes of elements: rods and beams, plane and shell elements
+CORNERS = {3: (0, 1, 2), 4: (0, 1, 2, 3), 6: (0, 2, 4), 8: (0, 2, 4, 6)}  # nodes of a shell element -> its corners
 PHASE = 0.3  # [-] largest imaginary over largest real part, at the best phase, of a complex shape taken as real
 DIRECTIONS = {"x": "r1", "y": "r2", "z": "r3"}
 
@@ -72,7 +74,9 @@ def read(path: Any, direction: str) -> dict[str, np.ndarray]:
     Returns
     -------
     dict
-        frequencies (n_modes,), damping_ratio (n_modes,), shapes (n_points, n_modes), points (n_points, 1 or 2)
+        frequencies (n_modes,), damping_ratio (n_modes,), shapes (n_points, n_modes), points (n_points, 1 or 2), and
+        cells (n_cells, 2 or 3), point numbers: lines between the points of a beam, triangles of a plate; quadrilaterals
+        are halved, and elements with nodes that were not measured are left out
     """
     path, direction = check.path("path", path), check.one_of("direction", direction, DIRECTIONS)
     return isolated.read(path, "a universal file", "modes.universal_files:arrays", direction)
@@ -106,6 +110,8 @@ def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:
     frequencies, damping, shapes = zip(*sorted(table, key=lambda entry: entry[0]))
     result = {"frequencies": np.array(frequencies), "damping_ratio": np.array(damping)}
     result |= {"shapes": np.column_stack(shapes), "points": points[:, keep]}
+    elements = [element for i, kind in enumerate(kinds) if kind == 2412 for element in _elements(file, i)]
+    cells = _cells(elements, {int(n): i for i, n in enumerate(measured)}, len(keep))
     if len(result["shapes"]) != len(points):
         raise ValueError(
             f"{path.name} has shapes at {len(result['shapes'])} nodes but names {len(points)}; export it again"
@@ -113,7 +119,31 @@ def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:
     for what, values in result.items():
         if not (np.abs(values) <= check.REACH).all() or (what == "frequencies" and values.min() < 0.0):
             raise ValueError(f"{path.name} has {what} that are negative, too large or not numbers; export it again")
-    return result
+    return result | {"cells": cells}
+
+
+def _elements(file: Any, i: int) -> list[dict]:
+    """Elements of a data set 2412; none if pyuff cannot read them, as it cannot read solids of many nodes."""
+    try:
+        found = file.read_sets(i)
+    except Exception:  # it raises nothing more special; the shapes can be read without the elements
+        return []
+    return [element for kind in found if isinstance(kind, int) for element in found[kind]]
+
+
+def _cells(elements: list[dict], row: dict[int, int], dimension: int) -> np.ndarray:
+    """Elements whose nodes were all measured, as point numbers, (n_cells, dimension + 1)."""
+    found = []
+    for element in elements:
+        code, nodes = int(element["fe_descriptor"]), element["nodes_nums"]
+        if dimension == 1:
+            corners = nodes[:2] if code in LINES else []
+        else:
+            corners = [nodes[i] for i in CORNERS.get(len(nodes), ())] if code in SHELLS else []
+        points = [row[int(node)] for node in corners if int(node) in row]
+        if corners and len(points) == len(corners):
+            found += [[points[0], *points[i : i + dimension]] for i in range(1, len(points) - dimension + 1)]
+    return np.array(found, int).reshape(-1, dimension + 1)
 
 
 def _mode(name: str, i: int, mode: dict, component: str, measured: np.ndarray) -> tuple[float, float, np.ndarray]:

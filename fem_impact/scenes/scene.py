@@ -158,6 +158,30 @@ class Scene:
         _check_whole(scene)
         return scene
 
+    def changed(self, values: Mapping[str, float]) -> "Scene":
+        """The scene with other numbers, by names such as ``material.E`` or ``supports.left.stiffness``.
+
+        Raises
+        ------
+        ValueError
+            If there is no such table or key, or the scene with these numbers is invalid.
+        """
+        if not isinstance(values, Mapping):
+            raise ValueError(f"values must be a dict of names and numbers, got {check.shown(values)}")
+        tables: dict[str, Any] = {name: _opened(table) for name, table in self.data().items()}
+        for name, value in values.items():
+            *path, key = str(name).split(".")
+            table: Any = tables
+            for part in path:
+                table = table.get(part) if isinstance(table, dict) else None
+            if not path or not isinstance(table, dict) or not isinstance(table.get(key, 0.0), (int, float)):
+                raise ValueError(f"values must name numbers in tables of the scene, got {check.shown(name)}")
+            table[key] = check.number(f"values[{check.shown(name)}]", value)
+        try:
+            return scene_of(tables, self.path, folder=Path())
+        except ValueError as error:
+            raise ValueError(f"values must be numbers of the scene: {error}") from None
+
     def picture(self) -> str:
         """The target with its supports, strike point and observed points, as SVG."""
         at = np.atleast_1d(np.asarray(self.blow.values["at"], float))
@@ -270,6 +294,11 @@ class Scene:
             raise fault(self.path, f"[{table}] {error}") from None
         except (OverflowError, ZeroDivisionError):
             raise fault(self.path, f"[{table}] has a number too large or too small; check its units") from None
+
+
+def _opened(value: Any) -> Any:
+    """A table with the tables in it, as dicts of their own."""
+    return {key: _opened(item) for key, item in value.items()} if isinstance(value, Mapping) else value
 
 
 @check.typed

@@ -197,7 +197,9 @@ def mobility(modes: Modes, at: Any, to: Any = None, *, band: tuple[float, float]
     low, high = check.band("band", band, "Hz")
     grid = np.geomspace(low, high, SPECTRUM_POINTS)
     frequencies = np.union1d(grid, flexible[(flexible > low) & (flexible < high)] * (1.0 + 1e-6))  # misses no peak
-    value = spectra.mobility(modes, at, at if to is None else to, frequencies)
+    value = spectra.mobility(
+        modes, modes.point("at", at), modes.point("at" if to is None else "to", at if to is None else to), frequencies
+    )
     with styled(7.0, 5.0) as figure:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         above.loglog(frequencies, np.abs(value))

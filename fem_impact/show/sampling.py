@@ -18,10 +18,11 @@ HALVINGS = 5  # [-] most refinements; each splits a triangle into four
 def grid(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
     """Points (n_points, dimension) [m] and cells (n_cells, dimension + 1) of a body, refined until smooth to the eye.
 
-    New points lie on the straight sides of the elements, so a curved edge stays as coarse as the mesh.
+    New points lie on the straight sides of the elements, so a curved edge stays as coarse as the mesh. Shapes known at
+    points only are not refined.
     """
     points, cells = modes.shapes.grid()
-    for _ in range(HALVINGS):
+    for _ in range(HALVINGS if modes.continuous else 0):
         if modes.dimension != 2 or cells.shape[1] != 3 or len(points) >= ENOUGH:
             break
         cells, sides = quartered(cells, len(points))

@@ -113,6 +113,7 @@ class Pair:
     striker: slice
     target: slice
     rows: np.ndarray
+    rated: bool  # whether the force depends on how fast the contact is pressed
 
     __repr__ = check.brief
 
@@ -126,13 +127,15 @@ def pair(striker: Body, target: Body, contact: Contact) -> Pair:
     for body, sign in ((striker, 1.0), (target, -1.0)):
         if body.rest <= 0.0:
             continue
-        if contact.loss == 0.0:
+        if not contact.rated:
             law[0, 3] += body.rest
             continue
         above, damping = rest_mode(body.dimension, body.omega[-1], body.zeta[-1], True)
         omega, zeta = np.append(omega, above), np.append(zeta, damping)
         shape, motion = np.append(shape, sign * np.sqrt(body.rest) * above), np.append(motion, 0.0)
-    return Pair(omega, zeta, shape[None], motion, law, slice(0, n), slice(n, n + m), target.rows)
+    return Pair(
+        omega, zeta, shape[None], motion, law, slice(0, n), slice(n, n + m), target.rows, contact.rated
+    )  # fmt: skip
 
 
 def run(bodies: Pair, speed: float, step: float, horizon: float) -> History:
@@ -153,7 +156,7 @@ def run(bodies: Pair, speed: float, step: float, horizon: float) -> History:
 def longest_step(bodies: Pair, duration: float) -> float:
     """Step [s] for contacts of about ``duration`` [s], short enough for the modes that the contact feels."""
     step = duration / STEPS
-    if bodies.law[0, 2] > 0.0:
+    if bodies.rated:
         return step  # the mode that stands for the rest is a dashpot, not a vibration
     flexible = bodies.omega > 0.0
     share = (bodies.shape[0, flexible] / bodies.omega[flexible]) ** 2

@@ -19,7 +19,7 @@ from .profiles import Profile
 from .records import Taps
 from .rig import Rig
 from .solver import Data, Problem, Solution
-from .unknowns import TIME, Setting, Unknown, checked, unit_of
+from .unknowns import TIME, Setting, Unknown, changed, checked, unit_of
 
 STARTS = 5  # [-] searches, from the best of `solver.SCREENED` points
 SAME = 1e-3  # [-] relative difference of two sums of squares that are the same minimum
@@ -210,8 +210,7 @@ class Found:
     @property
     def contact(self) -> Contact:
         """The contact law found."""
-        changed = {name.partition(".")[2]: value for name, value in self.point.items() if name.startswith("contact.")}
-        return replace(self.problem.setting.contact, **changed)
+        return changed(self.problem.setting.contact, self.problem.values(self.best.x))
 
     @property
     def striker(self) -> Striker:
@@ -221,7 +220,8 @@ class Found:
         if len(body.omega) == 1 and given.modes.n_modes == 1:
             return Striker.rigid(body.felt_mass)
         if given.modes.n_modes > 1:
-            part = {key: self.point.get(f"striker.{key}") for key in ("mass", "first_frequency")}
+            values = self.problem.values(self.best.x)
+            part = {key: values.get(f"striker.{key}") for key in ("mass", "first_frequency")}
             return Striker.flexible(given.modes.scaled(**part), at=given.at)
         modes = Modes.from_arrays(
             body.omega / (2.0 * np.pi), body.row[None], points=[[0.0]], mass=body.mass, damping_ratio=body.zeta
@@ -278,7 +278,8 @@ class Found:
             place = [0.0]
         hammer, law = self.striker, self.contact
         if tip is not None:
-            law = replace(law, stiffness=law.stiffness * check.positive("tip", tip))
+            factor = check.positive("tip", tip)
+            law = replace(law, stiffness=law.stiffness * factor, hard_stiffness=law.hard_stiffness * factor)
         typical = float(np.mean(self.problem.speeds(self.best.x)))
         if mass is not None:
             mass = check.positive("mass", mass, "kg")
@@ -471,7 +472,8 @@ def fit(
     contact : Contact or sequence of Contact
         Several laws are compared by how well they predict taps left out; the best is returned.
     unknown : mapping of name to (low, high)
-        ``contact.stiffness``, ``contact.exponent``, ``contact.loss`` (and any other number of the law),
+        ``contact.stiffness``, ``contact.exponent``, ``contact.loss`` or any other number of a `Contact`
+        (``contact.hysteresis`` and ``contact.relaxation`` of felt, ``contact.yield_approach``, ``contact.depth``, ...),
         ``striker.mass``, ``striker.first_frequency``, ``striker.mode_ratio``, ``striker.damping``,
         ``striker.tip_mass``, ``target.mass``, ``target.first_frequency``, ``target.damping``, ``target.x``,
         ``target.y`` (strike point), and for up to six modes of an unknown target ``mode1.frequency``, ``mode1.mass``
@@ -537,7 +539,11 @@ def fit(
 
 def _law_name(law: Contact) -> str:
     kinds = {1.0: "linear", 1.5: "Hertz"}
-    return kinds.get(law.exponent, f"power {law.exponent:g}") + (" with loss" if law.loss else "")
+    words = {"loss": " with loss", "hard_stiffness": " over a hard layer", "yield_approach": " that yields",
+             "hysteresis": " felt"}  # fmt: skip
+    return kinds.get(law.exponent, f"power {law.exponent:g}") + "".join(
+        word for name, word in words.items() if getattr(law, name)
+    )
 
 
 def joined(taps: Any, name: str = "taps") -> Taps:
@@ -562,7 +568,7 @@ def joined(taps: Any, name: str = "taps") -> Taps:
 
 
 def _fit(taps, *, target, at, striker, contact, unknown, known, response_at, window, starts, robust, rig, watch, rng):
-    names = checked(unknown, target, striker, contact)
+    names = checked(unknown, target, striker, contact, known)
     notes: list[str] = []
     points, n_points = None, 0
     if response_at is not None:

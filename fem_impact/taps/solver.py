@@ -96,7 +96,7 @@ class Problem:
         """Unfiltered fine records, (n_taps, 1 + n_points, n_fine)."""
         values = self.values(x)
         bodies, tip_mass = self.setting.bodies(values)
-        duration = self.setting.contact_time(values)
+        duration = self.setting.duration(values)
         return blows.records(
             bodies, self.speeds(x), duration=duration, n_times=self.data.n_times, lead=self.data.lead,
             rig=self.setting.rig, tip_mass=tip_mass,

@@ -1,4 +1,4 @@
-"""Frequency responses of measured taps, those of modes at many points, and measured modes beside computed ones."""
+"""Frequency responses of measured taps, and measured modes beside computed ones."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,6 @@ from .records import Taps
 METHODS = ("H1", "H2")
 MOST_TIMES = 2**24  # [-] samples of a transform
 TAPER = 0.25  # [-] of the force window that falls as a cosine, so that no edge is heard
-QUANTITIES = {"receptance": 0, "mobility": 1, "accelerance": 2}  # -> powers of i omega
 FREQUENCY_WEIGHT = 1.0  # [-] of a relative frequency difference of 100 % beside 1 - MAC when modes are paired
 UNITS = {"m/s^2": "accelerance", "m/s": "mobility", "m": "receptance"}
 FUNCTION, RESPONSE_CODE = 4, {"m/s^2": 12, "m/s": 11, "m": 8}  # codes of data set 58
@@ -108,40 +107,6 @@ def _force_window(time: np.ndarray, onset: np.ndarray, length: float) -> np.ndar
     x = (time - onset[:, None]) / length
     fall = np.clip((x - (1.0 - TAPER)) / TAPER, 0.0, 1.0)
     return np.where(x < -0.1, 0.0, 0.5 + 0.5 * np.cos(np.pi * fall))
-
-
-@check.typed
-def functions(modes: Modes, at: Any, to: Any, frequencies: Any, quantity: str = "mobility") -> np.ndarray:
-    """Motion at many points per unit force at many points, over frequency.
-
-    Parameters
-    ----------
-    modes : Modes
-    at : array_like, (n_forces, dimension) [m]
-    to : array_like, (n_points, dimension) [m]
-    frequencies : array_like, (n_frequencies,) [Hz], positive
-    quantity : "receptance", "mobility" or "accelerance"
-
-    Returns
-    -------
-    ndarray, shape (n_frequencies, n_points, n_forces), complex [m/N], [m/(N s)] or [m/(N s^2)]
-        The kept modes are summed; the others act by their residual compliance.
-    """
-    power = QUANTITIES[check.one_of("quantity", quantity, QUANTITIES)]
-    frequency = check.array("frequencies", frequencies, (None,), "Hz", lift=True)
-    if (frequency <= 0.0).any():
-        raise ValueError(f"frequencies must be positive, got {frequency.min():g} Hz")
-    forces, places = modes.points("at", at), modes.points("to", to)
-    struck, moved = modes.shape_at(forces), modes.shape_at(places)  # (n_forces, n_modes), (n_points, n_modes)
-    omega = 2.0 * np.pi * frequency[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        factor = 1.0 / (modes.omega**2 - omega**2 + 2j * modes.damping_ratio * modes.omega * omega)
-    rest = np.zeros((len(places), len(forces)))
-    if modes.dimension:
-        both = np.vstack([forces, places])
-        rest = modes.residual_compliance(both)[len(forces) :, : len(forces)]
-    total = np.einsum("fm,pm,am->fpa", factor, moved, struck) + rest
-    return total * (1j * omega[:, :, None]) ** power
 
 
 def mac(first: Any, second: Any) -> np.ndarray:

@@ -5,13 +5,14 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
 from scipy.special import gamma
 
 from .._base import check
-from ..impact.contact import Contact, wall_time
+from ..impact.contact import Contact, acting_stiffness, wall_time
 from ..impact.striker import Striker
 from ..modes.modal import Modes
 from . import arguments, blows
@@ -26,7 +27,9 @@ RATIO = 1.0  # [-] mode ratio of a striker, unless it is unknown too: two equal 
 NAME = re.compile(r"(contact|striker|target|mode\d)\.(\w+)")
 UNITS = {
     "stiffness": "N/m**exponent", "exponent": "", "loss": "s/m", "mass": "kg", "first_frequency": "Hz",
-    "mode_ratio": "", "damping": "", "tip_mass": "kg", "x": "m", "y": "m", "frequency": "Hz", "gain": "",
+    "mode_ratio": "", "damping": "", "tip_mass": "kg", "x": "m", "y": "m", "frequency": "Hz", "gain": "", "gap": "m",
+    "depth": "m", "hard_stiffness": "N/m**hard_exponent", "hard_exponent": "", "yield_approach": "m", "hysteresis": "",
+    "relaxation": "s",
 }  # fmt: skip
 TIME = "contact.time"  # the coordinate that stands for the stiffness while fitting [s]
 
@@ -74,18 +77,22 @@ class Unknown:
 
 
 def checked(
-    unknown: Mapping[str, Any], target: Modes | None, striker: Striker, contact: Contact
+    unknown: Mapping[str, Any],
+    target: Modes | None,
+    striker: Striker,
+    contact: Contact,
+    known: Mapping[str, float] | None = None,
 ) -> tuple[Unknown, ...]:
-    """The unknowns by name; ValueError for a name that nothing here has."""
+    """The unknowns by name; ValueError for a name that nothing here has, and for ranges that make no contact."""
     given = arguments.ranges("unknown", unknown)
     contacts = [field.name for field in dataclasses.fields(contact) if field.type in ("float", float)]
     modes = sorted({int(name[4]) for name in unknown if re.match(r"mode\d\.", str(name))})
-    known = [f"contact.{name}" for name in contacts] + [f"striker.{name}" for name in STRIKER]
-    known += [f"target.{name}" for name in TARGET if target is not None or name == "mass"]
-    known += [f"mode{i}.{name}" for i in range(1, MOST_MODES + 1) for name in MODE]
+    contains = [f"contact.{name}" for name in contacts] + [f"striker.{name}" for name in STRIKER]
+    contains += [f"target.{name}" for name in TARGET if target is not None or name == "mass"]
+    contains += [f"mode{i}.{name}" for i in range(1, MOST_MODES + 1) for name in MODE]
     found = []
     for name, limits in given.items():
-        check.one_of("unknown", name, known)
+        _check_name("unknown", name, contains)
         found.append(Unknown(name, *limits))
         if name.endswith((".stiffness", ".exponent", ".frequency", "mass", "first_frequency")) and found[-1].low < 0.0:
             raise ValueError(f"unknown[{name!r}] must not reach below zero, got {limits[0]:g} {unit_of(name)}")
@@ -93,6 +100,10 @@ def checked(
             found[-1].log
         ):
             raise ValueError(f"unknown[{name!r}] must begin above zero, got {limits[0]:g} {unit_of(name)}")
+    held = known or {}
+    for name in held:
+        _check_name("known", name, contains)
+    _check_contact(contact, found, held)
     for i in modes:
         for part in ("frequency", "mass"):
             if f"mode{i}.{part}" not in unknown:
@@ -106,6 +117,29 @@ def checked(
     elif "striker.first_frequency" not in unknown and {"striker.mode_ratio", "striker.damping"} & set(unknown):
         raise ValueError("unknown must hold striker.first_frequency too: the striker given is rigid")
     return tuple(found)
+
+
+def _check_name(label: str, name: str, names: list[str]) -> None:
+    """ValueError that lists the names, without all the modes."""
+    if name not in names:
+        check.one_of(label, name, [each for each in names if not re.match(r"mode[2-9]", each)])
+
+
+def changed(contact: Contact, values: Mapping[str, float]) -> Contact:
+    """The contact with the values whose names begin with ``contact.``; others do not matter."""
+    own = {name.partition(".")[2]: value for name, value in values.items() if name.startswith("contact.")}
+    own.pop(TIME.partition(".")[2], None)
+    return replace(contact, **{name: float(value) for name, value in own.items()})
+
+
+def _check_contact(contact: Contact, unknown: list[Unknown], known: Mapping[str, float]) -> None:
+    """ValueError unless the numbers at the ends of all ranges make a contact."""
+    own = [each for each in unknown if each.name.startswith("contact.")]
+    for ends in product(*((each.low, each.high) for each in own)):
+        try:
+            changed(contact, {**known, **{each.name: end for each, end in zip(own, ends)}})
+        except ValueError as error:
+            raise ValueError(f"unknown and known must make a contact within all ranges: {error}") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,14 +162,8 @@ class Setting:
         """Both bodies and the contact that the values make, and the mass of the tip [kg]."""
         striker = self.hammer(values)
         target = self.structure(values)
-        changed = {
-            name.partition(".")[2]: float(value)
-            for name, value in values.items()
-            if name.startswith("contact.") and name != TIME
-        }
-        return blows.pair(striker, target, replace(self.contact, **changed)), values.get(
-            "striker.tip_mass", self.rig.tip_mass
-        )
+        tip_mass = values.get("striker.tip_mass", self.rig.tip_mass)
+        return blows.pair(striker, target, changed(self.contact, values)), tip_mass
 
     @cached_property
     def _hammer(self) -> blows.Body:
@@ -196,6 +224,14 @@ class Setting:
         k = values.get("contact.stiffness", self.contact.stiffness)
         a = values.get("contact.exponent", self.contact.exponent)
         return float(wall_time(k, a, 1.0 / mass, 0.5 * self.impulse / mass))
+
+    def duration(self, values: Mapping[str, float]) -> float:
+        """The same time [s] with all that the contact does: layers, yielding, memory."""
+        law = changed(self.contact, values)
+        mass = self.felt_mass(values)
+        speed = 0.5 * self.impulse / mass
+        acting = acting_stiffness(np.array(law.numbers), 1.0 / mass, speed)
+        return float(wall_time(acting, law.exponent, 1.0 / mass, speed))
 
     def stiffness(self, values: Mapping[str, float], time: float) -> float:
         """The stiffness [N/m**exponent] that `contact_time` has this contact time [s] for."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from .._base import check
 from .._base.check import SimulationError
 from ..fe.assembly import System
 from ..modes.modal import Modes, find_modes
+from ..scenes.scene import Scene, load_scene
 from . import arguments, transfer
 from .transfer import Pair
 from .unknowns import Unknown
@@ -20,6 +22,7 @@ STEP = 0.01  # [-] of logarithms, for derivatives by differences: frequencies go
 MOST_SOLVES = 200  # [-] of the body
 CLOSE = 1e-7  # [-] relative change that ends the search
 MORE = 2  # [-] modes computed beyond those measured, so that one may be missed in the measurement
+TABLES = ("mesh", "material", "section", "target", "supports")  # of a scene: what its modes depend on
 POOR = 0.1  # [-] half width of an interval, in logarithms: wider constants are not told
 
 
@@ -60,7 +63,7 @@ class Updated:
 
 
 def update(
-    build: Callable[[dict[str, float]], Any],
+    build: Callable[[dict[str, float]], Any] | Scene | str | Path,
     measured: Any,
     unknown: Mapping[str, Any],
     *,
@@ -71,7 +74,10 @@ def update(
 
     Parameters
     ----------
-    build : function of a dict of values, which returns the assembled `System` or its `Modes`
+    build : path of a scene file, Scene, or function
+        The body. Of a scene, the unknowns are numbers of its tables by their names, such as ``material.E``,
+        ``section.thickness`` or ``supports.left.stiffness``; its modes are found to the tolerance of its strike. A
+        function takes a dict of values and returns the assembled `System` or its `Modes`.
     measured : array_like, (n_modes,) [Hz], or Modes
         Ascending frequencies; `Modes` of a measurement are paired with the computed ones by their shapes too.
     unknown : mapping of name to (low, high), both positive
@@ -87,7 +93,7 @@ def update(
     Raises
     ------
     ValueError
-        If there are fewer frequencies than unknowns, or ``build`` returns something else.
+        If there are fewer frequencies than unknowns, ``build`` returns something else, or a scene has no such number.
     SimulationError
         If the search does not end within 200 solves.
 
@@ -100,9 +106,17 @@ def update(
     >>> found = fi.update(bar, true, {"E": (50e9, 500e9)})
     >>> round(found.values["E"] / 1e9, 2)
     205.0
+    >>> ranges = {"material.E": (100e9, 300e9), "section.thickness": (5e-3, 20e-3)}
+    >>> found = fi.update("studies/scenes/disk.toml", [2500.0, 5200.0, 8530.0], ranges)
+    >>> found.uncertain  # a thin disk's frequencies tell thickness times the root of the modulus only
+    ('material.E', 'section.thickness')
     """
-    if not callable(build):
-        raise ValueError(f"build must be a function of a dict of values, got {check.shown(build)}")
+    if isinstance(build, (str, Path)):
+        build = load_scene(check.path("build", build))
+    if not isinstance(build, Scene) and not callable(build):
+        raise ValueError(
+            f"build must be a function of a dict of values, a Scene or the path of one, got {check.shown(build)}"
+        )
     ranges = [Unknown(name, *limits) for name, limits in arguments.ranges("unknown", unknown).items()]
     for each in ranges:
         if not each.log:
@@ -114,6 +128,9 @@ def update(
         )
     if (target <= 0.0).any():
         raise ValueError("measured must hold positive frequencies only; leave out rigid motions")
+    if isinstance(build, Scene):
+        _check_names(build, ranges)
+    rigid = [0]  # motions of the body, which the measurement does not have
     kept: dict[bytes, tuple[Modes, tuple[Pair, ...]]] = {}
 
     def computed(x: np.ndarray) -> tuple[Modes, tuple[Pair, ...]]:
@@ -121,7 +138,12 @@ def update(
         if key not in kept:
             if len(kept) >= MOST_SOLVES:
                 raise SimulationError(f"the search did not end within {MOST_SOLVES} solves; narrow the ranges")
-            modes = _modes(build({each.name: float(each.outside(z)) for each, z in zip(ranges, x)}), len(target))
+            values = {each.name: float(each.outside(z)) for each, z in zip(ranges, x)}
+            find = _scene_modes(build, values) if isinstance(build, Scene) else _found(build(values))
+            modes = find(len(target) + MORE + rigid[0])
+            if modes.n_rigid > rigid[0]:
+                rigid[0] = modes.n_rigid
+                modes = find(len(target) + MORE + rigid[0])
             flexible = modes.omega > 0.0
             own: Any = modes if isinstance(measured, Modes) else modes.frequencies[flexible]
             kept[key] = modes, transfer.matched(measured, own, points=points)
@@ -157,9 +179,24 @@ def update(
     return Updated(values, spread, pairs, modes, len(kept))
 
 
-def _modes(body: Any, count: int) -> Modes:
+def _check_names(scene: Scene, ranges: list[Unknown]) -> None:
+    """ValueError unless the unknowns are numbers of the scene's body."""
+    for each in ranges:
+        check.one_of(f"the table of unknown[{each.name!r}]", each.name.partition(".")[0], TABLES)
+        try:
+            scene.changed({each.name: each.low})
+        except ValueError as error:
+            raise ValueError(f"unknown[{each.name!r}]: {error}") from None
+
+
+def _scene_modes(scene: Scene, values: dict[str, float]) -> Callable[[int], Modes]:
+    return scene.changed(values).modes
+
+
+def _found(body: Any) -> Callable[[int], Modes]:
+    """A function of the number of modes that finds them."""
     if isinstance(body, Modes):
-        return body
+        return lambda count: body
     if isinstance(body, System):
-        return find_modes(body, n_modes=count + MORE)
+        return lambda count: find_modes(body, n_modes=count)
     raise ValueError(f"build must return a System of fi.assemble or Modes, got {check.shown(body)}")

@@ -39,7 +39,34 @@ def test_mobility_of_a_rigid_mass_is_that_of_a_mass():
     assert_allclose(spectra.mobility(modes, None, None, [5.0]), 1.0 / (2j * np.pi * 5.0 * 2.0), rtol=1e-14)
 
 
+def test_many_points_are_reciprocal_and_agree_with_single_ones():
+    modes = analytic.rectangle(1.0, 0.7, mass=0.5, first_frequency=80.0, n_modes=30, damping_ratio=0.01)
+    points, frequencies = [(0.2, 0.3), (0.6, 0.5), (0.5, 0.1)], np.array([50.0, 81.0, 200.0])
+    found = {name: spectra.mobility(modes, points, points, frequencies, name) for name in spectra.QUANTITIES}
+    assert found["mobility"].shape == (3, 3, 3)
+    assert_allclose(found["mobility"], found["mobility"].transpose(0, 2, 1), rtol=1e-10)  # same sum in another order
+    for i, to in enumerate(points):
+        for j, at in enumerate(points):
+            assert_allclose(found["mobility"][:, i, j], spectra.mobility(modes, at, to, frequencies), rtol=1e-10)
+    s = 2j * np.pi * frequencies[:, None, None]
+    assert_allclose(found["receptance"] * s, found["mobility"], rtol=1e-12)
+    assert_allclose(found["receptance"] * s**2, found["accelerance"], rtol=1e-12)
+    row = spectra.mobility(modes, points[0], points[1:], frequencies)
+    assert_allclose(row, found["mobility"][:, 1:, :1], rtol=1e-10)
+
+
+def test_an_undamped_mode_is_infinite_at_its_frequency_but_at_its_nodes():
+    modes = analytic.Modes.from_arrays([100.0, 300.0], [[1.0, 1.0], [0.0, 1.0]], points=[[0.0], [1.0]], mass=1.0)
+    found = np.abs(spectra.mobility(modes, [[0.0], [1.0]], [[0.0], [1.0]], [100.0, 200.0]))
+    assert np.isinf(found[0]).tolist() == [[True, False], [False, False]]
+    s = 2.0 * np.pi
+    assert_allclose(found[0, 1, 1], s * 100.0 / (s**2 * (300.0**2 - 100.0**2)), rtol=1e-12)  # the other mode alone
+    assert np.isfinite(found[1]).all()
+
+
 def test_frequencies_must_be_positive():
     modes = analytic.Modes.rigid(2.0)
+    with pytest.raises(ValueError, match="quantity must be one of receptance, mobility, accelerance"):
+        spectra.mobility(modes, None, None, [1.0], "compliance")
     with pytest.raises(ValueError, match="frequencies must be positive, got 0 Hz"):
         spectra.mobility(modes, None, None, [0.0])

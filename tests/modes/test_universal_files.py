@@ -8,8 +8,9 @@ from fem_impact import mesh
 from fem_impact.fe.assembly import assemble
 from fem_impact.fe.section import Beam, Material, Plate
 from fem_impact.modes import universal_files
+from fem_impact.modes.air import in_air
 from fem_impact.modes.modal import Modes, find_modes
-from fem_impact.show import export
+from fem_impact.show import export, figures, sampling
 
 pyuff = pytest.importorskip("pyuff", reason="the uff extra is not installed")
 pytestmark = pytest.mark.usefixtures("read_here")
@@ -42,6 +43,50 @@ def test_nodes_and_triangles_are_in_the_file(tmp_path):
     assert_allclose([element["nodes_nums"] for element in sets[2][91]], cells + 1)  # 91: thin shell triangle
 
 
+def test_elements_come_back_and_connect_the_measured_points(tmp_path):
+    modes, points, cells, path = written(tmp_path)
+    again = Modes.from_uff(path, mass=modes.mass)
+    assert np.array_equal(again.shapes.grid()[1], cells)
+    assert not again.continuous and modes.continuous
+    drawn = sampling.grid(again)  # not refined: nothing is known between the points
+    assert_allclose(drawn[0], points, atol=1e-9)
+    assert np.array_equal(drawn[1], cells)
+    figure = figures.mode_shapes(again, count=4)
+    assert len(figure.axes) >= 4
+    export.write_uff(tmp_path / "again.uff", again)
+    assert np.array_equal(Modes.from_uff(tmp_path / "again.uff", mass=modes.mass).shapes.grid()[1], cells)
+    with pytest.raises(ValueError, match="in_air needs"):
+        in_air(again)
+
+
+def test_other_elements_are_taken_by_their_corners(tmp_path):
+    _, points, _, path = written(tmp_path)
+    sets = pyuff.UFF(str(path)).read_sets()
+
+    def element(code, nodes):
+        beam = {"beam_orientation": 0, "beam_foreend_cross": 1, "beam_aftend_cross": 1} if code == 11 else {}
+        return {"element_nums": 1, "fe_descriptor": code, "phys_table": 1, "mat_table": 1, "color": 1,
+                "num_nodes": len(nodes), "nodes_nums": nodes} | beam  # fmt: skip
+
+    mixed = [(94, [1, 2, 3, 4]), (92, [1, 9, 2, 8, 3, 7]), (95, [1, 9, 2, 8, 3, 7, 5, 6]), (11, [1, 2]),
+             (111, [1, 2, 3, 4]), (91, [1, 2, 999_999])]  # fmt: skip
+    table = {}
+    for code, nodes in mixed:
+        table.setdefault(code, []).append(element(code, nodes))
+    other = tmp_path / "mixed.uff"
+    kept = [s for s in sets if s["type"] != 2412]
+    pyuff.UFF(str(other)).write_sets([{"type": 2412} | table, *kept], mode="add")
+    found = {tuple(cell) for cell in Modes.from_uff(other, mass=1.0).shapes.grid()[1].tolist()}
+    assert found == {(0, 1, 2), (0, 2, 3), (0, 2, 4)}  # quadrilateral halved; (0, 1, 2) is in three of them
+    bare = tmp_path / "bare.uff"
+    solid = element(116, list(range(1, 21)))  # on three lines, as the format has it
+    pyuff.UFF(str(bare)).write_sets([{"type": 2412, 116: [solid]}, *kept], mode="add")
+    line = "".join(f"{node:10d}" for node in range(1, 21))
+    assert line in bare.read_text()
+    bare.write_text(bare.read_text().replace(line, "\n".join((line[:80], line[80:160], line[160:]))))
+    assert Modes.from_uff(bare, mass=1.0).shapes.grid()[1].shape == (len(points), 1)  # points alone
+
+
 def test_a_beam_comes_back_as_a_line_of_points(tmp_path):
     beam = Beam.rectangular(Material(E=210e9, nu=0.3, rho=7850.0), width=0.02, height=0.01)
     modes = find_modes(assemble(mesh.line(1.0, size=0.1), beam, {"left": "clamped"}), n_modes=3)
@@ -52,6 +97,7 @@ def test_a_beam_comes_back_as_a_line_of_points(tmp_path):
     again = Modes.from_uff(tmp_path / "bar.unv", mass=modes.mass)
     assert again.dimension == 1
     assert_allclose(again.shape_at([1.0]), modes.shape_at([1.0]), rtol=1e-5)
+    assert np.array_equal(again.shapes.grid()[1], cells)
 
 
 def test_shapes_are_scaled_by_their_modal_mass(tmp_path):

@@ -5,6 +5,7 @@ import pytest
 
 import fem_impact as fi
 from fem_impact.taps import blows, rig
+from fem_impact.taps.unknowns import Setting
 
 AT = (0.17, 0.11)
 
@@ -31,6 +32,27 @@ def test_a_quick_blow_agrees_with_strike_and_its_record_with_measure(plate, hamm
     wanted = fi.measure(hit, rate=25600.0, at=(0.1, 0.1), before=20 / 25600, duration=80 / 25600)
     assert np.abs(found[0] - wanted.force[0]).max() < 3e-5 * wanted.peak[0]  # 40 steps per contact
     assert np.abs(found[1] - wanted.response[0, :, 0]).max() < 1e-4 * np.abs(wanted.response).max()
+
+
+@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
+@pytest.mark.parametrize(
+    "law",
+    [fi.Contact.felt(1e8, 2.0, hysteresis=0.4, relaxation=1e-4), fi.Contact.elastic_plastic(1e7, yield_approach=5e-5),
+     fi.Contact.layers(1e6, 1.2, depth=1e-4, hard_stiffness=1e9)],
+    ids=["felt", "plastic", "layers"],
+)  # fmt: skip
+def test_a_quick_blow_of_a_law_with_memory_or_corners_agrees_with_strike(plate, law):
+    hammer = fi.Striker.rigid(0.02)
+    hit = fi.strike(plate, hammer, law, at=AT, speed=1.3, tolerance=1e-5)
+    pair = blows.pair(blows.of_striker(hammer), blows.of_target(plate, AT), law)
+    duration = Setting(plate, AT, hammer, law, rig.Rig(25600.0), (), None, 0, hit.impulse).duration({})
+    assert duration == pytest.approx(hit.contact_time, rel=0.25)  # on a wall, at half the impulse
+    history = blows.run(pair, 1.3, blows.longest_step(pair, duration), 3e-3)
+    times = np.linspace(0.0, hit.contact_time, 200)[1:-1]
+    with np.errstate(all="ignore"):  # rates of the force, not used here, are infinite at corners
+        found, wanted = (one.force_at(times, 0)[0] for one in (history, hit.history))
+    assert np.abs(found - wanted).max() < 2e-4 * hit.peak_force  # 40 steps per contact; 4e-5 measured
+    assert abs(history.impulses.sum() - hit.impulse) < 2e-5 * hit.impulse
 
 
 def test_a_scaled_body_is_the_scaled_modes(plate):

@@ -101,6 +101,39 @@ def test_a_response_tells_what_the_force_cannot(structure):
     assert low < 1.0 < high and high / low < 1.1
 
 
+LOSING = {
+    "felt": (
+        fi.Contact.felt(5e8, 1.8, hysteresis=0.4, relaxation=4e-4), fi.Contact.power(5e8, 1.8),
+        {"contact.stiffness": (1e6, 1e11), "contact.hysteresis": (0.0, 0.9), "contact.relaxation": (2e-5, 1e-2)},
+    ),
+    "plastic": (
+        fi.Contact.elastic_plastic(2e8, 1.5, yield_approach=3e-5), fi.Contact.hertz(1e8),
+        {"contact.stiffness": (1e6, 1e11), "contact.yield_approach": (5e-6, 5e-4)},
+    ),
+    "layers": (
+        fi.Contact.layers(2e6, 1.0, depth=1e-4, hard_stiffness=5e8), fi.Contact.linear(1e6),
+        {
+            "contact.stiffness": (1e5, 1e8), "contact.depth": (2e-5, 5e-4), "contact.hard_stiffness": (1e7, 1e10),
+        },
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", LOSING)
+def test_any_number_of_a_contact_is_found_by_its_name(structure, kind):
+    truth, guess, ranges = LOSING[kind]
+    taps = taps_of(structure, [0.0], law=truth, noise=0.001)
+    made = fi.fit(
+        taps, target=structure, at=[0.0], striker=fi.Striker.rigid(MASS), contact=guess, unknown=ranges, starts=3
+    )
+    assert made.unidentifiable == () and made.whiteness > 0.01
+    for name in ranges:
+        wanted = getattr(truth, name.partition(".")[2])
+        low, high = made.interval(name, 0.95)
+        assert low < wanted < high  # this seed's noise
+        assert getattr(made.contact, name.partition(".")[2]) == pytest.approx(wanted, rel=0.02)  # 0.6 % measured
+
+
 def test_a_tap_that_disagrees_is_named(structure):
     taps = taps_of(structure, [0.0], speeds=(0.4, 0.7, 1.0, 1.3))
     other = taps_of(structure, [0.0], law=fi.Contact.power(2e8, 1.7), speeds=(0.9,))
@@ -147,6 +180,13 @@ def test_wrong_arguments_are_refused(structure):
         fi.fit(taps, response_at=[[0.0]], **given)
     with pytest.raises(ValueError, match="known and unknown both name"):
         fi.fit(taps, known={"striker.mass": 0.1}, **given)
+    with pytest.raises(ValueError, match="known must be one of"):
+        fi.fit(taps, known={"contact.hardness": 0.1}, **given)
+    felt = {"contact.hysteresis": (0.0, 0.9), "contact.exponent": (0.8, 3.0)}
+    with pytest.raises(ValueError, match="make a contact within all ranges: relaxation must be positive"):
+        fi.fit(taps, **given | {"unknown": {"contact.hysteresis": (0.0, 0.9)}})
+    with pytest.raises(ValueError, match="make a contact within all ranges: exponent must be at least 1"):
+        fi.fit(taps, known={"contact.relaxation": 1e-3}, **given | {"unknown": felt})
     with pytest.raises(ValueError, match="taps must be"):
         fi.fit(3, **given)
     cut = fi.Taps.from_arrays(taps[0].force, rate=RATE, overload=True)

@@ -1,10 +1,13 @@
 """Material constants from measured frequencies."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import fem_impact as fi
 
+DISK = Path(__file__).parents[2] / "studies" / "scenes" / "disk.toml"
 # [Hz] measured on a wooden plate 0.212 x 0.108 x 0.0045 m, 457 kg/m^3, clamped at one side
 # (Nemus-Project/magpie-matlab, MIT licence)
 MEASURED = (87.0, 160.0, 540.0, 616.0, 651.0, 1061.0)
@@ -39,6 +42,28 @@ def test_a_bar_gives_its_modulus_and_says_how_well():
     assert len(found.pairs) == 5 and found.error < 3e-3
 
 
+def test_a_scene_file_gives_its_constants_by_their_names(tmp_path):
+    true = fi.load_scene(DISK).modes(6).frequencies[[0, 1, 3, 5]]  # modes in pairs are measured once
+    off = tmp_path / "off.toml"
+    off.write_text(DISK.read_text().replace("E = 210e9\nnu = 0.3\nrho = 7850.0\n\n[section]",
+                                            "E = 150e9\nnu = 0.3\nrho = 7000.0\n\n[section]"))  # fmt: skip
+    for build in (str(off), fi.load_scene(off)):
+        found = fi.update(build, true, unknown={"material.E": (50e9, 500e9)})
+        assert found.values["material.E"] == pytest.approx(210e9 * 7000.0 / 7850.0, rel=1e-5)  # E / rho is told
+        assert found.error < 1e-5
+    scaled = fi.load_scene(off).changed(found.values | {"section.thickness": 5e-3})
+    assert scaled.modes(1).frequencies[0] == pytest.approx(0.5 * true[0], rel=1e-5)
+
+
+def test_rigid_motions_are_not_counted_among_the_measured():
+    def free(values):
+        return fi.assemble(fi.mesh.rectangle(0.4, 0.3), fi.Plate(fi.Material(E=values["E"], nu=0.3, rho=2700.0), 3e-3))
+
+    true = fi.find_modes(free({"E": 70e9}), n_modes=8).frequencies[3:]
+    found = fi.update(free, true, {"E": (20e9, 200e9)})  # 5 frequencies and 3 rigid motions
+    assert found.values["E"] == pytest.approx(70e9, rel=1e-6) and len(found.pairs) == 5
+
+
 def test_constants_that_only_act_together_are_called_untold():
     def body(values):
         return fi.Modes.from_arrays(
@@ -62,3 +87,9 @@ def test_wrong_arguments_are_refused():
         fi.update(plate, [100.0], {"E": (0.0, 2.0)})
     with pytest.raises(ValueError, match="must be a function"):
         fi.update(3, [100.0], {"E": (1.0, 2.0)})
+    with pytest.raises(ValueError, match="E_long is not a key"):
+        fi.update(DISK, [100.0], {"material.E_long": (1.0, 2.0)})
+    with pytest.raises(ValueError, match="must be one of mesh, material, section, target, supports"):
+        fi.update(DISK, [100.0], {"striker.mass": (1.0, 2.0)})
+    with pytest.raises(ValueError, match="must name numbers in tables of the scene"):
+        fi.update(DISK, [100.0], {"supports.boundary": (1.0, 2.0)})
