@@ -57,6 +57,7 @@ INNER = {
     "explore.serve",  # ends at an interruption only, see test_explore
     "ToleranceWarning", "analytic.closed_form",
     "Taps", "Taps.summary",  # made by read_taps and Taps.from_arrays
+    "pictures.gallery", "pictures.film", "hammers.choose_on",
     "Modes", "sound.Sound.audible", "sound.Sound.faded", "sound.Sound.wav", "hammers.Hammer.data",
 }  # fmt: skip
 
@@ -388,7 +389,7 @@ def cases(names: Any = None) -> Iterator[tuple[str, str, str]]:
 
 # --- the judge -------------------------------------------------------------------------------------------------------
 
-INFINITE = {"threshold_frequency", "mobility"}  # documented to give inf
+INFINITE = {"threshold_frequency", "mobility", "Response.motion_error"}  # documented to give inf
 ENDLESS = {"order"}  # fields documented to be infinite now and then
 OTHER_NAMES = {  # parameter: words under which an error may speak of it besides its own name
     **dict.fromkeys(("length", "width", "radius", "factor", "corners", "hole"), ("size", "outline", "max_frequency")),

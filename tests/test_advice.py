@@ -76,8 +76,8 @@ def test_a_band_that_is_too_wide_gets_its_limit(tmp_path, quantity, target):
 
 def test_a_map_of_too_many_modes_proposes_a_tolerance(tmp_path, monkeypatch):
     monkeypatch.setitem(planner.MOST_MODES, "fe", 150)
-    found = loaded(tmp_path, QUICK.replace('source = "analytic"', 'source = "fe"'))
-    over = {"contact.stiffness": [1e3, 1e5]}
+    text = QUICK.replace('source = "analytic"', 'source = "fe"').replace("[strike]", "[strike]\nresidual = false")
+    found, over = loaded(tmp_path, text), {"contact.stiffness": [1e3, 1e5]}
     with pytest.raises(fi.SimulationError, match="leave out the stiffest contacts") as caught:
         maps.map_scene(found, over=over, tolerance=1e-9)
     enough = float(re.search(r"tolerance = (\S+) is affordable", str(caught.value))[1])
@@ -381,7 +381,7 @@ ADVICE = {  # what fails, the message, and what it advises
     ),
     "vectors with a number of modes": (
         lambda _: planned(target="vectors", n_modes=9),
-        "target = 'vectors' needs a plate .*; use target = 'modal'",
+        "target = 'vectors' needs a thin plate in a vacuum .*; use target = 'modal'",
         lambda _: planned(target="modal", n_modes=9),
     ),
     "no scale of closed forms": (

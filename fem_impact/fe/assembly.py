@@ -263,14 +263,20 @@ def _check_on(space: Any, frame: Frame, name: str, points: np.ndarray) -> None:
         raise ValueError(f"{name} must lie on the body, got ({where}) m")
 
 
-def reassemble(system: System, mesh: Mesh, near: np.ndarray | None = None, layer: float | None = None) -> System:
+def reassemble(
+    system: System,
+    mesh: Mesh,
+    near: np.ndarray | None = None,
+    layer: float | None = None,
+    element: str | None = None,
+) -> System:
     """Assemble the same body on another mesh.
 
-    ``near`` (n_points, dimension) [m] and ``layer`` replace those of the system.
+    ``near`` (n_points, dimension) [m], ``layer`` and ``element`` replace those of the system.
     """
     near, layer = system.near if near is None else near, system.layer if layer is None else layer
     rest = list(system.point_masses), near, system.graded, layer
-    return _made(mesh, system.section, system.supports, system.element, *rest)
+    return _made(mesh, system.section, system.supports, element or system.element, *rest)
 
 
 def notes_on(mesh: Mesh, section: Plate | Beam) -> tuple[str, ...]:

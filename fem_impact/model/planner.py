@@ -566,7 +566,7 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     if not fits:
         if target == "vectors":
             raise ValueError(
-                f"{blow.name}target = 'vectors' needs a thin plate by elements that can be meshed again, its residual, "
+                f"{blow.name}target = 'vectors' needs a thin plate in a vacuum by elements that can be meshed again, its residual, "
                 "no n_modes or max_frequency, and no damping ratios given mode by mode; use target = 'modal'"
             )
         return None
