@@ -381,7 +381,7 @@ ADVICE = {  # what fails, the message, and what it advises
     ),
     "vectors with a number of modes": (
         lambda _: planned(target="vectors", n_modes=9),
-        "target = 'vectors' needs a plate .*; use target = 'modal'",
+        "target = 'vectors' needs a thin plate .*; use target = 'modal'",
         lambda _: planned(target="modal", n_modes=9),
     ),
     "no scale of closed forms": (
