@@ -118,7 +118,7 @@ def in_air(
     (True, True)
     """
     density, speed = check.positive("density", density, "kg/m^3"), check.positive("speed", speed, "m/s")
-    if sides not in (1, 2):
+    if check.count("sides", sides) > 2:
         raise ValueError(f"sides must be 1 or 2, got {sides}")
     points, cells = modes.shapes.grid()
     if modes.dimension != 2 or not modes.continuous:
