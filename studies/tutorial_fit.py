@@ -99,8 +99,8 @@ def leftover(found, taps: fi.Taps) -> list[str]:
         noise = float(np.std(whole[:begin])) / float(np.linalg.norm(one.measured)) * np.sqrt(len(square))
         lines.append(
             f"  {taps.labels[i]}: {100 * one.error:.2g} % of the rms force, {100 * shares[0]:.0f} % of its square "
-            f"while the force rises, {100 * shares[1]:.0f} % while it falls, {100 * shares[2]:.0f} % outside the pulse; half "
-            f"below {middle:.0f} Hz, 90 % below {high:.0f} Hz; noise before the trigger {100 * noise:.1g} % rms; peak "
+            f"while the force rises, {100 * shares[1]:.0f} % while it falls, {100 * shares[2]:.0f} % outside the pulse; "
+            f"half below {middle:.0f} Hz, 90 % below {high:.0f} Hz; noise before the trigger {100 * noise:.1g} % rms; peak "
             f"{one.measured[peak]:.0f} N, {1e6 * width(one.measured, taps.rate):.0f} us above half of it"
         )
     first, second = (
@@ -113,7 +113,7 @@ def leftover(found, taps: fi.Taps) -> list[str]:
         for moved in (np.roll(two, shift) for shift in range(-FINE, FINE + 1))
     )
     lines.append(
-        f"  The two hardest taps, moved and scaled onto each other without any law, differ by {100 * best:.2g} % rms."
+        f"  The two hardest taps, moved and scaled onto each other without any law, differ by {100 * best:.1f} % rms."
     )
     return lines
 
