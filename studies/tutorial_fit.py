@@ -98,10 +98,10 @@ def leftover(found, taps: fi.Taps) -> list[str]:
         whole, begin = taps.force[i], int(taps.onset[i] * taps.rate) - QUIET
         noise = float(np.std(whole[:begin])) / float(np.linalg.norm(one.measured)) * np.sqrt(len(square))
         lines.append(
-            f"  {taps.labels[i]}: {100 * one.error:.2g} % of the rms force, {100 * shares[0]:.0f} % of its square "
-            f"while the force rises, {100 * shares[1]:.0f} % while it falls, {100 * shares[2]:.0f} % outside the pulse; "
-            f"half below {middle:.0f} Hz, 90 % below {high:.0f} Hz; noise before the trigger {100 * noise:.1g} % rms; peak "
-            f"{one.measured[peak]:.0f} N, {1e6 * width(one.measured, taps.rate):.0f} us above half of it"
+            f"  {taps.labels[i]}: {100 * one.error:.2g} % of the rms force; of its square {100 * shares[0]:.0f} % "
+            f"while the force rises, {100 * shares[1]:.0f} % while it falls, {100 * shares[2]:.0f} % outside; "
+            f"half below {middle:.0f} Hz, 90 % below {high:.0f} Hz; before the trigger {100 * noise:.1g} % of noise; "
+            f"peak {one.measured[peak]:.0f} N, {1e6 * width(one.measured, taps.rate):.0f} us above half of it"
         )
     first, second = (
         found.left_out()[i].measured for i in np.argsort([-one.measured.max() for one in found.left_out()])[:2]
