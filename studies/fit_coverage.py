@@ -1,12 +1,15 @@
 """Do the intervals of `fi.fit` hold the truth as often as they say, and does it name what the data do not tell?
 
     python studies/fit_coverage.py [--sets 0] [--first 0] [--file studies/fit_coverage.csv] [--out studies/pictures]
+    python studies/fit_coverage.py --timed 3
 
 Makes that many sets of taps of a random hammer through a random contact law on a wall, a known plate or a structure of
 one unknown mode, measured with 0.5 % of noise at 25.6 or 51.2 kHz (3 to 10 taps), fits each, and appends one line for
 each unknown to the file. Then prints what all lines of the file say and draws fit_coverage.png; without --sets it only
 does this. What no data can tell is known beforehand: from force alone, a hammer's mass, the stiffness and the loss of a
 tip on a wall go together, and so do the masses of a hammer and of an unknown structure.
+
+With --timed it prints instead how long fits of five taps with six unknowns take, the best of that many repetitions.
 """
 
 import argparse
@@ -123,6 +126,48 @@ def weak(found: Found, name: str) -> bool:
     return bool(2.0 * 1.645 * spread > WEAK * (high - low))
 
 
+def five_taps(kind: str):
+    """Five taps of a plate or of a structure of one mode, and what fits six unknowns to them."""
+    law = fi.Contact.power(3e8, 1.6, loss=0.2)
+    ranges = {"contact.stiffness": (1e6, 1e11), "contact.exponent": (1.0, 3.0), "contact.loss": (0.0, 2.0)}
+    given = {"contact": fi.Contact.hertz(1e7), "striker": fi.Striker.rigid(0.1)}
+    if kind == "plate":  # known, struck at an unknown point
+        target = fi.analytic.rectangle(0.5, 0.4, mass=1.5, first_frequency=90.0, n_modes=30, damping_ratio=0.01)
+        at, guess = (0.21, 0.13), (0.25, 0.2)
+        given |= {"target": target, "at": guess}
+        ranges |= {"striker.mass": (0.02, 0.5), "target.x": (0.1, 0.4), "target.y": (0.08, 0.32)}
+    else:
+        target = fi.Modes.from_arrays([700.0], [[0.8**-0.5]], points=[[0.0]], mass=0.8, damping_ratio=0.03)
+        at = [0.0]
+        ranges |= {"mode1.frequency": (200.0, 3e3), "mode1.mass": (0.1, 5.0), "mode1.damping": (0.005, 0.2)}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fi.ToleranceWarning)
+        hits = [fi.strike(target, fi.Striker.rigid(0.1), law, at=at, speed=v) for v in (0.5, 0.7, 1.0, 1.3, 1.6)]
+    taps = [fi.measure(hit, rate=25600.0, noise=NOISE, rng=i, duration=8e-3) for i, hit in enumerate(hits)]
+    return taps, {"unknown": ranges, **given}
+
+
+def timed(count: int) -> dict[str, tuple[float, float]]:
+    """Seconds of the search and of search and profiles, the least of ``count`` repetitions, printed."""
+    found = {}
+    for kind in ("plate", "mode"):
+        taps, given = five_taps(kind)
+        seconds = []
+        for _ in range(count):
+            start = time.perf_counter()
+            made = fi.fit(taps, profiles=False, **given)
+            searched = time.perf_counter() - start
+            told = sum(profile.told == "told" for profile in made.profiles.values())
+            seconds.append((searched, time.perf_counter() - start))
+        search, whole = map(min, zip(*seconds))
+        found[kind] = search, whole
+        print(
+            f"{kind}: five taps, {len(made.names)} unknowns ({told} told): {search:.2g} s, with profiles {whole:.2g} s "
+            f"(one process, best of {count})"
+        )
+    return found
+
+
 def read(path: Path) -> list[dict]:
     with path.open() as file:
         rows = list(csv.DictReader(file))
@@ -203,7 +248,11 @@ def main(arguments: list[str] | None = None) -> list[dict]:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--file", type=Path, default=HERE / "fit_coverage.csv")
     parser.add_argument("--out", type=Path, default=HERE / "pictures")
+    parser.add_argument("--timed", type=int, default=0)
     options = parser.parse_args(arguments)
+    if options.timed:
+        timed(options.timed)
+        return []
     for number in range(options.first, options.first + options.sets):
         rows = examine(number)
         new = not options.file.exists()

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import resample
 
 import fem_impact as fi
 from fem_impact.pages import fit_page
@@ -34,6 +35,8 @@ MODELS = {  # name -> law to begin with, unknowns
 PLATE = {"length": 0.4, "width": 0.3, "mass": 1.62, "first_frequency": 190.0}  # 5 mm of aluminium, hinged
 AT = (0.2, 0.15)  # m, its middle
 HEADS = np.geomspace(0.02, 1.0, 25)  # [kg] of other hammers
+FINE = 16  # [-] points per sample of the interpolation of a pulse
+QUIET = 12  # [samples] before the onset that are not taken for noise: the filter rings there
 TIPS = np.geomspace(1e-3, 10.0, 33)  # [-] stiffness of other tips over the one found
 
 
@@ -71,6 +74,48 @@ def compare(taps: fi.Taps) -> list[Verdict]:
             Verdict(name, made.error, max(one.error for one in left_out), max(one.error_of_peak for one in left_out))
         )
     return found
+
+
+def width(tap: np.ndarray, rate: float) -> float:
+    """Time [s] for which a tap (n_times,) exceeds half its peak, of its band-limited interpolation."""
+    fine = resample(tap, FINE * len(tap))
+    return float(np.count_nonzero(fine > 0.5 * fine.max()) / (FINE * rate))
+
+
+def leftover(found, taps: fi.Taps) -> list[str]:
+    """What is left of every tap predicted from the others: where in the pulse, at which frequencies, above what noise;
+    and how much two taps of nearly the same peak differ, whatever the law."""
+    lines = []
+    for i, one in enumerate(found.left_out()):
+        square, peak = one.residual**2, int(one.measured.argmax())
+        inside = one.measured > 0.05 * one.measured[peak]
+        places = np.arange(len(square))
+        shares = [float(square[part].sum() / square.sum()) for part in
+                  (inside & (places <= peak), inside & (places > peak), ~inside)]  # fmt: skip
+        power = np.cumsum(np.abs(np.fft.rfft(one.residual)) ** 2)
+        frequency = np.fft.rfftfreq(len(square), 1.0 / taps.rate)
+        middle, high = (frequency[np.searchsorted(power, part * power[-1])] for part in (0.5, 0.9))
+        whole, begin = taps.force[i], int(taps.onset[i] * taps.rate) - QUIET
+        noise = float(np.std(whole[:begin])) / float(np.linalg.norm(one.measured)) * np.sqrt(len(square))
+        lines.append(
+            f"  {taps.labels[i]}: {100 * one.error:.2g} % of the rms force; of its square {100 * shares[0]:.0f} % "
+            f"while the force rises, {100 * shares[1]:.0f} % while it falls, {100 * shares[2]:.0f} % outside; "
+            f"half below {middle:.0f} Hz, 90 % below {high:.0f} Hz; before the trigger {100 * noise:.1g} % of noise; "
+            f"peak {one.measured[peak]:.0f} N, {1e6 * width(one.measured, taps.rate):.0f} us above half of it"
+        )
+    first, second = (
+        found.left_out()[i].measured for i in np.argsort([-one.measured.max() for one in found.left_out()])[:2]
+    )
+    one, two = (np.roll(fine, FINE * len(first) // 2 - int(fine.argmax())) for fine in
+                (resample(first, FINE * len(first)), resample(second, FINE * len(second))))  # fmt: skip
+    best = min(
+        np.linalg.norm(one - (one @ moved) / (moved @ moved) * moved) / np.linalg.norm(one)
+        for moved in (np.roll(two, shift) for shift in range(-FINE, FINE + 1))
+    )
+    lines.append(
+        f"  The two hardest taps, moved and scaled onto each other without any law, differ by {100 * best:.1f} % rms."
+    )
+    return lines
 
 
 def plate() -> fi.Modes:
@@ -125,6 +170,8 @@ def main(folder: Path) -> dict:
     free = fitted("power law with loss", taps, {"striker.mass": (0.02, 1.0)}, profiles=True)
     print(free.summary())
     best = fitted("the same behind a springy tip", taps)
+    print("\nWhat is left of each tap predicted from the other three, by the springy tip:")
+    print("\n".join(leftover(best, taps)))
     fi.figures.save(folder / "fit_pulses.png", fit_page.pulses(best))
     fi.figures.save(folder / "fit_profiles.png", fit_page.profiles(free))
 
