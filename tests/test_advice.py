@@ -14,6 +14,7 @@ import fem_impact as fi
 from fem_impact import cli
 from fem_impact.impact import collision
 from fem_impact.model import planner
+from fem_impact.model.target import Target
 from fem_impact.pages import report
 from fem_impact.scenes import maps, schema
 
@@ -383,6 +384,11 @@ ADVICE = {  # what fails, the message, and what it advises
         lambda _: planned(target="vectors", n_modes=9),
         "target = 'vectors' needs a thin plate in a vacuum .*; use target = 'modal'",
         lambda _: planned(target="modal", n_modes=9),
+    ),
+    "air around a beam": (
+        lambda _: Target(fi.mesh.line(0.4), BEAM, air="both sides"),
+        "air is known around plates only; leave it out",
+        lambda _: Target(fi.mesh.line(0.4), BEAM),
     ),
     "no scale of closed forms": (
         lambda _: fi.analytic.rectangle(0.4, 0.3, mass=0.2, n_modes=4),

@@ -566,8 +566,8 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     if not fits:
         if target == "vectors":
             raise ValueError(
-                f"{blow.name}target = 'vectors' needs a thin plate in a vacuum by elements that can be "
-                "meshed again, its residual, no n_modes or max_frequency, and no damping ratios given mode by mode; use target = 'modal'"
+                f"{blow.name}target = 'vectors' needs a thin plate in a vacuum by elements that can be meshed again, "
+                "its residual, no n_modes or max_frequency, and no damping ratios mode by mode; use target = 'modal'"
             )
         return None
     band = asked.quantities.get("sound")
