@@ -263,6 +263,7 @@ def main() -> None:
         everything = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20_000)
         reference = fi.strike(everything, **blow(exact), tolerance=1e-9)
         found = [replace(dial, error=difference(dial.run.response, reference)) for dial in found]
+        print(table(found), flush=True)
         through = dials(whole, "modal") if options.modes else []
         parts = {} if options.only_chain else {
             "first 60 frequencies: mesh and element": meshes(),
@@ -270,7 +271,6 @@ def main() -> None:
             "blow: step and scheme": steps(exact, reference),
         }  # fmt: skip
         panels = {**parts, "from mesh to response": combinations(whole, reference)}
-    print(table(found))
     print("\n".join(cheapest(list(panels.values())[-1], found)))
     print("\n".join(["predicted and measured:", *predictions(found)]))
     for one, other in zip(found, through):
