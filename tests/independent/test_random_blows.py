@@ -410,7 +410,7 @@ ALL |= dict.fromkeys(reference.OUTLINES, 0.15 / len(reference.OUTLINES))
 
 @pytest.fixture(scope="module")
 def few(tmp_path_factory):
-    return judged_blows(SEED, 75, QUICK, (-4.0, -2.0), tmp_path_factory.mktemp("few"))
+    return judged_blows(SEED, 50, QUICK, (-4.0, -2.0), tmp_path_factory.mktemp("few"))
 
 
 @pytest.fixture(scope="module")

@@ -228,6 +228,7 @@ def test_a_plate_gives_what_its_series_says_at_many_points(name, all_cases):
     check(name, ALL if all_cases else SLOW)
 
 
+@pytest.mark.slow
 def test_a_clamped_rectangle_gives_what_mixed_elements_say():
     pytest.importorskip("ngsolve")
     check("clamped rectangle", MIXED_FAST)

@@ -138,6 +138,7 @@ def test_sliders_change_the_pictures(opened):
     assert shown.errors == []
 
 
+@pytest.mark.slow
 def test_click_moves_the_strike_point(opened):
     shown = opened()
     place = "JSON.stringify(Bokeh.documents[0].get_model_by_name('at').data)"

@@ -96,6 +96,7 @@ def test_a_saved_scene_strikes_as_the_page_does(stand, tmp_path):
 ELEMENTS = TEXT.replace('source = "analytic"', 'source = "fe"').replace("stiffness = 695e3", "stiffness = 2e6")
 
 
+@pytest.mark.slow
 def test_hard_blows_on_elements_are_resolved_by_vectors(tmp_path):
     """Where the first modes leave the contact unresolved; against a thousand modes in closed form."""
     (tmp_path / "elements.toml").write_text(ELEMENTS)

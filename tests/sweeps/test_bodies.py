@@ -49,6 +49,7 @@ def test_a_map_of_elements_is_that_of_the_closed_form(law, soft, hard, tolerance
     assert (table.truncation > 0.0).all()
 
 
+@pytest.mark.slow
 def test_cells_at_several_points_are_single_blows_there():
     points = [(0.2, 0.11), (0.1, 0.2), (0.33, 0.08)]
     over = {"mass": [5e-3, 0.03], "at": points}

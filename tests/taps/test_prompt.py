@@ -31,6 +31,7 @@ def test_frf_of_a_file_lists_peaks_and_writes_a_table(tmp_path, capsys):
     assert rows.shape[1] == 4 and rows[-1, 0] == pytest.approx(12800.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_frf_of_a_scene_finds_its_modes(tmp_path, capsys):
     scene = ROOT / "studies" / "scenes" / "drumstick.toml"
     assert cli.main(["frf", str(scene), "--rate", "12800"]) == 0
