@@ -30,7 +30,7 @@ PATIENCE, LEAST_GAIN = 3, 0.7  # [-] more vectors are given up if so many steps 
 TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before
 SHARE = 0.45  # [-] of what the steps leave of the tolerance, for too few vectors, before the mesh is compared
 COARSER = 1.5  # [-] element size of the comparison over that of the blow
-MOST_VECTORS = 1500  # [-] limit on their number: dense matrices of this size take a second
+MOST_VECTORS = 1000  # [-] limit on their number: beyond, rounding of the highest pairs outgrows what is gained
 
 
 def usable(target: Target) -> bool:
