@@ -149,7 +149,7 @@ REMEDIES = {
     ),
     "still air, a light plate": (
         lambda: blow(plate(1e-3, SPRUCE, 20), law=fi.Contact.hertz(1e7)),
-        "^take the modes in air, from `fi.in_air`$",
+        r'^take the modes in air: air = "both sides" under \[target\], or `fi\.in_air`$',
         [lambda: blow(fi.in_air(plate(1e-3, SPRUCE, 20)), law=fi.Contact.hertz(1e7))],
     ),
     "still air, a beam of no known width": (

@@ -23,7 +23,7 @@ AIR = (1.204, 343.2)  # [kg/m^3], [m/s] density and speed of sound at 20 degrees
 LIMIT = 0.02  # [-] mass of the air over that of the body at which frequencies drop by 1 %
 ROUNDED = 0.1  # [-] of k**2: k**2 - k_0**2 does not get smaller, as the waves of a finite plate are not straight
 NUMBER = "mass of the air moved over that of the body"
-IN_AIR = "take the modes in air, from `fi.in_air`"
+IN_AIR = 'take the modes in air: air = "both sides" under [target], or `fi.in_air`'
 
 
 def of_target(struck: Struck) -> Assumption:
