@@ -25,8 +25,8 @@ from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 
-import frontier
 import numpy as np
+import scene_speed
 
 import fem_impact as fi
 from fem_impact.model import cost, planner
@@ -61,7 +61,7 @@ def tight(folder: Path, only: Sequence[str] = ()) -> list[tuple[Path, float]]:
             path = next((HERE / "scenes").rglob(f"{body}.toml"))
         else:
             path = folder / f"plate_{body:.0e}.toml"
-            path.write_text(frontier.SCENE.format(source="fe").replace("695e3", f"{body:g}"))
+            path.write_text(scene_speed.FRONTIER.format(source="fe").replace("695e3", f"{body:g}"))
         if not only or any(part in path.stem for part in only):
             found.append((path, tolerance))
     return found

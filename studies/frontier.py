@@ -27,30 +27,10 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+import scene_speed
 
 import fem_impact as fi
 
-SCENE = """
-[mesh]
-shape = "rectangle"
-length = 1.55
-width = 1.0
-[target]
-mass = 0.2
-first_frequency = 100.0
-source = "{source}"
-[supports]
-boundary = "hinged"
-[striker]
-kind = "rigid"
-mass = 0.0333333333333333
-[contact]
-kind = "hertz"
-stiffness = 695e3
-[strike]
-at = [0.465, 0.3]
-speed = 1.0
-"""
 TOLERANCES = [10.0**-n for n in range(1, 9)]
 SIZES = (0.5, 0.35, 0.25, 0.18, 0.125, 0.09, 0.06)  # [m] of elements
 NUMBERS = (10, 20, 40, 80, 160, 320, 640, 1280)  # [-] numbers of modes
@@ -89,7 +69,7 @@ def timed(make: Callable[[], object], repeats: int = REPEATS) -> tuple[float, ob
 def scene(source: str, folder: Path) -> fi.Scene:
     """The scene with closed-form or finite-element modes."""
     path = folder / f"{source}.toml"
-    path.write_text(SCENE.format(source=source))
+    path.write_text(scene_speed.FRONTIER.format(source=source))
     return fi.load_scene(path)
 
 

@@ -28,13 +28,27 @@ import fem_impact as fi
 HERE = Path(__file__).parent
 EVERYDAY_TOLERANCE = 1e-2  # [-] of every everyday scene, as their files say too
 THROUGH_MODES = {"target": "modal"}  # what a plan needs so that the body's modes carry the blow
-PLATE = """
+# the plate of frontier.py, by elements ("fe") or closed forms ("analytic")
+FRONTIER = """
 [mesh]
 shape = "rectangle"
-length = {length}
-width = {width}
+length = 1.55
+width = 1.0
+[target]
+mass = 0.2
+first_frequency = 100.0
+source = "{source}"
 [supports]
 boundary = "hinged"
+[striker]
+kind = "rigid"
+mass = 0.0333333333333333
+[contact]
+kind = "hertz"
+stiffness = 695e3
+[strike]
+at = [0.465, 0.3]
+speed = 1.0
 """
 NAMED = {  # name: text of the scene, tolerances
     # a bronze disk (as the cymbals of scenes/everyday, without a hole) and the tip of a hickory stick; by elements, as
@@ -67,7 +81,13 @@ at = [0.08, 0.06]
 speed = 2.0
 """, (1e-2, 1e-4)),
     # a steel ball of 1 cm on spruce of 3 mm; its contact is that with spruce across the grain, 0.85 GPa
-    "ball_on_spruce": (PLATE.format(length=0.4, width=0.3) + """
+    "ball_on_spruce": ("""
+[mesh]
+shape = "rectangle"
+length = 0.4
+width = 0.3
+[supports]
+boundary = "hinged"
 [material]
 E = 10.9e9
 nu = 0.372
@@ -93,22 +113,7 @@ at = [0.15, 0.12]
 speed = 1.0
 """, (1e-2,)),
     "guitar_top": ((HERE / "scenes" / "guitar_top.toml").read_text(encoding="utf-8"), (1e-2,)),
-    # the plate of frontier.py
-    "frontier_plate": (PLATE.format(length=1.55, width=1.0) + """
-[target]
-mass = 0.2
-first_frequency = 100.0
-source = "fe"
-[striker]
-kind = "rigid"
-mass = 0.0333333333333333
-[contact]
-kind = "hertz"
-stiffness = 695e3
-[strike]
-at = [0.465, 0.3]
-speed = 1.0
-""", (1e-7,)),
+    "frontier_plate": (FRONTIER.format(source="fe"), (1e-7,)),
 }  # fmt: skip
 
 

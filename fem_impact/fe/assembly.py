@@ -140,8 +140,9 @@ class System:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the mesh assumed, and numbers that are probably a slip of a unit."""
-        return notes_on(self.mesh, self.section)
+        """What mesh and theory assumed, and numbers that are probably a slip of a unit."""
+        assumed = plausible.rolling(self.section.material) if self.theory == "mindlin" else ()
+        return plausible.together(notes_on(self.mesh, self.section), assumed)
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         """Whether each point (n_points, dimension) [m] lies on the body, (n_points,) bool."""

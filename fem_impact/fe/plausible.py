@@ -47,6 +47,7 @@ RANGES = {
 }  # fmt: skip
 NAMES = {"rho": "density", "damping_ratio": "damping_ratio =", "speed": "speed", "length": "a length of"}
 TURN = 2.0 * np.pi  # [rad]
+ROLLING = 20.0  # [-] G over the rolling shear modulus of softwood: 0.064 E over 0.003 E, Wood Handbook, table 5-1
 THICK = 0.3  # [-] thickness over the shortest side above which a body is no longer thin
 
 
@@ -86,6 +87,16 @@ def body(sides: Sequence[float], section: Any = None) -> tuple[str, ...]:
             "thin bodies, and 3 mm is 0.003"
         )
     return tuple(notes)
+
+
+def rolling(given: Any) -> tuple[str, ...]:
+    """Note on a `Material` across whose grain a thick plate shears as stiffly as in its plane: wood does not."""
+    if given.G is None or given.G_yz is not None:
+        return ()
+    return (
+        f"G_yz is not stated and taken as that in the plane, G = {given.G:g} Pa; the rolling shear modulus of wood is "
+        f"about {given.G / ROLLING:.2g}",
+    )
 
 
 def damping(ratios: np.ndarray) -> tuple[str, ...]:

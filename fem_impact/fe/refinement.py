@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from .._base import check
 from .._base.files import replacing
 from ..mesh import mesh_files
-from ..mesh.meshes import MOST_CELLS
+from ..mesh.meshes import MOST_CELLS, Mesh
 from . import residual, thick
 from .assembly import THICK, System, assemble, reassemble
 from .eigenvalues import FIRST_SLICE, RESIDUAL, SPARE, STRICT, Flexibility, by_slices, count_below, lowest
@@ -40,6 +40,9 @@ LAYERS = 10.0  # [-] largest element under tension, in edge layers sqrt(D / tens
 FINEST_LAYER = 40.0  # [-] but elements are not made smaller than the body's extent divided by this
 LOOSEST = 0.1  # [-] largest tolerance of frequencies
 MOST_UNKNOWNS = 150_000  # [-] refinement gives up beyond this size
+DOFS_PER_AREA = {  # [-] unknowns per square, or length, of the element size
+    "argyris": 10.4, "hermite": 2.0, "argyris and shear": 47.0, "hermite and shear": 4.0,
+}  # fmt: skip
 AIM = 0.9  # [-] fraction of the tolerance that the first mesh aims at
 MARGIN = 0.6  # [-] fraction of the tolerance that later meshes aim at
 ORDERS = 7.5, 5.0  # [-] powers of the element size with which the first two parts of the error fall
@@ -71,6 +74,16 @@ class Spectrum:
     def n_rigid(self) -> int:
         """Number of rigid motions."""
         return self.flexibility.rigid.shape[1]
+
+
+def unknowns(element: str, mesh: Mesh, size: float) -> float:
+    """Number of unknowns [-] on a mesh of the same outline with another element size [m]."""
+    return DOFS_PER_AREA[element] * mesh.area / size**mesh.dimension
+
+
+def smallest_size(element: str, mesh: Mesh) -> float:
+    """Element size [m] of the same outline with as many unknowns as are allowed."""
+    return float((unknowns(element, mesh, 1.0) / MOST_UNKNOWNS) ** (1.0 / mesh.dimension))
 
 
 def _wave(system: System, n_modes: int | None, max_frequency: float | None) -> float:

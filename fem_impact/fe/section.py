@@ -35,7 +35,7 @@ class Material:
         Stress at which it yields in tension; tells whether a contact dents it (`Response.assumptions`).
     G_xz, G_yz : float [Pa], optional
         Shear moduli of an orthotropic material through the thickness, along and across the grain; only thick plates
-        and beams use them. By default both are G.
+        and beams use them, and the estimate of what a thin one lacks. By default both are G.
 
     Examples
     --------
@@ -138,13 +138,17 @@ class Material:
         return turn.T @ local @ turn
 
     @property
+    def transverse(self) -> tuple[float, float]:
+        """Shear moduli [Pa] through the thickness, along and across the grain: as stated, else that in the plane."""
+        plain = self.E / (2.0 * (1.0 + self.nu)) if self.G is None else self.G
+        return (plain if self.G_xz is None else self.G_xz, plain if self.G_yz is None else self.G_yz)
+
+    @property
     def through(self) -> np.ndarray:
         """Shear stiffness through the thickness (2, 2) [Pa] on shear strains (xz, yz), in the axes of the plate."""
-        plain = self.E / (2.0 * (1.0 + self.nu)) if self.G is None else self.G
-        along, across = (plain if given is None else given for given in (self.G_xz, self.G_yz))
         c, s = np.cos(self.angle), np.sin(self.angle)
         turn = np.array([[c, s], [-s, c]])
-        return turn.T @ np.diag([along, across]) @ turn
+        return turn.T @ np.diag(self.transverse) @ turn
 
 
 def evaluate(name: str, value: Varying, points: np.ndarray, unit: str) -> np.ndarray:
@@ -316,10 +320,7 @@ class Beam:
 
     def shear(self, points: np.ndarray) -> np.ndarray:
         """Shear stiffness (n_points,) [N] on the mean shear strain, for a Timoshenko beam."""
-        material = self.material
-        plain = material.E / (2.0 * (1.0 + material.nu)) if material.G is None else material.G
-        G = plain if material.G_xz is None else material.G_xz
-        return self.shear_coefficient * G * self._area(points)
+        return self.shear_coefficient * self.material.transverse[0] * self._area(points)
 
     def rotary(self, points: np.ndarray) -> np.ndarray:
         """Rotary inertia per length (n_points,) [kg m], for a Timoshenko beam."""

@@ -86,9 +86,7 @@ class History:
     shape: np.ndarray  # (n_contacts, n_modes) [kg**-0.5] signed: the approach is offset + shape @ q
     offset: np.ndarray  # (n_contacts,) [m]
     bias: np.ndarray  # (n_modes,) [N kg**-0.5] constant modal forces
-    law: (
-        np.ndarray
-    )  # (n_contacts, 9 or 4) as `law.spring_of` reads it: stiffness, exponent, loss, series compliance, ..
+    law: np.ndarray  # (n_contacts, 9 or 4) stiffness, exponent, loss, series compliance, .. as `law.spring_of` reads it
     start_q: np.ndarray  # (n_modes,) [m kg**0.5]
     start_p: np.ndarray  # (n_modes,) [m kg**0.5/s]
     steps: np.ndarray  # (n_steps, 3 + (4 + n_coefficients) n_contacts), see `energy.run_energy`

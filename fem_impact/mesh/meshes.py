@@ -72,9 +72,7 @@ class Mesh:
     @property
     def area(self) -> float:
         """Area [m^2] of a plate, up to the chords of curved edges; length [m] of a beam."""
-        corner = self.points[self.cells]
-        sides = corner[:, 1:] - corner[:, :1]
-        return float(np.abs(np.linalg.det(sides)).sum()) / self.dimension
+        return measure(self.points, self.cells)
 
     def _repr_html_(self) -> str:
         """Notebook view: the outline and a table of its size and edges."""
@@ -326,6 +324,12 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
     )  # fmt: skip
     return replace(made, recipe=partial(_resized, made))
+
+
+def measure(points: np.ndarray, cells: np.ndarray) -> float:
+    """Area [m^2] of triangles or length [m] of line elements, from points (n_points, dimension) and cells."""
+    corner = points[cells]
+    return float(np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])).sum()) / points.shape[1]
 
 
 @check.typed

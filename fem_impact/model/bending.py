@@ -23,7 +23,7 @@ from scipy import special
 from ..fe import beam_elements
 from ..fe.assembly import System, support_of_facets
 from ..fe.residual import Moments
-from ..fe.section import Beam, Material, Plate, evaluate
+from ..fe.section import SHEAR, Beam, Plate, evaluate
 from ..fe.springs import along_facets
 from ..fe.supports import cells_of_facets
 from ..mesh.meshes import Mesh
@@ -32,14 +32,12 @@ from ..modes.analytic import BeamShapes, DiskShapes, RectangleShapes
 from ..modes.modal import FieldShapes, Modes, ScaledShapes, Shapes
 from ..modes.ritz import RitzShapes
 
-KAPPA = 5.0 / 6.0  # [-] shear coefficient of plates
 LOW = 40  # [-] flexible modes that are integrated; a blow's results depend on few others one by one
 TRUE_VECTORS = 4  # [-] of so many Ritz pairs the lowest one is a mode: those above are packets, whose shear is singular
 TOP = 4  # [-] the upper one of so many parts of the integrated modes tells how those above go on
 NODES = 3  # [-] Gauss points in each direction of a triangle: slopes to 1e-3, as modes need several triangles
 RADIAL = 160  # [-] Gauss points along the radius of a disk: 20 for each wave of its fortieth mode
 ALONG = 200  # [-] Gauss points along a beam
-ROLLING = 20.0  # [-] G over the rolling shear modulus of softwood: 0.064 E over 0.003 E, Wood Handbook, table 5-1
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,20 +188,6 @@ def _extended(modes: Modes, low: slice, found: np.ndarray, per_extent: float, th
     return Bending(wave, every[0], every[1], *(every[2:] if thick else (None, None, None)))
 
 
-def shear_modulus(material: Material) -> tuple[float, float]:
-    """Shear moduli [Pa] across the thickness, along and across the grain; the second of wood is its rolling shear."""
-    if material.G is None:
-        G = material.E / (2.0 * (1.0 + material.nu))
-        return G, G
-    return material.G, material.G / ROLLING
-
-
-def beam_kappa(section: Beam) -> float:
-    """Cowper's shear coefficient [-] of a rectangle or circle."""
-    nu = section.material.nu if section.material.G is None else 0.0
-    return 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu) if section.round else 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu)
-
-
 def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     """Slope, volume, rotary inertia, shear and edge (5, n) of a plate's shapes (n_dofs, n) by elements."""
     space: Any = system.space
@@ -229,13 +213,10 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     result[2] = np.einsum("eq,eqk->k", area * inertia * h**2 / 12.0, steep) / (frame.inertia * frame.length**2)
     moments = Moments(system)
     force = moments.derivatives(cells, x, 1)  # (n_cells, 2, 3, n_q, 21)
-    Q = [force[:, 0, 0] + force[:, 1, 2], force[:, 0, 2] + force[:, 1, 1]]
-    along, across = shear_modulus(section.material)
-    c, s = np.cos(section.material.angle), np.sin(section.material.angle)
+    Q = np.stack([(q @ moved) for q in (force[:, 0, 0] + force[:, 1, 2], force[:, 0, 2] + force[:, 1, 1])])
+    soft = np.linalg.inv(section.shear(flat)).reshape(*area.shape, 2, 2) * frame.stiffness / frame.length**2
     energy = (vectors * (system.K @ vectors)).sum(axis=0)
-    for q, modulus in ((c * Q[0] + s * Q[1], along), (-s * Q[0] + c * Q[1], across)):
-        soft = frame.stiffness / frame.length**2 / (KAPPA * modulus * h)
-        result[3] += np.einsum("eq,eqk->k", area * soft, (q @ moved) ** 2) / energy
+    result[3] = np.einsum("eq,aeqk,eqab,beqk->k", area, Q, soft, Q, optimize=True) / energy
     rim = system.rim
     free = np.flatnonzero(np.array(rim.kinds) == "free") if rim is not None else np.zeros(0, int)
     if len(free) and rim is not None:
@@ -248,7 +229,7 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
         flat = frame.centre + frame.length * place.reshape(-1, 2)
         h = evaluate("thickness", section.thickness, flat, "m").reshape(ds.shape)
         stiff = section.stiffness(flat)[:, 2, 2].reshape(ds.shape) / frame.stiffness
-        fades = h / np.sqrt(12.0 * KAPPA) / frame.length
+        fades = h / np.sqrt(12.0 * SHEAR) / frame.length
         result[4] = np.einsum("eq,eqk->k", ds * fades / stiff, twist**2) / energy
     return result
 
@@ -267,33 +248,26 @@ def _beam(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     if not thick:
         return result
     place = (frame.centre + frame.length * x.reshape(-1, 1)).clip(system.mesh.points.min(), system.mesh.points.max())
-    stiffness, inertia = section.stiffness(place).reshape(x.shape), section.inertia(place).reshape(x.shape)
-    gyration = stiffness * section.material.rho / section.material.E  # rho I [kg m]
+    stiffness, gyration = section.stiffness(place).reshape(x.shape), section.rotary(place).reshape(x.shape)
     result[2] = np.einsum("eq,eqk->k", dx * gyration, steep) / (frame.inertia * frame.length**2)
     moment = (stiffness / frame.stiffness)[..., None] * (bend @ moved)
     node = np.polynomial.legendre.leggauss(x.shape[1])[0]
     fit = np.linalg.inv(np.polynomial.legendre.legvander(node, len(node) - 1))
     turn = np.polynomial.legendre.legval(node, np.polynomial.legendre.legder(np.eye(len(node)))).T @ fit
     Q = np.einsum("pq,eqk->epk", turn, moment) * (2.0 / space.length)[:, None, None]
-    area = inertia / section.material.rho
-    soft = frame.stiffness / frame.length**2 / (beam_kappa(section) * shear_modulus(section.material)[0] * area)
+    soft = frame.stiffness / frame.length**2 / section.shear(place).reshape(x.shape)
     result[3] = np.einsum("eq,eqk->k", dx * soft, Q**2) / (vectors * (system.K @ vectors)).sum(axis=0)
     return result
 
 
 def _uniform(body: Known) -> tuple[float, float]:
-    """Rotary inertia and shear [m**2] of a uniform body over its squared wavenumber."""
+    """Rotary inertia and shear [m**2] of a uniform, if a plate isotropic body over its squared wavenumber."""
     section = body.section
     if section is None:
         return 0.0, 0.0
     origin = np.zeros((1, body.modes.dimension))
-    G = shear_modulus(section.material)[0]
-    if isinstance(section, Plate):
-        h = float(evaluate("thickness", section.thickness, origin, "m")[0])
-        return h**2 / 12.0, float(section.stiffness(origin)[0, 0, 0]) / (KAPPA * G * h)
-    area = float(section.inertia(origin)[0]) / section.material.rho
-    squared = float(section.stiffness(origin)[0]) / (section.material.E * area)
-    return squared, squared * section.material.E / (beam_kappa(section) * G)
+    stiffness, shear = section.stiffness(origin).flat[0], section.shear(origin).flat[0]
+    return float(section.rotary(origin)[0] / section.inertia(origin)[0]), float(stiffness / shear)
 
 
 def _rectangle(shapes: RectangleShapes, body: Known, amplitude: float) -> np.ndarray:
@@ -333,7 +307,7 @@ def _disk(shapes: DiskShapes, low: slice, body: Known, amplitude: float) -> np.n
     result[2], result[3] = rotary * steep / a**2, shear * force / a**2
     if shapes.edge == "free" and body.thickness is not None:
         j, dj, i, di = (part[0] for part in parts(np.ones((1, 1))))
-        fades = body.thickness / np.sqrt(12.0 * KAPPA)
+        fades = body.thickness / np.sqrt(12.0 * SHEAR)
         result[4] = 2.0 * (1.0 - shapes.nu) * fades / a * (n * (dj + di - j - i)) ** 2 / (z**4 * whole)
     return result
 

@@ -14,10 +14,9 @@ import numpy as np
 
 from ..fe.section import Material
 from ..impact.assumption import Assumption
-from ..impact.contact import Contact, loss_number
+from ..impact.contact import YIELDS, Contact, loss_number
 from .restrike import Struck, softer
 
-YIELD = 1.6  # [-] largest pressure at first yield over the yield strength, nu = 0.3
 SMALL = 0.5  # [-] contact radius over half the thickness, over a wavelength / (2 pi) or over the distance to an edge
 NEAREST = 1e-6  # [-] least distance to an edge over the thickness
 SLOW = 0.2  # [-] longest period of the striker's own vibration over the contact time
@@ -64,7 +63,7 @@ def yielding(struck: Struck) -> Assumption:
         return Assumption("no yielding", None, 1.0, dict.fromkeys(quantities), quantities, remedy, number, why)
     R, E = round_body
     weakest = min(strength for strength in strengths.values() if strength is not None)
-    value = (6.0 * hit.peak_force * E**2 / (np.pi**3 * R**2)) ** (1.0 / 3.0) / (YIELD * weakest)
+    value = (6.0 * hit.peak_force * E**2 / (np.pi**3 * R**2)) ** (1.0 / 3.0) / (YIELDS * weakest)
     remedy = PLASTIC
     if value <= 1.0 and missing:
         why, remedy = f"yield strength of the {missing[0]}", "state its yield_strength"

@@ -43,9 +43,6 @@ SHORT_WAVES = {  # [-] frequency error for which `find_modes` chooses the mesh
 PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}  # that a user may set
 ARGUMENTS = tuple(signature(collision.strike).parameters)[3:]  # after modes, striker and contact
 TARGETS = ("rigid", "infinite", "vectors", "modal")
-DOFS_PER_AREA = {  # [-] unknowns per square, or length, of the element size
-    "argyris": 10.4, "hermite": 2.0, "argyris and shear": 47.0, "hermite and shear": 4.0,
-}  # fmt: skip
 DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow
 FAINTEST = 8.0  # [-] frequency up to which a force has the fraction FAINT of its impulse, times the contact's duration
 TOLD_AT = 200  # [-] times at which the motion of Ritz vectors is judged
@@ -582,18 +579,18 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
         size = asked.pieces.get("size") or vectors.size_for(blow.target, 0.5 / asked.duration, asked.tolerance)
     mesh = blow.target.mesh
     assert mesh is not None
-    smallest = (DOFS_PER_AREA["argyris"] * mesh.area / refinement.MOST_UNKNOWNS) ** 0.5
+    smallest = refinement.smallest_size("argyris", mesh)
     if size < smallest and "size" not in asked.pieces and not blow.target.size_stated:
         plan = _last_resort(asked, stages) if target is None else None
         if plan is not None:
             return plan
         soft = blow.contact.stiffness * (size / smallest) ** (2.0 * (blow.contact.exponent + 1.0))
-        needs = DOFS_PER_AREA["argyris"] * mesh.area / size**2
+        needs = refinement.unknowns("argyris", mesh, size)
         raise check.SimulationError(
             f"{blow.name}this blow needs about {needs:.2g} unknowns, elements of {size:.2g} m, more than the limit of "
             f"{refinement.MOST_UNKNOWNS}; take a contact with stiffness = {float(f'{0.9 * soft:.1e}'):g}"
         )
-    n_dofs = round(DOFS_PER_AREA["argyris"] * mesh.area / size**2) + DOFS_AT_BLOW
+    n_dofs = round(refinement.unknowns("argyris", mesh, size)) + DOFS_AT_BLOW
     count = vectors.first_count(blow.target, 0.5 / asked.duration, asked.tolerance)
     kept = f"the target is described by some {count} Ritz vectors started from the blow, more if their error shows"
     reason = f"argyris elements of {size:.3g} m, smaller towards the blow, with some {n_dofs} unknowns"
@@ -672,7 +669,7 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
     mesh = system.mesh
     stated = plan.blow.target.size_stated or "size" in plan.changes or refinement.resolves(system, limit)
     size = mesh.size if stated else min(mesh.size, refinement.size_for(system, None, limit, None))
-    n_dofs = round(DOFS_PER_AREA[system.element] * mesh.area / size**mesh.dimension)
+    n_dofs = round(refinement.unknowns(system.element, mesh, size))
     error = max(float(first.frequency_error.max()), SHORT_WAVES[system.element])
     reason = f"{system.element} elements of {size:.3g} m, about {n_dofs} unknowns, resolve the shortest wave"
     work = cost.by_modes(n_dofs, plan.n_modes) if plan.n_modes > first.n_modes else cost.NOTHING

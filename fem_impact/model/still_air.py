@@ -14,12 +14,12 @@ London A 382, 245-271; Wallace (1972), J. Acoust. Soc. Am. 51, 946-952.
 import numpy as np
 
 from ..impact.assumption import Assumption
+from ..modes.air import DENSITY, SPEED
 from ..modes.modal import Modes
 from .bending import Bending, Known, known
 from .restrike import Struck
 from .thinness import plane_wave
 
-AIR = (1.204, 343.2)  # [kg/m^3], [m/s] density and speed of sound at 20 degrees C
 LIMIT = 0.02  # [-] mass of the air over that of the body at which frequencies drop by 1 %
 ROUNDED = 0.1  # [-] of k**2: k**2 - k_0**2 does not get smaller, as the waves of a finite plate are not straight
 NUMBER = "mass of the air moved over that of the body"
@@ -44,7 +44,7 @@ def of_target(struck: Struck) -> Assumption:
         section = None if body is None else body.plate
         if section is None or body is None:
             return told(None, dict.fromkeys(quantities), "the waves of the body")
-        mass = 2.0 * AIR[0] / (body.per_extent * plane_wave(section, struck.omega))
+        mass = 2.0 * DENSITY / (body.per_extent * plane_wave(section, struck.omega))
         row = history.shape[:, mine] / (1.0 + mass) ** 0.25
         return told(mass, struck.changes(shape=struck.of_target(row, "shape")))
     found = None if body is None or struck.bending is None else loading(body, struck.bending)
@@ -74,7 +74,7 @@ def loading(body: Known, integrals: Bending) -> tuple[np.ndarray, np.ndarray] | 
 
     For a plate in a baffle; one without moves as much air, but radiates less.
     """
-    rho, c = AIR
+    rho, c = DENSITY, SPEED
     omega, per_extent = body.modes.omega, body.per_extent
     moving = (omega > 0.0) & (integrals.wave > 0.0)
     k, k0 = np.where(moving, integrals.wave, 1.0), np.where(moving, omega, c) / c
@@ -111,4 +111,4 @@ def coincidence(body: Known, integrals: Bending) -> float | None:
     moving = (body.modes.omega > 0.0) & (integrals.wave > 0.0)
     if not moving.any():
         return None
-    return float(AIR[1] ** 2 / (2.0 * np.pi) * np.median(integrals.wave[moving] ** 2 / body.modes.omega[moving]))
+    return float(SPEED**2 / (2.0 * np.pi) * np.median(integrals.wave[moving] ** 2 / body.modes.omega[moving]))

@@ -12,9 +12,9 @@ Mindlin (1951), J. Appl. Mech. 18, 31-38; Wang (1994), J. Vib. Acoust. 116, 536-
 
 import numpy as np
 
-from ..fe.section import Plate
+from ..fe.section import SHEAR, Plate
 from ..impact.assumption import Assumption
-from .bending import KAPPA, Bending, Known, shear_modulus
+from .bending import Bending, Known
 from .restrike import Struck, softer
 
 LIMIT = 0.23  # [-] thickness times wavenumber at which a wave is 1 % too fast for nu = 0.3
@@ -70,8 +70,12 @@ def _heard(found: Bending | None) -> np.ndarray | None:
 
 def _shear_give(plate: Plate, thickness: float, low: float) -> float:
     """Deflection [m/N] by shear under a point force, between a wavenumber [rad/m] and that of a dent."""
-    G = float(np.mean(shear_modulus(plate.material)))
-    return max(0.0, np.log(DENT / (thickness * low))) / (2.0 * np.pi * KAPPA * G * thickness) if low > 0.0 else 0.0
+    return max(0.0, np.log(DENT / (thickness * low))) / (2.0 * np.pi * _shear(plate, thickness)) if low > 0.0 else 0.0
+
+
+def _shear(plate: Plate, thickness: float) -> float:
+    """Shear stiffness [N/m] for which an isotropic plate sinks under a point force as this one does."""
+    return SHEAR * thickness * float(np.sqrt(np.prod(plate.material.transverse)))
 
 
 def _give(struck: Struck, body: Known, plate: Plate, integrals: Bending) -> float:
@@ -96,9 +100,8 @@ def _simplified(struck: Struck, body: Known) -> tuple[float | None, dict[str, fl
     value = body.thickness * wave
     changed = softer(history, _shear_give(plate, body.thickness, wave))
     if struck.ideal == "infinite":
-        G = float(np.mean(shear_modulus(plate.material)))
-        D = float(plate.stiffness(np.zeros((1, 2)))[0, 0, 0])
-        drop = value**2 / 12.0 + D * wave**2 / (KAPPA * G * body.thickness)
+        D = plate.stiffness(np.zeros((1, 2)))[0]
+        drop = value**2 / 12.0 + float(np.sqrt(D[0, 0] * D[1, 1])) * wave**2 / _shear(plate, body.thickness)
         # the modes of a wide plate get denser by the whole drop of omega**2, and so does the mobility
         changed["shape"] = struck.of_target(history.shape[:, struck.mine] * np.sqrt(1.0 + drop), "shape")
     return value, dict(struck.changes(**changed)), ""

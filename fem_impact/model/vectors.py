@@ -121,13 +121,20 @@ class Seen:
 
     def modes(self, cutoff: Callable[[Modes, float], float]) -> Modes:
         """The target as struck; Ritz pairs above ``cutoff`` [Hz], of them and a safety factor, act as a spring."""
+        self.whole, kept = self._struck(self.fine, self.coarse, cutoff)
+        return kept
+
+    def _struck(
+        self, fine: Krylov, coarse: Krylov | None, cutoff: Callable[[Modes, float], float]
+    ) -> tuple[Modes, Modes]:
+        """All Ritz pairs of the vectors, with those on a coarser mesh, and the same up to ``cutoff``."""
         with self.stages("vectors"):
-            found = self.fine.modes(self.count)
-            if self.coarse is not None:
-                other = replace(self.coarse.modes(self.count), poorer={})
+            found = fine.modes(self.count)
+            if coarse is not None:
+                other = replace(coarse.modes(self.count), poorer={})
                 found = replace(found, poorer={**found.poorer, "mesh": other})
-        self.whole = found = self.target.finished_vectors(found)
-        return found.truncated(max_frequency=cutoff(found, self.margin) * (1.0 + 1e-9))
+        found = self.target.finished_vectors(found)
+        return found, found.truncated(max_frequency=cutoff(found, self.margin) * (1.0 + 1e-9))
 
     def improved(self, error: Error, allowed: float) -> bool:
         """Take more vectors or a finer mesh, whichever the error of a blow calls for; False if neither is possible."""

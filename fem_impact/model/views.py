@@ -5,7 +5,6 @@ cost one solution each, and are as good as those of a single blow there.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -38,10 +37,5 @@ class Views(Seen):
 
     def of(self, point: int, cutoff: Callable[[Modes, float], float]) -> Modes:
         """The target as seen from one of the points; ``cutoff`` as in `Seen.modes`."""
-        with self.stages("vectors"):
-            found = self.fine.each[point].modes(self.count)
-            if self.coarse is not None:
-                other = replace(self.coarse.each[point].modes(self.count), poorer={})
-                found = replace(found, poorer={**found.poorer, "mesh": other})
-        found = self.target.finished_vectors(found)
-        return found.truncated(max_frequency=cutoff(found, self.margin) * (1.0 + 1e-9))
+        coarse = None if self.coarse is None else self.coarse.each[point]
+        return self._struck(self.fine.each[point], coarse, cutoff)[1]

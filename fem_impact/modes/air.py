@@ -32,6 +32,7 @@ from scipy.linalg import block_diag, eigh
 
 from .._base import check
 from ..fe import plausible
+from ..mesh.meshes import measure
 from .modal import Modes, Shapes
 
 DENSITY, SPEED = 1.204, 343.2  # [kg/m^3], [m/s] of air at 20 degrees C and 1013 hPa
@@ -127,7 +128,7 @@ def in_air(
         return modes
     how: dict[str, Any] = {"density": density, "speed": speed, "sides": sides, "baffled": baffled}
     poorer = {cause: in_air(other, **how) for cause, other in modes.poorer.items()}
-    area = 0.5 * float(np.abs(np.linalg.det(points[cells[:, 1:]] - points[cells[:, :1]])).sum())
+    area = measure(points, cells)
     wave = np.sqrt(4.0 * np.pi * modes.n_modes / area)  # [1/m] of the highest mode, by Weyl's law
     size = min(2.0 * np.pi / wave / PER_WAVE, np.sqrt(area) / FEWEST)
     share = 1.0 if baffled else 0.5

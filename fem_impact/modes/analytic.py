@@ -15,7 +15,7 @@ from ..fe.assembly import support_of_facets
 from ..fe.section import KINDS, Beam, Plate
 from ..mesh.meshes import Mesh
 from . import timoshenko
-from .modal import Damping, Modes, Shapes, damping_ratios
+from .modal import BeamlikeShapes, Damping, Modes, Shapes, damping_ratios
 
 IMAGES = 6  # [-] image forces beyond each shorter side of a hinged plate; the n-th contributes exp(-2 pi n)
 NEAR_POLE = 1.0  # [-] distance x below which polylogarithms are summed as power series, which converge up to 2 pi
@@ -325,18 +325,15 @@ def _beam_roots(ends: tuple[str, str], n: int) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class BeamShapes(Shapes):
+class BeamShapes(BeamlikeShapes):
     """Shapes of a uniform Euler-Bernoulli beam of unit mass, length and rigidity over x / length in 0 ... 1.
 
     A flexible shape is A cos kx + B sin kx + C exp(-kx) + D exp(k (x - 1)): bounded terms, so that mode 1000 keeps
     its digits where cosh and sinh would cancel.
     """
 
-    length: float  # [m]
-    ends: tuple[str, str]
     k: np.ndarray  # (n_modes,) wavenumber times length; 0 for rigid motions
     weights: np.ndarray  # (n_modes, 4)
-    dimension: int = 1
 
     __repr__ = check.brief
 
@@ -349,24 +346,8 @@ class BeamShapes(Shapes):
         values[:, ~flexible] = self.weights[~flexible, 0] + x * self.weights[~flexible, 1]
         return values
 
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        return np.all((points >= -1e-9 * self.length) & (points <= (1 + 1e-9) * self.length), axis=1)
-
-    def compliance(self, points: np.ndarray) -> np.ndarray:
-        result = self.deflection(points, points)
-        return 0.5 * (result + result.T)
-
-    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Exact static deflection under each load; a beam that can move rigidly gets inertia relief."""
-        x = points[:, 0] / self.length
-        return np.column_stack([_beam_green(self.ends, load)(x) for load in loads[:, 0] / self.length])
-
-    def take(self, n_modes: int) -> "BeamShapes":
-        return replace(self, k=self.k[:n_modes], weights=self.weights[:n_modes])
-
-    def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        node = np.arange(129)
-        return self.length * node[:, None] / 128.0, np.column_stack([node[:-1], node[1:]])
+    def green(self, load: float, x: np.ndarray) -> np.ndarray:
+        return _beam_green(self.ends, load)(x)
 
 
 VANISHING = {"clamped": (0, 1), "hinged": (0, 2), "free": (2, 3)}  # orders of the derivatives that are zero at an end

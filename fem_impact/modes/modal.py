@@ -1,5 +1,6 @@
 """Modes: the description of a structure that every later stage works on, whether computed or measured."""
 
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -52,6 +53,44 @@ class Shapes(Protocol):
 
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
         """Points (n_points, dimension) [m] and cells (n_cells, dimension + 1) for drawing the body."""
+
+
+@dataclass(frozen=True, eq=False)
+class BeamlikeShapes(Shapes):
+    """What the closed forms of all beams share; each array of theirs has one row per mode."""
+
+    length: float  # [m]
+    ends: tuple[str, str]
+
+    @property
+    def dimension(self) -> int:
+        return 1
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.all((points >= -1e-9 * self.length) & (points <= (1 + 1e-9) * self.length), axis=1)
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        result = self.deflection(points, points)
+        return 0.5 * (result + result.T)
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Exact static deflection under each load; a beam that can move rigidly gets inertia relief."""
+        x = points[:, 0] / self.length
+        return np.column_stack([self.green(load, x) for load in loads[:, 0] / self.length])
+
+    @abstractmethod
+    def green(self, load: float, x: np.ndarray) -> np.ndarray:
+        """Deflection (n,) of the unit beam at x (n,) under a unit force at ``load``, without its rigid motion."""
+
+    def take(self, n_modes: int) -> Any:
+        arrays: dict[str, Any] = {
+            name: value[:n_modes] for name, value in vars(self).items() if isinstance(value, np.ndarray)
+        }
+        return replace(self, **arrays)
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        node = np.arange(129)
+        return self.length * node[:, None] / 128.0, np.column_stack([node[:-1], node[1:]])
 
 
 @dataclass(frozen=True, eq=False)

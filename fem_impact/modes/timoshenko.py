@@ -16,12 +16,12 @@ Huang (1961), J. Appl. Mech. 28, 579-584 (all ends); Wittrick and Williams (1971
 for counting modes.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from .._base import check
-from .modal import Shapes
+from .modal import BeamlikeShapes
 
 HALVINGS = 62  # [-] bisections of a bracket of five modes; 55 reach rounding
 STEEP = 1.0  # [-] q above which exponentials replace cosh and sinh, which are bounded below
@@ -150,15 +150,12 @@ def rigid(ends: tuple[str, str], stoutness: Stoutness) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class TimoshenkoShapes(Shapes):
+class TimoshenkoShapes(BeamlikeShapes):
     """Shapes of a uniform Timoshenko beam of unit mass and rigidity over x / length in 0 ... 1."""
 
-    length: float  # [m]
-    ends: tuple[str, str]
     stoutness: Stoutness
     p: np.ndarray  # (n_modes,) omega squared; 0 for rigid motions
     weights: np.ndarray  # (n_modes, 4)
-    dimension: int = 1
 
     __repr__ = check.brief
 
@@ -170,24 +167,8 @@ class TimoshenkoShapes(Shapes):
         values[:, ~flexible] = self.weights[~flexible, 0] + x[:, None] * self.weights[~flexible, 1]
         return values
 
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        return np.all((points >= -1e-9 * self.length) & (points <= (1 + 1e-9) * self.length), axis=1)
-
-    def compliance(self, points: np.ndarray) -> np.ndarray:
-        result = self.deflection(points, points)
-        return 0.5 * (result + result.T)
-
-    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Exact static deflection under each load; a beam that can move rigidly gets inertia relief."""
-        x = points[:, 0] / self.length
-        return np.column_stack([_green(self.ends, self.stoutness, load, x) for load in loads[:, 0] / self.length])
-
-    def take(self, n_modes: int) -> "TimoshenkoShapes":
-        return replace(self, p=self.p[:n_modes], weights=self.weights[:n_modes])
-
-    def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        node = np.arange(129)
-        return self.length * node[:, None] / 128.0, np.column_stack([node[:-1], node[1:]])
+    def green(self, load: float, x: np.ndarray) -> np.ndarray:
+        return _green(self.ends, self.stoutness, load, x)
 
 
 def _green(ends: tuple[str, str], stoutness: Stoutness, load: float, x: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..fe import refinement
 from ..impact import accuracy, threshold
 from ..impact.collision import strike
 from ..impact.contact import Contact
@@ -183,11 +184,10 @@ class Bench:
             }  # fmt: skip
 
         assert target.mesh is not None
-        area = planner.DOFS_PER_AREA["argyris"] * target.mesh.area
         for share in SHARES:
             hard = harder(share)
             size = vectors.size_for(target, case.with_values(hard).resonance, VECTORS)
-            if area / size**2 <= MOST_UNKNOWNS:
+            if refinement.unknowns("argyris", target.mesh, size) <= MOST_UNKNOWNS:
                 masses = start.mass, start.mass * SPANS["mass"] ** (0.5 * share)
                 heavier = [{**harder(part * share), "mass": mass} for part in (0.0, 0.5, 1.0) for mass in masses]
                 sized = bodies.Sized(target, case, [hard, harder(-share)], heavier, VECTORS)

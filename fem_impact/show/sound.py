@@ -9,7 +9,7 @@ from scipy.io import wavfile
 
 from .._base import check, markup
 from ..impact.response import Response
-from ..model.still_air import AIR
+from ..modes.air import DENSITY, SPEED
 from . import sampling
 
 RATE = 48_000  # [Hz] sample rate: all audible modes are below half of it
@@ -156,7 +156,7 @@ def radiate(
     duration: float | None = None,
     rate: int = RATE,
     normalise: bool = False,
-    air: tuple[float, float] = AIR,
+    air: tuple[float, float] = (DENSITY, SPEED),
 ) -> Sound:
     """Sound pressure near a plate mounted in an infinite rigid wall.
 

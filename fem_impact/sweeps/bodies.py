@@ -233,9 +233,8 @@ class Sized:
         target = self.target
         size = vectors.size_for(target, resonance, self.tolerance)
         assert target.mesh is not None
-        area = planner.DOFS_PER_AREA["argyris"] * target.mesh.area
-        smallest = (area / refinement.MOST_UNKNOWNS) ** 0.5
-        return None if size < smallest and not target.size_stated else size
+        allowed = target.size_stated or size >= refinement.smallest_size("argyris", target.mesh)
+        return size if allowed else None
 
     def _enough(
         self,

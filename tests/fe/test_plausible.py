@@ -79,6 +79,16 @@ def test_everyday_bodies_get_no_note():
     assert fi.Striker.sphere(fi.Material(**STEEL), 0.01).notes == ()
 
 
+@pytest.mark.parametrize(
+    "theory, told, expected", [("kirchhoff", {}, 0), ("mindlin", {}, 1), ("mindlin", {"G_yz": 4e7}, 0)]
+)
+def test_wood_whose_rolling_shear_modulus_is_taken_for_that_in_the_plane_is_noted(theory, told, expected):
+    wood = fi.Material.orthotropic(E_along=11e9, E_across=0.8e9, nu=0.37, G=0.7e9, rho=430.0, **told)
+    notes = fi.assemble(fi.mesh.rectangle(0.3, 0.2, size=0.2), fi.Plate(wood, 0.01), theory=theory).notes
+    assert len(notes) == expected
+    assert all("G_yz is not stated and taken as that in the plane, G = 7e+08 Pa" in note for note in notes)
+
+
 def test_a_new_damping_ratio_replaces_the_note_on_the_old_one():
     slipped = fi.analytic.disk(0.1, section=plate(), n_modes=4, damping_ratio=5)
     assert slipped.damped(0.05).notes == ()

@@ -5,10 +5,11 @@ import pytest
 
 import fem_impact as fi
 from fem_impact.model import audit, bending, still_air
+from fem_impact.modes import air
 
 SPRUCE = fi.Material(E=10e9, nu=0.3, rho=450.0)
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
-RHO, C = still_air.AIR
+RHO, C = air.DENSITY, air.SPEED
 
 
 def found(hit):

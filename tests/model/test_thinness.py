@@ -138,6 +138,31 @@ def test_what_a_thick_theory_has_is_no_effect_and_what_it_changes_was_foretold(w
     assert true / 3.0 < found(thin).effect["contact_time"] < 3.0 * true
 
 
+@pytest.mark.parametrize(
+    "stated", [{}, {"G_xz": 0.6e9, "G_yz": 0.035e9, "angle": 0.3}], ids=["in the plane", "rolling"]
+)
+@pytest.mark.parametrize("body", ["plate", "beam"])
+def test_wood_is_as_soft_in_shear_to_the_audit_as_to_the_thick_theory(body, stated):
+    """Shear moduli through the thickness count where they are stated, else that in the plane, for both."""
+    if body == "beam":
+        stated = {"G_xz": 0.1e9} if stated else {}
+    wood = fi.Material.orthotropic(E_along=11e9, E_across=0.8e9, nu=0.37, G=0.7e9, rho=430.0, **stated)
+    if body == "plate":
+        section, mesh, at, theory = fi.Plate(wood, 0.01), fi.mesh.rectangle(*SIDES, size=0.1), (0.12, 0.09), "mindlin"
+        supports, strength = {"boundary": "hinged"}, 3e6
+    else:
+        section, mesh = fi.Beam.rectangular(wood, width=0.03, height=0.02), fi.mesh.line(0.3)
+        supports, strength, at, theory = {"left": "hinged", "right": "hinged"}, 3e7, 0.12, "timoshenko"
+    thin, thick_one = (
+        blow(fi.find_modes(fi.assemble(mesh, section, supports, theory=each), n_modes=12), 0.02, strength, at)
+        for each in (None, theory)
+    )
+    effect = found(thin).effect
+    for name, key in (("impulse", "impulse"), ("contact_time", "contact_time"), ("force", "peak_force")):
+        true = abs(getattr(thick_one, key) / getattr(thin, key) - 1.0)
+        assert true / 3.0 < effect[name] < 3.0 * true  # with rolling shear that was not stated, up to 5 times
+
+
 def test_a_stick_that_is_told_slender_or_stout_has_its_shear_and_a_hammer_has_none():
     plate = fi.analytic.rectangle(*SIDES, section=fi.Plate(STEEL, 0.003), n_modes=60)
     stick = fi.Striker.stick(mass=0.05, first_frequency=500.0, slenderness=20.0)
