@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh_tridiagonal
 
 from .._base import check
 from ..fe import point_load
@@ -23,7 +24,7 @@ from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise, one_thread
 from .modal import Damping, Modes, Shapes, damping_notes, damping_ratios
 
-GROWN = 32  # [-] vectors for which room is made at a time
+DRIFT = 1e-11  # [-] overlap with earlier vectors above which they are removed more often
 DEPENDENT = 1e-10  # [-] a new vector shorter than this fraction of its length before orthogonalisation adds nothing
 FEWER = 0.7  # [-] fraction of the vectors with which a second blow tells the error of having no more
 
@@ -84,7 +85,9 @@ class Krylov:
 
     def __init__(self, system: System, points: np.ndarray, shift: float) -> None:
         self.system = system
-        self._solve = factorise(system.K + (shift / system.frame.rate) ** 2 * system.M).solve
+        self.shift = (shift / system.frame.rate) ** 2  # s**2 in the frame
+        self._shifted = system.K + self.shift * system.M
+        self._solve = factorise(self._shifted).solve
         self._moving = system.M @ system.rigid
         self._flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
         self._begin(points)
@@ -95,10 +98,13 @@ class Krylov:
         self.loads = np.asarray(system.interpolate(points).todense()).T  # (n_dofs, n_points)
         self.width = len(points)
         self.vectors = np.empty((0, system.n_dofs))  # (room, n_dofs) mass-orthonormal rows
-        self.stiffness = np.zeros((0, 0))  # (n_projected, n_projected) of the first vectors
+        self.projected = np.zeros((0, 0))  # (room, room) of (K + s**2 M)**-1 M
         self.count, self.full = 0, False
         self._next = self._flexibility.solve(self.loads)  # the static deflection, so that the compliance is exact
         self.compliance = self.loads.T @ self._next  # (n_points, n_points) in the frame
+        self._carried = np.zeros((system.n_dofs, 0))  # M times the two latest blocks of vectors
+        self._latest = 0, 0, 0  # where the two latest blocks of vectors begin, and where they end
+        self._period, self._due = 1, 1  # [-] blocks between two looks at all vectors, and blocks until the next one
 
     def beside(self, points: np.ndarray) -> "Krylov":
         """Vectors started from other points, with the same factorisations."""
@@ -110,37 +116,85 @@ class Krylov:
     def grow(self, count: int) -> None:
         """Make vectors until there are at least ``count``, or all that the loads can reach."""
         M = self.system.M
-        while self.count < min(count, self.system.n_dofs - self.system.rigid.shape[1]) and not self.full:
-            if self.count + self.width > len(self.vectors):
-                room = np.empty((max(GROWN, self.width), self.system.n_dofs))
-                self.vectors = np.concatenate([self.vectors, room])
-            new, known = self._next, self.vectors[: self.count]
+        most = min(count, self.system.n_dofs - self.system.rigid.shape[1])
+        self._make_room(most + self.width - 1)
+        while self.count < most and not self.full:
+            before, start, end = self._latest
+            overlap = self._carried.T @ self._next  # in exact arithmetic only the two latest blocks overlap
+            self.projected[before:end, start:end] = overlap[:, : end - start]
+            new = self._next - self.vectors[before:end].T @ overlap
+            new = new - self.system.rigid @ (self._moving.T @ new)
             heavy = M @ new
-            length = np.sqrt(np.einsum("ij,ij->j", new, heavy))
-            for start in (max(0, self.count - 2 * self.width), 0):  # the last vectors hold nearly all that must go
-                new = new - self.system.rigid @ (self._moving.T @ new) - known[start:].T @ (known[start:] @ heavy)
-                heavy = M @ new
-            value, turn = np.linalg.eigh(new.T @ heavy / np.outer(length, length))
+            self._due -= 1
+            if self._due <= 0:
+                new, heavy = self._cleared(new, heavy)
+            gram = new.T @ heavy
+            length = np.sqrt((overlap**2).sum(axis=0) + gram.diagonal())  # before `overlap` was removed
+            value, turn = np.linalg.eigh(gram / np.outer(length, length))
             kept = value > DEPENDENT**2
             if not kept.any():
                 self.full = True
                 return
             unit = (turn[:, kept] / np.sqrt(value[kept])) / length[:, None]
-            self.vectors[self.count : self.count + unit.shape[1]] = (new @ unit).T
-            self.count += unit.shape[1]
-            self._next = self._solve(np.ascontiguousarray(heavy @ unit))
+            stop = end + unit.shape[1]
+            self.vectors[end:stop] = (new @ unit).T
+            self.projected[end:stop, start:end] = (unit.T @ gram)[:, : end - start]
+            self.projected[start:end, end:stop] = self.projected[end:stop, start:end].T
+            latest = np.ascontiguousarray(heavy @ unit)
+            self._carried = np.hstack([self._carried[:, start - before :], latest])
+            self.count, self._latest = stop, (start, end, stop)
+            self._next = self._solve(latest)
 
-    def _project(self) -> None:
-        """Extend the projected stiffness to all vectors there are."""
-        before, now = len(self.stiffness), self.count
-        if now == before:
-            return
-        vectors = self.vectors[:now]
-        columns = vectors @ (self.system.K @ vectors[before:].T)
-        whole = np.zeros((now, now))
-        whole[:before, :before] = self.stiffness
-        whole[:, before:], whole[before:, :] = columns, columns.T
-        self.stiffness = 0.5 * (whole + whole.T)
+    def _make_room(self, count: int) -> None:
+        """Take memory for so many vectors."""
+        more = count - len(self.vectors)
+        if more > 0:
+            self.vectors = np.concatenate([self.vectors, np.empty((more, self.system.n_dofs))])
+            self.projected = np.pad(self.projected, (0, more))
+
+    def _cleared(self, new: np.ndarray, heavy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """New vectors and M times them without the parts along earlier vectors that rounding brought back."""
+        known = self.vectors[: self.count]
+        drift = known @ heavy
+        new = new - known.T @ drift
+        heavy = self.system.M @ new
+        if self._due == 0:  # the next block follows from this one and from the one before, which keeps its drift
+            worst = np.abs(drift / np.sqrt(np.einsum("ij,ij->j", new, heavy))).max(initial=0.0)
+            self._period = max(1, self._period // 2) if worst > DRIFT else self._period + 1
+        else:
+            self._due = self._period
+        return new, heavy
+
+    def _eigenpairs(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Ascending eigenvalues (count,) and vectors (count, count) of the stiffness projected onto the first vectors.
+
+        They come from its shifted inverse, whose rounding is relative to the shift: the stiffness itself spans so many
+        decades that rounding of its largest eigenvalue would spoil the low ones.
+        """
+        inverse = self._inverse(count)
+        if self.width == 1:
+            value, turn = eigh_tridiagonal(inverse.diagonal(), inverse.diagonal(1))
+        else:
+            value, turn = np.linalg.eigh(inverse)
+        value, turn = value[::-1], turn[:, ::-1]
+        return 1.0 / np.maximum(value, np.finfo(float).eps * value[0]) - self.shift, turn
+
+    def _inverse(self, count: int) -> np.ndarray:
+        """Inverse of the stiffness K + s**2 M projected onto the first vectors, (count, count).
+
+        It differs from the projected inverse in the last columns only, because the images of all other vectors lie in
+        the space; those columns follow from the stiffness of the last vectors.
+        """
+        reach = 2 * self.width - 1  # the image of a vector ends so many vectors later
+        last, band = min(reach, count), slice(max(0, count - 2 * reach), count)
+        inverse = self.projected[:count, :count].copy()
+        inverse = 0.5 * (inverse + inverse.T)
+        pushed = self._shifted @ self.vectors[count - last : count].T  # (n_dofs, last)
+        stiff = self.vectors[band] @ pushed
+        rest = inverse[count - last :, band] @ stiff - np.eye(last)
+        excess = np.linalg.solve(stiff[-last:].T, rest.T)  # rest = excess @ stiff[-last:]
+        inverse[-last:, -last:] -= 0.5 * (excess + excess.T)
+        return inverse
 
     def modes(self, count: int, damping_ratio: Damping = 0.0) -> Modes:
         """Ritz pairs of the first ``count`` vectors, after the rigid motions, which are exact.
@@ -148,7 +202,6 @@ class Krylov:
         `Modes.poorer` holds those of fewer vectors, so that a blow states the error of having no more.
         """
         self.grow(count)
-        self._project()
         count = min(count, self.count)
         found = self._pairs(count, damping_ratio)
         if count == self.count and self.full:
@@ -157,7 +210,7 @@ class Krylov:
 
     def _pairs(self, count: int, damping_ratio: Damping) -> Modes:
         frame, rigid = self.system.frame, self.system.rigid
-        value, turn = np.linalg.eigh(self.stiffness[:count, :count])
+        value, turn = self._eigenpairs(count)
         omega = np.concatenate([np.zeros(rigid.shape[1]), np.sqrt(np.maximum(value, 0.0)) * frame.rate])
         basis = self.vectors[:count]
         rows = np.hstack([self.loads.T @ rigid, (basis @ self.loads).T @ turn]) * frame.mass**-0.5
