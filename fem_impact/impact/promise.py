@@ -53,6 +53,8 @@ def remedy(hit: "Response") -> str:
             f"find the modes of {name} with tolerance = {limit:.1g}, or on a finer mesh"
             for name, limit in _finer_modes(hit)
         ]
+    if error.inherited > allowed:
+        advice.append("give the blow before a smaller tolerance")
     if error.step > allowed:
         advice.append("leave dt and scheme to the program, or give a smaller dt")
     return "; ".join(advice) or f"take a tolerance of {_above(error.total):g}"

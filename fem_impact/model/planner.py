@@ -41,7 +41,8 @@ SHORT_WAVES = {  # [-] frequency error for which `find_modes` chooses the mesh
     "argyris": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
 }  # fmt: skip
 PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}  # that a user may set
-ARGUMENTS = tuple(signature(collision.strike).parameters)[3:]  # after modes, striker and contact
+# after modes, striker and contact; a plan is for a body at rest
+ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
 TARGETS = ("rigid", "infinite", "vectors", "modal")
 DOFS_PER_AREA = {  # [-] unknowns per square, or length, of the element size
     "argyris": 10.4, "hermite": 2.0, "argyris and shear": 47.0, "hermite and shear": 4.0,
@@ -779,12 +780,12 @@ def strike(
     contact: Contact,
     *,
     at: Any,
-    speed: float,
+    speed: float | None,
     damping_ratio: Damping | None = None,
     strict: bool = False,
     **options: Any,
 ) -> Response:
-    """Strike a body at rest and follow both bodies until their final separation.
+    """Strike a body, at rest or still moving, and follow both bodies until their final separation.
 
     Parameters
     ----------
@@ -797,7 +798,10 @@ def strike(
     contact : Contact
     at : strike point, (dimension,) [m]
     speed : float [m/s]
-        Speed of the striker's contact point towards the body.
+        Speed of the striker's contact point towards the body. None, with ``start``, if the striker goes on as it moves.
+    start : State or Response, optional
+        Where an earlier blow left the body (`Response.state`; of a response, its end), for Modes only. The striker
+        arrives where the surface then is; whoever struck before is gone. A dent or felt is taken as new.
     tolerance : float [-]
         Largest accepted error: absolute for the restitution, relative for impulse, contact time and peak force.
     quantity : str, sequence of str or mapping of str to frequency [Hz], optional
@@ -846,4 +850,8 @@ def strike(
         run = partial(collision.strike, modes, striker, contact, at=at, speed=speed)
         first = run(**options)
         return promise.kept(audit.audited(_within(first.tolerance, first, run, options)), strict)
+    if options.pop("start", None) is not None or speed is None:
+        raise ValueError(
+            "start needs modes, taken as they are: give those of the blow before, hit.target, and no part of a plan"
+        )
     return plan_of(modes, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options).strike(strict)

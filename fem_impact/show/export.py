@@ -206,7 +206,7 @@ SCALARS = (
     "n_impacts", "contact_time", "peak_force", "impulse", "restitution", "speed", "energies", "dissipated",
     "energy_error", "momentum_error", "tolerance", "tolerance_met", "verdict", "finished", "scheme",
 )  # fmt: skip
-ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "sensitivity", "total", "resolvable")
+ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "inherited", "sensitivity", "total", "resolvable")
 IMPACT_PARTS = ("start", "end", "peak_force", "impulse", "contact")
 
 
