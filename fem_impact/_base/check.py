@@ -34,6 +34,7 @@ SOURCES = {  # type -> how a user makes one, for error messages
     "Scene": "fi.load_scene",
     "State": "Response.state",
     "Striker": "fi.Striker.rigid, sphere, stick or flexible",
+    "Strokes": "fi.strokes",
     "System": "fi.assemble",
     "Touch": "fi.Touch",
 }

@@ -265,6 +265,16 @@ def collide(
     >>> [round(float(hit.velocity(None, [0.01], body=i)[0, 0]), 3) for i in range(3)]  # m/s
     [0.0, 0.0, 1.0]
     """
+    rule: dict[str, Any] = {"tolerance": tolerance, "quantity": quantity, "residual": residual, "duration": duration}
+    rule |= {"max_impacts": max_impacts, "scheme": scheme, "dt": dt, "forces": forces, "start": start}
+    return promise.kept(met(bodies, contacts, speeds=speeds, states=states, **rule), strict)
+
+
+def met(
+    bodies, contacts, *, speeds=None, states=None, tolerance=TOLERANCE, quantity=None, residual=True, duration=None,
+    max_impacts=None, scheme=None, dt=None, forces=None, start=None,
+) -> Response:  # fmt: skip
+    """`collide` without a word on its tolerance."""
     options = Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
     bodies, contacts = check.several("bodies", bodies, Modes), check.several("contacts", contacts, Touch)
     before = start.state() if isinstance(start, Response) else start
@@ -279,7 +289,7 @@ def collide(
         parts = [replace(part, pressed=before.force[rows].T) for part, rows in zip(parts, ends)]
         doubt = 1.0 + before.error
         others = [[*parts[:i], _faster(part, doubt), *parts[i + 1 :]] for i, part in enumerate(parts)]
-    return promise.kept(_follow(bodies, contacts, parts, arriving, options, others=others), strict)
+    return _follow(bodies, contacts, parts, arriving, options, others=others)
 
 
 def _moving(part: _Part, q: np.ndarray, p: np.ndarray) -> _Part:

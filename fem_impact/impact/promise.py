@@ -60,12 +60,12 @@ def remedy(hit: "Response") -> str:
     return "; ".join(advice) or f"take a tolerance of {_above(error.total):g}"
 
 
-def kept(hit: "Response", strict: bool = False) -> "Response":
-    """The response; if it missed its tolerance, warn, or raise SimulationError if ``strict``."""
+def kept(hit: Any, strict: bool = False) -> Any:
+    """A response or a sequence; if it missed its tolerance, warn, or raise SimulationError if ``strict``."""
     if not hit.tolerance_met:
         if strict:
-            raise SimulationError(verdict(hit))
-        warnings.warn(verdict(hit), ToleranceWarning, stacklevel=_callers_level())
+            raise SimulationError(hit.verdict)
+        warnings.warn(hit.verdict, ToleranceWarning, stacklevel=_callers_level())
     return hit
 
 

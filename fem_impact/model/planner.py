@@ -335,7 +335,7 @@ def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:
         with stages("strike"), blow.target.blame("strike"):
             run = partial(collision.strike, modes, striker, blow.contact)
             first = run(**{**asked.values, "tolerance": SHARE * asked.tolerance})
-            response = _within(asked.tolerance, first, run, asked.values)
+            response = within(asked.tolerance, first, run, asked.values)
         short = response.error.truncation > SHARE * asked.tolerance
         coarse = not given and response.error.total > asked.tolerance and response.error.mesh > MESH * asked.tolerance
         if plan.target != "modal" or fixed or not (short or coarse) or attempt == ATTEMPTS - 1:
@@ -378,7 +378,7 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
             response = run(**{**values, "tolerance": STEPS * asked.tolerance})
         if not seen.improved(response.error, asked.tolerance - response.error.step):
             break
-    response = _within(asked.tolerance, response, run, values)
+    response = within(asked.tolerance, response, run, values)
     if not response.tolerance_met and "target" not in asked.pieces:
         other = _last_resort(asked, stages)
         if other is not None and other.error < response.error.total:
@@ -412,7 +412,7 @@ def _ringing(asked: _Asked, keep: Any, response: Response) -> Modes:
     return target.surrounded(modes)
 
 
-def _within(tolerance: float, hit: Response, run: Callable[..., Response], values: Mapping[str, Any]) -> Response:
+def within(tolerance: float, hit: Response, run: Callable[..., Response], values: Mapping[str, Any]) -> Response:
     """The blow, or the same with time steps that leave room in the tolerance for the other errors."""
     left = tolerance - (hit.error.total - hit.error.step)
     if hit.error.total > tolerance and left > 0.0 and not values.get("dt"):
@@ -849,7 +849,7 @@ def strike(
     if isinstance(modes, Modes) and damping_ratio is None and not set(options) & set(PIECES):
         run = partial(collision.strike, modes, striker, contact, at=at, speed=speed)
         first = run(**options)
-        return promise.kept(audit.audited(_within(first.tolerance, first, run, options)), strict)
+        return promise.kept(audit.audited(within(first.tolerance, first, run, options)), strict)
     if options.pop("start", None) is not None or speed is None:
         raise ValueError(
             "start needs modes, taken as they are: give those of the blow before, hit.target, and no part of a plan"

@@ -18,6 +18,7 @@ from .._base.files import replacing, staged
 from ..impact.assumption import table
 from ..impact.response import Response
 from ..model.planner import Run
+from ..model.playing import Strokes
 from ..modes import universal_files
 from ..modes.modal import Modes
 from . import sampling, sound
@@ -146,7 +147,7 @@ def write_uff(path: str | Path, modes: Modes) -> None:
 
 @check.typed
 def write_wav(
-    path: str | Path, response: Response, at: Any = None, *, listener: Any = None, **options: Any
+    path: str | Path, response: Response | Strokes, at: Any = None, *, listener: Any = None, **options: Any
 ) -> sound.Sound:
     """Write the sound of a blow as 32-bit float WAV, with a fade at its end, and return it.
 
@@ -176,7 +177,7 @@ def write_wav(
 
 
 @check.typed
-def write_force(path: str | Path, response: Response) -> None:
+def write_force(path: str | Path, response: Response | Strokes) -> None:
     """Write the force history as CSV in full precision: a header with units, then one row per instant.
 
     Examples
