@@ -18,6 +18,7 @@ _NAMES = {
     "impact.spectra": "mobility",
     "impact.threshold": "threshold_frequency",
     "model.planner": "Plan strike",
+    "model.playing": "strokes",
     "scenes.scene": "Scene load_scene plan",
     "sweeps.grid": "sweep",
     "taps.records": "Taps read_taps",

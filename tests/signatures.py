@@ -255,6 +255,16 @@ def table() -> dict[str, dict[str, Any]]:
             "states": None, "tolerance": 1e-2, "quantity": None, "residual": True, "duration": 0.1, "max_impacts": 3,
             "scheme": "A4", "dt": 1e-5, "forces": [0.0, 0.0],
         },
+        "strike moving": {**blow, "speed": 0.5, "tolerance": 1e-1, "start": t["hit"].state(0.05)},
+        "collide moving": {
+            "bodies": [t["free"], t["free"]], "contacts": [fi.Touch(t["law"], 0, 1)], "tolerance": 1e-1,
+            "start": fi.collide([t["free"]] * 2, [fi.Touch(t["law"], 0, 1)], speeds=[1.0, 0.0], tolerance=1e-1),
+        },
+        "Response.state": {"self": t["hit"], "time": 1e-3},
+        "strokes": {
+            "modes": t["modes"], "strokes": [(0.0, t["striker"], t["law"], at, 1.0, 0.1)], "tolerance": 1e-1,
+            "quantity": None, "residual": True, "duration": 1.0, "start": t["hit"].state(0.05), "strict": False,
+        },
         "Scene.changed": {"self": t["scene"], "values": {"contact.stiffness": 2e6}},
         "Scene.modes": {"self": t["scene"], "count": 5},
         "Scene.plan": {"self": t["scene"], "watch": None, "tolerance": 1e-1},

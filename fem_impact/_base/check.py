@@ -32,7 +32,9 @@ SOURCES = {  # type -> how a user makes one, for error messages
     "Response": "fi.strike or fi.collide",
     "Run": "Scene.run",
     "Scene": "fi.load_scene",
+    "State": "Response.state",
     "Striker": "fi.Striker.rigid, sphere, stick or flexible",
+    "Strokes": "fi.strokes",
     "System": "fi.assemble",
     "Touch": "fi.Touch",
 }

@@ -19,6 +19,7 @@ from .compiled.law import FELT
 from .contact import Contact, acting_stiffness, wall_time
 from .quantities import asked_for
 from .response import Dip, Error, History, Response
+from .state import State
 from .striker import Striker
 
 TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
@@ -144,6 +145,7 @@ class _Part:
     bias: np.ndarray
     force: float  # [N] constant force at its first contact
     points: np.ndarray  # (n_ends, dimension) [m] contact points
+    pressed: np.ndarray  # (2, n_ends) [N], [N/s] contact forces at the start and their rates
 
 
 @check.typed
@@ -153,7 +155,7 @@ def strike(
     contact: Contact,
     *,
     at: Any,
-    speed: float,
+    speed: float | None,
     tolerance: float = TOLERANCE,
     quantity: Any = None,
     residual: bool = True,
@@ -163,9 +165,13 @@ def strike(
     dt: float | None = None,
     striker_force: float = 0.0,
     target_force: float = 0.0,
+    start: State | Response | None = None,
 ) -> Response:
     """Strike a body with known modes; see `fi.strike`."""
-    speed = check.non_negative("speed", speed, "m/s")
+    if speed is None and start is None:
+        raise ValueError("speed must be given in m/s, or start, which tells how the striker moves")
+    speed = speed if speed is None else check.non_negative("speed", speed, "m/s")
+    before = start.state() if isinstance(start, Response) else start
     forces = [
         check.number(name, x, "N") for name, x in (("striker_force", striker_force), ("target_force", target_force))
     ]
@@ -174,19 +180,41 @@ def strike(
     rows = modes.shapes.at(point)
     rest = left_out(modes, point, rows) if residual and modes.dimension else None
     struck = _part(modes, ((0, -1.0),), point, rows, rest, forces[1])
+    if before is not None:
+        struck = _moving(struck, *before.of(-1, "modes", modes))
 
-    def blow(striker: Striker) -> Response:
+    def blow(striker: Striker, speed: float, own: tuple[np.ndarray, np.ndarray] | None = None) -> Response:
         touch = Touch(contact, 0, 1, striker.at[None], point)
         rest = striker.left_out if residual and striker.modes.dimension else None
-        motion = speed * striker.motion
-        arriving = _part(striker.modes, ((0, 1.0),), striker.at[None], striker.shape[None], rest, forces[0], motion)
-        return _follow((striker.modes, modes), [touch], [arriving, struck], speed, options, striker, point[0])
+        arriving = _part(striker.modes, ((0, 1.0),), striker.at[None], striker.shape[None], rest, forces[0])
 
+        def start(one: float = 1.0, other: float = 1.0) -> list[_Part]:
+            """Both bodies at the start, each as fast as it is known times a factor."""
+            target = _faster(struck, other)
+            if own is None:  # the striker arrives at the surface, wherever that is
+                return [_moving(arriving, float(rows[0] @ target.q) * striker.motion, speed * striker.motion), target]
+            pressed = np.zeros((2, 1)) if before is None else before.force.T
+            return [replace(_faster(_moving(arriving, *own), one), pressed=pressed), replace(target, pressed=pressed)]
+
+        doubt = 0.0 if before is None else 1.0 + before.error
+        others = [start(*factors) for factors in ((doubt, 1.0), (1.0, doubt))[own is None :] if doubt]
+        return _follow((striker.modes, modes), [touch], start(), speed, options, striker, point[0], others)
+
+    if speed is None:
+        assert before is not None
+        striker = before.same_striker(striker, contact, modes, point)
+        own = before.of(0, "striker", striker.modes)
+        return blow(striker, float(striker.shape @ np.where(striker.modes.omega == 0.0, own[1], 0.0)), own)
+    if before is not None and before.force.any():
+        raise ValueError(
+            "start must be a time when nothing touches, or speed None for the striker to go on; at "
+            f"{before.time:.4g} s a force of {before.force[:, 0].max():.3g} N acts"
+        )
     if striker.fixed or not residual or speed == 0.0:
-        return blow(striker)
+        return blow(striker, speed)
     needed = striker_modes(striker, contact=contact, speed=speed, tolerance=options.tolerance)[0]
-    hit = blow(shortened(striker, needed))
-    return hit if hit.error.truncation <= 0.5 * options.tolerance else blow(striker)
+    hit = blow(shortened(striker, needed), speed)
+    return hit if hit.error.truncation <= 0.5 * options.tolerance else blow(striker, speed)
 
 
 @check.typed
@@ -204,6 +232,7 @@ def collide(
     scheme: str | None = None,
     dt: float | None = None,
     forces: Sequence[float] | None = None,
+    start: State | Response | None = None,
     strict: bool = False,
 ) -> Response:
     """Collide any number of bodies at any number of contacts.
@@ -219,6 +248,8 @@ def collide(
         Initial modal displacements and velocities of each body; ``speeds`` adds to them.
     forces : sequence of float [N], (n_bodies,)
         Constant force at each body's first contact point, with the sign convention of the speeds.
+    start : State or Response, optional
+        Where an earlier collision of the same bodies left them (`Response.state`), instead of ``states``.
     tolerance, quantity, residual, duration, max_impacts, scheme, dt, strict
         As in `strike`.
 
@@ -234,14 +265,47 @@ def collide(
     >>> [round(float(hit.velocity(None, [0.01], body=i)[0, 0]), 3) for i in range(3)]  # m/s
     [0.0, 0.0, 1.0]
     """
+    rule: dict[str, Any] = {"tolerance": tolerance, "quantity": quantity, "residual": residual, "duration": duration}
+    rule |= {"max_impacts": max_impacts, "scheme": scheme, "dt": dt, "forces": forces, "start": start}
+    return promise.kept(met(bodies, contacts, speeds=speeds, states=states, **rule), strict)
+
+
+def met(
+    bodies, contacts, *, speeds=None, states=None, tolerance=TOLERANCE, quantity=None, residual=True, duration=None,
+    max_impacts=None, scheme=None, dt=None, forces=None, start=None,
+) -> Response:  # fmt: skip
+    """`collide` without a word on its tolerance."""
     options = Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
     bodies, contacts = check.several("bodies", bodies, Modes), check.several("contacts", contacts, Touch)
+    before = start.state() if isinstance(start, Response) else start
+    if before is not None:
+        if states is not None:
+            raise ValueError("states must be left out if start is given, which has the states of all bodies")
+        states = before.states(bodies, [touch.law for touch in contacts])
     parts, arriving = _parts(bodies, contacts, speeds, states, forces, residual)
-    return promise.kept(_follow(bodies, contacts, parts, arriving, options), strict)
+    others = []
+    if before is not None:
+        ends = [[i for i, _ in part.touched] for part in parts]
+        parts = [replace(part, pressed=before.force[rows].T) for part, rows in zip(parts, ends)]
+        doubt = 1.0 + before.error
+        others = [[*parts[:i], _faster(part, doubt), *parts[i + 1 :]] for i, part in enumerate(parts)]
+    return _follow(bodies, contacts, parts, arriving, options, others=others)
 
 
-def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> Response:
-    """Run the blow to the required tolerance and estimate the remaining errors."""
+def _moving(part: _Part, q: np.ndarray, p: np.ndarray) -> _Part:
+    return replace(part, q=q, p=p)
+
+
+def _faster(part: _Part, factor: float) -> _Part:
+    """The same body with all motion larger by a factor, its rigid position as it is."""
+    return _moving(part, np.where(part.omega == 0.0, 1.0, factor) * part.q, factor * part.p)
+
+
+def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, others=()) -> Response:
+    """Run the blow to the required tolerance and estimate the remaining errors.
+
+    ``others`` are the parts as they would move at the start if the blow before erred as estimated.
+    """
     system = _joined(parts, contacts)
     endless = not np.isfinite(options.horizon) and not options.n_max
     if endless and (system.bias @ system.shape.T > 0.0).any():
@@ -257,7 +321,8 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> R
     )
     truncation, resolvable = _truncation(parts, contacts, system, coarse, ran, size, differ, pace, *last)
     mesh_error = _mesh_error(bodies, parts, contacts, system, coarse, ran, size, differ, options.tolerance, pace, last)
-    parted = {"truncation": truncation, "mesh": mesh_error}
+    inherited = sum(differ(_run(_joined(other, contacts), ran, size, pace, *last), coarse) for other in others)
+    parted = {"truncation": truncation, "mesh": mesh_error, "inherited": inherited}
     for i, body in enumerate(bodies):
         for cause, other in body.poorer.items():
             poorer = [*parts[:i], _poorer(parts[i], other), *parts[i + 1 :]]
@@ -349,7 +414,10 @@ def _part(
     still = np.zeros(modes.n_modes)
     bias = force * rows[0] if force else still
     velocity = still if motion is None else motion
-    return _Part(modes.omega, modes.damping_ratio, rows, touched, rest, doubt, still, velocity, bias, force, points)
+    pressed = np.zeros((2, n_ends))
+    return _Part(
+        modes.omega, modes.damping_ratio, rows, touched, rest, doubt, still, velocity, bias, force, points, pressed
+    )
 
 
 def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
@@ -363,7 +431,8 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
     offset = np.array([-t.law.gap for t in contacts])
     n_modes = sum(len(part.omega) for part in parts)
     shape = np.zeros((len(contacts), n_modes))
-    extra: list[tuple[float, float, np.ndarray]] = []  # frequency, damping ratio, signed shape (n_contacts,)
+    # frequency, damping ratio, signed shape (n_contacts,), constant force, static deflection and its rate
+    extra: list[tuple[float, float, np.ndarray, float, float, float]] = []
     start = 0
     for part in parts:
         for (i, sign), row in zip(part.touched, part.rows):
@@ -383,12 +452,12 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
                 column = np.zeros(len(law))
                 for (i, sign), share in zip(part.touched, vector):
                     column[i] += sign * share * np.sqrt(value) * above
-                extra.append((above, damping, column))
+                held = -(part.pressed @ column[[i for i, _ in part.touched]]) / above**2
+                extra.append((above, damping, column, 0.0, float(held[0]), float(held[1])))
     lists = [[getattr(part, name) for part in parts] for name in ("omega", "zeta", "bias", "q", "p")]
     if extra:
-        shape = np.ascontiguousarray(np.hstack([shape, *(column[:, None] for _, _, column in extra)]))
-        added = [[omega for omega, _, _ in extra], [zeta for _, zeta, _ in extra], *[[0.0] * len(extra)] * 3]
-        lists = [[*one, np.array(more)] for one, more in zip(lists, added)]
+        shape = np.ascontiguousarray(np.hstack([shape, *(mode[2][:, None] for mode in extra)]))
+        lists = [[*one, np.array([mode[k] for mode in extra])] for one, k in zip(lists, (0, 1, 3, 4, 5))]
     omega, zeta, bias, q, p = (np.concatenate(one) for one in lists)
     return _System(omega, zeta, shape, offset, bias, law, q, p)
 
@@ -403,7 +472,7 @@ def _poorer(part: _Part, modes: Modes) -> _Part:
     rows, still = modes.shapes.at(part.points), np.zeros(modes.n_modes)
     moving = part.omega == 0.0
     if part.q.any() or part.p[~moving].any():
-        raise ValueError("states must be zero for a body of Ritz vectors; find its modes with find_modes")
+        raise ValueError("a body of Ritz vectors must start at rest; find its modes with find_modes")
     velocity = still
     if part.p.any():
         velocity = float(part.rows[0] @ part.p) * modes.rigid_motion(part.points[:1])
@@ -730,8 +799,10 @@ def _difference(
     """
     if len(coarse.contacts) != len(fine.contacts) or coarse.status != fine.status:
         return 1.0
-    momentum = float(np.linalg.norm(fine.start_p) or np.linalg.norm(fine.end_p)) or 1.0
-    speed = np.abs(coarse.end_p[coarse.omega == 0.0] - fine.end_p[fine.omega == 0.0])
+    rigid = fine.omega == 0.0  # a swinging body has much momentum, of which the striker's error is no share
+    momentum = max(float(np.linalg.norm(p[rigid])) for p in (fine.start_p, fine.end_p))
+    momentum = momentum or float(np.linalg.norm(fine.start_p) or np.linalg.norm(fine.end_p)) or 1.0
+    speed = np.abs(coarse.end_p[coarse.omega == 0.0] - fine.end_p[rigid])
     found = {"restitution": float(speed.max(initial=0.0)) / momentum / over[0]}
     if len(fine.contacts):
         one, two = (_totals(history) for history in (coarse, fine))

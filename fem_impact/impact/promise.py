@@ -53,17 +53,19 @@ def remedy(hit: "Response") -> str:
             f"find the modes of {name} with tolerance = {limit:.1g}, or on a finer mesh"
             for name, limit in _finer_modes(hit)
         ]
+    if error.inherited > allowed:
+        advice.append("give the blow before a smaller tolerance")
     if error.step > allowed:
         advice.append("leave dt and scheme to the program, or give a smaller dt")
     return "; ".join(advice) or f"take a tolerance of {_above(error.total):g}"
 
 
-def kept(hit: "Response", strict: bool = False) -> "Response":
-    """The response; if it missed its tolerance, warn, or raise SimulationError if ``strict``."""
+def kept(hit: Any, strict: bool = False) -> Any:
+    """A response or a sequence; if it missed its tolerance, warn, or raise SimulationError if ``strict``."""
     if not hit.tolerance_met:
         if strict:
-            raise SimulationError(verdict(hit))
-        warnings.warn(verdict(hit), ToleranceWarning, stacklevel=_callers_level())
+            raise SimulationError(hit.verdict)
+        warnings.warn(hit.verdict, ToleranceWarning, stacklevel=_callers_level())
     return hit
 
 

@@ -16,6 +16,7 @@ from .assumption import Assumption
 from .compiled import law, propagation, record
 from .contact import Contact
 from .quantities import USUAL, words
+from .state import State
 from .striker import Striker
 
 CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more than this factor
@@ -25,6 +26,7 @@ PEAK_LOOKS = 16  # [-] samples per step in the search for the peak force; misses
 # [-] largest difference of descriptions up to which Ritz vectors tell a motion: as much as modes err that are found
 # as far as the force reaches
 MOVED = {"displacement": 1e-2, "velocity": 3e-2}
+RELEASED = 1e-9  # [-] of the peak force: a smaller one is the rounding of a release
 LASTS = 2.0  # [-] and no longer than this many times the run, as later echoes may be missing from all of them
 LOOKED_AT = 200  # [-] times at which this error is estimated
 DIP_BLOCK = 8  # [-] points per static solution: each is a load, and the cost grows with the pairs of points
@@ -56,11 +58,13 @@ class Error:
     resolvable: bool = True  # False: the left-out modes govern the contact itself, and no estimate holds
     idealisation: float = 0.0  # [-] of treating the target as rigid or infinite
     sensitivity: float = 1.0  # [-] growth of a small difference from first to last impact
+    inherited: float = 0.0  # [-] of the motion at the start, from the blow before
 
     @property
     def total(self) -> float:
         """The sum [-]; infinite if the modes cannot resolve the contact."""
-        return self.step + self.truncation + self.mesh + self.idealisation if self.resolvable else float("inf")
+        found = self.step + self.truncation + self.mesh + self.idealisation + self.inherited
+        return found if self.resolvable else float("inf")
 
     @property
     def dominant(self) -> tuple[str, float]:
@@ -70,6 +74,7 @@ class Error:
             "modes left out": self.truncation,
             "the finite elements": self.mesh,
             "the simplified target": self.idealisation,
+            "the blow before": self.inherited,
         }
         return max(parts.items(), key=lambda part: part[1])
 
@@ -284,6 +289,8 @@ class Response:
         """
         if self.at is None:
             raise ValueError("on needs a blow of `strike`, with one strike point")
+        if self.moving:
+            raise ValueError("on needs a blow on a body at rest: only its own modes know how this one moved before")
         point = modes.point("at", self.at)
         whole, softness = self.bodies[-1].shapes.compliance(point)[0, 0], modes.shapes.compliance(point)[0, 0]
         sampled = isinstance(modes.shapes, SampledShapes)  # it may not know the modes left out
@@ -498,6 +505,52 @@ class Response:
         back[order] = np.arange(len(order))
         return q[:, part][back], p[:, part][back]
 
+    def state(self, time: float | None = None) -> State:
+        """Where all bodies are at a time and how they move, for another blow to start from.
+
+        Parameters
+        ----------
+        time : float [s], optional
+            By default the end of the run. After the end only if the bodies separated for good.
+
+        Examples
+        --------
+        >>> drum = fi.analytic.disk(0.18, edge="clamped", mass=0.1, first_frequency=150.0, n_modes=40)
+        >>> stick, law = fi.Striker.rigid(0.02), fi.Contact.linear(1e5)
+        >>> first = fi.strike(drum, stick, law, at=(0.05, 0.0), speed=1.0)
+        >>> second = fi.strike(drum, stick, law, at=(0.05, 0.0), speed=1.0, start=first.state(0.02))
+        >>> round(float(first.peak_force / second.peak_force), 1) != 1.0  # the head moves
+        True
+        """
+        end = self.history.end_time
+        time = end if time is None else check.non_negative("time", time, "s")
+        over = self.history.status in (record.FINISHED, record.SETTLED)
+        if time > end and not over:
+            raise ValueError(f"time must be at most {end:g} s, where the run stopped before its end, got {time:g} s")
+        bodies = tuple(self._moved(body) for body in range(len(self.bodies)))
+        found = [self.modal_state([time], body=body) for body in range(len(bodies))]
+        forces = np.array([self.history.force_at(np.array([time]), i) for i in range(len(self.contacts))])[:, :, 0]
+        forces[forces[:, 0] <= RELEASED * self.peak_force] = 0.0
+        remembers = any(law.yield_approach or law.hysteresis for law in self.contacts)
+        return State(
+            time,
+            bodies,
+            tuple(q[0] for q, _ in found),
+            tuple(p[0] for _, p in found),
+            forces,
+            min(self.error.total, 1.0),
+            self.striker,
+            self.contacts,
+            self.at,
+            remembers and any(impact.start < time for impact in self.impacts),
+        )
+
+    @property
+    def moving(self) -> bool:
+        """Whether the target moved when the blow began."""
+        part = self.body_slice(len(self.bodies) - 1)
+        return bool(self.history.start_q[part].any() or self.history.start_p[part].any())
+
     def modal_energy(self, times: Any, *, body: int = -1) -> np.ndarray:
         """Energy [J] of each mode of the target at any times, (n_times, n_modes); parameters as in `modal_state`."""
         q, p = self.modal_state(times, body=body)
@@ -659,6 +712,21 @@ class Response:
         return result
 
     @property
+    def start_energies(self) -> dict[str, float]:
+        """Energies [J] at the start, of the same parts: what the blow began with."""
+        h, last = self.history, len(self.bodies) - 1
+        names = list(self.energies)[: last + 1]
+        found = {name: h.energy(h.start_q, h.start_p, self.body_slice(body)) for body, name in enumerate(names)}
+        found["contact"] = self._balance["start"] - sum(found.values())
+        return {**found, "dissipated": 0.0}
+
+    @property
+    def energy_gains(self) -> dict[str, float]:
+        """Energy [J] that each part gained in the blow; negative what it lost. They add up to zero."""
+        start = self.start_energies
+        return {name: energy - start[name] for name, energy in self.energies.items()}
+
+    @property
     def dissipated(self) -> dict[str, float]:
         """Energy [J] lost to modal damping and to the contacts; exactly zero without damping or contact loss."""
         lossy = any(contact.lossy for contact in self.contacts)
@@ -736,9 +804,16 @@ class Response:
             f"restitution {round(self.restitution, 5) + 0.0:.5f} at {self.speed:g} m/s",
             f"energy {total:.5g} J: {shares}",
             f"estimated error {error.total:.1e} of {words(self.quantities)}: step {error.step:.1e}, truncation "
-            f"{error.truncation:.1e}, mesh {error.mesh:.1e}, idealisation {error.idealisation:.1e}; energy error "
-            f"{self.energy_error:.1e}",
+            f"{error.truncation:.1e}, mesh {error.mesh:.1e}, idealisation {error.idealisation:.1e}"
+            + (f", the blow before {error.inherited:.1e}" if error.inherited else "")
+            + f"; energy error {self.energy_error:.1e}",
         ]
+        if self.moving:
+            began, gained = (
+                ", ".join(f"{name} {x:.4g} J" for name, x in each.items() if name != "dissipated")
+                for each in (self.start_energies, self.energy_gains)
+            )
+            lines.insert(-1, f"the target moved at the start: {began}; gained in the blow: {gained}")
         if several:
             each = ", ".join(f"contact {i} {1e3 * time:.5g} ms" for i, time in enumerate(self.contact_times))
             lines.append(f"time in contact: {each}; any of them {1e3 * self.touching_time:.5g} ms")

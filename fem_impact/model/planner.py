@@ -41,7 +41,8 @@ SHORT_WAVES = {  # [-] frequency error for which `find_modes` chooses the mesh
     "argyris": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
 }  # fmt: skip
 PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}  # that a user may set
-ARGUMENTS = tuple(signature(collision.strike).parameters)[3:]  # after modes, striker and contact
+# after modes, striker and contact; a plan is for a body at rest
+ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
 TARGETS = ("rigid", "infinite", "vectors", "modal")
 DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow
 FAINTEST = 8.0  # [-] frequency up to which a force has the fraction FAINT of its impulse, times the contact's duration
@@ -331,7 +332,7 @@ def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:
         with stages("strike"), blow.target.blame("strike"):
             run = partial(collision.strike, modes, striker, blow.contact)
             first = run(**{**asked.values, "tolerance": SHARE * asked.tolerance})
-            response = _within(asked.tolerance, first, run, asked.values)
+            response = within(asked.tolerance, first, run, asked.values)
         short = response.error.truncation > SHARE * asked.tolerance
         coarse = not given and response.error.total > asked.tolerance and response.error.mesh > MESH * asked.tolerance
         if plan.target != "modal" or fixed or not (short or coarse) or attempt == ATTEMPTS - 1:
@@ -374,7 +375,7 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
             response = run(**{**values, "tolerance": STEPS * asked.tolerance})
         if not seen.improved(response.error, asked.tolerance - response.error.step):
             break
-    response = _within(asked.tolerance, response, run, values)
+    response = within(asked.tolerance, response, run, values)
     if not response.tolerance_met and "target" not in asked.pieces:
         other = _last_resort(asked, stages)
         if other is not None and other.error < response.error.total:
@@ -408,7 +409,7 @@ def _ringing(asked: _Asked, keep: Any, response: Response) -> Modes:
     return target.surrounded(modes)
 
 
-def _within(tolerance: float, hit: Response, run: Callable[..., Response], values: Mapping[str, Any]) -> Response:
+def within(tolerance: float, hit: Response, run: Callable[..., Response], values: Mapping[str, Any]) -> Response:
     """The blow, or the same with time steps that leave room in the tolerance for the other errors."""
     left = tolerance - (hit.error.total - hit.error.step)
     if hit.error.total > tolerance and left > 0.0 and not values.get("dt"):
@@ -776,12 +777,12 @@ def strike(
     contact: Contact,
     *,
     at: Any,
-    speed: float,
+    speed: float | None,
     damping_ratio: Damping | None = None,
     strict: bool = False,
     **options: Any,
 ) -> Response:
-    """Strike a body at rest and follow both bodies until their final separation.
+    """Strike a body, at rest or still moving, and follow both bodies until their final separation.
 
     Parameters
     ----------
@@ -794,7 +795,10 @@ def strike(
     contact : Contact
     at : strike point, (dimension,) [m]
     speed : float [m/s]
-        Speed of the striker's contact point towards the body.
+        Speed of the striker's contact point towards the body. None, with ``start``, if the striker goes on as it moves.
+    start : State or Response, optional
+        Where an earlier blow left the body (`Response.state`; of a response, its end), for Modes only. The striker
+        arrives where the surface then is; whoever struck before is gone. A dent or felt is taken as new.
     tolerance : float [-]
         Largest accepted error: absolute for the restitution, relative for impulse, contact time and peak force.
     quantity : str, sequence of str or mapping of str to frequency [Hz], optional
@@ -842,5 +846,9 @@ def strike(
     if isinstance(modes, Modes) and damping_ratio is None and not set(options) & set(PIECES):
         run = partial(collision.strike, modes, striker, contact, at=at, speed=speed)
         first = run(**options)
-        return promise.kept(audit.audited(_within(first.tolerance, first, run, options)), strict)
+        return promise.kept(audit.audited(within(first.tolerance, first, run, options)), strict)
+    if options.pop("start", None) is not None or speed is None:
+        raise ValueError(
+            "start needs modes, taken as they are: give those of the blow before, hit.target, and no part of a plan"
+        )
     return plan_of(modes, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options).strike(strict)

@@ -171,7 +171,15 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
 }  # fmt: skip
 TABLES = [*MAKERS, "supports"]
 REQUIRED = ("mesh", "striker", "contact", "strike")
-SUPPLIED = {"material", "modes", "striker", "contact", "sphere", "plate"}  # arguments that come from other tables
+SUPPLIED = {
+    "material",
+    "modes",
+    "striker",
+    "contact",
+    "sphere",
+    "plate",
+    "start",
+}  # arguments that come from other tables
 PATHS = ("source", "path")  # keys that name a file, relative to the scene file
 
 

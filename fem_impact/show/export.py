@@ -18,6 +18,7 @@ from .._base.files import replacing, staged
 from ..impact.assumption import table
 from ..impact.response import Response
 from ..model.planner import Run
+from ..model.playing import Strokes
 from ..modes import universal_files
 from ..modes.modal import Modes
 from . import sampling, sound
@@ -146,7 +147,7 @@ def write_uff(path: str | Path, modes: Modes) -> None:
 
 @check.typed
 def write_wav(
-    path: str | Path, response: Response, at: Any = None, *, listener: Any = None, **options: Any
+    path: str | Path, response: Response | Strokes, at: Any = None, *, listener: Any = None, **options: Any
 ) -> sound.Sound:
     """Write the sound of a blow as 32-bit float WAV, with a fade at its end, and return it.
 
@@ -176,7 +177,7 @@ def write_wav(
 
 
 @check.typed
-def write_force(path: str | Path, response: Response) -> None:
+def write_force(path: str | Path, response: Response | Strokes) -> None:
     """Write the force history as CSV in full precision: a header with units, then one row per instant.
 
     Examples
@@ -206,7 +207,7 @@ SCALARS = (
     "n_impacts", "contact_time", "peak_force", "impulse", "restitution", "speed", "energies", "dissipated",
     "energy_error", "momentum_error", "tolerance", "tolerance_met", "verdict", "finished", "scheme",
 )  # fmt: skip
-ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "sensitivity", "total", "resolvable")
+ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "inherited", "sensitivity", "total", "resolvable")
 IMPACT_PARTS = ("start", "end", "peak_force", "impulse", "contact")
 
 

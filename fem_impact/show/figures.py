@@ -18,6 +18,7 @@ from .._base.files import replacing
 from ..impact import spectra
 from ..impact.response import Response
 from ..mesh.mesh_files import boundary
+from ..model.playing import Strokes
 from ..modes.modal import Modes
 from . import sampling
 from .canvas import COLOURS, VERMILION
@@ -88,12 +89,12 @@ def save(path: str | Path, figure: Figure) -> None:
 
 
 @check.typed
-def force(response: Response, *, band: tuple[float, float] = SPECTRUM_BAND) -> Figure:
+def force(response: Response | Strokes, *, band: tuple[float, float] = SPECTRUM_BAND) -> Figure:
     """Plot the contact force over time, and the magnitude of its spectrum over frequency.
 
     Parameters
     ----------
-    response : Response
+    response : Response or Strokes
     band : (low, high) [Hz] of the spectrum shown
 
     Returns
@@ -119,13 +120,13 @@ def force(response: Response, *, band: tuple[float, float] = SPECTRUM_BAND) -> F
     return figure
 
 
-def _draw_force(axes: Any, response: Response) -> None:
+def _draw_force(axes: Any, response: Response | Strokes) -> None:
     start, end = response.time[0], response.time[-1]
     if response.impacts:
         start, end = response.impacts[0].start, response.impacts[-1].end
     room = MARGIN * (end - start)
     several = response.force.ndim == 2
-    names = [f"contact {i}" for i in range(response.history.n_contacts)] if several else None
+    names = [f"contact {i}" for i in range(response.force.shape[1])] if several else None
     axes.plot(response.time, response.force, label=names)
     if several and len(names or ()) <= MOST_NUMBERS:
         axes.legend(loc="upper right")

@@ -9,6 +9,7 @@ from scipy.io import wavfile
 
 from .._base import check, markup
 from ..impact.response import Response
+from ..model.playing import Strokes
 from ..modes.air import DENSITY, SPEED
 from . import sampling
 
@@ -96,17 +97,22 @@ class Sound:
 
 @check.typed
 def synthesise(
-    response: Response, at: Any = None, *, duration: float | None = None, rate: int = RATE, normalise: bool = False
+    response: Response | Strokes,
+    at: Any = None,
+    *,
+    duration: float | None = None,
+    rate: int = RATE,
+    normalise: bool = False,
 ) -> Sound:
     """Turn the velocity of a point of the struck body into sound, from the first touch on.
 
     Parameters
     ----------
-    response : Response
+    response : Response or Strokes
     at : array_like, shape (dimension,) [m], optional
-        Point to listen to; the strike point by default.
+        Point to listen to; the (first) strike point by default.
     duration : float [s], optional
-        By default until the slowest mode has lost 60 dB, but at least 0.5 s and at most 5 s.
+        By default until the slowest mode has lost 60 dB, but at least 0.5 s and at most 5 s after the last stroke.
     rate : int [Hz]
     normalise : bool
         Scale the largest sample to 1. Otherwise 1 means ``FULL_SCALE`` for every blow, so that two strikes can be
@@ -134,6 +140,17 @@ def synthesise(
     rate, heard = _audible(response, rate)
     times = response.time[0] + np.arange(_length(response, heard, duration, rate)) / rate
     shape = modes.shape_at(point)[0]  # (n_modes,)
+    velocity = np.concatenate([_velocity(hit, heard, shape, part) for hit, _, part in _parts(response, times)])
+    return _scaled(velocity, rate, FULL_SCALE, "m/s", normalise)
+
+
+def _parts(response: Response | Strokes, times: np.ndarray) -> list[tuple[Response, slice, np.ndarray]]:
+    """The blow that tells the motion at each of ascending times: it, its times, and these from its start."""
+    return [(response, slice(0, len(times)), times)] if isinstance(response, Response) else response.parts(times)
+
+
+def _velocity(response: Response, heard: np.ndarray, shape: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Velocity [m/s] of a point at equally spaced times of one blow, (n_times,)."""
     flights = _flights(response, times)
     alone = np.ones(len(times), bool)  # samples whose states are asked for: all but those within the flights
     for first, last in flights:
@@ -145,12 +162,12 @@ def synthesise(
     for first, last in flights:
         state = q[row[first], heard], p[row[first], heard]
         velocity[first:last] = _ring(response, times[first:last], state, heard, shape[None, heard] + 0j, 1)
-    return _scaled(velocity, rate, FULL_SCALE, "m/s", normalise)
+    return velocity
 
 
 @check.typed
 def radiate(
-    response: Response,
+    response: Response | Strokes,
     listener: Any,
     *,
     duration: float | None = None,
@@ -162,7 +179,7 @@ def radiate(
 
     Parameters
     ----------
-    response : Response of a struck plate
+    response : Response or Strokes of a plate
     listener : array_like, shape (3,) [m]
         Position; the third coordinate is the distance from the plate's plane, positive on the side it moves to.
     duration, rate, normalise
@@ -203,15 +220,17 @@ def radiate(
     way = np.sqrt(((points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)  # (n_points,) [m]
     shapes = modes.shapes.at(points)[:, heard] * (weights / way)[:, None]  # (n_points, n_heard)
     times = response.time[0] + np.arange(_length(response, heard, duration, rate)) / rate
-    n_first = int(np.searchsorted(times, response.time[-1] + way.max() / speed, side="right"))
-    first = _arrival(response, times[:n_first], heard, shapes, way / speed)
     delayed = np.stack(
         [np.einsum("km,km->m", shapes, np.exp(-np.outer(way / speed, r))) for r in _roots(response, heard)]
     )
-    if n_first < len(times):
-        q, p = (state[0, heard] for state in response.modal_state(times[n_first : n_first + 1]))
-        first = np.append(first, _ring(response, times[n_first:], (q, p), heard, delayed, 2))
-    return _scaled(first, rate, LOUDEST, "Pa", normalise)
+    pressure = []
+    for hit, part, local in _parts(response, times):
+        n_first = int(np.searchsorted(local, hit.time[-1] + way.max() / speed, side="right"))
+        pressure.append(_arrival(response, times[part][:n_first], heard, shapes, way / speed, 1.0 / rate))
+        if n_first < len(local):
+            q, p = (state[0, heard] for state in hit.modal_state(local[n_first : n_first + 1]))
+            pressure.append(_ring(hit, local[n_first:], (q, p), heard, delayed, 2))
+    return _scaled(np.concatenate(pressure), rate, LOUDEST, "Pa", normalise)
 
 
 def beside(listener: Any) -> np.ndarray:
@@ -224,16 +243,17 @@ def beside(listener: Any) -> np.ndarray:
     return place
 
 
-def _audible(response: Response, rate: int) -> tuple[int, np.ndarray]:
+def _audible(response: Response | Strokes, rate: int) -> tuple[int, np.ndarray]:
     rate = check.count("rate", rate, high=HIGHEST_RATE)
     return rate, (response.target.omega > 0.0) & (response.target.omega < np.pi * rate)
 
 
-def _length(response: Response, heard: np.ndarray, duration: float | None, rate: int) -> int:
-    """Number of samples in a duration [s]; without one, chosen from the decay."""
+def _length(response: Response | Strokes, heard: np.ndarray, duration: float | None, rate: int) -> int:
+    """Number of samples in a duration [s]; without one, chosen from the decay after the last stroke."""
     if duration is None:
         slowest = float((response.target.damping_ratio * response.target.omega)[heard].min(initial=np.inf))
         duration = float(np.clip(DECAY / slowest, SHORTEST, LONGEST)) if slowest > 0.0 else LONGEST
+        duration += 0.0 if isinstance(response, Response) else float(response.starts[-1] - response.starts[0])
     duration = check.between("duration", check.positive("duration", duration, "s"), 0.0, MOST_SAMPLES / rate, "s")
     return max(1, round(duration * rate))
 
@@ -243,7 +263,7 @@ def _scaled(signal: np.ndarray, rate: int, full_scale: float, unit: str, normali
     return Sound(signal / (scale or 1.0), rate, scale or full_scale, unit)
 
 
-def _roots(response: Response, heard: np.ndarray) -> np.ndarray:
+def _roots(response: Response | Strokes, heard: np.ndarray) -> np.ndarray:
     """Both roots [1/s] of ``s**2 + 2 zeta omega s + omega**2`` for each audible mode, (2, n_heard)."""
     omega, zeta = response.target.omega[heard], response.target.damping_ratio[heard]
     zeta = np.where(np.abs(zeta - 1.0) < CRITICAL, 1.0 + CRITICAL, zeta)
@@ -305,12 +325,14 @@ def _areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     return np.bincount(cells.reshape(-1), np.repeat(area / 3.0, 3), minlength=len(points))
 
 
-def _arrival(response, times: np.ndarray, heard: np.ndarray, shapes: np.ndarray, delay: np.ndarray) -> np.ndarray:
+def _arrival(
+    response: Response | Strokes, times: np.ndarray, heard: np.ndarray, shapes: np.ndarray, delay: np.ndarray, sample
+) -> np.ndarray:
     """Pressure (n_times,) [Pa] while sound from the blow still arrives: sums the delayed acceleration of each point."""
     pressure, began = np.zeros(len(times)), response.time[0]
     silent = int(np.searchsorted(times, began + delay.min(), side="right"))
-    step = (times[-1] - times[0]) / max(1, len(times) - 1) / OVERSAMPLING
-    for start in range(max(1, silent), len(times), BLOCK):
+    step = sample / OVERSAMPLING  # [s]
+    for start in range(silent, len(times), BLOCK):
         part = slice(start, start + BLOCK)
         # instants whose sound arrives in this block, with one more on each side for the finite differences
         first, last = max(began, times[start] - delay.max() - step), times[part][-1] - delay.min() + step

@@ -1,0 +1,99 @@
+"""Where all bodies of a blow are at one time and how they move, so that another blow can start there."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from ..modes.modal import Modes
+from .contact import Contact
+from .striker import Striker
+
+SAME = 1e-9  # [-] two bodies are the same if masses and frequencies differ by less: rounding, but no other body
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The motion of all bodies of a blow at one time; `Response.state` makes it."""
+
+    time: float  # [s] since the start of that blow
+    bodies: tuple[Modes, ...]
+    displacements: tuple[np.ndarray, ...]  # (n_modes,) [m kg**0.5] of each body
+    velocities: tuple[np.ndarray, ...]  # (n_modes,) [m kg**0.5/s]
+    force: np.ndarray  # (n_contacts, 2) [N], [N/s] contact forces and their rates
+    error: float  # [-] estimated, of the blow so far
+    striker: Striker | None = None
+    contacts: tuple[Contact, ...] = ()
+    at: np.ndarray | None = None  # (dimension,) [m] strike point
+    remembers: bool = False  # whether a contact may have yielded or be felt that has not recovered
+
+    __repr__ = check.brief
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+        for array in (*self.displacements, *self.velocities):
+            array.setflags(write=False)
+
+    def of(self, body: int, name: str, modes: Modes) -> tuple[np.ndarray, np.ndarray]:
+        """Modal displacements and velocities (n_modes,) of a body; ValueError unless ``modes`` are its own."""
+        mine = self.bodies[body]
+        if modes is not mine and not (_alike(modes, mine) and modes.n_modes == mine.n_modes):
+            raise ValueError(
+                f"{name} must be those of the body that moves at the start, {mine.n_modes} modes of {mine.mass:g} kg, "
+                f"got {modes.n_modes} modes of {modes.mass:g} kg; after a blow on a System give hit.target"
+            )
+        return self.displacements[body], self.velocities[body]
+
+    def states(self, bodies: Sequence[Modes], laws: Sequence[Contact]) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The states of all bodies of `collide`; ValueError unless bodies and contacts are those of the blow before."""
+        if len(bodies) != len(self.bodies) or tuple(laws) != self.contacts:
+            raise ValueError(
+                f"start must come from a blow of the same bodies and contacts, got {len(self.bodies)} bodies and "
+                f"{len(self.contacts)} contacts for {len(bodies)} and {len(laws)}"
+            )
+        self._forgets()
+        return [self.of(i, f"bodies[{i}]", modes) for i, modes in enumerate(bodies)]
+
+    def same_striker(self, striker: Striker, law: Contact, modes: Modes, at: Any) -> Striker:
+        """The striker that goes on; ValueError if it, its contact or the strike point is another than before."""
+        mine = self.striker
+        if mine is None or not _alike(mine.modes, striker.modes) or not np.array_equal(mine.at, striker.at):
+            raise ValueError("striker must be the one of the blow before if speed is None; give its speed")
+        if law != self.contacts[0] or self.at is None or not np.array_equal(self.at, at[0]):
+            raise ValueError("contact and at must be those of the blow before if speed is None; give a speed")
+        self._forgets()
+        return mine
+
+    def _forgets(self) -> None:
+        if self.remembers:
+            raise ValueError(
+                "start must be before the first touch if the contact yields or is felt: what it remembers is not kept"
+            )
+
+    def displacement(self, points: Any, *, body: int = -1) -> np.ndarray:
+        """Displacement [m] of a body at points (n_points, dimension) [m], by its modes, (n_points,)."""
+        return self.bodies[body].shape_at(points) @ self.displacements[body]
+
+    def velocity(self, points: Any, *, body: int = -1) -> np.ndarray:
+        """Velocity [m/s] of a body at points (n_points, dimension) [m], by its modes, (n_points,)."""
+        return self.bodies[body].shape_at(points) @ self.velocities[body]
+
+    @property
+    def energies(self) -> tuple[float, ...]:
+        """Kinetic and elastic energy [J] of each body."""
+        parts = zip(self.bodies, self.displacements, self.velocities)
+        return tuple(0.5 * float(p @ p + (modes.omega * q) @ (modes.omega * q)) for modes, q, p in parts)
+
+    def summary(self) -> str:
+        """The state in words."""
+        each = ", ".join(f"{x:.4g} J" for x in self.energies)
+        touch = f"contact forces {', '.join(f'{x:.4g}' for x in self.force[:, 0])} N" if self.force.any() else "apart"
+        return f"{self.time * 1e3:.4g} ms after the start, {touch}; energies of {len(self.bodies)} bodies: {each}"
+
+
+def _alike(one: Modes, other: Modes) -> bool:
+    """Whether both describe the same body, perhaps with another number of modes."""
+    n = min(one.n_modes, other.n_modes)
+    return bool(np.isclose(one.mass, other.mass, rtol=SAME) and np.allclose(one.omega[:n], other.omega[:n], rtol=SAME))

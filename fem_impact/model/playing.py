@@ -1,0 +1,460 @@
+"""Blows one after another on a body that goes on moving: rolls, flams, ruffs and ostinati."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .._base import check
+from .._base.check import SimulationError
+from ..impact import collision, promise
+from ..impact.collision import TOLERANCE, Touch
+from ..impact.compiled import record
+from ..impact.contact import Contact
+from ..impact.quantities import words
+from ..impact.response import Impact, Response
+from ..impact.state import State
+from ..impact.striker import Striker
+from ..modes.modal import Modes
+from . import audit, planner
+
+EACH = 0.5  # [-] of the tolerance for each blow by itself; the rest is for what it inherits from those before
+FEW_MODES = 0.1  # [-] of the tolerance at which the modes of a striker are chosen that meets others on the body
+MOST_BLOWS = 100_000  # [-] above a day of drumming; more are a mistake
+LISTED = 20  # [-] impacts listed in a summary
+
+
+class Stroke(NamedTuple):
+    """One blow of a sequence."""
+
+    when: float  # [s] time at which the striker is at the surface
+    striker: Striker
+    contact: Contact
+    at: Any  # (dimension,) [m] strike point
+    speed: float  # [m/s] of the striker's contact point towards the body
+    # [s] after which the striker is lifted, as soon as it does not touch; None: when it has parted for good
+    lasts: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """Blows one after another on one body: what `fi.strokes` found."""
+
+    target: Modes
+    strokes: tuple[Stroke, ...]  # in order of time
+    starts: np.ndarray  # (n_hits,) [s] when each of `hits` begins
+    hits: tuple[Response, ...]  # the blows; one for several strikers that are on the body together
+    strikers: tuple[tuple[int, ...], ...]  # the strokes that make up each of `hits`, in the order of its contacts
+    tolerance: float  # [-] requested
+    notes: tuple[str, ...] = field(default=(), repr=False)
+
+    __repr__ = check.brief
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+
+    @property
+    def at(self) -> np.ndarray:
+        """The first strike point, (dimension,) [m]."""
+        return self.target.point("at", self.strokes[0].at)[0]
+
+    @cached_property
+    def impacts(self) -> tuple[Impact, ...]:
+        """All impacts in order of their start; the number of the stroke stands for the contact."""
+        found: list[Impact] = []
+        for start, hit, strokes in zip(self.starts.tolist(), self.hits, self.strikers):
+            for each in hit.impacts:
+                stroke, begin, end = strokes[each.contact], start + each.start, start + each.end
+                same = (i for i, old in enumerate(found) if old.contact == stroke and each.start == 0.0)
+                i = next((i for i in same if found[i].end >= begin), None)  # the run was cut while this one lasted
+                if i is None:
+                    found.append(Impact(begin, end, each.peak_force, each.impulse, stroke))
+                else:
+                    peak = max(found[i].peak_force, each.peak_force)
+                    found[i] = Impact(found[i].start, end, peak, found[i].impulse + each.impulse, stroke)
+        return tuple(sorted(found, key=lambda impact: (impact.start, impact.contact)))
+
+    @property
+    def n_impacts(self) -> int:
+        """Number of impacts."""
+        return len(self.impacts)
+
+    @property
+    def contact_time(self) -> float:
+        """Total time in contact [s]."""
+        return float(sum(impact.duration for impact in self.impacts))
+
+    @property
+    def impulse(self) -> float:
+        """Total impulse of the contact forces [N s]."""
+        return float(sum(impact.impulse for impact in self.impacts))
+
+    @property
+    def peak_force(self) -> float:
+        """Largest force of one striker [N]."""
+        return max((impact.peak_force for impact in self.impacts), default=0.0)
+
+    @cached_property
+    def _samples(self) -> tuple[np.ndarray, np.ndarray]:
+        times = [start + hit.time for start, hit in zip(self.starts, self.hits)]
+        forces = [hit.force if hit.force.ndim == 1 else hit.force.sum(axis=1) for hit in self.hits]
+        return np.concatenate(times), np.concatenate(forces)
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times [s] of `force`, (n_times,)."""
+        return self._samples[0]
+
+    @property
+    def force(self) -> np.ndarray:
+        """Sum of the contact forces [N] at `time`, (n_times,)."""
+        return self._samples[1]
+
+    def spectrum(self, frequencies: Any) -> np.ndarray:
+        """Fourier transform of `force` [N s], (n_frequencies,), complex."""
+        asked = check.array("frequencies", frequencies, (None,), "Hz", lift=True)
+        turns = np.exp(-2j * np.pi * np.outer(self.starts, asked))
+        return np.einsum("hf,hf->f", turns, np.array([hit.spectrum(asked) for hit in self.hits]))
+
+    def parts(self, times: np.ndarray) -> list[tuple[Response, slice, np.ndarray]]:
+        """The blow that tells the motion at each of ascending times: it, its times, and these from its start."""
+        edges = np.append(np.searchsorted(times, self.starts[1:]), len(times))
+        first, found = 0, []
+        for start, hit, last in zip(self.starts, self.hits, edges.tolist()):
+            if last > first:
+                found.append((hit, slice(first, last), np.maximum(times[first:last] - start, 0.0)))
+            first = last
+        return found
+
+    def _at(self, times: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Times in ascending order, and the order that leads back."""
+        asked = check.array("times", times, (None,), "s", lift=True)
+        if asked.size and asked.min() < self.starts[0]:
+            raise ValueError(f"times must not be before the first stroke at {self.starts[0]:g} s, got {asked.min():g}")
+        order = np.argsort(asked, kind="stable")
+        return asked[order], np.argsort(order, kind="stable")
+
+    def modal_state(self, times: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Modal displacements and velocities of the body, (n_times, n_modes); see `Response.modal_state`."""
+        sorted_times, back = self._at(times)
+        found = [hit.modal_state(part) for hit, _, part in self.parts(sorted_times)]
+        empty = np.zeros((0, self.target.n_modes))
+        q, p = (np.concatenate([empty, *(pair[k] for pair in found)])[back] for k in (0, 1))
+        return q, p
+
+    @check.typed
+    def displacement(self, points: Any, times: Any, *, residual: bool = True) -> np.ndarray:
+        """Displacement [m] of the body, (n_times, n_points); see `Response.displacement`."""
+        return self._moved("displacement", points, times, residual)
+
+    @check.typed
+    def velocity(self, points: Any, times: Any, *, residual: bool = True) -> np.ndarray:
+        """Velocity [m/s] of the body, (n_times, n_points); see `Response.displacement`."""
+        return self._moved("velocity", points, times, residual)
+
+    def _moved(self, name: str, points: Any, times: Any, residual: bool) -> np.ndarray:
+        sorted_times, back = self._at(times)
+        place = self.target.points("points", points)
+        found = [getattr(hit, name)(place, part, residual=residual) for hit, _, part in self.parts(sorted_times)]
+        return np.concatenate([np.zeros((0, len(place))), *found])[back]
+
+    def state(self, time: float) -> State:
+        """Where the body and the strikers then on it are at a time [s]; see `Response.state`."""
+        start, (hit, _, part) = self.starts[0], self.parts(self._at([time])[0])[0]
+        return replace(hit.state(float(part[0])), time=time - start)
+
+    @property
+    def error(self) -> float:
+        """The largest estimated error of a blow [-], with what it inherits from those before."""
+        return max(hit.error.total for hit in self.hits)
+
+    @property
+    def tolerance_met(self) -> bool:
+        """Whether the estimated error of every blow is at most the tolerance."""
+        return self.error <= self.tolerance
+
+    @property
+    def verdict(self) -> str:
+        """One sentence: whether the tolerance is met and, if not, by which blow and what would meet it."""
+        worst = max(range(len(self.hits)), key=lambda i: self.hits[i].error.total)
+        hit = self.hits[worst]
+        if self.tolerance_met:
+            return (
+                f"tolerance {self.tolerance:g} met by all: estimated error {self.error:.1e} of {words(hit.quantities)}"
+            )
+        strokes = " and ".join(str(i) for i in self.strikers[worst])
+        return f"stroke {strokes} at {self.starts[worst]:.4g} s: {promise.verdict(hit)}"
+
+    @property
+    def energies(self) -> dict[str, float]:
+        """Energies [J]: of the body at the start, brought by the strikers, of the body as the last blow ends, lost to
+        damping and contacts until then, and what is left, which the strikers took away.
+        """  # fmt: skip
+        first, last = self.hits[0], self.hits[-1]
+        found = {
+            "start": float(first.modal_energy([0.0])[0].sum()),
+            "brought": sum(0.5 * each.striker.felt_mass * each.speed**2 for each in self.strokes),
+            "target": float(last.modal_energy([last.history.end_time])[0].sum()),
+            "dissipated": sum(hit.energies["dissipated"] for hit in self.hits),
+        }
+        for hit, after in pairwise(self.hits):  # as it swings freely until the next blow
+            ends = hit.modal_energy([hit.history.end_time])[0] - after.modal_energy([0.0])[0]
+            found["dissipated"] += float(ends.sum())
+        rest = found["start"] + found["brought"] - found["target"] - found["dissipated"]
+        return {**found, "taken away": rest}
+
+    def summary(self) -> str:
+        """The sequence in a few readable lines."""
+        lines = [
+            self.verdict,
+            f"{len(self.strokes)} strokes, {self.n_impacts} impacts in {self.impacts[-1].end - self.starts[0]:.4g} s"
+            if self.impacts
+            else f"{len(self.strokes)} strokes, no impact",
+        ]
+        lines += [
+            f"  {each.start * 1e3:10.4f} to {each.end * 1e3:10.4f} ms: stroke {each.contact}, peak "
+            f"{each.peak_force:.5g} N, impulse {each.impulse:.5g} N s"
+            for each in self.impacts[:LISTED]
+        ]
+        if self.n_impacts > LISTED:
+            lines.append(f"  ... and {self.n_impacts - LISTED} more")
+        told = ", ".join(f"{name} {value:.4g} J" for name, value in self.energies.items())
+        lines += [
+            f"contact time {self.contact_time * 1e3:.5g} ms, largest force {self.peak_force:.5g} N, impulse "
+            f"{self.impulse:.5g} N s",
+            f"energy {told}",
+            f"the last blow: {self.hits[-1].outcome}",
+        ]
+        return "\n".join([*lines, *(f"Note: {note}" for note in self.notes)])
+
+
+@dataclass(eq=False)
+class _Stick:
+    """A striker on the body, as it moves when the next blow begins."""
+
+    number: int
+    striker: Striker
+    q: np.ndarray
+    p: np.ndarray
+    force: np.ndarray  # (2,) [N], [N/s] at its contact and its rate
+
+
+@check.typed
+def strokes(
+    modes: Modes,
+    strokes: Sequence,
+    *,
+    tolerance: float = TOLERANCE,
+    quantity: Any = None,
+    residual: bool = True,
+    duration: float | None = None,
+    start: State | Response | None = None,
+    strict: bool = False,
+) -> Strokes:
+    """Strike a body again and again while it goes on moving: rolls, flams, ruffs, ostinati, two sticks at once.
+
+    Parameters
+    ----------
+    modes : Modes
+        The struck body.
+    strokes : sequence of (when, striker, contact, at, speed) or (when, striker, contact, at, speed, lasts)
+        When the striker is at the surface [s], wherever that then is, with which speed [m/s], and after which time [s]
+        it is lifted, as soon as it does not touch. Without ``lasts`` it stays until it has parted for good (proved);
+        then it is taken away as the next stroke begins. Strikers that are on the body together act together.
+    tolerance, quantity, residual, strict
+        As in `fi.strike`, for every blow with what it inherits from those before.
+    duration : float [s], optional
+        Time after the first stroke at which everything stops at the latest.
+    start : State or Response, optional
+        Where an earlier blow left the body, as in `fi.strike`.
+
+    Returns
+    -------
+    Strokes
+        ``hits`` are the single blows; motion, force and sound are those of all.
+
+    Examples
+    --------
+    >>> drum = fi.analytic.disk(0.18, edge="clamped", mass=0.1, first_frequency=150.0, n_modes=40, damping_ratio=0.01)
+    >>> stick, law = fi.Striker.rigid(0.02), fi.Contact.linear(1e5)
+    >>> flam = fi.strokes(drum, [(0.0, stick, law, (0.05, 0.0), 0.3), (0.03, stick, law, (0.06, 0.0), 2.0)],
+    ...                   tolerance=1e-2)
+    >>> len(flam.hits), flam.impacts[-1].contact, flam.peak_force > 20.0
+    (2, 1, True)
+    """
+    played = tuple(sorted(_checked(modes, strokes), key=lambda stroke: stroke.when))
+    tolerance = check.tolerance(tolerance)
+    end = np.inf if duration is None else played[0].when + check.positive("duration", duration, "s")
+    begun = start.state() if isinstance(start, Response) else start
+    still = np.zeros(modes.n_modes)
+    game = _Game(modes, played, played[0].when, still, still)
+    if begun is not None:
+        if begun.force.any():
+            raise ValueError(f"start must be a time when nothing touches; at {begun.time:.4g} s a force acts")
+        game.q, game.p = begun.of(-1, "modes", modes)
+        game.error = begun.error
+    game.play(end, {"tolerance": EACH * tolerance, "quantity": quantity, "residual": residual})
+    notes = tuple(dict.fromkeys(note for hit in game.hits for note in hit.notes))
+    hits = tuple(replace(hit, tolerance=tolerance) for hit in game.hits)
+    found = Strokes(modes, played, np.array(game.starts), hits, tuple(game.who), tolerance, notes)
+    return promise.kept(found, strict)
+
+
+def _checked(modes: Modes, strokes: Any) -> list[Stroke]:
+    """The strokes, each with every number checked."""
+    if not isinstance(strokes, (list, tuple)) or not 0 < len(strokes) <= MOST_BLOWS:
+        raise ValueError(
+            "strokes must be a list of (when, striker, contact, at, speed) or, to be lifted, with lasts, got "
+            f"{check.shown(strokes)}"
+        )
+    found = []
+    for i, stroke in enumerate(strokes):
+        name = f"strokes[{i}]"
+        if not isinstance(stroke, (list, tuple)) or len(stroke) not in (5, 6):
+            raise ValueError(f"{name} must be (when, striker, contact, at, speed), got {check.shown(stroke)}")
+        one = Stroke(*stroke)
+        check.instance(f"{name} striker", one.striker, Striker)
+        check.instance(f"{name} contact", one.contact, Contact)
+        when, speed = check.number(f"{name} when", one.when, "s"), check.positive(f"{name} speed", one.speed, "m/s")
+        lasts = one.lasts if one.lasts is None else check.positive(f"{name} lasts", one.lasts, "s")
+        found.append(Stroke(when, one.striker, one.contact, modes.point(f"{name} at", one.at)[0], speed, lasts))
+    return found
+
+
+def _lift(stroke: Stroke) -> float:
+    """When a striker is to be lifted [s]."""
+    return np.inf if stroke.lasts is None else stroke.when + stroke.lasts
+
+
+@dataclass(eq=False)
+class _Game:
+    """A sequence as it is played: the body and the strikers on it at the time reached, and the blows so far."""
+
+    modes: Modes
+    played: tuple[Stroke, ...]
+    now: float  # [s]
+    q: np.ndarray
+    p: np.ndarray
+    error: float = 0.0
+    sticks: list[_Stick] = field(default_factory=list)
+    starts: list[float] = field(default_factory=list)
+    hits: list[Response] = field(default_factory=list)
+    who: list[tuple[int, ...]] = field(default_factory=list)
+
+    def play(self, end: float, rule: dict[str, Any]) -> None:
+        """Follow all strokes until the last has parted for good or ``end`` [s]."""
+        n_begun = 0
+        while self.now < end:
+            fresh = [i for i in range(n_begun, len(self.played)) if self.played[i].when <= self.now]
+            n_begun += len(fresh)
+            lifts = [_lift(self.played[i]) for i in (*(stick.number for stick in self.sticks), *fresh)]
+            to_come = [stroke.when for stroke in self.played[n_begun : n_begun + 1]]
+            until = min([end, *to_come, *(lift for lift in lifts if lift > self.now)])
+            limit = {
+                "duration": None if np.isinf(until) else until - self.now,
+                "max_impacts": 1 if any(lift <= self.now for lift in lifts) else None,
+            }
+            if not lifts:
+                self._keep(self._alone(), ())
+            else:
+                try:
+                    self._blow(fresh, {**rule, **limit})
+                except SimulationError as problem:
+                    names = " and ".join(str(i) for i in (*(stick.number for stick in self.sticks), *fresh))
+                    raise SimulationError(f"stroke {names} at {self.now:.4g} s: {problem}") from None
+            over = self.hits[-1].history.status in (record.FINISHED, record.SETTLED)
+            if (over and not to_come) or not self._go_on(until, over):
+                return
+
+    def _keep(self, hit: Response, who: tuple[int, ...]) -> None:
+        self.starts.append(self.now)
+        self.hits.append(hit)
+        self.who.append(who)
+
+    def _go_on(self, until: float, over: bool) -> bool:
+        """Move on to where the last blow ended; False if nothing follows."""
+        hit = self.hits[-1]
+        length = until - self.now if over else hit.history.end_time
+        self.now = self.now + length if hit.history.status == record.IMPACTS else until
+        state = hit.state(length if over else None)
+        self.q, self.p, self.error = state.displacements[-1], state.velocities[-1], state.error
+        self.sticks = [] if over else self._staying(state)
+        return bool(np.isfinite(self.now))
+
+    def _staying(self, state: State) -> list[_Stick]:
+        """The strikers that stay on the body, as they move now."""
+        found = []
+        for i, stick in enumerate(self.sticks):
+            stroke = self.played[stick.number]
+            if _lift(stroke) <= self.now and not state.force[i].any():
+                continue
+            if stroke.contact.yield_approach or stroke.contact.hysteresis:
+                raise ValueError(
+                    f"strokes[{stick.number}] must have parted for good when the next blow or lift comes, at "
+                    f"{self.now:.4g} s, because its contact yields or is felt, whose memory cannot be carried over"
+                )
+            found.append(replace(stick, q=state.displacements[i], p=state.velocities[i], force=state.force[i]))
+        return found
+
+    def _blow(self, fresh: list[int], rule: dict[str, Any]) -> None:
+        """Run the strikers still on the body together with those that arrive now."""
+        moving = bool(self.error or self.q.any() or self.p.any())
+        if not self.sticks and len(fresh) == 1:
+            one = self.played[fresh[0]]
+            start = None
+            if moving:
+                start = State(0.0, (self.modes,), (self.q,), (self.p,), np.zeros((0, 2)), self.error)
+            blow = partial(
+                collision.strike, self.modes, one.striker, one.contact, at=one.at, speed=one.speed, start=start
+            )
+            hit = planner.within(rule["tolerance"], blow(**rule), blow, rule)
+            assert hit.striker is not None
+            none = np.zeros(0)
+            self.sticks = [_Stick(fresh[0], hit.striker, none, none, np.zeros(2))]
+            self._keep(audit.audited(hit), (fresh[0],))
+            return
+        sticks = [*self.sticks, *(self._arriving(i, rule) for i in fresh)]
+        laws = tuple(self.played[stick.number].contact for stick in sticks)
+        touches = [
+            Touch(law, i, len(sticks), stick.striker.at[None], self.played[stick.number].at[None])
+            for i, (law, stick) in enumerate(zip(laws, sticks))
+        ]
+        bodies = (*(stick.striker.modes for stick in sticks), self.modes)
+        q, p = (*(stick.q for stick in sticks), self.q), (*(stick.p for stick in sticks), self.p)
+        forces = np.array([stick.force for stick in sticks])
+        start = State(0.0, bodies, q, p, forces, self.error, None, laws)
+        blow = partial(collision.met, bodies, touches, start=start)
+        hit = planner.within(rule["tolerance"], blow(**rule), blow, rule)
+        self.sticks = sticks
+        self._keep(hit, tuple(stick.number for stick in sticks))
+
+    def _arriving(self, number: int, rule: dict[str, Any]) -> _Stick:
+        """A striker at the surface, wherever that is now, with the modes that it needs."""
+        one = self.played[number]
+        striker = one.striker
+        if not striker.fixed and rule["residual"]:
+            tolerance = FEW_MODES * rule["tolerance"]
+            needed = collision.striker_modes(striker, contact=one.contact, speed=one.speed, tolerance=tolerance)[0]
+            striker = collision.shortened(striker, needed)
+        surface = float(self.modes.shape_at(one.at[None])[0] @ self.q)
+        if self.hits:  # with the static deflection under those that press now
+            surface = float(self.hits[-1].displacement(one.at[None], [self.now - self.starts[-1]])[0, 0])
+        return _Stick(number, striker, surface * striker.motion, one.speed * striker.motion, np.zeros(2))
+
+    def _alone(self) -> Response:
+        """The body moving freely, as a blow without a touch."""
+        hit, n = self.hits[-1], self.modes.n_modes
+        h = hit.history
+        history = replace(
+            h, omega=self.modes.omega, zeta=self.modes.damping_ratio, shape=np.zeros((1, n)), offset=np.zeros(1),
+            bias=np.zeros(n), law=h.law[:1].copy(), start_q=self.q, start_p=self.p, end_q=self.q, end_p=self.p,
+            steps=np.zeros((0, 7 + h.n_coefficients)), now=np.zeros((6, 1)), work=np.zeros(1), end_time=0.0,
+            status=record.FINISHED,
+        )  # fmt: skip
+        return Response(
+            (self.modes,), hit.contacts[:1], history, 0.0, hit.tolerance, hit.scheme, hit.error,
+            quantities=hit.quantities,
+        )  # fmt: skip

@@ -1,0 +1,211 @@
+"""Blows on a body that still moves: from the state that another blow left."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+import fem_impact as fi
+
+TIGHT = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-16}
+
+
+def swinging(n_modes=10, seed=3, damping=0.01):
+    """A body known at two points; no mode is left out."""
+    rng = np.random.default_rng(seed)
+    frequencies = np.sort(rng.uniform(100.0, 3000.0, n_modes))
+    shapes = rng.normal(0.0, 2.0, (2, n_modes))
+    return fi.Modes.from_arrays(frequencies, shapes, points=[[0.0], [1.0]], mass=0.3, damping_ratio=damping)
+
+
+def followed(modes, at, mass, law, speed, q, p, duration):
+    """A mass that arrives at the surface of moving modes, by DOP853 restarted where it touches and parts.
+
+    Returns modal displacements and velocities of the body, velocity of the mass, impulse, and time in contact.
+    """
+    u, n = modes.shape_at([at])[0], modes.n_modes
+
+    def push(t, z):
+        d, v = z[2 * n] - u @ z[:n], z[2 * n + 1] - u @ z[n : 2 * n]
+        force = float(law.force(d, v))
+        swing = u * force - 2.0 * modes.damping_ratio * modes.omega * z[n : 2 * n] - modes.omega**2 * z[:n]
+        return np.concatenate([z[n : 2 * n], swing, [z[2 * n + 1], -force / mass, force]])
+
+    def gap(t, z):
+        return z[2 * n] - u @ z[:n]
+
+    gap.terminal = True
+    z, time, touching = np.concatenate([q, p, [u @ q, speed, 0.0]]), 0.0, 0.0
+    step = 1e-9 * duration
+    while time < duration:
+        leg = solve_ivp(push, (time, min(time + step, duration)), z, **TIGHT)  # off the event
+        z = leg.y[:, -1]
+        closed = gap(0.0, z) > 0.0
+        begin, time = time, leg.t[-1]
+        if time < duration:
+            leg = solve_ivp(push, (time, duration), z, events=[gap], max_step=duration / 200, **TIGHT)
+            z, time = leg.y[:, -1], leg.t[-1]
+        touching += (time - begin) * closed
+    return z[:n], z[n : 2 * n], z[2 * n + 1], z[2 * n + 2], touching
+
+
+@pytest.mark.parametrize("law", [fi.Contact.hertz(1e7), fi.Contact.power(1e7, 1.5, loss=0.3)], ids=["hertz", "loss"])
+def test_a_second_blow_meets_an_independent_integration(law):
+    modes, mass, later = swinging(), 0.02, 4e-3
+    blow = {"at": [0.0], "speed": 1.0, "tolerance": 1e-7}
+    first = fi.strike(modes, fi.Striker.rigid(mass), law, **blow)
+    second = fi.strike(modes, fi.Striker.rigid(mass), law, start=first.state(later), **(blow | {"at": [1.0]}))
+    still = np.zeros(10)
+    end = 1.1 * second.history.end_time
+    q, p, *_ = followed(modes, 0.0, mass, law, 1.0, still, still, later)
+    assert first.history.end_time < later
+    q, p, speed, impulse, touching = followed(modes, 1.0, mass, law, 1.0, q, p, end)
+    # both blows are asked for 1e-7; the reference is four digits better
+    assert_allclose(second.restitution, -speed, atol=1e-6)
+    assert_allclose(second.impulse, impulse, rtol=1e-6)
+    assert_allclose(second.contact_time, touching, rtol=1e-6)
+    found = second.modal_state([end])
+    assert_allclose(found[0][0], q, atol=1e-6 * np.abs(q).max())
+    assert_allclose(found[1][0], p, atol=1e-6 * np.abs(p).max())
+    alone = fi.strike(modes, fi.Striker.rigid(mass), law, **(blow | {"at": [1.0]}))
+    assert abs(alone.restitution - second.restitution) > 0.01  # the motion matters, and by far more than that
+
+
+PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=200, damping_ratio=0.01)
+STICK, AT = fi.Striker.stick(0.1, 10e3, n_modes=8), (0.465, 0.3)
+LISTEN, LATER = [(0.7, 0.6)], np.array([1e-3, 5e-3, 2e-2])  # m, s
+
+
+@pytest.mark.parametrize("where", ["between", "pressed"])
+@pytest.mark.parametrize(
+    ("law", "residual", "apart"),
+    [
+        (fi.Contact.linear(1e6), False, 1e-6),
+        (fi.Contact.hertz(5e7), True, 1e-6),  # a spring stands for the modes left out: nothing of it swings
+        (fi.Contact.power(5e7, 1.5, loss=0.05), True, 1e-2),  # overdamped modes stand for them, and start at rest
+    ],
+    ids=["bare", "complete", "loss"],
+)
+def test_a_blow_of_several_impacts_goes_on_from_its_middle(law, residual, apart, where):
+    blow = {"at": AT, "tolerance": 1e-7 if apart < 1e-3 else 1e-3, "residual": residual, "quantity": "n_impacts"}
+    whole = fi.strike(PLATE, STICK, law, speed=1.0, **blow)
+    one, two = whole.impacts[:2]
+    time = 0.5 * (one.end + two.start) if where == "between" else 0.6 * two.start + 0.4 * two.end
+    rest = fi.strike(PLATE, STICK, law, speed=None, start=whole.state(time), **blow)
+    assert rest.n_impacts == whole.n_impacts - 1 >= 1
+    assert_allclose([x.end + time for x in rest.impacts], [x.end for x in whole.impacts[1:]], rtol=0.1 * apart)
+    wanted = whole.velocity(LISTEN, time + LATER)
+    assert_allclose(rest.velocity(LISTEN, LATER), wanted, atol=apart * np.abs(wanted).max())
+    assert rest.energy_error < 1e-12
+
+
+@pytest.mark.parametrize("where", ["between", "pressed"])
+def test_a_collision_at_two_contacts_goes_on_from_its_middle(where):
+    bodies = [fi.Modes.rigid(0.05), fi.Modes.rigid(0.02), PLATE]
+    touches = [
+        fi.Touch(fi.Contact.hertz(1e7), 0, 2, None, AT),
+        fi.Touch(fi.Contact.linear(2e5, gap=1e-2), 1, 2, None, (1.0, 0.4)),
+    ]
+    rule = {"tolerance": 1e-3, "quantity": "n_impacts"}
+    whole = fi.collide(bodies, touches, speeds=[1.0, 2.0, 0.0], **rule)
+    first = whole.impacts[0]
+    time = 0.5 * (first.start + first.end) if where == "pressed" else 0.5 * (first.end + whole.impacts[1].start)
+    state = whole.state(time)
+    rest = fi.collide(bodies, touches, start=state, **rule)
+    assert state.force.any() == (where == "pressed")
+    assert rest.n_impacts == whole.n_impacts - (where != "pressed")
+    # pressed, the modes that stand for those left out start at their static deflection, and forget their swing
+    apart = 1e-5 if where == "between" else 1e-3
+    assert_allclose(rest.speeds, whole.speeds, atol=apart)
+    wanted = whole.velocity(LISTEN, time + LATER)
+    assert_allclose(rest.velocity(LISTEN, LATER), wanted, atol=apart * np.abs(wanted).max())
+
+
+def test_the_energies_of_a_second_blow_count_from_its_start():
+    law = fi.Contact.hertz(1e7)
+    first = fi.strike(PLATE, STICK, law, at=AT, speed=1.0)
+    state = first.state(0.03)
+    assert_allclose(state.energies[-1], first.modal_energy([0.03])[0].sum(), rtol=1e-12)
+    second = fi.strike(PLATE, STICK, law, at=AT, speed=0.5, start=state)
+    assert second.moving
+    assert not first.moving
+    start, gains = second.start_energies, second.energy_gains
+    assert_allclose(start["striker"], 0.5 * STICK.felt_mass * 0.5**2, rtol=1e-12)
+    assert_allclose(start["target"], state.energies[-1], rtol=1e-12)
+    assert_allclose(sum(second.energies.values()), sum(start.values()), rtol=1e-11)  # of the energy before
+    assert_allclose(sum(gains.values()), 0.0, atol=1e-12 * start["target"])
+    assert "the target moved at the start: striker" in second.summary()
+    assert "the target moved" not in first.summary()
+
+
+def test_the_striker_arrives_at_the_surface_where_it_is():
+    first = fi.strike(PLATE, STICK, fi.Contact.hertz(1e7), at=AT, speed=1.0)
+    state = first.state(6e-3)
+    surface = state.displacement([AT])[0]
+    assert abs(surface) > 1e-5  # m
+    for gap in (0.0, 1e-4):
+        hit = fi.strike(PLATE, STICK, fi.Contact.hertz(1e7, gap=gap), at=AT, speed=3.0, start=state)
+        there = hit.displacement([[1.0]], [0.0], body=0)[0, 0]
+        assert_allclose(there, surface, rtol=1e-12)
+        speed = 3.0 - state.velocity([AT])[0]
+        assert_allclose(hit.impacts[0].start, gap / speed, rtol=0.2, atol=1e-12)  # the surface swings meanwhile
+
+
+def test_errors_of_the_blow_before_count():
+    law, striker = fi.Contact.hertz(1e7), fi.Striker.rigid(0.02)
+
+    def pair(tolerance, of_both):
+        first = fi.strike(PLATE, striker, law, at=AT, speed=1.0, tolerance=tolerance)
+        state = first.state(6e-3)
+        return fi.strike(PLATE, striker, law, at=AT, speed=1.0, tolerance=tolerance if of_both else 1e-6, start=state)
+
+    exact = pair(1e-7, True)
+    with pytest.warns(fi.ToleranceWarning, match="mostly from the blow before"):
+        rough = pair(1e-3, False)
+    off = max(
+        abs(rough.restitution - exact.restitution),
+        *(abs(getattr(rough, name) / getattr(exact, name) - 1.0) for name in ("impulse", "contact_time", "peak_force")),
+    )
+    assert rough.error.inherited > 0.5 * rough.error.total
+    assert 0.3 * off < rough.error.total < 1e3 * off
+
+
+def test_the_motion_of_a_system_goes_on_in_its_modes():
+    plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), thickness=3e-3)
+    system = fi.assemble(fi.mesh.rectangle(0.465, 0.3), plate, {"boundary": "hinged"})
+    blow = {"at": (0.1, 0.1), "speed": 1.0, "tolerance": 1e-2}
+    ball, law = fi.Striker.rigid(0.005), fi.Contact.hertz(1e6)
+    first = fi.strike(system, ball, law, **blow)
+    second = fi.strike(first.target, ball, law, start=first, **blow)
+    assert second.moving
+    assert_allclose(second.start_energies["target"], first.modal_energy([first.history.end_time])[0].sum(), rtol=1e-12)
+    with pytest.raises(ValueError, match="start needs modes"):
+        fi.strike(system, ball, law, start=first, **blow)
+    with pytest.raises(ValueError, match=r"modes must be those of the body that moves .* give hit\.target"):
+        fi.strike(PLATE, ball, law, start=first, **blow)
+
+
+def test_what_cannot_start_says_so():
+    law, other = fi.Contact.hertz(1e7), fi.Contact.felt(1e7, 1.5, hysteresis=0.3, relaxation=1e-3)
+    hit = fi.strike(PLATE, STICK, law, at=AT, speed=1.0)
+    pressed = hit.state(0.5 * hit.impacts[0].end)
+    assert "contact forces" in pressed.summary()
+    assert "apart" in hit.state().summary()
+    goes = {"at": AT, "speed": None, "start": hit}
+    for call, words in (
+        (lambda: fi.strike(PLATE, STICK, law, at=AT, speed=1.0, start=pressed), "a time when nothing touches"),
+        (lambda: fi.strike(PLATE, STICK, law, at=AT, speed=None), "speed must be given in m/s"),
+        (lambda: fi.strike(PLATE, fi.Striker.rigid(1.0), law, **goes), "striker must be the one of the blow before"),
+        (lambda: fi.strike(PLATE, STICK, other, **goes), "contact and at must be those of the blow before"),
+        (lambda: fi.strike(PLATE, STICK, law, **(goes | {"at": (0.1, 0.1)})), "contact and at must be those"),
+        (lambda: fi.strike(PLATE, STICK, law, at=AT, speed=1.0, start=3), "start must be a State"),
+        (lambda: fi.collide([PLATE], [fi.Touch(law, 0, None, AT)], start=hit), "the same bodies and contacts"),
+        (lambda: hit.state(-1.0), "time must not be negative"),
+        (lambda: fi.strike(PLATE, STICK, law, at=AT, speed=1.0, max_impacts=1).state(1.0), "where the run stopped"),
+        (lambda: fi.strike(PLATE, STICK, law, at=AT, speed=1.0, start=hit).on(PLATE), "on a body at rest"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            call()
+    soft = fi.strike(PLATE, STICK, other, at=AT, speed=1.0, tolerance=1e-2)
+    with pytest.raises(ValueError, match="what it remembers is not kept"):
+        fi.strike(PLATE, STICK, other, at=AT, speed=None, start=soft)
