@@ -19,6 +19,7 @@ _NAMES = {
     "impact.threshold": "threshold_frequency",
     "model.planner": "Plan strike",
     "scenes.scene": "Scene load_scene plan",
+    "scenes.uncertainty": "spread",
     "sweeps.grid": "sweep",
     "taps.records": "Taps read_taps",
     "taps.rig": "measure",
