@@ -20,6 +20,7 @@ _NAMES = {
     "model.planner": "Plan strike",
     "model.playing": "strokes",
     "scenes.scene": "Scene load_scene plan",
+    "scenes.uncertainty": "spread",
     "sweeps.grid": "sweep",
     "taps.records": "Taps read_taps",
     "taps.rig": "measure",

@@ -97,7 +97,7 @@ def _interruptible(options: argparse.Namespace) -> Iterator[None]:
 
 def _kept(options: argparse.Namespace) -> str:
     """Say what an interrupted command left on disk."""
-    if options.run is not _map:
+    if options.run not in (_map, _spread):
         return "nothing was written"
     if options.store is None:
         return "nothing was written; --store DIR keeps finished cells"
@@ -250,6 +250,22 @@ def _parser() -> argparse.ArgumentParser:
     add("--cluster", metavar="ADDRESS", help="run on the Dask cluster whose scheduler has this address")
     add("--store", metavar="DIR", type=_place, help="keep finished cells there; an interrupted run continues from them")
     add("--max-cells", metavar="N", type=float, default=1e8, help="refuse maps with more cells (default: 1e8)")
+
+    add = verb(_spread, "spread", "strike a scene with uncertain inputs; tell how the answer is distributed, and why")
+    add("--vary", metavar="INPUT=DISTRIBUTION", action="append", default=[], required=True,
+        help='an uncertain number, such as "contact.stiffness=lognormal(695e3, 0.1)"; repeatable; also normal(mean, '
+        "deviation), uniform(low, high), loguniform(low, high), triangular(low, mode, high)")  # fmt: skip
+    add("--correlate", metavar="INPUT,INPUT=R", action="append", default=[], help="correlation of two; repeatable")
+    add("--blows", metavar="N", type=int, default=10_000, help="number of blows (default: 10000)")
+    add("--no-sobol", action="store_true", help="no Sobol indices: all blows go into the distributions")
+    add("--seed", metavar="N", type=int, default=0, help="of the scrambled points (default: 0)")
+    add("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
+    add("--max-frequency", metavar="HZ", type=float, help="add the spectral centroid up to this frequency (slow)")
+    add("--workers", metavar="N", type=int, help="number of threads (default: one per core)")
+    add("--cluster", metavar="ADDRESS", help="run on the Dask cluster whose scheduler has this address")
+    add("--store", metavar="DIR", type=_place, help="keep finished blows there; an interrupted run continues from them")
+    add("--out", metavar="DIR", type=_place, help="folder for spread.json, .nc, .csv and .png (default: out/NAME)")
+    add("--json", action="store_true", help="print the contents of spread.json instead of the summary")
 
     add = verb(
         _hammer, "hammer", "find the hammers that reach a bandwidth without a double hit",
@@ -464,6 +480,44 @@ def _map(options: argparse.Namespace) -> None:
         _say(f"Model: its own error is {float(own.min()):.1g} to {float(own.max()):.1g}{not_known}")
     _print_notes(table.attrs["notes"].splitlines())
     _say(f"Time: {time.perf_counter() - began:.2f} s", f"Files in {folder}{os.sep}: {', '.join(names)}")
+
+
+def _spread(options: argparse.Namespace) -> None:
+    from .scenes import uncertainty  # imported only when needed
+
+    began = time.perf_counter()
+    folder = options.out if options.out is not None else Path("out") / options.scene.stem
+    scene = fi.load_scene(options.scene)
+    vary = dict(_split("--vary", text) for text in options.vary)
+    pairs = [_split("--correlate", text) for text in options.correlate]
+    try:
+        correlation = {tuple(name.strip() for name in names.split(",")): float(value) for names, value in pairs}
+    except ValueError:
+        raise ValueError("--correlate must look like contact.stiffness,striker.mass=0.5") from None
+    with fi.export.staged(folder) as staging:
+        display = Display()
+        found = uncertainty.spread(
+            scene, vary, n=options.blows, correlation=correlation or None, sobol=False if options.no_sobol else None,
+            seed=options.seed, tolerance=options.tolerance, max_frequency=options.max_frequency,
+            workers=options.workers, client=options.cluster, store=options.store,
+            watch=partial(display.report, "blows"), stage=display,
+        )  # fmt: skip
+        with display("files"):
+            names = uncertainty.write(staging, found)
+    if options.json:
+        _print_json({**found.data(), "versions": fi.export.versions()})
+        return
+    _say(_title(scene))
+    print(found.summary())
+    _say(f"Time: {time.perf_counter() - began:.2f} s", f"Files in {folder}{os.sep}: {', '.join(names)}")
+
+
+def _split(option: str, text: str) -> tuple[str, str]:
+    """What stands before and after the equals sign of an option."""
+    name, equals, value = text.partition("=")
+    if not equals or not name.strip() or not value.strip():
+        raise ValueError(f"{option} must have a name, an equals sign and a value, got {text!r:.100}")
+    return name.strip(), value.strip()
 
 
 def _hammer(options: argparse.Namespace) -> None:

@@ -31,6 +31,7 @@ EXTRAS = {  # extra: its purpose and the modules it needs
     "cluster": ("clusters and stores", "distributed", "zarr"),
     "hdf5": ("meshes in HDF5", "h5py"),
     "completion": ("shell completion", "shtab"),
+    "spread": ("Sobol indices", "SALib"),
     "web": ("report and explore", "plotly", "bokeh", "jinja2"),
 }
 

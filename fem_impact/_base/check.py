@@ -32,6 +32,7 @@ SOURCES = {  # type -> how a user makes one, for error messages
     "Response": "fi.strike or fi.collide",
     "Run": "Scene.run",
     "Scene": "fi.load_scene",
+    "Spread": "fi.spread",
     "State": "Response.state",
     "Striker": "fi.Striker.rigid, sphere, stick or flexible",
     "Strokes": "fi.strokes",

@@ -11,7 +11,7 @@ import numpy as np
 from cycler import cycler
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import EngFormatter
+from matplotlib.ticker import EngFormatter, MaxNLocator
 
 from .._base import check
 from .._base.files import replacing
@@ -20,6 +20,7 @@ from ..impact.response import Response
 from ..mesh.mesh_files import boundary
 from ..model.playing import Strokes
 from ..modes.modal import Modes
+from ..sweeps.spreads import DOUBLE, QUANTITIES, Spread
 from . import sampling
 from .canvas import COLOURS, VERMILION
 
@@ -49,6 +50,20 @@ HEADROOM = 1.15  # [-] top of the force axis over the peak force: leaves room fo
 TIMES = 800  # [-] instants in the plot of energies
 MODE_DEPTH = 1e-8  # [-] bottom of the energy axis: 80 dB below the most energetic mode
 FLAT = 1e-9  # [-] a shape below this share of its largest deflection is zero up to rounding
+BINS = 60  # [-] of a histogram
+STRIPES = 16  # [-] groups of equally many blows along an input, whose medians are drawn
+TICKS = 4  # [-] most intervals between numbers below a narrow panel
+LARGE = 1e4  # [-] numbers from here on are drawn with SI prefixes
+TAILS = (0.001, 0.999)  # [-] levels between which a histogram is drawn
+LONGEST = 26  # [-] characters of an input's name that fit beside its bar
+NAMES = {  # quantity of a blow: its name in a picture
+    "n_impacts": "number of impacts",
+    "contact_time": "time in contact",
+    "restitution": "restitution",
+    "impulse": "impulse",
+    "peak_force": "peak force",
+    "centroid": "spectral centroid",
+}
 MARGIN = 0.1  # [-] time shown before and after the blow, over its duration
 
 
@@ -288,3 +303,96 @@ def _unflattened(shape: np.ndarray, cells: np.ndarray) -> np.ndarray:
         np.add.at(total, cells[:, i], shape[cells].sum(axis=1))
         np.add.at(count, cells[:, i], 3.0)
     return np.where(np.abs(shape) < FLAT, FLAT * total / np.maximum(count, 1.0), shape)
+
+
+@check.typed
+def spread(found: Spread) -> Figure:
+    """Plot what uncertain inputs do: a row for each quantity that varies, at most one page.
+
+    Parameters
+    ----------
+    found : Spread
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        From left to right: the distribution with its median and 90 % range, each with its interval; the quantity over
+        the input that matters most, median (of impacts the mean) and 90 % range; and the share of the variance that
+        each input takes part in, with first-order Sobol indices in front of the total ones.
+    """
+    rows = [name for name in found.varying if name != DOUBLE] or ["restitution"]
+    with styled(11.0, 0.9 + 1.95 * len(rows)) as figure:
+        panels = figure.subplots(len(rows), 3, squeeze=False, width_ratios=(1.1, 1.1, 1.0))
+        for (left, middle, right), name in zip(panels, rows):
+            _histogram(left, found, name)
+            _leading(middle, found, name)
+            _bars(right, found, name)
+        kind = "share of the variance (Sobol indices)" if found.shares else "squared rank correlation"
+        for panel, title in zip(panels[0], ("distribution, median, 90 %", "against the leading input, 90 %", kind)):
+            panel.set_title(title)
+        twice = found.chance()
+        said = f"double hit {100 * twice.value:.3g} % ({100 * twice.low:.3g} to {100 * twice.high:.3g} %)"
+        figure.suptitle(f"{found.title or 'Spread'}: {len(found.own)} independent blows, {said}", fontsize=11)
+    return figure
+
+
+def _histogram(axes: Any, found: Spread, name: str) -> None:
+    values = found.values(name)
+    if name == "n_impacts":
+        counts = np.arange(values.min(), values.max() + 1.0)
+        axes.bar(counts, [100.0 * (values == count).mean() for count in counts], 0.8, color=BLUE)
+        axes.xaxis.set_major_locator(MaxNLocator(TICKS, integer=True))
+    else:
+        low, high = np.quantile(values, TAILS)
+        weights = np.full(len(values), 100.0 / len(values))
+        axes.hist(values, BINS, (low, high) if low < high else None, color=BLUE, weights=weights)
+        for level, style in ((0.05, ":"), (0.5, "-"), (0.95, ":")):
+            each = found.quantile(name, level)
+            axes.axvline(each.value, color=VERMILION, ls=style, lw=1.2)
+            axes.axvspan(each.low, each.high, color=VERMILION, alpha=0.25, lw=0)
+        axes.xaxis.set_major_locator(MaxNLocator(TICKS))
+    axes.set(xlabel=NAMES[name], ylabel="blows [%]")
+    if QUANTITIES[name][0]:
+        _units(axes, QUANTITIES[name][0])
+
+
+def _leading(axes: Any, found: Spread, name: str) -> None:
+    """The quantity over the input with the largest share."""
+    order = found.ranking(name)
+    if not order:
+        axes.set_axis_off()
+        return
+    first = order[0][0]
+    x, y = found.values(first), found.values(name)
+    parts = np.array_split(np.argsort(x, kind="stable"), min(STRIPES, max(1, len(x) // TICKS)))
+    low, middle, high = np.array([np.quantile(y[part], (0.05, 0.5, 0.95)) for part in parts]).T
+    if name == "n_impacts":
+        middle = np.array([y[part].mean() for part in parts])
+    place = [np.median(x[part]) for part in parts]
+    axes.fill_between(place, low, high, color=GREEN, alpha=0.25, lw=0)
+    axes.plot(place, middle, color=GREEN)
+    unit = found.table[first].attrs["units"]
+    axes.set(xlabel=first if unit == "1" else f"{first} [{unit}]", ylabel=NAMES[name])
+    axes.xaxis.set_major_locator(MaxNLocator(TICKS))
+    axes.xaxis.set_major_formatter(EngFormatter(sep=" ") if np.abs(x).max() >= LARGE else "{x:g}")
+    if QUANTITIES[name][0]:
+        axes.yaxis.set_major_formatter(EngFormatter(unit=QUANTITIES[name][0], sep=" "))
+
+
+def _bars(axes: Any, found: Spread, name: str) -> None:
+    """Shares of the inputs, the largest on top."""
+    order = found.ranking(name)
+    place, shares = np.arange(len(order))[::-1], found.shares.get(name)
+    if shares:
+        for kind, height, colour in (("total", 0.72, "#BBBBBB"), ("first", 0.4, BLUE)):
+            each = [getattr(shares[key], kind) for key, _ in order]
+            value, high = 100.0 * np.array([(one.value, one.high) for one in each]).T
+            bars: dict[str, Any] = {"xerr": high - value, "ecolor": "#555555", "error_kw": {"lw": 1.0}}
+            axes.barh(place, value, height, color=colour, label=f"{kind} order", **bars)
+        axes.legend(loc="lower right", fontsize=8)
+    else:
+        axes.barh(place, [100.0 * share for _, share in order], 0.6, color=BLUE)
+    names = [key if len(key) <= LONGEST else f"{key[:LONGEST]}..." for key, _ in order]
+    axes.set_yticks(place, names, fontsize=8)
+    axes.set(xlim=(0.0, 105.0), xlabel="[%]")
+    axes.grid(False, axis="y")

@@ -99,24 +99,7 @@ class Grid:
 
     def blow(self, index: int) -> Response:
         """The blow of one cell by the modal engine."""
-        case = self.case(index)
-        hit = strike(
-            case.modes, case.striker, case.contact,
-            at=case.at, speed=case.speed, tolerance=self.tolerance, residual=self.residual,
-            max_impacts=self.max_impacts,
-        )  # fmt: skip
-        return audited(hit)
-
-    def strike(self, index: int) -> tuple[np.ndarray, str]:
-        """The layers of one cell from the modal engine, and its error text ('' if it succeeded)."""
-        try:
-            hit = self.blow(index)
-            row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force, hit.error.step]
-            row += [hit.spectral_centroid(self.band)] if self.band is not None else []
-            row += [function(hit) for function in self.extra.values()]
-        except SimulationError as error:
-            return np.full(len(self.layers), np.nan), str(error)
-        return np.array(row, float), ""
+        return struck_alone(self, self.case(index))
 
     def doubt(self, index: int) -> float:
         """Error [-] of the body's vectors and mesh in one cell struck alone; 0 if that fails."""
@@ -199,13 +182,7 @@ class Grid:
 
     def scene(self) -> dict[str, Any]:
         """The blow that all cells share, as plain numbers."""
-        law = self.base.contact
-        return {
-            "target": _plain(self.base.modes, self.base.at),
-            "striker": _plain(self.base.striker.modes, self.base.striker.at),
-            "contact": dict(vars(law)),
-            "speed": self.base.speed,
-        }
+        return plain(self.base)
 
     def sampled(self) -> "Grid":
         """The same grid with each body reduced to its contact points: small enough to send to a cluster."""
@@ -354,7 +331,7 @@ def run(
     grid = Grid(base, axes, tolerance, residual, band, dict(layers), bool(audit))
     admit(grid.n_cases, len(grid.layers), max_cells, quick=not grid.extra, tell=tell)
     fewer = grid.without_speed()
-    numbers, texts = _solve_all(fewer or grid, workers, client, store, watch)
+    numbers, texts = solve_all(fewer or grid, solve, workers, client, store, watch)
     failures = np.full((fewer or grid).n_cases, "", dtype=f"<U{max(map(len, texts.values()), default=1)}")
     failures[list(texts)] = list(texts.values())
     doubt = described(fewer or grid, numbers, workers)
@@ -413,10 +390,10 @@ def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, 
         tell(cost)
 
 
-def _solve_all(
-    grid: Grid, workers: int | None, client: Any, store: Any, watch: Watch | None
+def solve_all(
+    grid: Any, solve: Callable[..., Any], workers: int | None, client: Any, store: Any, watch: Watch | None
 ) -> tuple[np.ndarray, Texts]:
-    """Compute all cells, block by block, on a cluster or in threads of this process."""
+    """Compute all cells of a grid or a cloud, block by block, on a cluster or in threads of this process."""
     if client is not None:
         return by_cluster(grid, client, store, partial(solve, workers=1), watch)
     if store is not None:
@@ -464,9 +441,7 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
         name: grid.axes[name][place[name]] if name in place else np.full(stop - start, value)
         for name, value in base.items()
     }
-    quick = (column["exponent"] >= 1.0) & (column["gap"] >= 0.0) & (not grid.extra)
-    for name in ("hard_stiffness", "yield_approach", "hysteresis"):
-        quick &= column[name] == 0.0
+    quick = together(column) & (not grid.extra)
     cells = np.flatnonzero(quick)
     if cells.size:
         kind = np.zeros(stop - start, int)
@@ -490,18 +465,56 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
         for row, name in enumerate(names):
             numbers[row, cells] = getattr(found, name)
         quick[cells] = found.done & ~(np.isnan(found.centroid) & (grid.band is not None))
-    rest = np.flatnonzero(~quick)
+    return numbers, alone(grid, start, np.flatnonzero(~quick), numbers, workers)
+
+
+def together(column: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Which blows (n_cells,) can be followed together, by their parameters, (n_cells,) each."""
+    quick = (column["exponent"] >= 1.0) & (column["gap"] >= 0.0)
+    for name in ("hard_stiffness", "yield_approach", "hysteresis"):
+        quick &= column[name] == 0.0
+    return quick
+
+
+def alone(grid: Any, start: int, cells: np.ndarray, numbers: np.ndarray, workers: int | None) -> Texts:
+    """Strike cells of a block one by one; fill ``numbers`` (n_layers, n_cells) and return the error texts."""
     texts = {}
     with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
-        struck = [pool.submit(grid.strike, start + int(i)) for i in rest]
+        rows = [pool.submit(_row, grid, start + int(i)) for i in cells]
         try:
-            for i, cell in zip(rest, struck):
-                numbers[:, i], text = cell.result()
+            for i, row in zip(cells, rows):
+                numbers[:, i], text = row.result()
                 if text:
                     texts[start + int(i)] = text
         finally:
             pool.shutdown(cancel_futures=True)
-    return numbers, texts
+    return texts
+
+
+def struck_alone(grid: Any, case: Case) -> Response:
+    """A blow of a grid or a cloud by the modal engine."""
+    hit = strike(
+        case.modes, case.striker, case.contact,
+        at=case.at, speed=case.speed, tolerance=grid.tolerance, residual=grid.residual, max_impacts=grid.max_impacts,
+    )  # fmt: skip
+    return audited(hit)
+
+
+def _row(grid: Any, index: int) -> tuple[np.ndarray, str]:
+    """The layers of one cell from the modal engine, and its error text ('' if it succeeded)."""
+    try:
+        return numbers_of(grid.blow(index), grid.band, grid.extra), ""
+    except SimulationError as error:
+        return np.full(len(grid.layers), np.nan), str(error)
+
+
+def numbers_of(
+    hit: Response, band: float | None, extra: Mapping[str, Callable[[Response], float]] | None = None
+) -> np.ndarray:
+    """The layers (n_layers,) of one blow."""
+    row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force, hit.error.step]
+    row += [hit.spectral_centroid(band)] if band is not None else []
+    return np.array(row + [function(hit) for function in (extra or {}).values()], float)
 
 
 def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray, doubt: np.ndarray) -> xarray.Dataset:
@@ -541,6 +554,16 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray, doubt: np.nd
     notes = plausible.together(grid.base.modes.notes, grid.base.striker.notes)
     about = {"title": "Map of blows", "scene": json.dumps(grid.scene()), "notes": "\n".join(notes)}
     return xarray.Dataset(data, places, about | {"tolerance": grid.tolerance, "residual": int(grid.residual)})
+
+
+def plain(case: Case) -> dict[str, Any]:
+    """A blow as plain numbers."""
+    return {
+        "target": _plain(case.modes, case.at),
+        "striker": _plain(case.striker.modes, case.striker.at),
+        "contact": dict(vars(case.contact)),
+        "speed": case.speed,
+    }
 
 
 def _plain(modes: Modes, at: np.ndarray) -> dict[str, Any]:

@@ -1,0 +1,541 @@
+"""Blows whose inputs are uncertain: from distributions of numbers of a scene to distributions of the answer."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray
+
+from .._base import check
+from ..fe import plausible
+from ..fe.assembly import System, reassemble
+from ..fe.section import Beam, Elastic, Plate
+from ..impact.contact import Contact
+from ..impact.striker import Striker
+from ..model.planner import Blow
+from ..model.target import CLOSE, FIRST_FLEXIBLE, Stages, Target, Watch
+from ..modes.modal import Damping, Modes
+from ..show import export, figures
+from ..sweeps import bodies, cloud, grid
+from ..sweeps.cells import ALIASES, AXES, LAW, REACH, Case
+from ..sweeps.cloud import Cloud
+from ..sweeps.inputs import Input, crossed, drawn, mixing, read, shares
+from ..sweeps.spreads import DOUBLE, QUANTITIES, Checks, Spread
+from .maps import MOST_ROWS, changed_scene
+from .scene import Scene, load_scene
+
+CHECKED = 16  # [-] blows struck again one by one
+TAILS = (0.05, 0.95)  # [-] levels of an input of the body at which the body is made anew
+MOST_BLOWS = 10**7  # [-] of a spread: 1 GB of numbers
+PLACES = ("strike.x", "strike.y")  # inputs that move the strike point
+SIZE = "target.size"  # [-] factor on all lengths in the plane of a plate, or along a beam
+# Inputs of the body's modes by dimension: powers of its mass and of its frequencies; Kirchhoff, Euler and Bernoulli
+BODY: dict[int, dict[str, tuple[float, float]]] = {
+    2: {"section.thickness": (1.0, 1.0), "material.E": (0.0, 0.5), "material.rho": (1.0, -0.5), SIZE: (2.0, -2.0)},
+    1: {
+        "section.height": (1.0, 1.0), "section.width": (1.0, 0.0), "section.diameter": (2.0, 1.0),
+        "material.E": (0.0, 0.5), "material.rho": (1.0, -0.5), SIZE: (1.0, -2.0),
+    },
+}  # fmt: skip
+
+
+@check.typed
+def spread(
+    scene: Scene | str | Path | System | Modes,
+    vary: Mapping[str, Any],
+    striker: Striker | None = None,
+    contact: Contact | None = None,
+    *,
+    n: int = 10_000,
+    correlation: Any = None,
+    sobol: bool | None = None,
+    seed: int = 0,
+    tolerance: float | None = None,
+    max_frequency: float | None = None,
+    at: Any = None,
+    speed: float | None = None,
+    damping_ratio: Damping | None = None,
+    workers: int | None = None,
+    client: Any = None,
+    store: str | Path | None = None,
+    watch: Callable[[int, int], Any] | None = None,
+    stage: Watch | None = None,
+) -> Spread:
+    """Strike with uncertain inputs: how every quantity of the blow is distributed, and which input matters.
+
+    Parameters
+    ----------
+    scene : Scene, path of a scene file, System or Modes
+        A scene says everything else. A body needs striker, contact, ``at`` and ``speed``, as in `strike`.
+    vary : mapping of input to distribution
+        Inputs are the axes of a map (``contact.stiffness``, ``striker.mass``, ``strike.speed``, ...), the strike point
+        (``strike.x``, ``strike.y``), the body (``section.thickness``, ``material.E``, ``material.rho``, and
+        ``target.size``, a factor on its lengths, whose modes are rescaled), and in a scene any other number of a rigid
+        striker or of the contact. Distributions are ``("normal", mean, deviation)``, ``("lognormal", median, sigma)``
+        with the deviation of the logarithm, ``("uniform", low, high)``, ``("loguniform", low, high)``,
+        ``("triangular", low, mode, high)``, the same as text, or a frozen distribution of scipy.stats.
+    n : int
+        Number of blows, those for Sobol indices included.
+    correlation : matrix or mapping of pairs of inputs to numbers, optional
+        Correlations of the inputs' normal scores (a Gaussian copula).
+    sobol : bool, optional
+        Whether Sobol indices are wanted, for which blows share inputs in groups; by default wherever they exist: for
+        independent inputs, if SALib is installed (``pip install 'fem-impact[spread]'``).
+    seed : int
+        Of the scrambled points; the same seed gives the same blows.
+    tolerance : float [-], optional
+        Largest error of each blow; by default the scene's, or 1e-3.
+    max_frequency : float [Hz], optional
+        Adds the spectral centroid up to this frequency; that takes far longer than all other quantities.
+    at, speed, damping_ratio : as in `strike`, for a body
+    workers, client, store, watch : as in `sweep`
+    stage : callable, optional
+        Called with the name of each stage; returns a context manager.
+
+    Returns
+    -------
+    Spread
+
+    Raises
+    ------
+    ValueError
+        If an input is unknown, reaches values that are not allowed, or Sobol indices are asked for where there are
+        none.
+    SimulationError
+        If the body cannot be described well enough for the hardest of the blows.
+
+    Notes
+    -----
+    What needs kernels of its own for each value (strike point, damping ratio, and a flexible striker's frequency over
+    that of the body) takes at most 1024 values together. ``checks`` says what that changes.
+
+    Examples
+    --------
+    >>> wall, law = fi.Modes.rigid(1e9), fi.Contact.linear(1e5)
+    >>> blow = {"at": None, "speed": 1.0}
+    >>> found = fi.spread(wall, {"striker.mass": ("lognormal", 0.1, 0.2)}, fi.Striker.rigid(0.1), law, n=256, **blow)
+    >>> abs(found.quantile("contact_time", 0.5).value / (3.14159 * (0.1 / 1e5) ** 0.5) - 1.0) < 1e-2
+    True
+    """
+    told, blow = _told(scene, striker, contact, at, speed, damping_ratio)
+    inputs = read(vary)
+    n = check.count("n", n, high=MOST_BLOWS)
+    mixer = mixing(inputs, correlation)
+    seed = check.count("seed", seed, low=0)
+    groups, why = _grouped(sobol, mixer, n, len(inputs))
+    band = None if max_frequency is None else check.positive("max_frequency", max_frequency, "Hz")
+    limit = check.tolerance(blow.arguments.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance)
+    d = len(inputs)
+    points = crossed(shares(n // (d + 2), 2 * d, seed)) if groups else shares(n, d, seed)
+    values = drawn(inputs, points, mixer)
+    if not np.isfinite(values).all() or np.abs(values).max() > REACH:
+        raise ValueError(f"vary must stay finite and below {REACH:g}; choose distributions with shorter tails")
+    stages = Stages(stage)
+    asked = _Asked(blow, told, inputs, values, limit, band, stages, grid.kept_beside(store))
+    base, axes = asked.cases()
+    exact = Cloud(base, axes, limit, blow.arguments.get("residual", True), band)
+    rough = replace(exact, axes=cloud.few(base, axes), kernels={})
+    with stages("blows"):
+        numbers, texts = cloud.solve_all(rough, workers, client, store, watch)
+    with stages("checks"):
+        checks = _checked(exact, numbers, workers)
+        rescaled = asked.rescaled(base)
+    notes = plausible.together(base.modes.notes, base.striker.notes)
+    table = _table(inputs, values, rough.layers, numbers, texts, d + 2 if groups else 1, base, band)
+    title = told.title or told.path.name if told is not None else ""
+    return Spread(inputs, table, limit, groups, mixer, seed, checks=checks, rescaled=rescaled, title=title, notes=notes,
+                  why_no_shares=why)  # fmt: skip
+
+
+def _told(scene: Any, striker: Any, contact: Any, at: Any, speed: Any, damping_ratio: Any) -> tuple[Scene | None, Blow]:
+    """The scene if there is one, and the blow."""
+    if isinstance(scene, (System, Modes)):
+        check.instance("striker", striker, Striker)
+        check.instance("contact", contact, Contact)
+        values = {"at": at, "speed": check.positive("speed", speed, "m/s", reach=REACH)}
+        return None, Blow(Target.of(scene, damping_ratio), striker, contact, values)
+    for name, given in (("striker", striker), ("contact", contact), ("at", at), ("speed", speed),
+                        ("damping_ratio", damping_ratio)):  # fmt: skip
+        if given is not None:
+            raise ValueError(f"{name} must be left out for a scene, which has its own")
+    told = scene if isinstance(scene, Scene) else load_scene(scene)
+    return told, told.built
+
+
+def _grouped(sobol: bool | None, mixer: Any, n: int, n_inputs: int) -> tuple[bool, str]:
+    """Whether blows come in groups for Sobol indices and, if not, why."""
+    if sobol is False:
+        return False, ""
+    if mixer is not None:
+        why = "the inputs are correlated, so that no share of the variance belongs to one input alone"
+    elif n < 2 * (n_inputs + 2):
+        why = f"n must be at least {2 * (n_inputs + 2)} for {n_inputs} inputs"
+    else:
+        why = ""
+        try:
+            check.extra("SALib.analyze.sobol", "spread", "a Sobol index")
+        except ValueError as error:
+            why = str(error)
+    if why and sobol:
+        raise ValueError(f"sobol must be left out: {why}")
+    return not why, why
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """A blow and the values of its inputs: which axes of a map they are."""
+
+    blow: Blow
+    scene: Scene | None
+    inputs: Sequence[Input]
+    values: np.ndarray  # (n_cases, n_inputs)
+    tolerance: float
+    band: float | None
+    stages: Stages
+    keep: Path | None
+    own: dict[str, np.ndarray] = field(default_factory=dict)  # what `_sort` finds: axis of a map -> values
+    body: dict[str, np.ndarray] = field(default_factory=dict)  # input of the body -> value over its own [-]
+    parts: dict[str, np.ndarray] = field(default_factory=dict)  # other number of the scene -> values
+    places: dict[int, np.ndarray] = field(default_factory=dict)  # coordinate of the strike point -> values [m]
+
+    def __post_init__(self) -> None:
+        for each, column in zip(self.inputs, self.values.T):
+            self._sort(each.name, ALIASES.get(each.name, each.name), column)
+        if self.body and {"target_mass", "target_frequency"} & set(self.own):
+            raise ValueError("vary must name the mass and frequency of the body, or what makes them, but not both")
+
+    def _sort(self, name: str, axis: str, column: np.ndarray) -> None:
+        dimension = self.dimension
+        if name in PLACES[:dimension]:
+            self.places[PLACES.index(name)] = column
+        elif name in BODY.get(dimension, {}):
+            self.body[name] = column / self._of_body(name)
+            if not (self.body[name] > 0.0).all():
+                raise _below(name, column)
+        elif axis in AXES and axis != "at":
+            if axis in self.own:
+                raise ValueError(f"vary names {axis} twice")
+            self.own[axis] = column
+        elif self.scene is not None and self._numeric(name):
+            self.parts[name] = column
+        else:
+            known = [*ALIASES, *AXES, *PLACES[:dimension], *BODY.get(dimension, {})]
+            raise ValueError(f"vary: {check.shown(name)} is not an input{check.nearest(name, known)}")
+        if name == "material.E" and self.scene is not None and self.scene.contact.kind == "between":
+            self.parts[name] = column  # the contact's stiffness comes from the material, too
+
+    @property
+    def dimension(self) -> int:
+        """2 for a plate, 1 for a beam, 0 for a rigid body."""
+        target = self.blow.target
+        return target.mesh.dimension if target.mesh is not None else target.modes.dimension if target.modes else 0
+
+    def _numeric(self, name: str) -> bool:
+        """Whether the scene has such a number of a striker or of the contact."""
+        table, _, key = name.partition(".")
+        part = getattr(self.scene, table, None) if table in ("striker", "contact") else None
+        return part is not None and isinstance(part.values.get(key), (int, float))
+
+    def _of_body(self, name: str) -> float:
+        """The body's own value of an input, which must be one number."""
+        target = self.blow.target
+        if name == SIZE:
+            _scalable(target)
+            return 1.0
+        section = target.section
+        if section is None:
+            raise ValueError(f"vary: {name} needs a body with a section; vary target.mass and target.first_frequency")
+        table, key = name.split(".")
+        round_ = isinstance(section, Beam) and section.round
+        if (key == "diameter") != round_ and key in ("diameter", "width", "height"):
+            raise ValueError(f"vary: {name} is not a number of this section")
+        value = getattr(section.material if table == "material" else section, "height" if round_ and key == "diameter"
+                        else key)  # fmt: skip
+        if callable(value):
+            raise ValueError(f"vary: {name} varies in space already; vary target.mass and target.first_frequency")
+        return float(value)
+
+    def cases(self) -> tuple[Case, dict[str, np.ndarray]]:
+        """The blow that all cases share, on a body that serves all of them, and the axes."""
+        blow, axes = self.blow, dict(self.own)
+        self._add_parts(axes)
+        target, speed = blow.target, blow.arguments["speed"]
+        mass, frequency = self._factors(self.body)
+        given: dict[str, Any] = {"at": blow.arguments["at"], "speed": speed}
+        if target.modes is not None:
+            modes = target.finished(target.modes)
+            base = Case(modes, blow.striker, blow.contact, modes.point("at", given["at"])[0], speed)
+            self._add_body(base, axes, mass, frequency)
+            with self._blamed(axes):
+                bodies.checked_axes(base, self._ends(base, axes))
+            return base, axes
+        first = None
+        if self.body:
+            with self.stages("modes"):
+                first = target.surrounded(target.find(FIRST_FLEXIBLE, tolerance=CLOSE))
+        over = dict(axes)
+        if first is not None:
+            over["target_mass"] = first.mass * mass
+            over["target_frequency"] = float(first.frequencies[first.omega > 0.0][0]) * frequency
+        over = {name: np.unique([column.min(), column.max()]) for name, column in over.items()}
+        if self.places:
+            over["at"] = self._corners(np.atleast_1d(np.asarray(blow.arguments["at"], float)))
+        with self._blamed(axes):
+            base, _ = bodies.body_of(
+                target, blow.striker, blow.contact, **given, over=over or {"speed": np.array([speed])},
+                tolerance=self.tolerance, keep=self.keep, stages=self.stages,
+                alone=blow.arguments.get("residual", True) and not self.places,
+            )  # fmt: skip
+        base = replace(base, speed=speed)
+        self._add_body(base, axes, mass, frequency)
+        return base, axes
+
+    def _blamed(self, axes: Mapping[str, np.ndarray]) -> "_Blame":
+        return _Blame(axes, {ALIASES.get(each.name, each.name): each for each in self.inputs})
+
+    def _factors(self, body: Mapping[str, np.ndarray]) -> tuple[Any, Any]:
+        """Factors of the body's mass and of its frequencies, from those of its inputs."""
+        mass: Any = 1.0
+        frequency: Any = 1.0
+        for name, ratio in body.items():
+            of_mass, of_frequency = self._powers(name)
+            mass, frequency = mass * ratio**of_mass, frequency * ratio**of_frequency
+        return mass, frequency
+
+    def _powers(self, name: str) -> tuple[float, float]:
+        """Powers with which an input enters mass and frequencies; none where the scene states these themselves."""
+        mass, frequency = BODY[self.dimension][name]
+        stated = self.blow.target.scale
+        return 0.0 if "mass" in stated else mass, 0.0 if "first_frequency" in stated else frequency
+
+    def _add_body(self, base: Case, axes: dict[str, np.ndarray], mass: Any, frequency: Any) -> None:
+        """Add what moves the strike point and rescales the body to the axes."""
+        n = len(self.values)
+        if self.body:
+            axes["target_mass"] = np.broadcast_to(base.modes.mass * mass, (n,)).copy()
+            axes["target_frequency"] = np.broadcast_to(base.first_frequency * frequency, (n,)).copy()
+        if self.places:
+            points = np.tile(base.at, (n, 1))
+            for i, column in self.places.items():
+                points[:, i] = column
+            axes["at"] = base.modes.points("vary: strike point", points)
+
+    def _corners(self, at: np.ndarray) -> np.ndarray:
+        """Strike points at the ends of their ranges and in the middle, (n_points, dimension) [m]."""
+        ends = [
+            np.unique([self.places[i].min(), self.places[i].max()]) if i in self.places else [at[i]]
+            for i in range(len(at))
+        ]
+        return np.vstack([np.stack(np.meshgrid(*ends), axis=-1).reshape(-1, len(at)), at[None]])
+
+    def _ends(self, base: Case, axes: Mapping[str, np.ndarray]) -> dict[str, Any]:
+        """Smallest and largest value of each axis."""
+        found: dict[str, Any] = {n: [c.min(), c.max()] for n, c in axes.items() if n != "at"}
+        return found or {"speed": [base.speed]}
+
+    def _add_parts(self, axes: dict[str, np.ndarray]) -> None:
+        """Add the masses of strikers and the laws of contacts that are made anew for each blow."""
+        if not self.parts or self.scene is None:
+            return
+        laws, masses = np.empty((len(self.values), len(LAW))), np.empty(len(self.values))
+        for i, row in enumerate(zip(*self.parts.values())):
+            scene = self.scene
+            for name, value in zip(self.parts, row):
+                scene = changed_scene(scene, name, float(value))
+            striker, law = scene.make_striker(), scene.make_contact()
+            if striker.modes.omega.any() and any(name.startswith("striker.") for name in self.parts):
+                raise ValueError(
+                    f"vary: {next(n for n in self.parts if n.startswith('striker.'))} needs a rigid striker; "
+                    f"vary striker.mass and striker.first_frequency"
+                )
+            laws[i], masses[i] = [getattr(law, name) for name in LAW], striker.mass
+        for name, column in zip(LAW, laws.T):
+            if name not in axes and np.ptp(column) > 0.0:
+                axes[name] = column
+        if "mass" not in axes and np.ptp(masses) > 0.0:
+            axes["mass"] = masses
+
+    def rescaled(self, base: Case) -> dict[str, float]:
+        """Error [-] of rescaling the modes for each input of the body: against a body made anew near both tails.
+
+        `SIZE` is missing, as for the bodies that allow it the rescaled modes are the exact ones.
+        """
+        found = {}
+        alone = Cloud(base, {}, self.tolerance, self.blow.arguments.get("residual", True), None)
+        middle = {each.name: each for each in self.inputs}
+        for name in self.body:
+            if name == SIZE:
+                continue
+            worst = 0.0
+            own = self._of_body(name)
+            for value in middle[name].at(np.array(TAILS)):
+                ratio = float(value) / own
+                of_mass, of_frequency = self._powers(name)
+                mine = base.with_values({
+                    "target_mass": base.modes.mass * ratio**of_mass,
+                    "target_frequency": base.first_frequency * ratio**of_frequency,
+                })  # fmt: skip
+                other, _ = bodies.body_of(
+                    _made(self.blow.target, name, ratio), self.blow.striker, self.blow.contact,
+                    at=self.blow.arguments["at"], speed=self.blow.arguments["speed"], over={"speed": [base.speed]},
+                    tolerance=self.tolerance, alone=self.blow.arguments.get("residual", True), stages=self.stages,
+                )  # fmt: skip
+                try:
+                    one, two = (grid.numbers_of(grid.struck_alone(alone, case), None) for case in (mine, other))
+                except check.SimulationError:
+                    worst = math.inf
+                    continue
+                worst = max(worst, *_apart(one, two).values()) if one[0] == two[0] else math.inf
+            found[name] = worst
+        return found
+
+
+@dataclass(frozen=True)
+class _Blame:
+    """Turns an error about an axis into one that names the input and its distribution."""
+
+    axes: Mapping[str, np.ndarray]
+    inputs: Mapping[str, Input]
+
+    def __enter__(self) -> None:
+        for name, column in self.axes.items():
+            if name in self.inputs and name in ("mass", "stiffness", "speed", "target_mass", "target_frequency",
+                                                "striker_frequency") and column.min() <= 0.0:  # fmt: skip
+                raise _below(self.inputs[name].name, column)
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if isinstance(error, ValueError) and str(error).split(" ")[0].split("[")[0] in (
+            *AXES,
+            "over",
+            "first_frequency",
+        ):
+            raise ValueError(f"vary reaches values that are not allowed: {error}") from None
+
+
+def _below(name: str, column: np.ndarray) -> ValueError:
+    return ValueError(
+        f"vary[{name!r}] must stay positive, but it reaches {column.min():g}; "
+        "give lognormal, or uniform with a positive low"
+    )
+
+
+def _scalable(target: Target) -> None:
+    """ValueError unless all lengths of the body can be scaled exactly."""
+    springs = any(isinstance(held, Elastic) for held in target.supports.values())
+    pulled = isinstance(target.section, Plate) and target.section.tension
+    if target.mesh is None or springs or pulled or target.point_masses or target.thick or target.air or target.scale:
+        raise ValueError(
+            f"vary: {SIZE} needs a thin body of stated size, without springs, tension, point masses or air; "
+            "vary target.mass and target.first_frequency"
+        )
+
+
+def _made(target: Target, name: str, ratio: float) -> Target:
+    """The target with one number of its section or material multiplied."""
+    section = target.section
+    assert section is not None
+    table, key = name.split(".")
+    if table == "material":
+        changed: Any = replace(
+            section, material=replace(section.material, **{key: getattr(section.material, key) * ratio})
+        )
+    else:
+        keys = ("width", "height") if key == "diameter" else (key,)
+        changed = replace(section, **{each: getattr(section, each) * ratio for each in keys})
+    if target.system is None:
+        return replace(target, section=changed)
+    other = reassemble(replace(target.system, section=changed), target.system.mesh)
+    return Target.of(other, target.damping_ratio)
+
+
+def _checked(exact: Cloud, numbers: np.ndarray, workers: int | None) -> Checks:
+    """Strike a few blows again one by one, with the values they really have."""
+    some = [int(i) for i in np.unique(np.linspace(0, exact.n_cases - 1, CHECKED).astype(int))]
+
+    def again(index: int) -> Any:
+        with suppress(check.SimulationError):
+            return exact.blow(index)
+        return None
+
+    with ThreadPoolExecutor(workers) as pool:
+        hits = {i: hit for i, hit in zip(some, pool.map(again, some)) if hit is not None}
+    apart: dict[str, float] = {}
+    others = 0
+    for i, hit in hits.items():
+        row = grid.numbers_of(hit, exact.band)
+        if row[0] != numbers[0, i]:
+            others += 1
+            continue
+        for name, value in _apart(row, numbers[:, i]).items():
+            apart[name] = max(apart.get(name, 0.0), value)
+    unknown = {each.name: None for hit in hits.values() for each in hit.assumptions if not each.known}
+    return Checks(
+        len(hits), apart, others,
+        max((hit.error.truncation + hit.error.mesh for hit in hits.values()), default=math.nan),
+        max((hit.model_error for hit in hits.values()), default=math.nan), tuple(unknown),
+    )  # fmt: skip
+
+
+def _apart(one: np.ndarray, two: np.ndarray) -> dict[str, float]:
+    """Differences of two blows: of the restitution absolute, of the others relative to the first."""
+    found = {}
+    for i, name in enumerate(grid.LAYERS):
+        if name in ("n_impacts", "error") or i >= len(one):
+            continue
+        whole = 1.0 if name == "restitution" else abs(one[i])
+        found[name] = float(abs(two[i] - one[i]) / whole) if whole else 0.0
+    return found
+
+
+def _table(
+    inputs: Sequence[Input],
+    values: np.ndarray,
+    layers: Sequence[str],
+    numbers: np.ndarray,
+    texts: Mapping[int, str],
+    n_parts: int,
+    base: Case,
+    band: float | None,
+) -> xarray.Dataset:
+    """All blows as a Dataset along one dimension."""
+    data: dict[str, Any] = {}
+    for each, column in zip(inputs, values.T):
+        unit = AXES.get(ALIASES.get(each.name, each.name), ("",))[0].replace("exponent", f"{base.contact.exponent:g}")
+        data[each.name] = ("blow", column, {"units": unit or "1", "distribution": each.said})
+    for name, row in zip(layers, numbers):
+        unit, meaning = grid.LAYERS[name]
+        about: dict[str, Any] = {"units": unit or "1", "long_name": meaning}
+        if name == "centroid":
+            about["max_frequency"] = band
+        data[name] = ("blow", np.where(np.isnan(row), -1, row).astype(np.int32) if name == "n_impacts" else row, about)
+    counts = data["n_impacts"][1]
+    data[DOUBLE] = ("blow", (counts > 1).astype(np.int8), {"units": "1", "long_name": QUANTITIES[DOUBLE][1]})
+    part = np.arange(len(counts)) % n_parts
+    meaning = "0: all inputs from A, the last: all from B, others: one from B"
+    data["part"] = ("blow", part.astype(np.int32), {"long_name": meaning})
+    failures = np.full(len(counts), "", dtype=f"<U{max(map(len, texts.values()), default=1)}")
+    failures[list(texts)] = list(texts.values())
+    data["failure"] = ("blow", failures, {"long_name": "error text of a failed blow"})
+    return xarray.Dataset(data)
+
+
+def write(folder: Path, found: Spread) -> list[str]:
+    """Write spread.json, spread.nc, spread.csv and spread.png; return the names.
+
+    A spread of more than `maps.MOST_ROWS` blows gets no CSV file: it would be slow to write and useless.
+    """
+    names = ["spread.json", "spread.nc"]
+    export.write_json(folder / names[0], {**found.data(), "versions": export.versions()})
+    found.table.to_netcdf(folder / names[1], engine="scipy")
+    if found.n_blows <= MOST_ROWS:
+        names.append("spread.csv")
+        found.table.to_dataframe().to_csv(folder / "spread.csv")
+    if len(found.own):
+        names.append("spread.png")
+        figures.save(folder / "spread.png", figures.spread(found))
+    return names

@@ -1,0 +1,332 @@
+"""Uncertain blows of scenes and bodies: against closed forms, and against the same scene struck with other numbers."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray
+from numpy.testing import assert_allclose
+from scipy import stats
+
+import fem_impact as fi
+from fem_impact import cli
+from fem_impact.scenes import uncertainty
+from fem_impact.sweeps import cloud, grid
+
+MASS, STIFFNESS = 0.1, 1e5
+WALL = fi.Modes.rigid(1e12)  # so heavy that it does not move: 1e-13 of the striker's speed
+PLATE = """title = "A ball on a plate"
+[mesh]
+shape = "rectangle"
+length = 0.4
+width = 0.3
+[material]
+E = 10e9
+nu = 0.3
+rho = 450.0
+[section]
+kind = "plate"
+thickness = 3e-3
+[supports]
+boundary = "hinged"
+[striker]
+kind = "sphere"
+radius = 8e-3
+E = 210e9
+nu = 0.3
+rho = 7850.0
+[contact]
+kind = "between"
+[strike]
+at = [0.13, 0.1]
+speed = 1.0
+tolerance = 1e-3
+"""
+RIGID = PLATE.replace('kind = "between"', 'kind = "linear"\nstiffness = 1e5')
+
+
+def wall(vary, **wanted):
+    blow = {"at": None, "speed": 1.0, "tolerance": 1e-5, "sobol": False, **wanted}
+    return fi.spread(WALL, vary, fi.Striker.rigid(MASS), fi.Contact.linear(STIFFNESS), **blow)
+
+
+@pytest.fixture
+def scene(tmp_path):
+    def make(text=RIGID):
+        path = tmp_path / "ball.toml"
+        path.write_text(text)
+        return fi.load_scene(path)
+
+    return make
+
+
+def test_contact_times_on_a_wall_are_lognormal():
+    """pi sqrt(m / k) has half the sigmas of both; a Kolmogorov distance of random points would be 0.02."""
+    found = wall({"striker.mass": ("lognormal", MASS, 0.2), "contact.stiffness": ("lognormal", STIFFNESS, 0.3)}, n=2048)
+    exact = stats.lognorm(0.5 * np.hypot(0.2, 0.3), scale=np.pi * (MASS / STIFFNESS) ** 0.5)
+    assert stats.kstest(found.values("contact_time"), exact.cdf).statistic < 0.01
+    for level in (0.05, 0.5, 0.95):
+        each = found.quantile("contact_time", level)
+        assert each.low <= exact.ppf(level) <= each.high
+        assert_allclose(each.value, exact.ppf(level), rtol=5e-3)
+    assert found.checks.apart["contact_time"] < 2e-5 and found.n_failed == 0
+
+
+def test_correlated_inputs_change_the_deviation_as_the_closed_form_says():
+    """Of ln T, the variance is (s1^2 + s2^2 - 2 r s1 s2) / 4."""
+    inputs = {"striker.mass": ("lognormal", MASS, 0.2), "contact.stiffness": ("lognormal", STIFFNESS, 0.3)}
+    found = wall(inputs, n=2048, correlation={("striker.mass", "contact.stiffness"): 0.8})
+    exact = 0.5 * (0.2**2 + 0.3**2 - 2 * 0.8 * 0.2 * 0.3) ** 0.5
+    assert_allclose(np.log(found.values("contact_time")).std(), exact, rtol=5e-3)
+
+
+def test_sobol_indices_on_a_wall_are_those_of_a_product():
+    pytest.importorskip("SALib", reason="the spread extra is not installed")
+    sigmas = {"striker.mass": 0.2, "contact.stiffness": 0.4}
+    inputs = {"striker.mass": ("lognormal", MASS, 0.2), "contact.stiffness": ("lognormal", STIFFNESS, 0.4)}
+    found = wall(inputs, n=8192, sobol=True)
+    half = {name: (0.5 * sigma) ** 2 for name, sigma in sigmas.items()}
+    for name, square in half.items():
+        first = np.expm1(square) / np.expm1(sum(half.values()))
+        assert_allclose(found.shares["contact_time"][name].first.value, first, atol=0.02)
+        assert found.shares["contact_time"][name].total.low <= first <= 1.0
+    assert found.ranking("contact_time")[0][0] == "contact.stiffness"
+
+
+def test_what_depends_linearly_keeps_its_distribution():
+    """A linear contact on a wall gives the impulse 2 m v."""
+    found = wall({"strike.speed": ("uniform", 1.0, 3.0)}, n=512)
+    assert_allclose(found.values("impulse"), 2.0 * MASS * found.values("strike.speed"), rtol=1e-4)
+    assert found.correlations["impulse"]["strike.speed"] == pytest.approx(1.0)
+    assert "restitution" not in found.summary().split("better")[1]  # it does not vary
+
+
+def test_the_chance_of_a_double_hit_is_the_share_of_stiffnesses_that_hit_twice():
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=60)
+    blow = {"at": (0.465, 0.3), "speed": 1.0, "tolerance": 1e-2}
+    bodies = plate, fi.Striker.rigid(0.05), fi.Contact.linear(1e5)
+    found = fi.spread(plate, {"stiffness": ("uniform", 1e4, 2e5)}, *bodies[1:], n=2048, sobol=False, **blow)
+    stiffness = np.linspace(1e4, 2e5, 4001)
+    table = fi.sweep(*bodies, over={"stiffness": stiffness}, **blow)
+    exact = float((table.n_impacts > 1).mean())
+    twice = found.chance()
+    assert 0.05 < exact < 0.95 and found.chaotic
+    assert twice.low <= exact <= twice.high
+    assert_allclose(twice.value, exact, atol=5e-3)  # even points: within some cells of 1/2048 of each border
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [
+        ("section.thickness", ("normal", 3e-3, 2e-4)),
+        ("material.E", ("normal", 10e9, 1e9)),
+        ("material.rho", ("normal", 450.0, 50.0)),
+        ("target.mass", ("normal", 0.16, 0.01)),
+        ("strike.x", ("normal", 0.13, 0.01)),
+    ],
+)
+def test_a_blow_on_a_changed_body_is_that_of_the_changed_scene(scene, name, given):
+    text = RIGID + ("[target]\nmass = 0.16\n" if name == "target.mass" else "")
+    made = scene(text)
+    found = fi.spread(made, {name: given}, n=8, sobol=False)
+    for i in (0, 5):
+        value = float(found.values(name)[i])
+        if name == "strike.x":
+            hit = made.strike(at=(value, 0.1), tolerance=1e-4)
+        else:
+            hit = made.changed({name: value}).strike(tolerance=1e-4)
+        assert found.values("n_impacts")[i] == hit.n_impacts
+        assert_allclose(found.values("restitution")[i], hit.restitution, atol=1e-3)
+        for quantity in ("contact_time", "impulse", "peak_force"):
+            assert_allclose(found.values(quantity)[i], getattr(hit, quantity), rtol=1e-3)
+    assert all(error < 1e-3 for error in found.rescaled.values())
+    assert bool(found.rescaled) == name.startswith(("section", "material"))
+
+
+def test_size_scales_all_lengths(scene):
+    found = fi.spread(scene(), {"target.size": ("uniform", 0.9, 1.1)}, n=4, sobol=False)
+    for size, time, rebound in zip(*(found.values(n) for n in ("target.size", "contact_time", "restitution"))):
+        other = scene(RIGID.replace("0.4\n", f"{0.4 * size}\n").replace("width = 0.3", f"width = {0.3 * size}"))
+        hit = other.strike(at=(0.13 * size, 0.1 * size), tolerance=1e-4)
+        assert_allclose(time, hit.contact_time, rtol=1e-3)
+        assert_allclose(rebound, hit.restitution, atol=1e-3)
+
+
+def test_a_body_whose_modes_do_not_just_scale_says_the_error(scene):
+    """Under tension, frequencies do not follow the thickness: the rescaled modes are off by more than the blow."""
+    text = RIGID.replace("thickness = 3e-3", "thickness = 3e-3\ntension = 2e4")
+    found = fi.spread(scene(text), {"section.thickness": ("normal", 3e-3, 3e-4)}, n=8, sobol=False, tolerance=1e-2)
+    assert found.rescaled["section.thickness"] > 1e-2
+    assert "section.thickness: modes were rescaled; a body made anew differs" in found.summary()
+
+
+def test_a_contact_between_bodies_follows_its_materials(scene):
+    made = scene(PLATE)
+    vary = {"striker.radius": ("normal", 8e-3, 4e-4), "material.E": ("normal", 10e9, 5e8)}
+    found = fi.spread(made, vary, n=6, sobol=False)
+    for i in (1, 4):
+        hit = made.changed({name: float(found.values(name)[i]) for name in vary}).strike(tolerance=1e-4)
+        assert_allclose(found.values("contact_time")[i], hit.contact_time, rtol=1e-3)
+        assert_allclose(found.values("peak_force")[i], hit.peak_force, rtol=1e-3)
+
+
+def test_an_assembled_body_is_rebuilt_to_judge_its_rescaling():
+    plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), thickness=3e-3)
+    system = fi.assemble(fi.mesh.rectangle(0.4, 0.3), plate, {"boundary": "hinged"})
+    blow = {"at": (0.13, 0.1), "speed": 1.0, "tolerance": 1e-2, "damping_ratio": 0.01}
+    vary = {"section.thickness": ("normal", 3e-3, 2e-4)}
+    found = fi.spread(system, vary, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), n=16, sobol=False, **blow)
+    assert found.rescaled["section.thickness"] < 1e-2 and found.checks.body < 1e-2
+    twice = fi.assemble(
+        system.mesh, fi.Plate(plate.material, found.values("section.thickness")[3]), {"boundary": "hinged"}
+    )
+    hit = fi.strike(twice, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), **blow)
+    assert_allclose(found.values("contact_time")[3], hit.contact_time, rtol=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("vary", "text"),
+    [
+        ({"contact.stifness": "normal(1, 1)"}, "'contact.stifness' is not an input; did you mean 'contact.stiffness'"),
+        ({"mass": "normal(0.1, 0.01)", "striker.mass": "normal(0.1, 0.01)"}, "vary names mass twice"),
+        ({"strike.speed": "normal(1, 1)"}, r"vary\['strike.speed'\] must stay positive, but it reaches -.*lognormal"),
+        ({"section.thickness": "normal(3e-3, 2e-3)"}, r"vary\['section.thickness'\] must stay positive"),
+        ({"section.height": "normal(3e-3, 1e-4)"}, "'section.height' is not an input"),
+        ({"section.thickness": "normal(3e-3, 1e-4)", "target.mass": "normal(1, 0.1)"}, "mass and frequency of the body"),
+        ({"strike.x": "normal(0.13, 0.2)"}, "strike point"),
+        ({"contact.exponent": "uniform(-1, 2)"}, "exponent"),
+        ({"striker.mass": "lognormal(0.1, 50)"}, "vary must stay finite and below"),
+    ],
+)
+def test_inputs_that_make_no_sense_are_refused(scene, vary, text):
+    with pytest.raises(ValueError, match=text):
+        fi.spread(scene(), vary, n=64, sobol=False)
+
+
+def test_size_is_refused_where_modes_do_not_scale(scene):
+    for held in ("boundary = { stiffness = 1e4 }",):
+        made = scene(RIGID.replace('boundary = "hinged"', held))
+        with pytest.raises(ValueError, match=r"target.size needs a thin body"):
+            fi.spread(made, {"target.size": "uniform(0.9, 1.1)"}, n=8)
+
+
+def test_sobol_indices_are_refused_for_correlated_inputs_and_without_their_library(monkeypatch):
+    vary = {"striker.mass": ("lognormal", MASS, 0.2), "contact.stiffness": ("lognormal", STIFFNESS, 0.3)}
+    pair = {("striker.mass", "contact.stiffness"): 0.5}
+    with pytest.raises(ValueError, match="sobol must be left out: the inputs are correlated"):
+        wall(vary, n=64, correlation=pair, sobol=True)
+    found = wall(vary, n=64, correlation=pair, sobol=None)
+    assert "No Sobol indices: the inputs are correlated" in found.summary() and found.shares == {}
+    for module in ("SALib", "SALib.analyze", "SALib.analyze.sobol"):
+        monkeypatch.setitem(__import__("sys").modules, module, None)
+    with pytest.raises(ValueError, match=r"pip install 'fem-impact\[spread\]'"):
+        wall(vary, n=64, sobol=True)
+    assert "pip install 'fem-impact[spread]'" in wall(vary, n=64, sobol=None).summary()
+
+
+def test_a_scene_and_a_body_take_their_own_arguments(scene):
+    vary = {"striker.mass": "lognormal(0.1, 0.1)"}
+    with pytest.raises(ValueError, match="speed must be left out for a scene"):
+        fi.spread(scene(), vary, speed=1.0)
+    with pytest.raises(ValueError, match="striker must be a Striker"):
+        fi.spread(WALL, vary, at=None, speed=1.0)
+
+
+def test_the_same_seed_gives_the_same_blows():
+    vary = {"striker.mass": ("lognormal", MASS, 0.2)}
+    one, two, other = (wall(vary, n=32, seed=seed) for seed in (1, 1, 2))
+    xarray.testing.assert_identical(one.table, two.table)
+    assert not np.array_equal(one.table["striker.mass"], other.table["striker.mass"])
+
+
+def test_a_killed_run_resumes_from_its_store(tmp_path, monkeypatch):
+    pytest.importorskip("zarr", reason="the cluster extra is not installed")
+    vary, solved, real = {"striker.mass": ("lognormal", MASS, 0.2)}, [], cloud.solve
+
+    def count(blows, start, stop, **wanted):
+        if len(solved) == 20:
+            raise KeyboardInterrupt
+        solved.append(start)
+        return real(blows, start, stop, **wanted)
+
+    monkeypatch.setattr(cloud, "solve", count)
+    with pytest.raises(KeyboardInterrupt):
+        wall(vary, n=128, store=tmp_path / "blows")
+    first = list(solved)
+    solved.append(-1)  # so that the second run is not stopped
+    found = wall(vary, n=128, store=tmp_path / "blows")
+    assert not set(first) & set(solved[len(first) + 1 :])  # nothing twice
+    monkeypatch.undo()
+    assert_allclose(found.values("contact_time"), wall(vary, n=128).values("contact_time"), rtol=1e-9)
+    with pytest.raises(ValueError, match="store holds another map"):
+        wall(vary, n=128, seed=5, store=tmp_path / "blows")
+
+
+@pytest.mark.slow
+def test_a_cluster_gives_the_same_blows():
+    distributed = pytest.importorskip("distributed", reason="the cluster extra is not installed")
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=40)
+    vary = {"striker.mass": ("lognormal", 0.05, 0.2), "target.damping_ratio": ("uniform", 0.0, 0.02)}
+    blow = {"at": (0.465, 0.3), "speed": 1.0, "n": 256, "sobol": False}
+    bodies = fi.Striker.rigid(0.05), fi.Contact.hertz(1e6)
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        with distributed.Client(cluster) as client:
+            far = fi.spread(plate, vary, *bodies, client=client, **blow)
+    near = fi.spread(plate, vary, *bodies, **blow)
+    assert_allclose(far.values("restitution"), near.values("restitution"), rtol=1e-9)
+
+
+def test_failed_blows_are_told(monkeypatch):
+    def fail(blows, index):
+        raise fi.SimulationError("no luck")
+
+    monkeypatch.setattr(cloud.Cloud, "blow", fail)
+    felt = fi.Contact.felt(1e6, 2.0, hysteresis=0.3, relaxation=1e-3)
+    found = fi.spread(
+        WALL, {"speed": "uniform(1, 2)"}, fi.Striker.rigid(0.1), felt, n=16, at=None, speed=1.0, sobol=False
+    )
+    assert found.n_failed == 16 and found.checks.n_blows == 0 and set(found.table.failure.values) == {"no luck"}
+
+
+def test_the_centroid_is_one_of_the_quantities():
+    found = wall({"striker.mass": ("lognormal", MASS, 0.2)}, n=16, max_frequency=2e3, tolerance=1e-3)
+    hit = fi.strike(
+        WALL, fi.Striker.rigid(found.values("striker.mass")[2]), fi.Contact.linear(STIFFNESS), at=None, speed=1.0
+    )
+    assert_allclose(found.values("centroid")[2], hit.spectral_centroid(2e3), rtol=2e-3)
+
+
+def test_the_prompt_writes_numbers_and_a_picture_and_says_what_to_measure(scene, tmp_path, capsys):
+    made, out = scene(), tmp_path / "out"
+    words = ["spread", str(made.path), "--vary", "contact.stiffness=lognormal(1e5, 0.2)", "--vary",
+             "strike.speed = normal(1, 0.05)", "--correlate", "contact.stiffness, strike.speed=0.3", "--blows", "64",
+             "--out", str(out)]  # fmt: skip
+    assert cli.main(words) == 0
+    text = capsys.readouterr().out
+    assert "What should be measured better" in text and "A ball on a plate" in text
+    assert sorted(p.name for p in out.iterdir()) == ["spread.csv", "spread.json", "spread.nc", "spread.png"]
+    data = json.loads((out / "spread.json").read_text())
+    assert data["inputs"]["contact.stiffness"] == "lognormal(100000, 0.2)" and data["correlation"][0][1] == 0.3
+    table = xarray.load_dataset(out / "spread.nc", engine="scipy")
+    assert table.sizes["blow"] == 64 and table["contact_time"].attrs["units"] == "s"
+    assert cli.main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["blows"] == 64
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--vary", "contact.stiffness"], "--vary must have a name, an equals sign and a value"),
+        (["--vary", "contact.stiffness=lognormal(1e5)"], "must be lognormal(median, sigma)"),
+        (["--vary", "strike.speed=normal(1, 0.1)", "--correlate", "strike.speed=a"], "--correlate must look like"),
+        (["--vary", "strike.speed=normal(1, 0.1)", "--correlate", "strike.speed=0.5"], "correlation must map pairs"),
+    ],
+)
+def test_the_prompt_complains_in_one_line_and_writes_nothing(scene, tmp_path, capsys, words, text):
+    assert cli.main(["spread", str(scene().path), *words, "--out", str(tmp_path / "out")]) == 2
+    captured = capsys.readouterr()
+    assert text in captured.err and captured.err.count("\n") == 1 and not (tmp_path / "out").exists()
+
+
+def test_the_numbers_checked_are_those_of_the_layers():
+    assert set(uncertainty._apart(np.ones(7), np.ones(7))) == set(grid.LAYERS) - {"n_impacts", "error"}
