@@ -19,7 +19,8 @@ if COMPILED:
     COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # a file may say so too
     UNCOUNTED = hasattr(DefaultOptions, "_nrt")  # whether the compiler can leave out the counting of references
 LOOSE = {"reassoc", "contract"}  # sums may be reordered to run in parallel lanes; NaN and infinity keep their meaning
-ZERO, WHOLE = np.int64(0), np.bool_(True)  # no literals: what is called with one is compiled for it and then again
+# No literals: what is called with one is compiled for it and then again.
+ZERO, ONE, WHOLE = np.int64(0), np.int64(1), np.bool_(True)
 
 
 def _stamp() -> str:

@@ -8,8 +8,9 @@ through both ends can miss prove that no touch was passed, or mark the blow as d
 
 import numpy as np
 
-from .build import LOOSE, inner, outer
+from .build import LOOSE, ONE, ZERO, inner, outer
 from .law import Point, at, simple
+from .propagation import restore
 from .schemes import Free, Own, solve_constant, solve_ramp
 
 END, END_RAMP, RATE, RATE_RAMP, MEAN, MEAN_RAMP = (np.uintp(row) for row in range(6))  # rows of a kernel
@@ -36,10 +37,9 @@ def orbit(table, q, p, out_states):
 
     Parameters: table (4 or more, n_modes): a11, a12, a21, a22 of one step as in `propagation.step_table`.
     """
-    out_states[0, 0] = q
-    out_states[0, 1] = p
+    restore(q, p, out_states[0, 0], out_states[0, 1])
     for m in range(1, out_states.shape[0]):
-        x, y = out_states[m - 1]
+        x, y = out_states[m - 1, 0], out_states[m - 1, 1]
         for n in range(q.size):
             out_states[m, 0, n] = table[0, n] * x[n] + table[1, n] * y[n]
             out_states[m, 1, n] = table[2, n] * x[n] + table[3, n] * y[n]
@@ -373,10 +373,11 @@ def cleared(d0, v0, d1, v1, h, n, jumps, bends, slack, later, bounds, shares, se
 def lossy_peak(d0, v0, d1, v1, spring, loss):
     """Largest force on the cubic through both ends of a step, its slopes and the loss factor over the step's length."""
     values = np.empty(LOOKS + 1)
+    best = 0
     for look in range(LOOKS + 1):
         d, rate = cubic(d0, v0, d1, v1, look / LOOKS)
         values[look] = at(d, spring).force * (1.0 + loss * rate)
-    best = int(np.argmax(values))
+        best = look if values[look] > values[best] else best
     if best in (0, LOOKS):
         return values[best]
     left, right = values[best - 1], values[best + 1]
@@ -418,7 +419,7 @@ def run(
         spring = simple(k, a, loss, c)
         share, mine = shares[0, cell], shares[1, cell]
         known = min(32, n_steps)
-        combine(target[:, :known], striker[:, :known], share, mine, 0, rows[:, n_steps - known :])
+        combine(target[:, :known], striker[:, :known], share, mine, ZERO, rows[:, n_steps - known :])
         last = n_steps - 1
         own = Own(
             rows[END, last], rows[END_RAMP, last], rows[MEAN, last],
@@ -446,14 +447,14 @@ def run(
         high = low = swing = 0.0  # farthest approaches of this contact and gap; sum of 1 / rate at their ends
         margin = needed = 0.0
         largest = ripple = ripple_at = 0.0
-        count = 0
+        count = ZERO
         level = -1
-        n_segments = 1
+        n_segments = ONE
         segments[0, 0] = 0
         segments[0, 1] = n_steps
         status = LONG
         ending = DONE
-        n = 0
+        n = ZERO
         while n < n_steps:
             d0 = start.approach
             jump = 1
