@@ -10,7 +10,7 @@ import math
 import os
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, fields
 from functools import cache
@@ -33,17 +33,15 @@ START = 0.01  # [s] of a strike, besides its time steps
 RUNS = 20.0  # [-] time steps of all runs of a strike, over those of one undisturbed contact
 STEP, MODE_STEP = 2e-7, 3.3e-9  # [s] per time step, and per step and mode
 PLAIN = 1.2e-4  # [s] per time step in plain Python, instead
-ASSEMBLY = 4.5e-5  # [s] per unknown, with the mesh
-FACTORS = 4e-6, 6.5e-8  # [s] per unknown of a factorisation, and per unknown times the root of their number
-SOLVE, TURN = 4.2e-7, 6e-10  # [s] per unknown of a solution, and of making it orthogonal to another vector
+ASSEMBLY = 6.2e-5  # [s] per unknown, with the mesh
+FACTORS = 6e-6, 1.4e-7  # [s] per unknown of a factorisation, and per unknown times the root of their number
+SOLVE, TURN = 9.5e-7, 2e-9  # [s] per unknown of a solution, and of making it orthogonal to another vector
 DENSE = 4e-9  # [s] of all small eigenvalue problems, over their size cubed
 LANCZOS = 4.0  # [-] work per mode, over that per Ritz vector
 ATTEMPTS = 3.0  # [-] blows on the way to a tolerance
-# Fitted by studies/cost_predictions.py --fit to blows at tolerances from 1e-2 to 1e-6.
-GROWN = 120.0, 0.5  # [-] first vectors up to this number suffice; if more, the number grows by this power of the ratio
-MESHES = 1.8  # [-] work on all meshes over that on the first and the coarser one that it is compared with
-LIVELY, MORE = 10, 2.2  # [-] strikers that keep so many modes touch for longer, and need so many times more vectors
-FINER = 2.25  # [-] unknowns per area, over those of the mesh that it is compared with
+# As the runs of studies/cost_predictions.py need; it compares the numbers predicted with those done.
+GROWN = 120.0, 0.3  # [-] first vectors up to this number suffice; if more, the number grows by this power of the ratio
+LONG = 4.0, 0.7  # [-] the same over the length of the blow, in undisturbed contacts: later echoes need more vectors
 PROCESS, ELEMENTS = 2.1e8, 5e7  # [byte] of the process with its libraries, and of those for elements
 PER_UNKNOWN, PER_PAIR = 1e4, 16.0  # [byte] per unknown with its factors; per unknown and solution
 WORTH = 1.0  # [s] a run predicted to take longer is worth the benchmark
@@ -115,18 +113,19 @@ def compliance(n_dofs: float) -> Work:
     return _mesh(n_dofs, 2.0, 2.0) + Work(memory=ELEMENTS)
 
 
-def by_vectors(n_dofs: float, n_graded: float, n_vectors: float, n_striker_modes: int) -> Work:
-    """Ritz vectors on the mesh of the blow and on a coarser one, and what the blow may turn out to need.
+def grown(n_vectors: float, lasts: float) -> float:
+    """Number of Ritz vectors that a blow needs which begins with ``n_vectors`` and ``lasts`` so many contacts."""
+    return n_vectors * max(1.0, (n_vectors / GROWN[0]) ** GROWN[1], (lasts / LONG[0]) ** LONG[1])
 
-    ``n_graded`` of the unknowns belong to the elements that shrink towards the blow, alike on both meshes. Of
-    ``n_vectors`` the blow begins with, a hard blow or a tight tolerance makes more: each must be made orthogonal to all
-    before, so that the work grows with the square of their number.
+
+def by_vectors(n_dofs: Sequence[float], n_vectors: float, lasts: float) -> Work:
+    """Ritz vectors on several meshes of ``n_dofs`` unknowns, for a blow that begins with ``n_vectors``; see `grown`.
+
+    Each vector must be made orthogonal to all before, so that the work grows with the square of their number.
     """
-    touching = MORE if n_striker_modes >= LIVELY else 1.0
-    n_vectors *= max(touching, (n_vectors / GROWN[0]) ** GROWN[1])
-    coarser = n_graded + (n_dofs - n_graded) / FINER
-    once = _mesh(n_dofs, n_vectors, n_vectors) + _mesh(coarser, n_vectors, n_vectors)
-    return Work(MESHES * once.sparse, DENSE * n_vectors**3, ATTEMPTS * START, ELEMENTS + once.memory)
+    n_vectors = grown(n_vectors, lasts)
+    every = sum((_mesh(n, n_vectors, n_vectors) for n in n_dofs), NOTHING)
+    return every + Work(dense=DENSE * n_vectors**3, steps=ATTEMPTS * START, memory=ELEMENTS)
 
 
 def _mesh(n_dofs: float, n_solved: float, n_kept: float) -> Work:

@@ -45,6 +45,8 @@ PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_st
 ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
 TARGETS = ("rigid", "infinite", "vectors", "modal")
 DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow
+MANY = 2  # [-] impacts up to which the first two meshes suffice; each multiplies the error that a mesh makes before it
+ROUGH, LONGEST = 1e-2, 100.0  # [-] tolerance and length, in undisturbed contacts, of the blow that foresees the cost
 FAINTEST = 8.0  # [-] frequency up to which a force has the fraction FAINT of its impulse, times the contact's duration
 TOLD_AT = 200  # [-] times at which the motion of Ritz vectors is judged
 PER_MODE = 65.0  # [-] unknowns per mode found for motion and sound
@@ -591,14 +593,20 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
             f"{blow.name}this blow needs about {needs:.2g} unknowns, elements of {size:.2g} m, more than the limit of "
             f"{refinement.MOST_UNKNOWNS}; take a contact with stiffness = {float(f'{0.9 * soft:.1e}'):g}"
         )
-    n_dofs = round(refinement.unknowns("argyris", mesh, size)) + DOFS_AT_BLOW
+    with blow.target.blame("strike"):
+        at = check.array("at", values["at"], (2,), "m", lift=True)[None]
+    lasts, impacts = _foreseen(asked)
+    n_dofs, fixed = blow.target.unknowns(at, size, stages), blow.target.size_stated or "size" in asked.pieces
+    sizes = list(vectors.compared(blow.target, at, size, stages))
+    if impacts > MANY and not fixed:
+        sizes.append(vectors.finer(blow.target, at, sizes[0], stages))
     count = vectors.first_count(blow.target, 0.5 / asked.duration, asked.tolerance)
     kept = f"the target is described by some {count} Ritz vectors started from the blow, more if their error shows"
     reason = f"argyris elements of {size:.3g} m, smaller towards the blow, with some {n_dofs} unknowns"
     if asked.moving:
         reason += "; motion comes from the vectors as long as they tell it, later motion and sound from modes driven "
         reason += "by the force that the blow finds"
-    work = cost.by_vectors(n_dofs, DOFS_AT_BLOW, count, _striker_modes(asked, 1.0)[0])
+    work = cost.by_vectors([blow.target.unknowns(at, each, stages) for each in sizes], count, lasts)
     if asked.moving:
         rings = _ringing_count(asked)
         work += cost.by_modes(PER_MODE * FIRST_LOOK, FIRST_LOOK) + cost.by_modes(PER_MODE * rings, rings)
@@ -608,6 +616,22 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
         asked, target="vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
         element="argyris", steps=STEPS, mass=blow.target.mass, notes=blow.target.notes, work=work,
     )  # fmt: skip
+
+
+def _foreseen(asked: _Asked) -> tuple[float, int]:
+    """How long the blow lasts on an infinite plate, in undisturbed contacts, and its impacts; (1, 1) if not known."""
+    at, striker = np.atleast_1d(np.asarray(asked.values["at"], float)), asked.blow.striker
+    seen = idealisation.from_outside(asked.blow.target, at, asked.mass, asked.duration)
+    if seen is None or not np.isfinite(seen.mobility):
+        return 1.0, 1
+    endless = idealisation.endless(at, seen.mass, seen.mobility, asked.duration)
+    with suppress(check.SimulationError):
+        hit = collision.strike(
+            endless, collision.shortened(striker, _striker_modes(asked, 1.0)[0]), asked.blow.contact, at=at,
+            speed=asked.values["speed"], tolerance=ROUGH, duration=LONGEST * asked.duration,
+        )  # fmt: skip
+        return max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, hit.n_impacts
+    return 1.0, 1
 
 
 def _ringing_count(asked: _Asked) -> int:

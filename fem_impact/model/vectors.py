@@ -69,6 +69,23 @@ def size_for(target: Target, resonance: float, tolerance: float) -> float:
     return size
 
 
+def finer(target: Target, at: np.ndarray, size: float, stages: Stages) -> float:
+    """The next smaller element size [m] with more unknowns."""
+    before = target.unknowns(at, size, stages)
+    for _ in range(TRIES):
+        size /= COARSER
+        if target.unknowns(at, size, stages) > before:
+            break
+    return size
+
+
+def compared(target: Target, at: np.ndarray, size: float, stages: Stages) -> tuple[float, float]:
+    """Element sizes [m] of the first two meshes that are compared: finer ones if the outline allows no larger ones."""
+    if target.unknowns(at, COARSER * size, stages) < target.unknowns(at, size, stages):
+        return size, COARSER * size
+    return finer(target, at, size, stages), size
+
+
 def hopeless(tried: list[float]) -> bool:
     """Whether the last PATIENCE steps towards more vectors gained nothing; takes the errors of all steps."""
     return len(tried) > PATIENCE and min(tried[-PATIENCE:]) > LEAST_GAIN * min(tried[:-PATIENCE])
@@ -147,25 +164,23 @@ class Seen:
             self.count, self.margin = min(MOST_VECTORS, round(MORE * self.count)), NOTCH * self.margin
             return True
         if first:
-            self.coarse = self._krylov(self.size * COARSER)
-            if self.coarse.system.n_dofs >= self.fine.system.n_dofs:  # the outline allows no larger elements
+            size, coarser = compared(self.target, self.at, self.size, self.stages)
+            if size == self.size:
+                self.coarse = self._krylov(coarser)
+            else:
                 self._refine()
             return True
-        finer = self.fine.system.n_dofs * COARSER**2
+        more = self.fine.system.n_dofs * COARSER**2
         useless = self.spent and error.truncation > allowed
-        if error.mesh <= 0.5 * allowed or self.fixed or useless or finer > refinement.MOST_UNKNOWNS:
+        if error.mesh <= 0.5 * allowed or self.fixed or useless or more > refinement.MOST_UNKNOWNS:
             return False
         self._refine()
         return True
 
     def _refine(self) -> None:
         """Take a finer mesh; the difference of two counts for either, and a size that the user insists on stays."""
-        before, size = self.fine, self.size
-        for _ in range(TRIES):
-            size /= COARSER
-            other = self._krylov(size)
-            if other.system.n_dofs > before.system.n_dofs:
-                break
+        before, size = self.fine, finer(self.target, self.at, self.size, self.stages)
+        other = self._krylov(size)
         if self.fixed:
             self.coarse = other
         else:

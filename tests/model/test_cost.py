@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.impact.compiled import build
@@ -42,8 +43,8 @@ def benchmarks(monkeypatch):
         (cost.strikes, ((100.0, 50), (200.0, 50), (200.0, 100))),
         (cost.by_modes, ((3e3, 20), (6e3, 20), (6e3, 40))),
         (lambda n, _: cost.compliance(n), ((4e3, 0), (8e3, 0), (9e3, 0))),
-        (lambda n, k: cost.by_vectors(n, 3e3, k, 1), ((4e3, 80), (8e3, 80), (8e3, 160))),
-        (lambda n, s: cost.by_vectors(n, 3e3, 80, s), ((4e3, 1), (8e3, 1), (8e3, 20))),
+        (lambda n, k: cost.by_vectors([n, 3e3], k, 1.0), ((4e3, 80), (8e3, 80), (8e3, 160))),
+        (lambda n, lasts: cost.by_vectors([n, 3e3], 80, lasts), ((4e3, 1.0), (8e3, 1.0), (8e3, 20.0))),
     ],
 )
 def test_more_of_anything_costs_more_time_and_no_less_memory(work, sizes):
@@ -59,9 +60,31 @@ def test_the_time_of_a_finer_mesh_grows_faster_than_its_unknowns():
 
 def test_many_first_vectors_become_more_and_each_costs_more():
     """The plate of studies/frontier.py at 1e-6 begins with 302 vectors, ends with 592 and takes four times as long."""
-    few, many = (cost.by_vectors(7e3, 3e3, n, 1).on(cost.REFERENCE) for n in (120, 302))
-    assert many > 2.5 * few  # 302 vectors that do not grow would cost 1.9 times as much as 120
-    assert cost.by_vectors(7e3, 3e3, 60, 1).on(cost.REFERENCE) > 0.6 * few  # as many as are enough do not grow
+    meshes = [6676, 4591]
+    few, many = (cost.by_vectors(meshes, n, 1.0).on(cost.REFERENCE) for n in (120, 302))
+    assert many > 2.5 * few  # 302 vectors that do not grow would cost 2.1 times as much as 120
+    assert cost.by_vectors(meshes, 60, 1.0).on(cost.REFERENCE) > 0.5 * few  # as many as are enough do not grow
+
+
+@pytest.mark.parametrize(
+    ("name", "meshes", "vectors"),
+    [
+        ("guitar_fingernail", (29086, 6372), 84),  # a mesh file whose triangles are split in four
+        ("guitar_fingertip", (9620, 4927), 70),
+        ("cymbal_ride_20_oak", (9751, 6832, 16541), 231),  # four impacts
+        ("cymbal_splash_10_maple", (7386, 6232), 165),  # the stick stays for fourteen undisturbed contacts
+        ("drumstick", (3918, 3575), 149),
+        ("hammer_car_bonnet", (6309, 5221), 84),
+    ],
+)
+def test_the_plan_counts_the_unknowns_and_vectors_that_its_run_has(name, meshes, vectors, monkeypatch):
+    """Those of the runs are written down, as counted there; a longer blow may need two steps of 1.4 more, or none."""
+    counted, cost_of = [], cost.by_vectors
+    monkeypatch.setattr(cost, "by_vectors", lambda *told: counted.append(told) or cost_of(*told))
+    fi.load_scene(next(SCENES.rglob(f"{name}.toml"))).plan()
+    unknowns, first, lasts = counted[0]
+    assert_allclose(unknowns, meshes, rtol=0.01)
+    assert vectors / 1.7 <= cost.grown(first, lasts) <= 1.7 * vectors
 
 
 def test_a_machine_half_as_fast_takes_twice_as_long():
