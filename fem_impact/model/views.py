@@ -11,7 +11,7 @@ import numpy as np
 
 from ..modes.modal import Modes
 from ..modes.ritz import Krylov
-from .vectors import Seen
+from .vectors import Seen, folded
 
 TOGETHER = 8  # [-] points that share a mesh: each adds elements that shrink towards it
 
@@ -44,4 +44,4 @@ class Views(Seen):
                 other = replace(self.coarse.each[point].modes(self.count), poorer={})
                 found = replace(found, poorer={**found.poorer, "mesh": other})
         found = self.target.finished_vectors(found)
-        return found.truncated(max_frequency=cutoff(found, self.margin) * (1.0 + 1e-9))
+        return folded(found, cutoff, self.margin)

@@ -24,7 +24,7 @@ from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise, one_thread
 from .modal import Damping, Modes, Shapes, damping_notes, damping_ratios
 
-DRIFT = 1e-11  # [-] overlap with earlier vectors above which they are removed more often
+DRIFT = 1e-12  # [-] overlap with earlier vectors above which they are removed more often
 DEPENDENT = 1e-10  # [-] a new vector shorter than this fraction of its length before orthogonalisation adds nothing
 FEWER = 0.7  # [-] fraction of the vectors with which a second blow tells the error of having no more
 
@@ -124,10 +124,10 @@ class Krylov:
             self.projected[before:end, start:end] = overlap[:, : end - start]
             new = self._next - self.vectors[before:end].T @ overlap
             new = new - self.system.rigid @ (self._moving.T @ new)
-            heavy = M @ new
             self._due -= 1
             if self._due <= 0:
-                new, heavy = self._cleared(new, heavy)
+                new = self._cleared(new)
+            heavy = M @ new
             gram = new.T @ heavy
             length = np.sqrt((overlap**2).sum(axis=0) + gram.diagonal())  # before `overlap` was removed
             value, turn = np.linalg.eigh(gram / np.outer(length, length))
@@ -152,18 +152,23 @@ class Krylov:
             self.vectors = np.concatenate([self.vectors, np.empty((more, self.system.n_dofs))])
             self.projected = np.pad(self.projected, (0, more))
 
-    def _cleared(self, new: np.ndarray, heavy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """New vectors and M times them without the parts along earlier vectors that rounding brought back."""
-        known = self.vectors[: self.count]
-        drift = known @ heavy
-        new = new - known.T @ drift
-        heavy = self.system.M @ new
-        if self._due == 0:  # the next block follows from this one and from the one before, which keeps its drift
-            worst = np.abs(drift / np.sqrt(np.einsum("ij,ij->j", new, heavy))).max(initial=0.0)
-            self._period = max(1, self._period // 2) if worst > DRIFT else self._period + 1
-        else:
-            self._due = self._period
-        return new, heavy
+    def _cleared(self, new: np.ndarray) -> np.ndarray:
+        """New vectors without the parts along earlier ones that rounding brought back; clears the latest block alike.
+
+        The next block follows from both.
+        """
+        start, end = self._latest[1:]
+        both = np.hstack([self.vectors[start:end].T, new])
+        drift = self.vectors[:start] @ (self.system.M @ both)
+        both -= self.vectors[:start].T @ drift
+        self.vectors[start:end] = both[:, : end - start].T
+        heavy = self.system.M @ both
+        self._carried[:, len(self._carried.T) - (end - start) :] = heavy[:, : end - start]
+        new = both[:, end - start :] - both[:, : end - start] @ (heavy[:, : end - start].T @ both[:, end - start :])
+        worst = np.abs(drift[:, : end - start]).max(initial=0.0)
+        self._period = max(1, self._period // 2) if worst > DRIFT else self._period + 1
+        self._due = self._period
+        return new
 
     def _eigenpairs(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Ascending eigenvalues (count,) and vectors (count, count) of the stiffness projected onto the first vectors.
