@@ -24,6 +24,7 @@ from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise, one_thread
 from .modal import Damping, Modes, Shapes, damping_notes, damping_ratios
 
+PIECE = 2**20  # [byte] of earlier vectors taken at a time: fits into the cache of a core
 DRIFT = 1e-12  # [-] overlap with earlier vectors above which they are removed more often
 DEPENDENT = 1e-10  # [-] a new vector shorter than this fraction of its length before orthogonalisation adds nothing
 FEWER = 0.7  # [-] fraction of the vectors with which a second blow tells the error of having no more
@@ -125,7 +126,7 @@ class Krylov:
             new = self._next - self.vectors[before:end].T @ overlap
             new = new - self.system.rigid @ (self._moving.T @ new)
             self._due -= 1
-            if self._due <= 0:
+            if end and self._due <= 0:
                 new = self._cleared(new)
             heavy = M @ new
             gram = new.T @ heavy
@@ -158,17 +159,21 @@ class Krylov:
         The next block follows from both.
         """
         start, end = self._latest[1:]
-        both = np.hstack([self.vectors[start:end].T, new])
-        drift = self.vectors[:start] @ (self.system.M @ both)
-        both -= self.vectors[:start].T @ drift
-        self.vectors[start:end] = both[:, : end - start].T
-        heavy = self.system.M @ both
-        self._carried[:, len(self._carried.T) - (end - start) :] = heavy[:, : end - start]
-        new = both[:, end - start :] - both[:, : end - start] @ (heavy[:, : end - start].T @ both[:, end - start :])
-        worst = np.abs(drift[:, : end - start]).max(initial=0.0)
+        latest = end - start
+        both = np.vstack([self.vectors[start:end], new.T])
+        heavy = np.ascontiguousarray((self.system.M @ both.T).T)
+        rows, worst = max(1, PIECE // (8 * both.shape[1])), 0.0
+        for i in range(0, start, rows):  # a few rows at a time: memory is read once for both products
+            known = self.vectors[i : min(i + rows, start)]
+            drift = heavy @ known.T
+            both -= drift @ known
+            worst = max(worst, float(np.abs(drift[:latest]).max()))
+        self.vectors[start:end] = both[:latest]
+        self._carried[:, -latest:] = self.system.M @ both[:latest].T
+        new = both[latest:] - (both[latest:] @ self._carried[:, -latest:]) @ both[:latest]
         self._period = max(1, self._period // 2) if worst > DRIFT else self._period + 1
         self._due = self._period
-        return new
+        return new.T
 
     def _eigenpairs(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Ascending eigenvalues (count,) and vectors (count, count) of the stiffness projected onto the first vectors.
