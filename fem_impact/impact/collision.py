@@ -316,10 +316,11 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
     _check_way(system, pace[0] * pace[1], options.tolerance)
     last = options.horizon, options.n_max
     differ = partial(_difference, options.quantities)
-    history, step_error, ran, coarse, size = _controlled(
+    history, step_error, ran, coarse, (step, size) = _controlled(
         system, options.scheme, options.dt, options.tolerance, options.quantities, pace, *last
     )
-    truncation, resolvable = _truncation(parts, contacts, system, coarse, ran, size, differ, pace, *last)
+    told = [any(other.omega[-1] > body.omega[-1] for other in body.poorer.values()) for body in bodies]
+    truncation, resolvable = _truncation(parts, told, contacts, system, coarse, ran, size, differ, pace, *last)
     mesh_error = _mesh_error(bodies, parts, contacts, system, coarse, ran, size, differ, options.tolerance, pace, last)
     inherited = sum(differ(_run(_joined(other, contacts), ran, size, pace, *last), coarse) for other in others)
     parted = {"truncation": truncation, "mesh": mesh_error, "inherited": inherited}
@@ -327,8 +328,9 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
         for cause, other in body.poorer.items():
             poorer = [*parts[:i], _poorer(parts[i], other), *parts[i + 1 :]]
             try:
-                less = _run(_joined(poorer, contacts), ran, size, pace, *last)
-                parted[cause] += max(differ(less, coarse), float(_may_touch(coarse, less, pace[0])))
+                # in fine steps, because the fastest modes of two descriptions differ, and so do their step errors
+                less = _run(_joined(poorer, contacts), ran, step, pace, *last)
+                parted[cause] += max(differ(less, history), float(_may_touch(history, less, pace[0])))
             except SimulationError:  # the poorer body cannot be followed, so it tells nothing
                 parted[cause] += 1.0
     error = Error(step_error, **parted, resolvable=resolvable, sensitivity=_sensitivity(coarse, history))
@@ -632,10 +634,10 @@ def shortened(striker: Striker, n_modes: int) -> Striker:
 
 def _controlled(
     system, scheme, dt, tolerance, quantities, pace, horizon, n_max, free=None
-) -> tuple[History, float, str, History, float]:
+) -> tuple[History, float, str, History, tuple[float, float]]:
     """Refine until two successive runs agree to the tolerance; ``free`` if the scheme is our choice.
 
-    Returns the finer history, its estimated error, the scheme, the coarser history and its step size.
+    Returns the finer history, its estimated error, the scheme, the coarser history and the step sizes of both.
     """
     differ = partial(_difference, quantities)
     missed = _force_missed if "force" in quantities else lambda _: 0.0
@@ -651,7 +653,7 @@ def _controlled(
         dt = min(dt, 0.5 * horizon)
         fine = _run(system, scheme, dt, pace, horizon, n_max, "dt")
         coarse = _run(system, scheme, 2.0 * dt, pace, horizon, n_max, "dt")
-        return fine, max(differ(coarse, fine, over), missed(fine)), scheme, coarse, 2.0 * dt
+        return fine, max(differ(coarse, fine, over), missed(fine)), scheme, coarse, (dt, 2.0 * dt)
     if scheme == "collocation":
         sizes = [max(1e-15, tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)]
     else:
@@ -665,7 +667,7 @@ def _controlled(
         fine = _run(system, scheme, size, pace, horizon, n_max)
         estimate = max(differ(coarse, fine, over), missed(fine))
         if estimate <= tolerance:
-            met = fine, estimate, scheme, coarse, before
+            met = fine, estimate, scheme, coarse, (size, before)
             if grazes == GRAZES or not _grazes(fine, GRAZE * tolerance * (size / sizes[1]) ** 3):
                 return met
         grazes += met is not None
@@ -864,12 +866,13 @@ def _sensitivity(coarse: History, fine: History) -> float:
     return max(1.0, float((abs(one[-1] - two[-1]) + least) / (abs(one[0] - two[0]) + least)))
 
 
-def _truncation(parts, contacts, system: _System, whole: History, scheme, size, differ, pace, horizon, n_max):
+def _truncation(parts, told, contacts, system: _System, whole: History, scheme, size, differ, pace, horizon, n_max):
     """Estimated error [-] of leaving out modes, and whether the estimate can be trusted.
 
     Repeats the run with the upper modes of one body replaced by their compliance. The error falls at least with the
     power FALLING of the highest kept frequency, so the change bounds the error of the modes already left out. Two such
-    runs and a minimum, AT_LEAST of the predicted error, guard against a change that is small by chance.
+    runs and a minimum, AT_LEAST of the predicted error, guard against a change that is small by chance. The bodies
+    ``told`` (n_bodies,) have a poorer description with modes above those of their own, whose blow tells the error.
     """
     if not any(part.rest.any() for part in parts):
         return 0.0, True
@@ -886,7 +889,7 @@ def _truncation(parts, contacts, system: _System, whole: History, scheme, size, 
     found = 0.0
     for i, part in enumerate(parts):
         guesses = [0.0]
-        for wanted in THINNED:
+        for wanted in () if told[i] else THINNED:
             thin, ratio = _thinned(part, wanted)
             if 1.0 < ratio < np.inf:
                 less = [*parts[:i], thin, *parts[i + 1 :]]

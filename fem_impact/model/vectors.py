@@ -24,13 +24,15 @@ FIRST = 84, 0.22  # vectors tried first: they resolve one undisturbed contact
 FOLDED = 4.0, 0.6  # what modes left out may err, over what the highest pairs may that act as a spring
 EXCITED = 12.0, 0.25  # highest frequency of a mode that matters, over that of the contact
 FEWEST = 30  # [-] vectors besides those that stand for modes: for the dip under the load
-MORE = 1.4  # [-] factor on the number of vectors as long as they are too few
+MORE = 1.1, 1.4  # [-] smallest and largest factor on the number of vectors as long as they are too few
+FALLING = 3.0  # [-] power of the number of vectors with which their error falls, once they resolve the contact
+LESS_FOLDED = 16.0  # [-] divides what those of poorer descriptions may err
 NOTCH = 4.0  # [-] divides what the highest Ritz pairs, which act as a spring, may err, each time
 PATIENCE, LEAST_GAIN = 3, 0.7  # [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7
 TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before
 SHARE = 0.45  # [-] of what the steps leave of the tolerance, for too few vectors, before the mesh is compared
 COARSER = 1.5  # [-] element size of the comparison over that of the blow
-MOST_VECTORS = 1000  # [-] limit on their number: beyond, rounding of the highest pairs outgrows what is gained
+MOST_VECTORS = 2000  # [-] limit on their number: a mesh of 20 000 unknowns takes some 0.3 GB for them
 
 
 def usable(target: Target) -> bool:
@@ -89,6 +91,19 @@ def compared(target: Target, at: np.ndarray, size: float, stages: Stages) -> tup
 def hopeless(tried: list[float]) -> bool:
     """Whether the last PATIENCE steps towards more vectors gained nothing; takes the errors of all steps."""
     return len(tried) > PATIENCE and min(tried[-PATIENCE:]) > LEAST_GAIN * min(tried[:-PATIENCE])
+
+
+def folded(found: Modes, cutoff: Callable[[Modes, float], float], margin: float) -> Modes:
+    """The Ritz pairs up to ``cutoff``, as in `Seen.modes`; those above act as a spring.
+
+    The poorer descriptions keep more pairs, so that the difference of their blows tells what the spring costs too.
+    """
+    low, high = (cutoff(found, factor * margin) * (1.0 + 1e-9) for factor in (1.0, LESS_FOLDED))
+    poorer = {
+        cause: other.truncated(max_frequency=max(high, float(other.frequencies[0])))
+        for cause, other in found.poorer.items()
+    }
+    return replace(replace(found, poorer={}).truncated(max_frequency=low), poorer=poorer)
 
 
 class Seen:
@@ -151,7 +166,7 @@ class Seen:
                 other = replace(coarse.modes(self.count), poorer={})
                 found = replace(found, poorer={**found.poorer, "mesh": other})
         found = self.target.finished_vectors(found)
-        return found, found.truncated(max_frequency=cutoff(found, self.margin) * (1.0 + 1e-9))
+        return found, folded(found, cutoff, self.margin)
 
     def improved(self, error: Error, allowed: float) -> bool:
         """Take more vectors or a finer mesh, whichever the error of a blow calls for; False if neither is possible."""
@@ -161,7 +176,8 @@ class Seen:
             return False
         self.spent = self.spent or (few and (self.count >= MOST_VECTORS or self._stuck(error.truncation)))
         if few and not self.spent:
-            self.count, self.margin = min(MOST_VECTORS, round(MORE * self.count)), NOTCH * self.margin
+            more = np.clip((error.truncation / (SHARE * allowed)) ** (1.0 / FALLING), *MORE) if first else MORE[1]
+            self.count, self.margin = min(MOST_VECTORS, round(more * self.count)), NOTCH * self.margin
             return True
         if first:
             size, coarser = compared(self.target, self.at, self.size, self.stages)

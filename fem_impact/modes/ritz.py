@@ -24,7 +24,8 @@ from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise, one_thread
 from .modal import Damping, Modes, Shapes, damping_notes, damping_ratios
 
-DRIFT = 1e-11  # [-] overlap with earlier vectors above which they are removed more often
+PIECE = 2**20  # [byte] of earlier vectors taken at a time: fits into the cache of a core
+DRIFT = 1e-12  # [-] overlap with earlier vectors above which they are removed more often
 DEPENDENT = 1e-10  # [-] a new vector shorter than this fraction of its length before orthogonalisation adds nothing
 FEWER = 0.7  # [-] fraction of the vectors with which a second blow tells the error of having no more
 
@@ -124,10 +125,10 @@ class Krylov:
             self.projected[before:end, start:end] = overlap[:, : end - start]
             new = self._next - self.vectors[before:end].T @ overlap
             new = new - self.system.rigid @ (self._moving.T @ new)
-            heavy = M @ new
             self._due -= 1
-            if self._due <= 0:
-                new, heavy = self._cleared(new, heavy)
+            if end and self._due <= 0:
+                new = self._cleared(new)
+            heavy = M @ new
             gram = new.T @ heavy
             length = np.sqrt((overlap**2).sum(axis=0) + gram.diagonal())  # before `overlap` was removed
             value, turn = np.linalg.eigh(gram / np.outer(length, length))
@@ -152,18 +153,27 @@ class Krylov:
             self.vectors = np.concatenate([self.vectors, np.empty((more, self.system.n_dofs))])
             self.projected = np.pad(self.projected, (0, more))
 
-    def _cleared(self, new: np.ndarray, heavy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """New vectors and M times them without the parts along earlier vectors that rounding brought back."""
-        known = self.vectors[: self.count]
-        drift = known @ heavy
-        new = new - known.T @ drift
-        heavy = self.system.M @ new
-        if self._due == 0:  # the next block follows from this one and from the one before, which keeps its drift
-            worst = np.abs(drift / np.sqrt(np.einsum("ij,ij->j", new, heavy))).max(initial=0.0)
-            self._period = max(1, self._period // 2) if worst > DRIFT else self._period + 1
-        else:
-            self._due = self._period
-        return new, heavy
+    def _cleared(self, new: np.ndarray) -> np.ndarray:
+        """New vectors without the parts along earlier ones that rounding brought back; clears the latest block alike.
+
+        The next block follows from both.
+        """
+        start, end = self._latest[1:]
+        latest = end - start
+        both = np.vstack([self.vectors[start:end], new.T])
+        heavy = np.ascontiguousarray((self.system.M @ both.T).T)
+        rows, worst = max(1, PIECE // (8 * both.shape[1])), 0.0
+        for i in range(0, start, rows):  # a few rows at a time: memory is read once for both products
+            known = self.vectors[i : min(i + rows, start)]
+            drift = heavy @ known.T
+            both -= drift @ known
+            worst = max(worst, float(np.abs(drift[:latest]).max()))
+        self.vectors[start:end] = both[:latest]
+        self._carried[:, -latest:] = self.system.M @ both[:latest].T
+        new = both[latest:] - (both[latest:] @ self._carried[:, -latest:]) @ both[:latest]
+        self._period = max(1, self._period // 2) if worst > DRIFT else self._period + 1
+        self._due = self._period
+        return new.T
 
     def _eigenpairs(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Ascending eigenvalues (count,) and vectors (count, count) of the stiffness projected onto the first vectors.
