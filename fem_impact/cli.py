@@ -693,6 +693,8 @@ def _add_taps(verb: Any) -> None:
     add("--unknown", metavar="NAME=LOW:HIGH", action="append", default=[],
         help="a number to find in a range; repeatable (default: stiffness, exponent, loss of the contact)")  # fmt: skip
     add("--known", metavar="NAME=VALUE", action="append", default=[], help="a number to hold; repeatable")
+    add("--per-tap", metavar="NAME", action="append", default=[],
+        help="an unknown that every tap gets its own value of, as no spot is struck twice; repeatable")  # fmt: skip
     add("--mass", metavar="KG", type=float, help="mass of the hammer (default: the scene's, or 0.1)")
     add("--out", metavar="DIR", type=_place, help="folder for fit.html, fit.json and scene.toml (default: out/NAME)")
     add("--json", action="store_true", help="print the contents of fit.json instead of the summary")

@@ -27,7 +27,7 @@ from scipy.stats import beta
 
 import fem_impact as fi
 from fem_impact.impact.contact import wall_time
-from fem_impact.taps.fit import Found
+from fem_impact.taps.found import Found
 
 HERE = Path(__file__).parent
 NOISE = 0.005  # [-] of the peak

@@ -2,9 +2,10 @@
 
     python studies/tutorial_fit.py [folder]
 
-Reads the taps in `measured/acceleration_multi.lvm`, compares four models by how well they predict a tap from the other
-three, shows which values the taps tell, and asks which plate this hammer would hit twice. Writes fit_pulses.png,
-fit_profiles.png and fit_double_hits.png.
+Reads the taps in `measured/acceleration_multi.lvm`, compares models by how well they predict a tap from the other
+three, among them one that gives every tap a stiffness of its own (a hand strikes no spot twice), shows which values the
+taps tell, and asks which plate this hammer would hit twice. Writes fit_pulses.png, fit_profiles.png and
+fit_double_hits.png.
 """
 
 import sys
@@ -18,6 +19,8 @@ from scipy.signal import resample
 import fem_impact as fi
 from fem_impact.pages import fit_page
 from fem_impact.show import plots
+from fem_impact.taps.found import Found
+from fem_impact.taps.predictions import Prediction
 
 HERE = Path(__file__).parent
 MASS = 0.15  # [kg] of the hammer: nobody wrote it down, and the taps cannot tell it
@@ -26,12 +29,19 @@ SPEED = 0.2  # [m/s] of the taps, for 0.15 kg
 STIFFNESS = {"contact.stiffness": (1e2, 1e18)}
 POWER = STIFFNESS | {"contact.exponent": (1.0, 4.0), "contact.loss": (0.0, 20.0)}
 HEAD = {"striker.first_frequency": (1e3, 2e4), "striker.mode_ratio": (0.1, 100.0), "striker.damping": (0.01, 2.0)}
-MODELS = {  # name -> law to begin with, unknowns
-    "linear spring": (fi.Contact.linear(1e6), STIFFNESS),
-    "Hertz": (fi.Contact.hertz(1e7), STIFFNESS),
-    "power law with loss": (fi.Contact.hertz(1e7), POWER),
-    "the same behind a springy tip": (fi.Contact.hertz(1e7), POWER | {"contact.loss": (0.1, 1e3)} | HEAD),
+SPRINGY = POWER | {"contact.loss": (0.1, 1e3)} | HEAD
+EACH = ("contact.stiffness",)
+MODELS = {  # name -> law to begin with, unknowns, those with a value for each tap
+    "linear spring": (fi.Contact.linear(1e6), STIFFNESS, ()),
+    "Hertz": (fi.Contact.hertz(1e7), STIFFNESS, ()),
+    "Hertz, a stiffness for each tap": (fi.Contact.hertz(1e7), STIFFNESS, EACH),
+    "power law with loss": (fi.Contact.hertz(1e7), POWER, ()),
+    "power law with loss, a stiffness for each tap": (fi.Contact.hertz(1e7), POWER, EACH),
+    "power law with loss, a loss for each tap": (fi.Contact.hertz(1e7), POWER, ("contact.loss",)),
+    "power law behind a springy tip": (fi.Contact.hertz(1e7), SPRINGY, ()),
+    "power law behind a springy tip, a stiffness for each tap": (fi.Contact.hertz(1e7), SPRINGY, EACH),
 }
+BEST = "power law with loss, a stiffness for each tap"
 PLATE = {"length": 0.4, "width": 0.3, "mass": 1.62, "first_frequency": 190.0}  # 5 mm of aluminium, hinged
 AT = (0.2, 0.15)  # m, its middle
 HEADS = np.geomspace(0.02, 1.0, 25)  # [kg] of other hammers
@@ -48,6 +58,13 @@ class Verdict:
     error: float  # [-] rms of all taps over their force
     left_out: float  # [-] worst tap predicted from the others, over the rms of its force
     of_peak: float  # [-] the same over its peak
+    fall: float  # [-] worst fall of a pulse, predicted from the other taps and its own rise, over the rms of its force
+    found: Found
+
+    def bic(self, freedom: int) -> float:
+        """Bayesian information criterion [-] with so many independent samples, besides those for the values found."""
+        count = self.found.problem.n_values
+        return (freedom + count) * float(np.log(self.found.best.cost)) + count * float(np.log(freedom + count))
 
 
 def read() -> fi.Taps:
@@ -57,9 +74,10 @@ def read() -> fi.Taps:
 
 def fitted(name: str, taps: fi.Taps, extra: dict | None = None, profiles: bool = False):
     """One model of the taps."""
-    law, unknown = MODELS[name]
+    law, unknown, per_tap = MODELS[name]
     return fi.fit(
-        taps, striker=fi.Striker.rigid(MASS), contact=law, unknown=unknown | (extra or {}), profiles=profiles,
+        taps, striker=fi.Striker.rigid(MASS), contact=law, unknown=unknown | (extra or {}), per_tap=per_tap,
+        profiles=profiles, robust=False,
         starts=8 if HEAD.items() <= unknown.items() else 4,
     )  # fmt: skip
 
@@ -71,9 +89,18 @@ def compare(taps: fi.Taps) -> list[Verdict]:
         made = fitted(name, taps)
         left_out = made.left_out()
         found.append(
-            Verdict(name, made.error, max(one.error for one in left_out), max(one.error_of_peak for one in left_out))
-        )
+            Verdict(
+                name, made.error, max(one.error for one in left_out), max(one.error_of_peak for one in left_out),
+                max(fall(one) for one in made.left_out(rise_only=True)), made,
+            )
+        )  # fmt: skip
     return found
+
+
+def fall(one: Prediction) -> float:
+    """Error after the largest force, over the rms of the force there [-]."""
+    after = slice(int(one.measured.argmax()) + 1, None)
+    return float(np.linalg.norm(one.residual[after]) / np.linalg.norm(one.measured[after]))
 
 
 def width(tap: np.ndarray, rate: float) -> float:
@@ -161,17 +188,22 @@ def main(folder: Path) -> dict:
     print(taps.summary())
     print("\nModels, each tap predicted from the other three (worst tap):")
     verdicts = compare(taps)
+    freedom = min(one.found.freedom for one in verdicts)
+    lowest = min(one.bic(freedom) for one in verdicts)
     for one in verdicts:
         print(
-            f"  {one.name}: fitted to {100 * one.error:.2g} %, left out {100 * one.left_out:.2g} % of the rms force, "
-            f"{100 * one.of_peak:.2g} % of the peak"
+            f"  {one.name}: {one.found.problem.n_values} values, fitted to {100 * one.error:.2g} %, left out "
+            f"{100 * one.left_out:.2g} % of the rms force, {100 * one.of_peak:.2g} % of the peak; its fall, from its "
+            f"rise, {100 * one.fall:.2g} %; information criterion {one.bic(freedom) - lowest:.0f} above the lowest"
         )
-    print("\nWhat the taps tell, and what not (power law with loss, the mass of the hammer unknown too):")
-    free = fitted("power law with loss", taps, {"striker.mass": (0.02, 1.0)}, profiles=True)
+    by_name = {one.name: one.found for one in verdicts}
+    print("\nWhat the taps tell, and what not (a stiffness for each tap, the mass of the hammer unknown too):")
+    free = fitted(BEST, taps, {"striker.mass": (0.02, 1.0)}, profiles=True)
     print(free.summary())
-    best = fitted("the same behind a springy tip", taps)
-    print("\nWhat is left of each tap predicted from the other three, by the springy tip:")
-    print("\n".join(leftover(best, taps)))
+    best = by_name[BEST]
+    for name in ("power law behind a springy tip", BEST):
+        print(f"\nWhat is left of each tap predicted from the other three, by the {name}:")
+        print("\n".join(leftover(by_name[name], taps)))
     fi.figures.save(folder / "fit_pulses.png", fit_page.pulses(best))
     fi.figures.save(folder / "fit_profiles.png", fit_page.profiles(free))
 
@@ -179,8 +211,9 @@ def main(folder: Path) -> dict:
     modes, limits = plate(), {}
     for mass in MASSES:
         made = fi.fit(
-            taps, striker=fi.Striker.rigid(mass), contact=fi.Contact.hertz(1e7), unknown=POWER, profiles=False, starts=3
-        )
+            taps, striker=fi.Striker.rigid(mass), contact=fi.Contact.hertz(1e7), unknown=POWER, per_tap=EACH,
+            profiles=False, starts=3,
+        )  # fmt: skip
         limits[mass] = [softest(modes, made.contact, float(head)) for head in HEADS]
         own = softest(modes, made.contact, mass)
         verdict = (

@@ -14,7 +14,7 @@ from .._base.files import replacing
 from ..scenes.sentences import si
 from ..show import export, figures
 from ..show.figures import BLUE, GREEN, SKY, VERMILION
-from ..taps.fit import Found
+from ..taps.found import Found, differ
 from ..taps.unknowns import unit_of
 from . import report
 
@@ -141,6 +141,7 @@ def write(
         summary=found.summary().splitlines(),
         told=told,
         untold=found.unidentifiable,
+        spreads={name: differ(each) for name, each in found.spreads.items()},
         ridges={name: ", ".join(f"{k} with power {v:.2g}" for k, v in found.ridges[name].items())
                 for name in found.unidentifiable},
         tiles=[

@@ -9,7 +9,7 @@ from .._base import check
 from .._base.files import replacing
 from ..scenes.scene import Scene
 from ..scenes.schema import written
-from .fit import Found
+from .found import Found
 
 HEAVY = 1e6  # [-] mass of the plate that stands for a wall, over the hammer's
 STIFF = 1e6  # [Hz] its first frequency

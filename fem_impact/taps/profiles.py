@@ -20,6 +20,7 @@ TOO_STEEP, BACK = 1.6, 0.2  # [-] a rise beyond the target by the first is tried
 SHORTEST = 1e-9  # [-] step over the coordinate
 MOST_POINTS = 16  # [-] to each side
 ITERATIONS = 12  # [-] of the readjustment at each point
+MORE = 50  # [-] iterations if those did not suffice and the rise would count
 CLOSE = 1e-6  # [-] change of the sum of squares or the values that ends it
 BETTER = 0.05  # [-] of the noise variance: a profile that falls by more has found a better fit
 AT_BOUND = 0.02  # [-] of a range: a value this close to its bound may be held by it
@@ -153,6 +154,7 @@ def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int,
     opened, held, found = [False, False], ["", ""], best
     for side, (sign, bound) in enumerate(((-1.0, low[j]), (1.0, high[j]))):
         x, step, at, root, steep = best.x.copy(), FIRST * target * spread, float(best.x[j]), 0.0, 0.0
+        ended = False
         step, before = min(step, 0.25 * (high[j] - low[j])), best.x
         for _ in range(MOST_POINTS):
             last = at + sign * step
@@ -160,6 +162,7 @@ def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int,
                 break
             ended = sign * (last - bound) >= -1e-9 * abs(bound)
             last = float(bound) if ended else last
+            step = abs(last - at)
             guess = x.copy()
             if before is best.x and x is not before:
                 guess[others] += lean * (last - at)
@@ -171,6 +174,8 @@ def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int,
             guess = np.clip(guess, low, high)
             try:
                 moved = solve(problem, guess, ITERATIONS, CLOSE, held=(j,))
+                if not moved.ended and moved.cost - best.cost > target**2 * noise:  # slow along a ridge by a bound
+                    moved = solve(problem, moved.x, MORE, CLOSE, held=(j,))
             except SimulationError:
                 held[side] = "the simulation"
                 break
@@ -189,7 +194,7 @@ def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int,
             slope = max(root - was, 1e-3) / step
             step *= float(np.clip((1.02 * target - root) / slope / step, *GROWTH))
         if root < target and steep <= TOO_STEEP * target:
-            opened[side] = not (side == 0 and named.floor)
+            opened[side] = not (side == 0 and named.floor and ended)
         else:
             bounded = _limiting(problem, x, j, noise)
             held[side] = bounded[0] if bounded else ""

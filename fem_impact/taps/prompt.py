@@ -13,8 +13,8 @@ from ..impact.striker import Striker
 from ..scenes.scene import Scene, load_scene
 from ..show import export
 from . import found_scene, transfer
-from .fit import Found, Watch
 from .fit import fit as fit_taps
+from .found import Found, Watch
 from .records import Taps, read_taps
 from .rig import measure
 
@@ -105,7 +105,7 @@ def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None]:
         given |= {"target": scene.modes(), "at": scene.blow.values["at"], "contact": scene.make_contact()}
         if options.mass is None:
             given["striker"] = scene.make_striker()
-    return fit_taps(taps, unknown=unknown, known=known, watch=watch, **given), scene
+    return fit_taps(taps, unknown=unknown, known=known, per_tap=options.per_tap, watch=watch, **given), scene
 
 
 def write(folder: Path, found: Found, scene: Scene | None) -> tuple[dict[str, Any], list[str]]:

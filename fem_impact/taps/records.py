@@ -10,14 +10,10 @@ import numpy as np
 import xarray as xr
 
 from .._base import check, markup
-from . import arguments, readers, triggers, units
+from . import arguments, channels, readers, triggers
 
 TOGETHER = 0.05  # [s] pulses closer than this belong to one tap: nobody taps twice within a twentieth of a second
-BEFORE = 0.02  # [s] longest record before a tap
-LONGEST = 10.0  # [s] longest record of one tap
-FEWEST = 8  # [-] samples before a tap from which an offset is estimated
 RATES = (1.0, 1e9)  # [Hz] allowed
-MOST_TAPS = 10_000  # [-] of one file: more are noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +78,7 @@ class Taps:
         names = arguments.texts("names", names, n_channels, "response")
         unit = arguments.texts("units", ["m/s^2"] * n_channels if units is None else units, n_channels, "response")
         for text in unit:
-            check.one_of("units", text, [si for si in readers.units.KINDS if si != "N"])
+            check.one_of("units", text, [si for si in channels.units.KINDS if si != "N"])
         tags = [f"tap {i + 1}" for i in range(n_taps)] if labels is None else labels
         tags = arguments.texts("labels", tags, n_taps, "tap of force")
         said = arguments.texts("notes", tuple(notes) if isinstance(notes, (list, tuple)) else notes)
@@ -190,7 +186,7 @@ class Taps:
         """Standard deviation of each force before its tap or, if that is short, of its differences, (n_taps,) [N]."""
         begins = np.maximum(0, (self.onset * self.rate).astype(int) - 3)
         return np.array([
-            np.std(row[:n]) if n >= FEWEST else triggers.noise(row) for row, n in zip(self.force, begins)
+            np.std(row[:n]) if n >= triggers.FEWEST else triggers.noise(row) for row, n in zip(self.force, begins)
         ])  # fmt: skip
 
     def pick(self, which: Any) -> "Taps":
@@ -317,13 +313,13 @@ def read_taps(
         raise ValueError(f"rate must be given: {name} does not state the sampling rate")
     if found.rate is not None and rate is not None and abs(found.rate / stated - 1.0) > 1e-3:
         notes.append(f"the file states {found.rate:g} Hz; rate={stated:g} Hz was used")
-    unit = _units(found, units)
+    unit = channels.stated_units(found, units)
     if full_scale is not None:
         full_scale = check.positive("full_scale", full_scale, "N")
-    struck = _force_channel(found, force, unit, name)
-    others = _response_channels(found, response, unit, struck)
-    scales = _scales(found, scale, struck)
-    factor, notes_ = _factor(found.names[struck], unit[struck], "N", scales.get(struck), name)
+    struck = channels.force_channel(found, force, unit, name)
+    others = channels.response_channels(found, response, unit, struck)
+    scales = channels.scales(found, scale, struck)
+    factor, notes_ = channels.factor(found.names[struck], unit[struck], "N", scales.get(struck), name)
     notes += notes_
     raw = [segment[:, struck] * factor for segment in found.segments]
     flip = -1.0 if max(row.max() for row in raw) < -min(row.min() for row in raw) else 1.0
@@ -331,8 +327,8 @@ def read_taps(
         notes.append("the force is mostly negative and was turned around")
     kinds, factors = [], []
     for i in others:
-        kind = units_kind(unit[i])
-        value, more = _factor(found.names[i], unit[i], kind, scales.get(i), name)
+        kind = channels.kind(unit[i])
+        value, more = channels.factor(found.names[i], unit[i], kind, scales.get(i), name)
         kinds.append(kind)
         factors.append(value)
         notes += more
@@ -340,7 +336,7 @@ def read_taps(
         (flip * row, segment[:, others] * np.array(factors)) for row, segment in zip(raw, found.segments)
     ]  # each (n_samples,), (n_samples, n_responses)
     options = {"trigger": trigger, "before": before, "length": length, "together": together}
-    rows, responses, labels, said = _cut(segments, stated, name, **options)
+    rows, responses, labels, said = triggers.cut(segments, stated, name, **options)
     cut = [
         [triggers.clipped(row, full_scale), *(triggers.clipped(column) for column in other.T)]
         for row, other in zip(rows, responses)
@@ -353,149 +349,3 @@ def read_taps(
     flat = [f"{label} ({', '.join(taps._cut(i))})" for i, label in enumerate(taps.labels) if any(cut[i])]
     said += [f"cut off by the range of the channel: {', '.join(flat)}"] if flat else []
     return Taps(taps.table, tuple(notes + said))
-
-
-def units_kind(unit: str) -> str:
-    """The SI unit of a response's kind; an acceleration if the unit is not known."""
-    found = units.known(unit)
-    return found[0] if found and found[0] != "N" else "m/s^2"
-
-
-def _units(found: readers.Recording, given: Mapping[str, str] | None) -> list[str]:
-    unit = []
-    for name, stated in zip(found.names, found.units):
-        unit.append(stated or units.label(name)[1])
-    for name, text in arguments.table("units", given).items():
-        if not isinstance(text, str) or units.known(text) is None:
-            words = ", ".join(word for factors in units.KINDS.values() for word in factors)
-            raise ValueError(f"units must be one of {words}, got {check.shown(text)} for {name!r}")
-        unit[_channel("units", name, found)] = text
-    return unit
-
-
-def _channel(argument: str, which: Any, found: readers.Recording) -> int:
-    """The number of a channel named by (part of) its name or by its number."""
-    there = ", ".join(repr(name) for name in found.names[:20])
-    if isinstance(which, (int, np.integer)) and not isinstance(which, bool):
-        if 0 <= which < len(found.names):
-            return int(which)
-        raise ValueError(
-            f"{argument} must be a channel from 0 to {len(found.names) - 1}, got {which}; they are {there}"
-        )
-    if not isinstance(which, str):
-        raise ValueError(f"{argument} must be the name or number of a channel, got {check.shown(which)}")
-    for test in (str.__eq__, lambda name, text: name.casefold() == text.casefold(),
-                 lambda name, text: text.casefold() in name.casefold()):  # fmt: skip
-        hits = [i for i, name in enumerate(found.names) if test(name, which)]
-        if len(hits) == 1:
-            return hits[0]
-        if hits:
-            break
-    said = "fits several channels" if hits else "is no channel"
-    raise ValueError(f"{argument}: {check.shown(which)} {said}; they are {there}{check.nearest(which, found.names)}")
-
-
-def _force_channel(found: readers.Recording, force: Any, unit: list[str], name: str) -> int:
-    if force is not None:
-        return _channel("force", force, found)
-    kinds = [units.known(text) for text in unit]
-    hits = [i for i, kind in enumerate(kinds) if kind and kind[0] == "N"]
-    hits = hits or [i for i, text in enumerate(found.names) if units.FORCE_NAMES.search(text)]
-    if len(hits) != 1 and len(found.names) == 1:
-        hits = [0]
-    if len(hits) != 1:
-        there = ", ".join(repr(text) for text in found.names[:20])
-        said = "has several force channels" if hits else "does not say which channel is the force"
-        raise ValueError(f"force must be given: {name} {said}; its channels are {there}")
-    return hits[0]
-
-
-def _response_channels(found: readers.Recording, response: Any, unit: list[str], struck: int) -> list[int]:
-    if response is not None:
-        asked = [response] if isinstance(response, (str, int, np.integer)) else response
-        if not isinstance(asked, (list, tuple)):
-            raise ValueError(f"response must be the names or numbers of channels, got {check.shown(response)}")
-        return [_channel("response", which, found) for which in asked]
-    kinds = [units.known(text) for text in unit]
-    return [
-        i
-        for i, (kind, text) in enumerate(zip(kinds, found.names))
-        if i != struck and ((kind and kind[0] != "N") or (not unit[i] and units.RESPONSE_NAMES.search(text)))
-    ]
-
-
-def _scales(found: readers.Recording, scale: Any, struck: int) -> dict[int, float]:
-    if scale is None:
-        return {}
-    if isinstance(scale, Mapping):
-        scale = arguments.table("scale", scale)
-        return {_channel("scale", name, found): check.number(f"scale of {name}", x) for name, x in scale.items()}
-    return {struck: check.number("scale", scale)}
-
-
-def _factor(name: str, unit: str, wanted: str, scale: float | None, file: str) -> tuple[float, list[str]]:
-    """What a channel is multiplied with to be in SI, and what was assumed for that."""
-    kind = units.known(unit)
-    if kind and kind[0] == wanted:
-        return kind[1] * (1.0 if scale is None else scale), []
-    if scale is not None:
-        return scale, []
-    if not unit:
-        return 1.0, [f"{name}: no unit stated, {wanted} assumed"]
-    raise ValueError(
-        f"scale must be given for {name!r} of {file}, which is in {unit!r} and not in a unit of the kind {wanted}: "
-        f"scale={{{name!r}: ... }} in {wanted} per {unit}"
-    )
-
-
-def _cut(segments, rate, name, *, trigger, before, length, together):
-    """Records of equal length around every tap: force, responses, labels and notes."""
-    pause = max(1, round(check.positive("together", together, "s") * rate))
-    level = None if trigger is None else check.positive("trigger", trigger, "N")
-    whole = np.concatenate([row - np.median(row) for row, _ in segments])
-    limit = triggers.level(whole) if level is None else level
-    places = []  # segment, first sample above the trigger, samples free before and after
-    for k, (row, _) in enumerate(segments):
-        begun = triggers.starts(row - np.median(row), limit, pause)
-        for i, start in enumerate(begun):
-            last = begun[i - 1] if i else 0
-            end = begun[i + 1] if i + 1 < len(begun) else len(row)
-            free = int(start) if not i else min(int(start - last), int(0.5 * (start - last)))
-            after = int(end - start) if i + 1 == len(begun) else int(0.5 * (end - start))
-            places.append((k, int(start), free, after))
-    if not places:
-        top = max(float(row.max()) for row, _ in segments)
-        raise ValueError(
-            f"no tap was found in {name}: its force reaches {top:.3g} N and the trigger is {limit:.3g} N; check scale "
-            "and trigger"
-        )
-    if len(places) > MOST_TAPS:
-        raise ValueError(f"{name} has {len(places)} places above {limit:.3g} N; give trigger= and together=")
-    wanted = BEFORE if before is None else check.positive("before", before, "s")
-    lead = min(round(wanted * rate), min(free for _, _, free, _ in places) if before is None else 10**9)
-    tail = min(after for _, _, _, after in places)
-    if length is not None:
-        tail = max(1, round(check.positive("length", length, "s") * rate) - lead)
-    tail = min(tail, round(LONGEST * rate))
-    rows, responses, labels, notes, offsets = [], [], [], [], []
-    for number, (k, start, _, _) in enumerate(places):
-        row, other = segments[k]
-        first, last = start - lead, start + tail
-        if first < 0 or last > len(row):
-            notes.append(f"tap {number + 1} is left out: its record is not complete")
-            continue
-        quiet = slice(max(0, first), max(0, start - max(3, (start - first) // 4)))
-        rest = row[quiet], other[quiet]
-        base = (np.median(rest[0]), np.median(rest[1], axis=0)) if len(rest[0]) >= FEWEST else (0.0, 0.0)
-        offsets.append(float(base[0]))
-        rows.append(row[first:last] - base[0])
-        responses.append(other[first:last] - base[1])
-        labels.append(f"tap {number + 1}")
-    if not rows:
-        raise ValueError(f"no tap in {name} has a complete record; give a shorter length or before, or check rate")
-    largest = max(offsets, key=abs)
-    if largest:
-        notes.append(f"offsets before the taps were removed, of the force up to {abs(largest):.2g} N")
-    if lead < FEWEST:
-        notes.append(f"only {lead} samples before the taps: offsets are not removed")
-    return np.array(rows), np.array(responses), labels, notes

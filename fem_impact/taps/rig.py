@@ -9,7 +9,8 @@ from .._base import check
 from ..impact.compiled import propagation
 from ..impact.response import History, Response
 from . import arguments
-from .records import LONGEST, RATES, Taps
+from .records import RATES, Taps
+from .triggers import LONGEST
 
 FILTERS = {  # end of the pass band and begin of the stop band, each over the sampling rate
     # linear-phase filters of delta-sigma converters; data sheets state 0.45 and 0.55 to 0.58 (TI SLAS666B, SBASAU5)

@@ -11,8 +11,8 @@ from scipy.optimize import linear_sum_assignment
 from .._base import check, isolated, markup
 from .._base.files import replacing
 from ..modes.modal import Modes
-from .fit import joined
 from .records import Taps
+from .windows import joined
 
 METHODS = ("H1", "H2")
 MOST_TIMES = 2**24  # [-] samples of a transform

@@ -15,10 +15,12 @@ TAPS = ROOT / "studies" / "measured" / "acceleration_multi.lvm"
 
 def test_fit_writes_a_page_numbers_and_a_scene(tmp_path, capsys):
     words = ["--unknown", "contact.stiffness=1e5:1e13", "--unknown", "contact.exponent=1:3", "--mass", "0.15"]
+    words += ["--per-tap", "contact.stiffness"]
     assert cli.main(["fit", str(TAPS), "--out", str(tmp_path / "out"), *words]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "4 taps explained to" in said and "90 % interval" in said
     data = json.loads((tmp_path / "out" / "fit.json").read_text())
+    assert len(data["per_tap"]["contact.stiffness"]["values"]) == 4 and "mean of the taps" in said
     assert data["values"]["contact.exponent"] > 1.0 and len(data["left_out"]) == 4
     assert (tmp_path / "out" / "fit.html").stat().st_size > 5e4
     assert fi.load_scene(tmp_path / "out" / "scene.toml").make_striker().mass == pytest.approx(0.15)

@@ -1,5 +1,7 @@
 """Residuals, their derivatives and the search."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -34,6 +36,26 @@ def test_derivatives_agree_with_central_differences(found):
         step[i] = 1e-3
         central = (problem.residual(x + step) - problem.residual(x - step)) / 2e-3
         assert np.abs(jacobian[:, i] - central).max() < 1e-3 * np.abs(central).max()  # one-sided steps of 1e-4
+
+
+def test_derivatives_hold_for_a_value_of_each_tap_and_coordinates_change_without_loss(found):
+    problem = replace(found.problem, own=("contact.time", "contact.loss"), _last={})
+    x = np.concatenate([found.best.x + 0.01, [0.1, -0.05, 0.02, 0.04]])
+    jacobian = problem.jacobian(x)
+    for i in [0, 2, *range(len(x) - 4, len(x))]:
+        step = np.zeros(len(x))
+        step[i] = 1e-3
+        central = (problem.residual(x + step) - problem.residual(x - step)) / 2e-3
+        assert np.abs(jacobian[:, i] - central).max() < 1e-3 * np.abs(jacobian).max(axis=0)[i]  # steps of 1e-4
+    own, other, mean = (problem.values(x, tap) for tap in (0, 1, None))
+    assert own["contact.loss"] - mean["contact.loss"] == pytest.approx(-0.01)  # half of 0.02 - 0.04, on a range of one
+    k = own["contact.stiffness"] * other["contact.stiffness"]
+    assert mean["contact.stiffness"] == pytest.approx(np.sqrt(k), rel=1e-9)
+    single = replace(problem, centre=1, _last={})
+    moved = problem.moved(x, single)
+    assert np.allclose(single.residual(moved), problem.residual(x), atol=1e-9)
+    assert single.values(moved)["contact.stiffness"] == pytest.approx(other["contact.stiffness"], rel=1e-9)
+    assert problem.kept([1]) == [0, 1, 2, 4, 6, 8, 10] and problem.n_values == 9
 
 
 def test_held_coordinates_stay(found):

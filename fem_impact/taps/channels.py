@@ -1,0 +1,102 @@
+"""Which channels of a recording are the force and the responses, and what they are in SI."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from . import arguments, readers, units
+
+
+def kind(unit: str) -> str:
+    """The SI unit of a response's kind; an acceleration if the unit is not known."""
+    found = units.known(unit)
+    return found[0] if found and found[0] != "N" else "m/s^2"
+
+
+def stated_units(found: readers.Recording, given: Mapping[str, str] | None) -> list[str]:
+    unit = []
+    for name, stated in zip(found.names, found.units):
+        unit.append(stated or units.label(name)[1])
+    for name, text in arguments.table("units", given).items():
+        if not isinstance(text, str) or units.known(text) is None:
+            words = ", ".join(word for factors in units.KINDS.values() for word in factors)
+            raise ValueError(f"units must be one of {words}, got {check.shown(text)} for {name!r}")
+        unit[number("units", name, found)] = text
+    return unit
+
+
+def number(argument: str, which: Any, found: readers.Recording) -> int:
+    """The number of a channel named by (part of) its name or by its number."""
+    there = ", ".join(repr(name) for name in found.names[:20])
+    if isinstance(which, (int, np.integer)) and not isinstance(which, bool):
+        if 0 <= which < len(found.names):
+            return int(which)
+        raise ValueError(
+            f"{argument} must be a channel from 0 to {len(found.names) - 1}, got {which}; they are {there}"
+        )
+    if not isinstance(which, str):
+        raise ValueError(f"{argument} must be the name or number of a channel, got {check.shown(which)}")
+    for test in (str.__eq__, lambda name, text: name.casefold() == text.casefold(),
+                 lambda name, text: text.casefold() in name.casefold()):  # fmt: skip
+        hits = [i for i, name in enumerate(found.names) if test(name, which)]
+        if len(hits) == 1:
+            return hits[0]
+        if hits:
+            break
+    said = "fits several channels" if hits else "is no channel"
+    raise ValueError(f"{argument}: {check.shown(which)} {said}; they are {there}{check.nearest(which, found.names)}")
+
+
+def force_channel(found: readers.Recording, force: Any, unit: list[str], name: str) -> int:
+    if force is not None:
+        return number("force", force, found)
+    kinds = [units.known(text) for text in unit]
+    hits = [i for i, kind in enumerate(kinds) if kind and kind[0] == "N"]
+    hits = hits or [i for i, text in enumerate(found.names) if units.FORCE_NAMES.search(text)]
+    if len(hits) != 1 and len(found.names) == 1:
+        hits = [0]
+    if len(hits) != 1:
+        there = ", ".join(repr(text) for text in found.names[:20])
+        said = "has several force channels" if hits else "does not say which channel is the force"
+        raise ValueError(f"force must be given: {name} {said}; its channels are {there}")
+    return hits[0]
+
+
+def response_channels(found: readers.Recording, response: Any, unit: list[str], struck: int) -> list[int]:
+    if response is not None:
+        asked = [response] if isinstance(response, (str, int, np.integer)) else response
+        if not isinstance(asked, (list, tuple)):
+            raise ValueError(f"response must be the names or numbers of channels, got {check.shown(response)}")
+        return [number("response", which, found) for which in asked]
+    kinds = [units.known(text) for text in unit]
+    return [
+        i
+        for i, (kind, text) in enumerate(zip(kinds, found.names))
+        if i != struck and ((kind and kind[0] != "N") or (not unit[i] and units.RESPONSE_NAMES.search(text)))
+    ]
+
+
+def scales(found: readers.Recording, scale: Any, struck: int) -> dict[int, float]:
+    if scale is None:
+        return {}
+    if isinstance(scale, Mapping):
+        scale = arguments.table("scale", scale)
+        return {number("scale", name, found): check.number(f"scale of {name}", x) for name, x in scale.items()}
+    return {struck: check.number("scale", scale)}
+
+
+def factor(name: str, unit: str, wanted: str, scale: float | None, file: str) -> tuple[float, list[str]]:
+    """What a channel is multiplied with to be in SI, and what was assumed for that."""
+    kind = units.known(unit)
+    if kind and kind[0] == wanted:
+        return kind[1] * (1.0 if scale is None else scale), []
+    if scale is not None:
+        return scale, []
+    if not unit:
+        return 1.0, [f"{name}: no unit stated, {wanted} assumed"]
+    raise ValueError(
+        f"scale must be given for {name!r} of {file}, which is in {unit!r} and not in a unit of the kind {wanted}: "
+        f"scale={{{name!r}: ... }} in {wanted} per {unit}"
+    )

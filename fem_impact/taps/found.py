@@ -1,0 +1,404 @@
+"""What a fit found, how far the data tell it, and what it predicts."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .._base import check, markup
+from ..impact.collision import strike
+from ..impact.contact import Contact
+from ..impact.response import Response
+from ..impact.striker import Striker
+from ..modes.modal import Modes
+from . import predictions, profiles, solver, spreads, windows
+from .predictions import Prediction
+from .profiles import Profile
+from .records import Taps
+from .solver import Problem, Solution
+from .spreads import Spread
+from .unknowns import changed, unit_of
+
+LUCK = 0.05  # [-] probability of a spread by noise alone, above which taps do not count as different
+REPEATS = 3  # [-] times that profiles may find a better fit and begin again
+
+Watch = Callable[[int, int], Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What `fit` found. Values that the data do not tell are in `unidentifiable` and not in `values`."""
+
+    taps: Taps  # those compared, cut to the window
+    used: tuple[int, ...]  # taps that the fit used
+    outliers: Mapping[str, float]  # label of a tap that disagrees -> its error when predicted from the others [-]
+    problem: Problem
+    best: Solution
+    minima: tuple[float, ...]  # [-] sums of squares at the ends of all searches
+    notes: tuple[str, ...]
+    compared: Mapping[str, float]  # contact law -> root mean square of its errors at left-out taps [-]; if several
+    watch: Watch | None = None
+
+    __repr__ = check.brief
+
+    @cached_property
+    def _noise(self) -> tuple[float, int, float]:
+        whole = self.problem.residual(self.best.x).reshape(-1, self.problem.data.n_times)
+        return profiles.variance(whole, self.problem.n_values)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The unknowns, in the order given."""
+        return tuple(each.name for each in self.problem.setting.unknown)
+
+    @cached_property
+    def point(self) -> dict[str, float]:
+        """The best values of all unknowns and speeds, told by the data or not: one of many that fit as well.
+
+        Of an unknown freed for each tap: the mean by its name, and each tap's by ``"contact.stiffness[0]"``.
+        """
+        values = self.problem.values(self.best.x)
+        found = {name: values[name] for name in self.names}
+        for name, each in self.spreads.items():
+            found |= {f"{name}[{i}]": float(value) for i, value in enumerate(each.values)}
+        return found | {f"speed[{i}]": float(v) for i, v in enumerate(self.problem.speeds(self.best.x))}
+
+    @property
+    def per_tap(self) -> tuple[str, ...]:
+        """The unknowns of which every tap has a value of its own."""
+        return tuple(name for name, each in zip(self.names, self.problem.free) if each.name in self.problem.own)
+
+    @cached_property
+    def spreads(self) -> dict[str, Spread]:
+        """How much the taps used differ in each unknown that was freed for them."""
+        noise, freedom, _ = self._noise
+        return {
+            name: spreads.spread(*_coordinate(self.problem, self.best.x, name), noise, freedom) for name in self.per_tap
+        }  # fmt: skip
+
+    def profile(self, name: str) -> Profile:
+        """The likelihood profile of an unknown, of a tap's own value of it, or of its speed, ``"speed[0]"``."""
+        check.one_of("name", name, self.point)
+        if name in self.profiles:
+            return self.profiles[name]
+        if name not in self._later:
+            noise, freedom, _ = self._noise
+            problem, x, j = _coordinate(self.problem, self.best.x, name)
+            best = replace(self.best, x=x)
+            self._later[name] = profiles.follow(problem, best, j, noise, freedom, name)[0]
+        return self._later[name]
+
+    @cached_property
+    def _later(self) -> dict[str, Profile]:
+        return {}
+
+    @cached_property
+    def profiles(self) -> dict[str, Profile]:
+        """The likelihood profiles of all unknowns."""
+        noise, freedom, _ = self._noise
+        found = {}
+        for i, name in enumerate(self.names):
+            problem, x, j = _coordinate(self.problem, self.best.x, name)
+            found[name] = profiles.follow(problem, replace(self.best, x=x), j, noise, freedom, name)[0]
+            if self.watch is not None:
+                self.watch(i + 1, len(self.names))
+        return found
+
+    def interval(self, name: str, level: float = 0.9) -> tuple[float, float]:
+        """The range (low, high) that holds a value with a probability; where the data set no limit, that of the range.
+
+        From the likelihood profile with the noise variance estimated, not from the curvature at the best fit.
+        """
+        return self.profile(name).interval(level)
+
+    @cached_property
+    def unidentifiable(self) -> tuple[str, ...]:
+        """The unknowns that the data do not tell."""
+        return tuple(name for name in self.names if self.profiles[name].told == "open")
+
+    @cached_property
+    def limited(self) -> tuple[str, ...]:
+        """The unknowns for which the data set only a lower or an upper limit."""
+        return tuple(name for name in self.names if self.profiles[name].told == "limited")
+
+    @cached_property
+    def ridges(self) -> dict[str, dict[str, float]]:
+        """Of every unknown that the data do not tell: how the others go along with it, as exponents."""
+        return {name: self.profiles[name].ridge for name in self.unidentifiable}
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The values that the data tell, in SI units; those with a limit only are among them."""
+        hidden = set(self.unidentifiable) | {
+            f"{name}[{i}]" for name in self.unidentifiable if name in self.per_tap for i in range(len(self.used))
+        }
+        if self.unidentifiable:  # a speed that moves along a ridge is not told either
+            hidden |= {name for ridge in self.ridges.values() for name in ridge if name.startswith("speed")}
+        return {name: value for name, value in self.point.items() if name not in hidden}
+
+    @cached_property
+    def residual(self) -> np.ndarray:
+        """Predicted less measured force of the taps used, (n_used, n_times) [N]."""
+        shape = self.problem.data.values.shape
+        return self.problem.residual(self.best.x).reshape(shape)[:, 0] * self.problem.data.scale[:, :1]
+
+    @property
+    def errors(self) -> np.ndarray:
+        """Root mean square of the residual over that of the force, of the taps used, (n_used,) [-]."""
+        measured = self.problem.data.values[:, 0] * self.problem.data.scale[:, :1]
+        return np.linalg.norm(self.residual, axis=1) / np.linalg.norm(measured, axis=1)
+
+    @property
+    def error(self) -> float:
+        """The same of all taps used together [-]."""
+        return float(np.sqrt(np.mean(self.errors**2)))
+
+    @property
+    def whiteness(self) -> float:
+        """Probability that white noise has residuals as coloured as these [-]: small means that the model lacks
+        something, and that the intervals were widened for it."""
+        return self._noise[2]
+
+    @property
+    def freedom(self) -> int:
+        """Independent samples less the values found [-]: fewer than samples if the residual is coloured."""
+        return self._noise[1]
+
+    def residual_spectrum(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Frequencies [Hz], and the amplitude spectra of residual and force, (n_used, n_frequencies) [N s]."""
+        rate = self.taps.rate
+        measured = self.problem.data.values[:, 0] * self.problem.data.scale[:, :1]
+        spectra = [np.abs(np.fft.rfft(rows, axis=1)) / rate for rows in (self.residual, measured)]
+        return np.fft.rfftfreq(self.residual.shape[1], 1.0 / rate), spectra[0], spectra[1]
+
+    def predict(self, tap: Any = 0) -> Prediction:
+        """A tap as the values found have it: a number of those given, or other `Taps`.
+
+        Its speed and onset, and its own values of the unknowns freed for each tap, are fitted to it.
+        """
+        if isinstance(tap, Taps):
+            windows.same_rate(tap, self.taps)
+            span = self.problem.data.n_times / self.taps.rate
+            lead = windows.BEFORE / self.taps.rate
+            onset = float(tap.onset[0])
+            cut = tap.pick(0).between(max(0.0, onset - lead), min(float(tap.time[-1]), onset - lead + span))
+        else:
+            check.count("tap", tap, low=0, high=self.taps.n_taps - 1)
+            cut = self.taps.pick(int(tap))
+        return predictions.predicted(self.problem, self.problem.values(self.best.x), cut)
+
+    @check.typed
+    def left_out(self, *, rise_only: bool = False) -> tuple[Prediction, ...]:
+        """Every tap used, predicted from the others.
+
+        All unknowns are found without it, then only its speed and onset, and what was freed for each tap, from itself;
+        with ``rise_only`` from its record up to the largest force, so that the fall of the pulse is predicted blindly.
+        """
+        if len(self.used) < 2:
+            raise ValueError("taps must be two at least, to predict one from the others")
+        if rise_only not in self._left_out:
+            used = self.taps.pick(list(self.used))
+            self._left_out[rise_only] = predictions.left_out(self.problem, self.best.x, used, rise_only)
+        return self._left_out[rise_only]
+
+    @cached_property
+    def _left_out(self) -> dict[bool, tuple[Prediction, ...]]:
+        return {}
+
+    @property
+    def contact(self) -> Contact:
+        """The contact law found."""
+        return changed(self.problem.setting.contact, self.problem.values(self.best.x))
+
+    @property
+    def striker(self) -> Striker:
+        """The hammer found."""
+        given = self.problem.setting.striker
+        body = self.problem.setting.hammer(self.problem.values(self.best.x))
+        if len(body.omega) == 1 and given.modes.n_modes == 1:
+            return Striker.rigid(body.felt_mass)
+        if given.modes.n_modes > 1:
+            values = self.problem.values(self.best.x)
+            part = {key: values.get(f"striker.{key}") for key in ("mass", "first_frequency")}
+            return Striker.flexible(given.modes.scaled(**part), at=given.at)
+        modes = Modes.from_arrays(
+            body.omega / (2.0 * np.pi), body.row[None], points=[[0.0]], mass=body.mass, damping_ratio=body.zeta
+        )
+        return Striker.flexible(modes, at=[0.0])
+
+    @property
+    def target(self) -> Modes | None:
+        """The struck body found, known at its strike point only; None for a wall."""
+        body = self.problem.setting.structure(self.problem.values(self.best.x))
+        if not len(body.omega):
+            return None
+        order = np.argsort(body.omega, kind="stable")
+        carried = float(np.square(body.row[body.omega > 0.0] / body.omega[body.omega > 0.0]).sum())
+        return Modes.from_arrays(
+            body.omega[order] / (2.0 * np.pi), body.row[None, order], points=[[0.0]],
+            mass=body.mass if np.isfinite(body.mass) else float(1.0 / np.square(body.row).max()),
+            damping_ratio=body.zeta[order], compliance=[[carried + body.rest]],
+        )  # fmt: skip
+
+    @check.typed
+    def double_hit(
+        self,
+        target: Modes | None = None,
+        *,
+        at: Any = None,
+        mass: float | None = None,
+        tip: float | None = None,
+        speed: float | None = None,
+    ) -> Response:
+        """The blow with another head or tip, whose `n_impacts` says whether it hits twice.
+
+        Parameters
+        ----------
+        target : Modes, optional
+            The body struck; by default that of the fit.
+        at : point of the target, (dimension,) [m]
+        mass : float [kg], optional
+            Of the hammer; by default that found.
+        tip : float [-], optional
+            Stiffness of the tip over that found.
+        speed : float [m/s], optional
+            By default the mean of the taps, at the same momentum for another mass.
+
+        Returns
+        -------
+        Response
+        """
+        body = target if target is not None else self.target
+        if body is None:
+            raise ValueError("target must be given: these taps were fitted to a wall, on which no hammer hits twice")
+        place = at if target is not None else ([0.0] if self.problem.setting.target is None else None)
+        if target is None:
+            place = [0.0]
+        hammer, law = self.striker, self.contact
+        if tip is not None:
+            factor = check.positive("tip", tip)
+            law = replace(law, stiffness=law.stiffness * factor, hard_stiffness=law.hard_stiffness * factor)
+        typical = float(np.mean(self.problem.speeds(self.best.x)))
+        if mass is not None:
+            mass = check.positive("mass", mass, "kg")
+            typical *= hammer.mass / mass
+            hammer = Striker.rigid(mass) if hammer.modes.n_modes == 1 else Striker.flexible(
+                hammer.modes.scaled(mass=mass), at=hammer.at
+            )  # fmt: skip
+        return strike(body, hammer, law, at=place, speed=typical if speed is None else speed, tolerance=1e-3)
+
+    def summary(self) -> str:
+        """What was found in a few readable lines; what the data do not tell is said first."""
+        lines = [
+            f"{len(self.used)} taps explained to {100.0 * self.error:.2g} % rms of their force, with "
+            f"{len(self.names)} unknowns besides speed and onset of each"
+        ]
+        if self.outliers:
+            each = ", ".join(f"{name} ({100.0 * error:.2g} %)" for name, error in self.outliers.items())
+            lines.append(f"left out, because the other taps predict them badly: {each}")
+        for name in self.unidentifiable:
+            along = ", ".join(f"{other}^{power:.2g}" for other, power in self.ridges[name].items())
+            said = f"; along its ridge, per power of it, go {along}" if along else ""
+            lines.append(f"The data do not tell {name}{said}")
+        rows = []
+        for name in self.names:
+            profile = self.profiles[name]
+            low, high = profile.interval()
+            unit = unit_of(name)
+            if profile.told == "open":
+                rows.append((name, "not told", "", unit))
+            elif profile.told == "limited":
+                limit = f"at least {low:.4g}" if profile.open[1] else f"at most {high:.4g}"
+                rows.append((name, limit, "", unit))
+            else:
+                rows.append((name, f"{profile.value:.4g}", f"{low:.4g} to {high:.4g}", unit))
+        lines += markup.columns(rows, ("", "value", "90 % interval", "unit"))
+        for spread in self.spreads.values():
+            lines.append(f"{spread.name} is the mean of the taps, which {differ(spread)}")
+        for name in self.names:
+            for end, other in zip(("below", "above"), self.profiles[name].held_by):
+                if other:
+                    lines.append(f"Note: {name} is limited {end} only by the range given for {other}")
+        if self.whiteness < profiles.DOUBTED:
+            lines.append("Note: the residual is not noise: the model lacks something; intervals are widened for it")
+        lines += [f"Note: {note}" for note in self.notes]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return markup.paragraphs(self.summary().splitlines())
+
+    def data(self) -> dict[str, Any]:
+        """Everything found, by name, in SI units, for a JSON file."""
+        return {
+            "values": self.values,
+            "unidentifiable": list(self.unidentifiable),
+            "limited": list(self.limited),
+            "ridges": self.ridges,
+            "intervals": {name: list(self.interval(name)) for name in self.names if name not in self.unidentifiable},
+            "point": self.point,
+            "per_tap": {
+                name: {
+                    "mean": each.mean,
+                    "deviation": each.deviation,
+                    "relative": each.relative,
+                    "by_noise": each.by_noise,
+                    "chance": each.chance,
+                    "values": each.values.tolist(),
+                }
+                for name, each in self.spreads.items()
+            },
+            "errors": self.errors.tolist(),
+            "left_out": [one.error for one in self.left_out()] if len(self.used) > 1 else [],
+            "outliers": dict(self.outliers),
+            "whiteness": self.whiteness,
+            "compared": dict(self.compared),
+            "notes": list(self.notes),
+        }
+
+
+def differ(each: Spread) -> str:
+    """How much the taps differ in an unknown, in words."""
+    size, noise = (
+        (f"{100.0 * each.deviation:.2g} %", f"{100.0 * each.by_noise:.2g} %") if each.relative
+        else (f"{each.deviation:.3g} {unit_of(each.name)}".strip(), f"{each.by_noise:.3g}")
+    )  # fmt: skip
+    said = f"differ by {size} (standard deviation); noise alone would make {noise}"
+    return said if each.chance < LUCK else f"{said}: one value for all would do"
+
+
+def _coordinate(problem: Problem, x: np.ndarray, name: str) -> tuple[Problem, np.ndarray, int]:
+    """The problem with a named value among its coordinates, the coordinates, and the number of that value."""
+    shared, _, number = name.partition("[")
+    i = int(number[:-1]) if number else 0
+    if shared == "speed":
+        other = replace(problem, momentum=False, _last={})
+        return other, problem.moved(x, other), problem.n_shared + i
+    j = [each.name for each in problem.setting.unknown].index(shared)
+    free = tuple(problem.setting.unknown[j] if k == j else each for k, each in enumerate(problem.free))
+    own = tuple(each.name for each, before in zip(free, problem.free) if before.name in problem.own)
+    other = replace(problem, free=free, own=own, centre=i if number else None, _last={})
+    return other, problem.moved(x, other), j
+
+
+def profiled(found: Found) -> Found:
+    """The fit with its profiles; a better fit that a profile meets becomes the fit."""
+    for _ in range(REPEATS):
+        noise, freedom, _ = found._noise
+        made, better = {}, None
+        for i, name in enumerate(found.names):
+            problem, x, j = _coordinate(found.problem, found.best.x, name)
+            made[name], met = profiles.follow(problem, replace(found.best, x=x), j, noise, freedom, name)
+            if found.watch is not None:
+                found.watch(i + 1, len(found.names))
+            if met.cost < found.best.cost - profiles.BETTER * noise:
+                better = problem, met
+                break
+        if better is None:
+            found.__dict__["profiles"] = made
+            return found
+        problem, met = better
+        best = solver.solve(found.problem, problem.moved(met.x, found.problem))
+        found = replace(found, best=best if best.cost < found.best.cost else found.best)
+    return found

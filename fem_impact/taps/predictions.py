@@ -1,0 +1,88 @@
+"""Taps as a model has them, with all held that taps have in common; and each from a fit to the others."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .._base import check
+from . import solver, windows
+from .records import Taps
+from .solver import HALF_LOST, Problem
+from .unknowns import TIME
+
+QUICK = 12  # [-] iterations for speed, onset and what else a tap has of its own
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """A tap as the model has it, with speed, onset and the unknowns that each tap has of its own fitted to it."""
+
+    time: np.ndarray  # (n_times,) [s] of the record
+    measured: np.ndarray  # (n_times,) [N]
+    force: np.ndarray  # (n_times,) [N]
+    speed: float  # [m/s]
+    onset: float  # [s]
+    own: Mapping[str, float]  # unknown freed for each tap -> its value here
+
+    __repr__ = check.brief
+
+    @property
+    def residual(self) -> np.ndarray:
+        """Predicted less measured force, (n_times,) [N]."""
+        return self.force - self.measured
+
+    @property
+    def error(self) -> float:
+        """Root mean square of the residual over that of the measured force [-]."""
+        return float(np.linalg.norm(self.residual) / np.linalg.norm(self.measured))
+
+    @property
+    def error_of_peak(self) -> float:
+        """Root mean square of the residual over the record, over the measured peak [-]."""
+        return float(np.sqrt(np.mean(self.residual**2)) / np.abs(self.measured).max())
+
+
+def predicted(problem: Problem, values: Mapping[str, float], tap: Taps, rise_only: bool = False) -> Prediction:
+    """One tap with all unknowns held at ``values``, but those that each tap has of its own.
+
+    They, its speed and its onset are found from the whole record or, with ``rise_only``, until the largest force.
+    """
+    n_points = problem.data.values.shape[1] - 1
+    data = windows.data(tap, n_points, np.ones(1 + n_points))
+    free = tuple(each for each in problem.free if each.name in problem.own)
+    names = {each.name for each in free} | {TIME} | ({"contact.stiffness"} if TIME in problem.own else set())
+    single = _force_only(
+        replace(
+            problem, data=replace(data, values=data.values[:, :1], scale=data.scale[:, :1]), free=free, own=(),
+            fixed={name: value for name, value in values.items() if name not in names},
+        )
+    )  # fmt: skip
+    until = int(tap.force[0].argmax()) + 1 if rise_only else None
+    seen = replace(single, data=replace(single.data, values=single.data.values[..., :until]), _last={})
+    own = [float(each.inside(values[each.name])) for each in free]
+    momentum = np.log(HALF_LOST * tap.impulse[0])
+    x = seen.aligned(np.array([*own, momentum, tap.onset[0] * tap.rate - data.lead - 1.0]))
+    x = solver.solve(seen, x, QUICK).x
+    made = single.sampled(single.fine(x), single.onsets(x))[0, 0] * data.scale[0, 0]
+    onset = (data.lead + float(single.onsets(x)[0])) / tap.rate
+    found = single.values(x)
+    freed = {name: found[name] for name in (each.name.replace(TIME, "contact.stiffness") for each in free)}
+    return Prediction(tap.time, tap.force[0], made, float(single.speeds(x)[0]), onset, freed)
+
+
+def _force_only(problem: Problem) -> Problem:
+    """The problem without response channels: a prediction is judged by the force."""
+    return replace(problem, setting=replace(problem.setting, points=None, n_points=0), _last={})
+
+
+def left_out(problem: Problem, x: np.ndarray, taps: Taps, rise_only: bool = False) -> tuple[Prediction, ...]:
+    """Every tap of a problem, predicted from a fit to the others that begins at ``x``."""
+    n_taps = problem.data.n_taps
+    found = []
+    for tap in range(n_taps):
+        others = [i for i in range(n_taps) if i != tap]
+        part = replace(problem, data=problem.data.pick(others), _last={})
+        without = solver.solve(part, x[problem.kept(others)])
+        found.append(predicted(part, part.values(without.x), taps.pick(tap), rise_only))
+    return tuple(found)

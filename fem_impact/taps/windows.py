@@ -1,0 +1,77 @@
+"""Taps joined to one table, cut to the samples that a fit compares, and scaled."""
+
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from .records import Taps
+from .solver import Data
+
+BEFORE = 12  # [samples] before the tap that are compared: the filter rings there
+AFTER = 1.5  # [-] of the length from the first to the last pulse: what is compared after it, at least BEFORE samples
+
+
+def joined(taps: Any, name: str = "taps") -> Taps:
+    """One table of taps from one or several."""
+    if isinstance(taps, Taps):
+        return taps
+    several = check.several(name, taps, Taps)
+    n_times = min(len(each.time) for each in several)
+    for each in several:
+        same_rate(each, several[0])
+        if each.units != several[0].units:
+            raise ValueError(f"taps must have the same responses, got units {each.units} and {several[0].units}")
+    return Taps.from_arrays(
+        np.concatenate([each.force[:, :n_times] for each in several]),
+        np.concatenate([each.response[:, :n_times] for each in several]),
+        rate=several[0].rate,
+        names=several[0].table["channel"].values.tolist(),
+        units=several[0].units,
+        overload=np.concatenate([each.table["overload"].values for each in several]),
+        notes=[note for each in several for note in each.notes],
+    )
+
+
+def same_rate(tap: Taps, taps: Taps) -> None:
+    """ValueError unless both are sampled alike."""
+    if abs(tap.rate / taps.rate - 1.0) > 1e-6:
+        raise ValueError(f"tap must be sampled at {taps.rate:g} Hz as the taps fitted, got {tap.rate:g} Hz")
+
+
+def cut(taps: Taps, window: Any) -> Taps:
+    """The taps cut to the samples compared, all with the same place of the onset."""
+    if window is not None:
+        before, after = check.array("window", window, (2,), "s")
+        first, last = before, after
+    else:
+        first = BEFORE / taps.rate
+        ends = []
+        for row, onset in zip(taps.force, taps.onset):
+            above = np.flatnonzero(row > 0.05 * row.max())
+            begin = int(onset * taps.rate)
+            later = above[above >= begin]
+            ends.append((later[-1] - begin + 1) if later.size else 1)
+        last = (1.0 + AFTER) * max(max(ends), BEFORE) / taps.rate
+    starts = np.round(taps.onset * taps.rate).astype(int)
+    before, after = round(float(first) * taps.rate), round(float(last) * taps.rate)
+    before, after = min(before, int(starts.min())), min(after, int(len(taps.time) - starts.max()))
+    if before < 0 or after < 4:
+        raise ValueError(f"window must leave samples after the onset, got {after}; give longer records")
+    rows = [np.arange(s - before, s + after) for s in starts]
+    force = np.stack([row[index] for row, index in zip(taps.force, rows)])
+    response = np.stack([row[index] for row, index in zip(taps.response, rows)])
+    made = Taps.from_arrays(
+        force, response, rate=taps.rate, names=taps.table["channel"].values.tolist(), units=taps.units,
+        overload=taps.table["overload"].values, labels=taps.labels, notes=taps.notes,
+    )  # fmt: skip
+    made.table["onset"] = ("tap", np.full(len(starts), before / taps.rate))
+    return made
+
+
+def data(taps: Taps, n_points: int, weights: np.ndarray) -> Data:
+    """The force and ``n_points`` responses of taps, scaled to their peaks over the weights (1 + n_points,)."""
+    records = np.concatenate([taps.force[:, None], np.moveaxis(taps.response, 2, 1)[:, :n_points]], axis=1)
+    scale = np.maximum(np.abs(records).max(axis=2), np.finfo(float).tiny) / weights
+    lead = max(0, round(float(np.median(taps.onset)) * taps.rate) - 1)
+    return Data(records / scale[:, :, None], scale, np.maximum(taps.impulse, 1e-300), lead)

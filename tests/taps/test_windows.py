@@ -1,0 +1,38 @@
+"""Taps joined to one table, and cut to what is compared."""
+
+import numpy as np
+import pytest
+
+import fem_impact as fi
+from fem_impact.taps import windows
+
+PULSE = 100.0 * np.sin(np.linspace(0.0, np.pi, 14)) ** 2
+
+
+def tap(place, n_times=400, rate=25600.0):
+    force = np.zeros(n_times)
+    force[place : place + len(PULSE)] = PULSE
+    return fi.Taps.from_arrays(force, rate=rate)
+
+
+def test_records_of_unequal_length_are_joined_to_the_shortest():
+    both = windows.joined([tap(50), tap(80, 300)])
+    assert both.n_taps == 2 and len(both.time) == 300 and both.labels == ("tap 1", "tap 2")
+    with pytest.raises(ValueError, match="sampled at 25600 Hz"):
+        windows.joined([tap(50), tap(50, rate=51200.0)])
+
+
+def test_all_onsets_come_to_the_same_place():
+    cut = windows.cut(windows.joined([tap(50), tap(83)]), None)
+    assert np.array_equal(cut.force[0], cut.force[1])
+    assert cut.onset[0] * cut.rate == pytest.approx(windows.BEFORE) and np.ptp(cut.onset) == 0.0
+    assert len(cut.time) >= windows.BEFORE + 2 * len(PULSE)
+    narrow = windows.cut(tap(50), (1e-4, 5e-4))
+    assert len(narrow.time) == round(1e-4 * 25600) + round(5e-4 * 25600)
+    with pytest.raises(ValueError, match="window must leave samples"):
+        windows.cut(tap(50), (0.0, 1e-4))
+
+
+def test_records_are_scaled_to_their_peaks_over_the_weights():
+    data = windows.data(windows.joined([tap(50), tap(83)]), 0, np.array([2.0]))
+    assert np.allclose(data.scale, PULSE.max() / 2.0) and np.allclose(np.abs(data.values).max(axis=2), 2.0)
