@@ -12,7 +12,7 @@ _NAMES = {
     "modes.ritz": "ritz_modes",
     "modes.air": "in_air",
     "impact.contact": "Contact",
-    "impact.striker": "Striker",
+    "impact.striker": "Striker Hand",
     "impact.response": "Response Impact",
     "impact.collision": "Touch collide",
     "impact.spectra": "mobility",

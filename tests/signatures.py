@@ -55,7 +55,7 @@ INNER = {
     "hammers.Hammer", "hammers.bandwidth_of", "hammers.half_sine_reach",
     "report.Player", "report.audio", "report.template",
     "explore.serve",  # ends at an interruption only, see test_explore
-    "ToleranceWarning", "analytic.closed_form",
+    "ToleranceWarning", "analytic.closed_form", "Striker.let_go",
     "Taps", "Taps.summary",  # made by read_taps and Taps.from_arrays
     "pictures.gallery", "pictures.film", "hammers.choose_on",
     "Modes", "sound.Sound.audible", "sound.Sound.faded", "sound.Sound.wav", "hammers.Hammer.data",
@@ -227,6 +227,8 @@ def table() -> dict[str, dict[str, Any]]:
         "Striker.sphere": {"material": t["metal"], "radius": 0.01},
         "Striker.stick": {"mass": 0.1, "first_frequency": 1e3, "n_modes": 3},
         "Striker.hammer": {"head": 0.03, "handle": 0.05, "stiffness": 1e4, "damping": 2.0},
+        "Hand": {"stiffness": 100.0, "damping": 0.1, "force": 1.0},
+        "Striker.held": {"self": t["striker"], "hand": fi.Hand(100.0)},
         "Striker.flexible": {"modes": t["free"], "at": None},
         "Response.displacement": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "body": -1, "residual": True},
         "Response.velocity": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "body": -1, "residual": True},

@@ -25,6 +25,7 @@ LONGEST_PATH = 4000  # [byte] longest path: Linux allows 4096
 SOURCES = {  # type -> how a user makes one, for error messages
     "Contact": "fi.Contact.hertz, linear or power",
     "Figure": "fi.figures",
+    "Hand": "fi.Hand",
     "Material": "fi.Material",
     "Mesh": "fi.mesh",
     "Modes": "fi.find_modes, fi.analytic or fi.Modes",

@@ -186,7 +186,8 @@ def strike(
     def blow(striker: Striker, speed: float, own: tuple[np.ndarray, np.ndarray] | None = None) -> Response:
         touch = Touch(contact, 0, 1, striker.at[None], point)
         rest = striker.left_out if residual and striker.modes.dimension else None
-        arriving = _part(striker.modes, ((0, 1.0),), striker.at[None], striker.shape[None], rest, forces[0])
+        arriving = _part(striker.body, ((0, 1.0),), striker.at[None], striker.shape[None], rest, forces[0])
+        arriving = replace(arriving, bias=arriving.bias + striker.push)
 
         def start(one: float = 1.0, other: float = 1.0) -> list[_Part]:
             """Both bodies at the start, each as fast as it is known times a factor."""
@@ -198,12 +199,12 @@ def strike(
 
         doubt = 0.0 if before is None else 1.0 + before.error
         others = [start(*factors) for factors in ((doubt, 1.0), (1.0, doubt))[own is None :] if doubt]
-        return _follow((striker.modes, modes), [touch], start(), speed, options, striker, point[0], others)
+        return _follow((striker.body, modes), [touch], start(), speed, options, striker, point[0], others)
 
     if speed is None:
         assert before is not None
         striker = before.same_striker(striker, contact, modes, point)
-        own = before.of(0, "striker", striker.modes)
+        own = before.of(0, "striker", striker.body)
         return blow(striker, float(striker.shape @ np.where(striker.modes.omega == 0.0, own[1], 0.0)), own)
     if before is not None and before.force.any():
         raise ValueError(
@@ -272,9 +273,9 @@ def collide(
 
 def met(
     bodies, contacts, *, speeds=None, states=None, tolerance=TOLERANCE, quantity=None, residual=True, duration=None,
-    max_impacts=None, scheme=None, dt=None, forces=None, start=None,
+    max_impacts=None, scheme=None, dt=None, forces=None, start=None, pushes=(),
 ) -> Response:  # fmt: skip
-    """`collide` without a word on its tolerance."""
+    """`collide` without a word on its tolerance; ``pushes`` are constant modal forces on the first bodies."""
     options = Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
     bodies, contacts = check.several("bodies", bodies, Modes), check.several("contacts", contacts, Touch)
     before = start.state() if isinstance(start, Response) else start
@@ -283,6 +284,7 @@ def met(
             raise ValueError("states must be left out if start is given, which has the states of all bodies")
         states = before.states(bodies, [touch.law for touch in contacts])
     parts, arriving = _parts(bodies, contacts, speeds, states, forces, residual)
+    parts = [*(replace(part, bias=part.bias + push) for part, push in zip(parts, pushes)), *parts[len(pushes) :]]
     others = []
     if before is not None:
         ends = [[i for i, _ in part.touched] for part in parts]
@@ -629,7 +631,7 @@ def shortened(striker: Striker, n_modes: int) -> Striker:
     """The striker with its first modes only; the others act as a spring."""
     if n_modes >= striker.modes.n_modes:
         return striker
-    return Striker.flexible(striker.modes.truncated(n_modes=n_modes), at=striker.at)
+    return replace(striker, modes=striker.modes.truncated(n_modes=n_modes), fixed=True)
 
 
 def _controlled(

@@ -659,7 +659,8 @@ class Response:
         h = self.history
         result = []
         for body, modes in enumerate(self.bodies):
-            part = slice(self.body_slice(body).start, self.body_slice(body).start + modes.n_rigid)
+            held = body == 0 and self.striker is not None and self.striker.hand is not None
+            part = slice(self.body_slice(body).start, self.body_slice(body).start + (1 if held else modes.n_rigid))
             rows = [i for i in range(h.n_contacts) if (h.shape[i, self.body_slice(body)] != 0.0).any()]
             sign = self._sign(body, rows[0]) if rows else 1.0
             result.append(sign * float(h.shape[rows[0], part] @ h.end_p[part]) if rows else 0.0)
@@ -671,7 +672,10 @@ class Response:
 
     @property
     def restitution(self) -> float:
-        """Minus final over initial speed of the striker's rigid motion, at its contact point [-]."""
+        """Minus final over initial speed of the striker's rigid motion, at its contact point [-].
+
+        On a body that moved before it may exceed 1. A held striker has no final speed but that at the end of the run.
+        """
         return -self.speeds[0] / self.speed if self.speed else 0.0
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Strikers: a rigid mass, a sphere, a stick or any body with modes, and its contact point."""
+"""Strikers: a rigid mass, a sphere, a stick or any body with modes, its contact point, and the hand that holds it."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,11 +10,76 @@ from .._base import check
 from ..fe import plausible
 from ..fe.section import Material
 from ..modes.analytic import SHEAR_RATIO, beam
-from ..modes.modal import Modes, left_out
+from ..modes.modal import Modes, Shapes, left_out
 
 SPHERES = 1e-9, 1e9  # [m] radius, from a few atoms to a star
 STICK_MODES = 96  # [-] bending modes of a stick; each blow keeps as many of them as it needs
 MOST_MODES = 1000  # [-] of a stick: higher modes have wavelengths as short as its thickness, where beam theory fails
+
+
+STIFF_HAND = 0.3  # [-] highest frequency in the hand over the first bending frequency: the squares add to some 10 %
+
+
+@dataclass(frozen=True)
+class Hand:
+    """What holds a striker: a spring, a damper and a constant force, as felt at its contact point.
+
+    They act along the blow on the rigid motion of the striker, not on its bending. Of a stick that turns about its
+    fulcrum, they are the hand's torques divided by the distance of the tip, stiffness and damping by its square. The
+    spring is slack with the striker at the surface; the force then presses or, if negative, draws back, so that the
+    striker would rest at ``force / stiffness`` beyond the surface.
+
+    Examples
+    --------
+    >>> grip = fi.Hand(stiffness=200.0, damping=0.5, force=2.0)  # would rest a centimetre beyond the surface
+    >>> round(fi.Striker.stick(mass=0.06, first_frequency=500.0).held(grip).hand_frequency, 1)  # Hz
+    15.9
+    """
+
+    stiffness: float  # [N/m]
+    damping: float = 0.0  # [N s/m]
+    force: float = 0.0  # [N] towards the struck body: grip or weight
+
+    def __post_init__(self) -> None:
+        check.settle(
+            self,
+            stiffness=check.positive("stiffness", self.stiffness, "N/m"),
+            damping=check.non_negative("damping", self.damping, "N s/m"),
+            force=check.number("force", self.force, "N"),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class HeldShapes(Shapes):
+    """The shapes of a body whose rigid motion is held by a spring."""
+
+    base: Shapes
+    omega: float  # [rad/s] of that motion
+
+    __repr__ = check.brief
+
+    @property
+    def dimension(self) -> int:
+        return self.base.dimension
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        return self.base.at(points)
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self.base.contains(points)
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        own = self.base.at(points)[:, :1] @ self.base.at(loads)[:, :1].T / self.omega**2
+        return self.base.deflection(loads, points) + own
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return self.base.compliance_error(points)
+
+    def take(self, n_modes: int) -> "HeldShapes":
+        return replace(self, base=self.base.take(n_modes))
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.base.grid()
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +95,7 @@ class Striker:
     material: Material | None = None  # of a sphere, for `Contact.between`
     radius: float | None = None  # [m] of a sphere
     fixed: bool = True  # True: a blow keeps all modes; False: only those its tolerance needs
+    hand: Hand | None = None  # what holds it, see `held`
 
     __repr__ = check.brief
 
@@ -52,6 +118,18 @@ class Striker:
                 "at must be a point that moves when the striker moves rigidly, got one at rest; move it off the hinge"
             )
         check.lock_arrays(self)
+        if self.hand is not None:
+            check.instance("hand", self.hand, Hand)
+            if self.modes.n_rigid != 1:
+                raise ValueError(
+                    f"hand needs a striker with one rigid motion, got {self.modes.n_rigid}; hinge it where it is held"
+                )
+            bending = float(self.modes.frequencies[1]) if self.modes.n_modes > 1 else np.inf
+            if self.hand_frequency > STIFF_HAND * bending:
+                raise ValueError(
+                    f"stiffness of the hand must keep the striker below {STIFF_HAND:g} of its bending at {bending:.4g} "
+                    f"Hz, got {self.hand_frequency:.4g} Hz; a hand that stiff bends it"
+                )
 
     @classmethod
     def rigid(cls, mass: float) -> "Striker":
@@ -164,6 +242,51 @@ class Striker:
         0.025
         """
         return cls(modes, at)
+
+    def held(self, hand: Hand) -> "Striker":
+        """The same striker held by a hand, which brings it back after each bounce.
+
+        Such a blow may never end by itself: give it a duration, or a number of impacts. The ``restitution`` then counts
+        the speed at the end of the run.
+
+        Examples
+        --------
+        >>> stick = fi.Striker.stick(mass=0.06, first_frequency=500.0).held(fi.Hand(stiffness=100.0, force=1.0))
+        >>> table, law = fi.Modes.rigid(50.0), fi.Contact.restituting(1e7, 1.5, restitution=0.8, speed=0.5)
+        >>> buzz = fi.strike(table, stick, law, at=None, speed=0.5, max_impacts=5, tolerance=1e-2)
+        >>> buzz.n_impacts
+        5
+        """
+        return replace(self, hand=hand)
+
+    def let_go(self, what: str) -> None:
+        """Raise ValueError if a hand holds the striker, for ``what`` cannot follow it."""
+        if self.hand is not None:
+            raise ValueError(f"striker must not be held by a hand in {what}, which follows single blows; leave it free")
+
+    @cached_property
+    def body(self) -> Modes:
+        """The modes of the striker as it is held; without a hand its own."""
+        if self.hand is None:
+            return self.modes
+        omega, damping = self.modes.omega.copy(), self.modes.damping_ratio.copy()
+        omega[0] = 2.0 * np.pi * self.hand_frequency
+        damping[0] = 0.5 * self.hand.damping / (self.felt_mass * omega[0])
+        return replace(self.modes, omega=omega, damping_ratio=damping, shapes=HeldShapes(self.modes.shapes, omega[0]))
+
+    @property
+    def hand_frequency(self) -> float:
+        """Frequency [Hz] of the striker swinging in the hand; 0 if nothing holds it."""
+        stiffness = 0.0 if self.hand is None else self.hand.stiffness
+        return float(np.sqrt(stiffness / self.felt_mass)) / (2.0 * np.pi)
+
+    @cached_property
+    def push(self) -> np.ndarray:
+        """Constant modal forces of the hand, (n_modes,) [N kg**-0.5]."""
+        push = np.zeros(self.modes.n_modes)
+        if self.hand is not None:
+            push[0] = self.hand.force * self.shape[0]
+        return push
 
     @property
     def mass(self) -> float:

@@ -294,7 +294,9 @@ def make(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
     """Choose the model of a blow; see `fi.plan`."""
     asked = _Asked.checked(blow, changes)
     target = asked.pieces.get("target")
-    if target is None and (blow.target.modes is not None or {"size", "n_modes", "max_frequency"} & set(asked.pieces)):
+    held = blow.striker.hand is not None  # it comes back when the body has long answered
+    stated = blow.target.modes is not None or {"size", "n_modes", "max_frequency"} & set(asked.pieces)
+    if target is None and (held or stated):
         target = "modal"
     plan = None if target in ("modal", "vectors") else _idealised(asked, target, stages)
     return plan or _by_vectors(asked, target, stages) or _modal(asked, stages)

@@ -422,11 +422,12 @@ class _Game:
             Touch(law, i, len(sticks), stick.striker.at[None], self.played[stick.number].at[None])
             for i, (law, stick) in enumerate(zip(laws, sticks))
         ]
-        bodies = (*(stick.striker.modes for stick in sticks), self.modes)
+        bodies = (*(stick.striker.body for stick in sticks), self.modes)
         q, p = (*(stick.q for stick in sticks), self.q), (*(stick.p for stick in sticks), self.p)
         forces = np.array([stick.force for stick in sticks])
         start = State(0.0, bodies, q, p, forces, self.error, None, laws)
-        blow = partial(collision.met, bodies, touches, start=start)
+        pushes = [stick.striker.push for stick in sticks]
+        blow = partial(collision.met, bodies, touches, start=start, pushes=pushes)
         hit = planner.within(rule["tolerance"], blow(**rule), blow, rule)
         self.sticks = sticks
         self._keep(hit, tuple(stick.number for stick in sticks))

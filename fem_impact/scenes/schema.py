@@ -20,7 +20,7 @@ from ..fe.assembly import THEORIES, assemble
 from ..fe.section import KINDS, SOFT, Beam, Elastic, Material, Plate
 from ..impact import collision
 from ..impact.contact import Contact
-from ..impact.striker import Striker
+from ..impact.striker import Hand, Striker
 from ..model.target import AIR, MODELS
 from ..modes.analytic import closed_form
 from ..modes.modal import find_modes
@@ -65,6 +65,27 @@ def _bar(
     known = closed_form(body, section, held, check.one_of("theory", theory, THEORIES[1]))
     find = known or partial(find_modes, assemble(body, section, held, theory=theory))
     return replace(Striker.flexible(find(n_modes=BAR_MODES), at=at), fixed=False)
+
+
+def _held(maker: Any) -> Callable[..., Striker]:
+    """The same maker of strikers, with a table {stiffness, damping, force} of the hand as another argument."""
+
+    def make(*, hand: Any = None, **values: Any) -> Striker:
+        striker = maker(**values)
+        if hand is None:
+            return striker
+        if not isinstance(hand, Mapping):
+            raise ValueError(f"hand must be a table {{ stiffness, damping, force }}, got {check.shown(hand)}")
+        try:
+            _check_keys("", "", dict(hand), Hand)
+        except ValueError as error:
+            raise ValueError(f"hand: {error}") from None
+        return striker.held(Hand(**hand))
+
+    own = inspect.signature(maker)
+    hand = inspect.Parameter("hand", inspect.Parameter.KEYWORD_ONLY, default=None)
+    make.__signature__ = own.replace(parameters=[*own.parameters.values(), hand])  # type: ignore[attr-defined]
+    return make
 
 
 def target_values(
@@ -157,8 +178,9 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
     "section": ("kind", {"plate": _plate, "beam": _beam}),
     "target": ("", {"": target_values}),
     "striker": ("kind", {
-        "rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick, "hammer": Striker.hammer,
-        "bar": _bar,
+        name: _held(maker) for name, maker in {
+            "rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick, "hammer": Striker.hammer, "bar": _bar,
+        }.items()
     }),
     "contact": ("kind", {
         "linear": Contact.linear, "hertz": Contact.hertz, "power": Contact.power,

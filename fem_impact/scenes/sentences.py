@@ -90,6 +90,8 @@ def words(scene: Scene, response: Response) -> list[str]:
     if scene.striker.kind == "stick":
         bending = striker.modes.frequencies[striker.modes.omega > 0.0][0]
         arrives += f" (effective mass {si(striker.felt_mass, 'kg')} at the tip; first bending mode {si(bending, 'Hz')})"
+    if striker.hand is not None:
+        arrives += f", held by a hand in which it swings at {si(striker.hand_frequency, 'Hz')}"
     blow = f"It is struck at {place(response.at)} by {arrives}, moving at {si(response.speed, 'm/s')}."
     raised = "" if law.exponent == 1.0 else f"{law.exponent:g}".translate(RAISED)
     stiffness = si(law.stiffness, "N/m") + raised

@@ -284,6 +284,7 @@ def sweep(
     [[1, 1, 4], [1, 2, 4]]
     """
     tolerance = check.tolerance(tolerance)
+    striker.let_go("a map")
     if isinstance(modes, Modes):
         modes = modes if damping_ratio is None else modes.damped(damping_ratio)
         speed = check.positive("speed", speed, "m/s", reach=REACH)

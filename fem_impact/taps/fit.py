@@ -115,6 +115,7 @@ def fit(
     >>> low < 2e8 < high, round(high / low, 1)
     (True, 1.0)
     """
+    striker.let_go("a fit")
     taps = windows.joined(taps)
     laws = [contact] if isinstance(contact, Contact) else list(check.several("contact", contact, Contact))
     options = {

@@ -82,3 +82,132 @@ def test_a_hammer_of_two_masses_moves_as_its_two_equations_say():
 def test_a_hammer_needs_masses_and_a_spring(wrong, text):
     with pytest.raises(ValueError, match=text):
         fi.Striker.hammer(**({"head": 0.1, "handle": 0.1, "stiffness": 1e3} | wrong))
+
+
+# --- a hand at the fulcrum -------------------------------------------------------------------------------------------
+
+HARD = fi.Contact.linear(1e7)
+WALL = [fi.Touch(HARD, 0, None)]
+
+
+def test_a_ball_under_gravity_flies_in_closed_parabolas_between_contacts():
+    ball, weight = fi.Striker.rigid(0.1), 0.981
+    hit = fi.strike(fi.Modes.rigid(1e9), ball, HARD, at=None, speed=1.0, striker_force=weight, max_impacts=6)
+    # no energy is lost, so it leaves as fast as it came, and is back after 2 v / g
+    flights = [after.start - before.end for before, after in zip(hit.impacts, hit.impacts[1:])]
+    assert_allclose(flights, 2.0 * 1.0 / 9.81, rtol=1e-7)  # the earth of 1e9 kg takes 1e-10
+    assert_allclose(hit.impacts[0].impulse, 2.0 * 0.1, rtol=0.01)  # and its weight for half a millisecond
+
+
+@pytest.mark.parametrize("force", [0.981, 5.0])
+@pytest.mark.parametrize("stiffness", [1e-3, 10.0, 200.0])
+def test_a_held_mass_is_back_when_its_swing_says(stiffness, force):
+    mass, speed = 0.1, 1.0
+    striker = fi.Striker.rigid(mass).held(fi.Hand(stiffness, force=force))
+    hit = fi.strike(fi.Modes.rigid(1e9), striker, HARD, at=None, speed=speed, max_impacts=4)
+    omega = np.sqrt(stiffness / mass)
+    # y = F/k (1 - cos wt) - v/w sin wt is zero again at tan(wt/2) = v w m / F; for a soft spring at 2 v m / F
+    wanted = 2.0 / omega * np.arctan(speed * omega * mass / force)
+    flights = [after.start - before.end for before, after in zip(hit.impacts, hit.impacts[1:])]
+    assert_allclose(flights, wanted, rtol=1e-6)
+    if stiffness == 1e-3:  # what a very soft spring errs against gravity alone: (v w m / F)**2 / 3
+        error = (speed * omega * mass / force) ** 2 / 3.0
+        assert_allclose(wanted, 2.0 * speed * mass / force * (1.0 - error), rtol=1e-6)
+
+
+def bounced(striker, law, speed, duration):
+    """A held striker on a rigid wall, by DOP853 restarted at every touch and release: its modes' velocities."""
+    body, row, n = striker.body, striker.shape, striker.modes.n_modes
+    hand, felt = striker.hand, striker.felt_mass
+    rate = 2.0 * striker.modes.damping_ratio * striker.modes.omega
+
+    def push(t, z):
+        q, p = z[:n], z[n:]
+        force = float(law.force(row @ q, row @ p))
+        # the hand on the rigid motion alone, at the tip
+        held = hand.force - hand.stiffness * row[0] * q[0] - hand.damping * row[0] * p[0]
+        modal = held * row * (np.arange(n) == 0) - force * row
+        return np.concatenate([p, modal - rate * p - striker.modes.omega**2 * q])
+
+    def touch(t, z):
+        return row @ z[:n]
+
+    touch.terminal = True
+    assert_allclose(body.omega[0], np.sqrt(hand.stiffness / felt), rtol=1e-12)
+    time, z = 0.0, np.concatenate([np.zeros(n), speed * striker.motion])
+    tight = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-15}
+    while time < duration:
+        leg = solve_ivp(push, (time, min(duration, time + 1e-9)), z, **tight)
+        time, z = leg.t[-1], leg.y[:, -1]
+        if time < duration:
+            leg = solve_ivp(push, (time, duration), z, events=[touch], max_step=1e-4, **tight)
+            time, z = leg.t[-1], leg.y[:, -1]
+    return z[n:]
+
+
+def test_a_held_stick_that_bends_meets_an_independent_integration():
+    stick = fi.Striker.stick(0.06, 400.0, n_modes=3).held(fi.Hand(stiffness=300.0, damping=0.4, force=2.0))
+    law, duration = fi.Contact.power(1e6, 1.5, loss=0.2), 0.03
+    table = fi.Modes.rigid(1e9)
+    hit = fi.strike(table, stick, law, at=None, speed=0.5, duration=duration, residual=False, tolerance=1e-7)
+    assert hit.n_impacts == 3
+    wanted = bounced(stick, law, 0.5, duration)
+    found = hit.modal_state([duration], body=0)[1][0]
+    assert_allclose(found, wanted, atol=1e-4 * np.abs(wanted).max())  # a thousandfold growth of errors over the bounces
+    assert hit.energy_error < 1e-12
+
+
+def test_a_bounce_that_dies_is_proved_to_have_ended():
+    law = fi.Contact.restituting(1e7, 1.5, restitution=0.7, speed=0.5)
+    stick = fi.Striker.stick(0.06, 500.0).held(fi.Hand(stiffness=100.0, damping=0.1, force=-0.2))  # rests 2 mm above
+    hit = fi.strike(fi.Modes.rigid(50.0), stick, law, at=None, speed=0.5, tolerance=1e-3, quantity="n_impacts")
+    assert hit.finished
+    assert hit.n_impacts >= 2  # it came back
+    times = hit.history.end_time + np.linspace(1e-4, 5.0, 20000)
+    gap = hit.displacement(None, times)[:, 0] - hit.displacement([[1.0]], times, body=0)[:, 0]
+    assert gap.min() > 0.0
+    assert_allclose(gap[-1], 2e-3 + hit.displacement(None, times[-1:])[0, 0], rtol=1e-2)
+
+
+def test_a_buzz_of_twenty_contacts():
+    law = fi.Contact.restituting(1e7, 1.5, restitution=0.9, speed=0.5)
+    stick = fi.Striker.stick(0.06, 500.0).held(fi.Hand(stiffness=100.0, damping=0.05, force=1.5))
+    table = fi.Modes.rigid(50.0)
+    hit = fi.strike(table, stick, law, at=None, speed=0.8, max_impacts=20, tolerance=1e-2, quantity="n_impacts")
+    assert hit.n_impacts == 20
+    assert hit.outcome == "stopped after max_impacts"
+    assert hit.energy_error < 1e-12
+    with pytest.raises(ValueError, match="duration or max_impacts must be given"):
+        fi.strike(table, stick, law, at=None, speed=0.8)
+    # as one of two strokes it is lifted after its time
+    pair = fi.strokes(
+        fi.analytic.disk(0.18, edge="clamped", mass=2.0, first_frequency=150.0, n_modes=60, damping_ratio=0.01),
+        [(0.0, stick, law, (0.05, 0.0), 0.8, 0.06), (0.05, stick, law, (-0.05, 0.0), 0.8, 0.06)],
+        tolerance=0.3, quantity="n_impacts",
+    )  # fmt: skip
+    assert {impact.contact for impact in pair.impacts} == {0, 1}
+    assert pair.hits[-1].finished  # both lifted: the head swings alone
+
+
+def test_a_held_striker_is_a_body_like_others():
+    stick = fi.Striker.stick(0.06, 500.0, n_modes=4)
+    held = stick.held(fi.Hand(stiffness=100.0, damping=0.3, force=1.0))
+    assert_allclose(held.hand_frequency, np.sqrt(100.0 / 0.02) / (2.0 * np.pi), rtol=1e-12)
+    assert_allclose(held.body.damping_ratio[0], 0.3 / (2.0 * np.sqrt(100.0 * 0.02)), rtol=1e-12)
+    tip = np.array([[1.0]])
+    assert_allclose(held.body.residual_compliance(tip), stick.modes.residual_compliance(tip), rtol=1e-9)
+    softer = held.body.shapes.compliance(tip) - stick.modes.shapes.compliance(tip)
+    assert_allclose(softer, 0.01, rtol=1e-9)  # m/N, of 100 N/m at the tip
+    assert held.felt_mass == stick.felt_mass
+    bar = fi.analytic.beam(0.2, ends=("free", "free"), mass=0.1, first_frequency=2e3, n_modes=12)
+    modes, law = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=20), fi.Contact.hertz(1e6)
+    for call, words in (
+        (lambda: fi.Striker.flexible(bar, at=[0.0]).held(fi.Hand(10.0)), "hand needs a striker with one rigid motion"),
+        (lambda: stick.held(fi.Hand(1e6)), "stiffness of the hand must keep the striker below 0.3 of its bending"),
+        (lambda: stick.held(3.0), "hand must be a Hand of fi.Hand"),
+        (lambda: fi.Hand(0.0), "stiffness must be positive"),
+        (lambda: fi.Hand(1.0, -1.0), "damping must not be negative"),
+        (lambda: fi.sweep(modes, held, law, at=(0.1, 0.1), speed=1.0, over={"mass": [0.1]}), "must not be held"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            call()

@@ -16,7 +16,7 @@ from fem_impact.fe import assembly
 from fem_impact.fe.section import Material, Plate
 from fem_impact.impact import collision
 from fem_impact.impact.contact import Contact
-from fem_impact.impact.striker import Striker
+from fem_impact.impact.striker import Hand, Striker
 from fem_impact.model import planner
 from fem_impact.modes import analytic, modal
 from fem_impact.scenes import maps, scene
@@ -120,6 +120,19 @@ def test_contacts_that_lose_and_a_hammer_in_a_scene(tmp_path, text, law):
     values = [0.5 * getattr(law, key), getattr(law, key)]
     table = maps.map_scene(loaded, over={f"contact.{key}": values}, tolerance=1e-2)
     assert float(table.restitution[1]) == pytest.approx(hit.restitution, abs=2e-2)
+
+
+def test_a_held_striker_in_a_scene_comes_back(tmp_path):
+    held = 'kind = "rigid"\nmass = 0.03\nhand = { stiffness = 100.0, damping = 0.1, force = -0.3 }'
+    loaded = scene.load_scene(write(tmp_path, TEXT.replace('kind = "rigid"\nmass = 0.03', held)))
+    assert loaded.make_striker().hand == Hand(100.0, 0.1, -0.3)
+    hit = loaded.strike(tolerance=0.1, duration=0.2, quantity="n_impacts")
+    assert any(impact.start > 0.02 for impact in hit.impacts)  # half a swing at 9 Hz
+    assert "held by a hand in which it swings at 9.189" in words(loaded, hit)[1]  # sqrt(100 / 0.03) / 2 pi
+    for wrong, text in (("3.0", "hand must be a table"), ("{ stifness = 1.0 }", "hand: stifness is not a key")):
+        told = held.partition("hand")[0] + f"hand = {wrong}"
+        with pytest.raises(ValueError, match=text):
+            scene.load_scene(write(tmp_path, TEXT.replace('kind = "rigid"\nmass = 0.03', told)))
 
 
 def test_finite_elements_and_formulas_agree_to_the_tolerance(tmp_path):
