@@ -344,7 +344,7 @@ def _histogram(axes: Any, found: Spread, name: str) -> None:
     else:
         low, high = np.quantile(values, TAILS)
         weights = np.full(len(values), 100.0 / len(values))
-        axes.hist(values, BINS, (low, high) if low < high else None, color=BLUE, weights=weights)
+        axes.hist(values, BINS, range=(low, high) if low < high else None, color=BLUE, weights=weights)
         for level, style in ((0.05, ":"), (0.5, "-"), (0.95, ":")):
             each = found.quantile(name, level)
             axes.axvline(each.value, color=VERMILION, ls=style, lw=1.2)
