@@ -127,6 +127,7 @@ def spread(
     n = check.count("n", n, high=MOST_BLOWS)
     mixer = mixing(inputs, correlation)
     seed = check.count("seed", seed, low=0)
+    workers = None if workers is None else check.count("workers", workers)
     groups, why = _grouped(sobol, mixer, n, len(inputs))
     band = None if max_frequency is None else check.positive("max_frequency", max_frequency, "Hz")
     limit = check.tolerance(blow.arguments.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance)

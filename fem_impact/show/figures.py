@@ -326,7 +326,7 @@ def spread(found: Spread) -> Figure:
             _histogram(left, found, name)
             _leading(middle, found, name)
             _bars(right, found, name)
-        kind = "share of the variance (Sobol indices)" if found.shares else "squared rank correlation"
+        kind = "variance explained (Sobol)" if found.shares else "squared rank correlation"
         for panel, title in zip(panels[0], ("distribution, median, 90 %", "against the leading input, 90 %", kind)):
             panel.set_title(title)
         twice = found.chance()
