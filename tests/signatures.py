@@ -122,6 +122,7 @@ def things() -> dict[str, Any]:
         "hit": fi.strike(modes, striker, law, at=(0.13, 0.1), speed=1.0, tolerance=1e-2),
         "outline": Outline.around(circle((0.0, 0.0), 1.0, "rim")),
         "plan": scene.plan(), "run": scene.run(target="modal"),
+        "spread": fi.spread(scene, {"striker.mass": "lognormal(0.03, 0.1)"}, n=8, tolerance=1e-1),
     }  # fmt: skip
 
 
@@ -283,6 +284,17 @@ def table() -> dict[str, dict[str, Any]]:
             "residual": True, "workers": 1, "store": None, "watch": None, "max_cells": 100.0,
             "tell": None,
         },
+        "spread": {
+            "scene": t["scene"], "vary": {"striker.mass": ("lognormal", 0.03, 0.1)}, "n": 8, "correlation": None,
+            "sobol": False, "seed": 1, "tolerance": 1e-1, "max_frequency": 1e3, "workers": 1, "store": None,
+            "watch": None, "stage": None,
+        },
+        "spread body": {
+            "scene": t["modes"], "vary": {"mass": "lognormal(0.03, 0.1)", "speed": "uniform(1, 2)"}, "n": 8,
+            "striker": t["striker"], "contact": t["law"], "at": at, "speed": 1.0, "damping_ratio": 0.01,
+            "correlation": {("mass", "speed"): 0.5}, "tolerance": 1e-1,
+        },
+        "figures.spread": {"found": t["spread"]},
         "mesh.Mesh.refined": {"self": t["square"], "factor": 2.0},
         "mesh.rectangle": {"length": 0.4, "width": 0.3, "size": 0.2},
         "mesh.line": {"length": 0.4, "size": 0.2},

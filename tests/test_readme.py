@@ -36,10 +36,20 @@ def test_python_example_of_a_plan_runs(monkeypatch, capsys):
     assert 0.2 < float(printed.splitlines()[-1]) < 0.4  # 0.314 on modes enough for 1e-4; fifty err by a few per cent
 
 
+@pytest.mark.slow
+def test_python_example_of_uncertain_inputs_runs(monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(ROOT)
+    example = blocks("python")[2].replace("spread.png", str(tmp_path / "spread.png"))
+    names = {"fi": fi}
+    exec(compile(example, "README.md", "exec"), names)
+    assert "What should be measured better" in capsys.readouterr().out
+    assert names["found"].n_failed == 0 and (tmp_path / "spread.png").is_file()
+
+
 def test_python_example_of_a_fit_runs(monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     names = {"fi": fi}
-    exec(compile(blocks("python")[2], "README.md", "exec"), names)
+    exec(compile(blocks("python")[3], "README.md", "exec"), names)
     assert "4 taps explained to 2.5 % rms" in capsys.readouterr().out
     low, high = names["found"].interval("contact.exponent")
     assert 1.5 < low < high < 1.9

@@ -112,7 +112,7 @@ def spread(
     Notes
     -----
     What needs kernels of its own for each value (strike point, damping ratio, and a flexible striker's frequency over
-    that of the body) takes at most 1024 values together. ``checks`` says what that changes.
+    that of the body) takes at most 256 values together. ``checks`` says what that changes.
 
     Examples
     --------
@@ -127,6 +127,7 @@ def spread(
     n = check.count("n", n, high=MOST_BLOWS)
     mixer = mixing(inputs, correlation)
     seed = check.count("seed", seed, low=0)
+    workers = None if workers is None else check.count("workers", workers)
     groups, why = _grouped(sobol, mixer, n, len(inputs))
     band = None if max_frequency is None else check.positive("max_frequency", max_frequency, "Hz")
     limit = check.tolerance(blow.arguments.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance)
@@ -284,7 +285,7 @@ class _Asked:
             over["target_frequency"] = float(first.frequencies[first.omega > 0.0][0]) * frequency
         over = {name: np.unique([column.min(), column.max()]) for name, column in over.items()}
         if self.places:
-            over["at"] = self._corners(np.atleast_1d(np.asarray(blow.arguments["at"], float)))
+            over["at"] = self._outermost(np.atleast_1d(np.asarray(blow.arguments["at"], float)))
         with self._blamed(axes):
             base, _ = bodies.body_of(
                 target, blow.striker, blow.contact, **given, over=over or {"speed": np.array([speed])},
@@ -325,13 +326,12 @@ class _Asked:
                 points[:, i] = column
             axes["at"] = base.modes.points("vary: strike point", points)
 
-    def _corners(self, at: np.ndarray) -> np.ndarray:
-        """Strike points at the ends of their ranges and in the middle, (n_points, dimension) [m]."""
-        ends = [
-            np.unique([self.places[i].min(), self.places[i].max()]) if i in self.places else [at[i]]
-            for i in range(len(at))
-        ]
-        return np.vstack([np.stack(np.meshgrid(*ends), axis=-1).reshape(-1, len(at)), at[None]])
+    def _outermost(self, at: np.ndarray) -> np.ndarray:
+        """The strike points with the smallest and the largest coordinates, (n_points, dimension) [m]."""
+        points = np.tile(at, (len(self.values), 1))
+        for i, column in self.places.items():
+            points[:, i] = column
+        return points[np.unique([points.argmin(axis=0), points.argmax(axis=0)])]
 
     def _ends(self, base: Case, axes: Mapping[str, np.ndarray]) -> dict[str, Any]:
         """Smallest and largest value of each axis."""
@@ -414,7 +414,8 @@ class _Blame:
             "over",
             "first_frequency",
         ):
-            raise ValueError(f"vary reaches values that are not allowed: {error}") from None
+            said = str(error).replace("over['at']", "the strike point")
+            raise ValueError(f"vary reaches values that are not allowed: {said}") from None
 
 
 def _below(name: str, column: np.ndarray) -> ValueError:

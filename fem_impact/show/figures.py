@@ -327,7 +327,7 @@ def spread(found: Spread) -> Figure:
             _histogram(left, found, name)
             _leading(middle, found, name)
             _bars(right, found, name)
-        kind = "share of the variance (Sobol indices)" if found.shares else "squared rank correlation"
+        kind = "variance explained (Sobol)" if found.shares else "squared rank correlation"
         for panel, title in zip(panels[0], ("distribution, median, 90 %", "against the leading input, 90 %", kind)):
             panel.set_title(title)
         twice = found.chance()
@@ -345,7 +345,7 @@ def _histogram(axes: Any, found: Spread, name: str) -> None:
     else:
         low, high = np.quantile(values, TAILS)
         weights = np.full(len(values), 100.0 / len(values))
-        axes.hist(values, BINS, (low, high) if low < high else None, color=BLUE, weights=weights)
+        axes.hist(values, BINS, range=(low, high) if low < high else None, color=BLUE, weights=weights)
         for level, style in ((0.05, ":"), (0.5, "-"), (0.95, ":")):
             each = found.quantile(name, level)
             axes.axvline(each.value, color=VERMILION, ls=style, lw=1.2)

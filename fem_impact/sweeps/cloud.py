@@ -12,7 +12,7 @@ from . import batches, grid
 from .cells import FAMILY_AXES, Case
 from .store import Texts
 
-FAMILIES = 1024  # [-] most pairs of bodies of a cloud that need kernels of their own
+FAMILIES = 256  # [-] most pairs of bodies of a cloud that need kernels of their own: some 5 ms each
 BANDS = 64  # [-] most upper ends of the centroid's band: blows on bodies of other frequencies share theirs
 SAME = 1e-12  # [-] relative difference of numbers that rounding may have made
 
@@ -121,7 +121,7 @@ def few(base: Case, axes: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     All dimensions that need kernels get equally many levels, each for as many cases as any other, at most `FAMILIES`
     together. The levels are means of their cases, so that means over all cases stay what they were.
     """
-    raised = axes.get("target_frequency", np.array([base.first_frequency])) / base.first_frequency
+    raised = axes["target_frequency"] / base.first_frequency if "target_frequency" in axes else np.ones(1)
     columns: dict[tuple[str, int], np.ndarray] = {}
     if base.striker.modes.omega.any() and {"striker_frequency", "target_frequency"} & set(axes):
         own = axes.get("striker_frequency", _first(base))

@@ -80,8 +80,8 @@ def test_few_values_need_kernels_and_means_are_kept():
     np.testing.assert_array_equal(found["target_frequency"], many["target_frequency"])  # free, see Cloud
     assert_allclose(found["damping_ratio"].mean(), many["damping_ratio"].mean(), rtol=1e-12)
     assert_allclose(found["at"].mean(axis=0), many["at"].mean(axis=0), rtol=1e-12)
-    # four dimensions share 1024 families: five levels each, a fifth of uniform values apart
-    assert np.abs(found["damping_ratio"] - many["damping_ratio"]).max() < 1.1 * 0.02 / 5 / 2 * 1.1
+    # four dimensions share 256 families: four levels each, of uniform values at most half a quarter off; 10 % by chance
+    assert np.abs(found["damping_ratio"] - many["damping_ratio"]).max() < 1.1 * 0.02 / 4 / 2
 
 
 def test_a_rigid_striker_on_bodies_of_many_frequencies_needs_one_family():

@@ -127,9 +127,7 @@ def test_a_failed_blow_takes_its_group_out_of_the_sobol_indices():
     pytest.importorskip("SALib", reason="the spread extra is not installed")
     whole = grouped(lambda a, b, c: a * b * c, n=512)
     counts = np.where(np.arange(5 * 512) % 499 == 3, -1, 1)
-    bad = whole.table.assign(
-        n_impacts=("blow", counts), restitution=whole.table.restitution.where(counts > 0)
-    )
+    bad = whole.table.assign(n_impacts=("blow", counts), restitution=whole.table.restitution.where(counts > 0))
     found = Spread(whole.inputs, bad, 1e-3, True).shares["restitution"]
     for name, share in whole.shares["restitution"].items():
         assert_allclose(found[name].total.value, share.total.value, atol=0.02)
