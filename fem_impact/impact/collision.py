@@ -423,7 +423,8 @@ def _may_touch(history: History, other: History, duration: float) -> bool:
     """Whether two descriptions of a blow differ so much in some flight that one more impact cannot be ruled out.
 
     Wherever the open contacts of the first come nearest, the gap must exceed the largest difference of the two motions
-    since the first impact. Looks ahead until all modes together cannot bridge the gap. ``duration`` [s] is that of one contact.
+    since the first impact. Looks ahead until all modes together cannot bridge the gap. ``duration`` [s] is that of one
+    contact.
     """
     if history.bias.any() or history.status != other.status or not len(history.contacts):
         return False
