@@ -494,9 +494,10 @@ def _may_touch(history: History, other: History, duration: float) -> bool:
     """Whether two descriptions of a blow differ so much in some flight that one more impact cannot be ruled out.
 
     Wherever the open contacts of the first come nearest, the gap must exceed the largest difference of the two motions
-    so far. Looks ahead until all modes together cannot bridge the gap. ``duration`` [s] is that of one contact.
+    since the first impact. Looks ahead until all modes together cannot bridge the gap. ``duration`` [s] is that of one
+    contact.
     """
-    if history.bias.any() or history.status != other.status:
+    if history.bias.any() or history.status != other.status or not len(history.contacts):
         return False
     rigid, shape = history.omega == 0.0, history.shape
     size = np.hypot(history.end_q, history.end_p / np.where(rigid, 1.0, history.omega))
@@ -506,14 +507,15 @@ def _may_touch(history: History, other: History, duration: float) -> bool:
     end = history.end_time
     if history.status == record.FINISHED:
         end += max(0.0, float(ahead.max(initial=0.0)))
-    times = np.linspace(0.0, end, int(min(LOOKS[1], LOOKS[0] * end / duration)) + 2)
+    start = float(history.contacts[:, 1].min())
+    times = np.linspace(start, end, int(min(LOOKS[1], LOOKS[0] * (end - start) / duration)) + 2)
     approach, doubt = history.motion(times), np.zeros((len(times), 1))
     doubt[:, 0] = np.maximum.accumulate(np.abs(approach - other.motion(times)).max(axis=1))
     row = np.searchsorted(history.steps[:, 0], times, side="right") - 1
     closed = history.pressed[row] & (times < history.end_time)[:, None]
     nearest = np.zeros(approach.shape, bool)
     nearest[1:-1] = (approach[1:-1] >= approach[:-2]) & (approach[1:-1] >= approach[2:])
-    nearest &= ~closed & (times > history.contacts[:, 1].min(initial=np.inf))[:, None]
+    nearest &= ~closed
     return bool((nearest & (approach > -doubt)).any())
 
 

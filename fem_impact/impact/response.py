@@ -174,8 +174,14 @@ class History:
         return q, p
 
     def motion(self, times: np.ndarray) -> np.ndarray:
-        """Approach [m] of the modes at ascending times, (n_times, n_contacts), without the dip of those left out."""
-        return self.offset + self.states(times)[0] @ self.shape.T
+        """Approach [m] of the modes at ascending times, (n_times, n_contacts), without the dip of those left out.
+
+        Needs the end state, which only the modes of the run itself have.
+        """
+        n = int(np.searchsorted(times, self.end_time))
+        ended = replace(self, start_q=self.end_q, start_p=self.end_p, steps=self.steps[:0])
+        q = np.vstack([self.states(times[:n])[0], ended.states(times[n:] - self.end_time)[0]])
+        return self.offset + q @ self.shape.T
 
     @cached_property
     def contacts(self) -> np.ndarray:

@@ -91,3 +91,12 @@ def test_a_body_that_stops_has_no_negative_restitution():
     touch = [fi.Touch(fi.Contact.linear(1e6), 0, 1)]
     hit = fi.collide([fi.Modes.rigid(0.1)] * 2, touch, speeds=[1.0, 0.0])
     assert abs(hit.restitution) < 1e-12 and "restitution 0.00000 at 1 m/s" in hit.summary()
+
+
+def test_motion_after_the_end_needs_no_replay():
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=40, damping_ratio=0.01)
+    hit = fi.strike(plate, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), at=(0.465, 0.3), speed=1.0, tolerance=1e-3)
+    history = hit.history
+    times = np.linspace(0.0, 3.0 * history.end_time, 40)
+    replayed = history.offset + history.states(times)[0] @ history.shape.T
+    assert_allclose(history.motion(times), replayed, rtol=0, atol=1e-12 * np.abs(replayed).max())

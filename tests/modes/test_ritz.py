@@ -84,6 +84,28 @@ def test_mass_orthonormal_however_many(rectangle):
     assert np.abs(gram - np.eye(200)).max() < 1e-10
 
 
+@pytest.mark.parametrize("places", [AT, [(0.12, 0.1), (0.3, 0.2)]])
+@pytest.mark.parametrize("count", [30, 31, 32])  # a block of two vectors may be cut
+def test_pairs_are_those_of_the_projected_stiffness(rectangle, places, count):
+    krylov = Krylov(rectangle, np.array(places), 3e4)
+    krylov.grow(40)
+    basis = krylov.vectors[:count]
+    value, turn = np.linalg.eigh(basis @ (rectangle.K @ basis.T))
+    rate, modes = rectangle.frame.rate, krylov.modes(count)
+    # rounding of the largest eigenvalue, 1e9 times the lowest, spoils the dense ones
+    assert modes.omega == pytest.approx(np.sqrt(value) * rate, rel=1e-6)
+    # squares do not depend on the sign of a pair
+    rows = (krylov.loads.T @ basis.T) @ turn * rectangle.frame.mass**-0.5
+    assert modes.shape_at(places) ** 2 == pytest.approx(rows**2, abs=1e-5 * np.square(rows).max())
+
+
+def test_low_frequencies_keep_their_digits_however_many_vectors(rectangle):
+    """From the projected stiffness itself they would differ by 5e-9."""
+    krylov = Krylov(rectangle, AT, 3e4)
+    few, many = (krylov.modes(n).omega[:5] for n in (200, 500))
+    assert many == pytest.approx(few, rel=1e-12)
+
+
 def test_all_that_a_small_mesh_can_reach():
     system = fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.3), SPRUCE, {"boundary": "hinged"})
     seen = fi.ritz_modes(system, [(0.2, 0.15)], max_frequency=5e3, n_vectors=5000)
@@ -116,6 +138,7 @@ def test_two_contacts_on_one_plate(rectangle):
     # both claims together
     assert hits[0].peak_force == pytest.approx(hits[1].peak_force, rel=1e-3 + float(hits[0].error))
     assert hits[0].impulse == pytest.approx(hits[1].impulse, rel=1e-3 + float(hits[0].error))
+    assert hits[0].contact_time == pytest.approx(hits[1].contact_time, rel=1e-3 + float(hits[0].error))
 
 
 def test_scaled_damped_and_truncated_with_their_doubts(rectangle):
