@@ -134,6 +134,10 @@ def synthesise(
     rate, heard = _audible(response, rate)
     times = response.time[0] + np.arange(_length(response, heard, duration, rate)) / rate
     shape = modes.shape_at(point)[0]  # (n_modes,)
+    if response.history.stretched is not None:  # the modes pull on each other: none rings on its own
+        blocks = [response.modal_state(times[i : i + BLOCK])[1] for i in range(0, len(times), BLOCK)]
+        velocity = np.concatenate([p @ np.where(heard, shape, 0.0) for p in blocks])
+        return _scaled(velocity, rate, FULL_SCALE, "m/s", normalise)
     flights = _flights(response, times)
     alone = np.ones(len(times), bool)  # samples whose states are asked for: all but those within the flights
     for first, last in flights:
@@ -204,6 +208,8 @@ def radiate(
     shapes = modes.shapes.at(points)[:, heard] * (weights / way)[:, None]  # (n_points, n_heard)
     times = response.time[0] + np.arange(_length(response, heard, duration, rate)) / rate
     n_first = int(np.searchsorted(times, response.time[-1] + way.max() / speed, side="right"))
+    if response.history.stretched is not None:
+        n_first = len(times)
     first = _arrival(response, times[:n_first], heard, shapes, way / speed)
     delayed = np.stack(
         [np.einsum("km,km->m", shapes, np.exp(-np.outer(way / speed, r))) for r in _roots(response, heard)]
