@@ -11,21 +11,25 @@ import numpy as np
 from .._base import check
 from .._base.check import SimulationError
 from ..modes.modal import Modes, left_out
+from ..modes.stretching import Stretching, stretch
 from . import accuracy, force_spectrum, promise
 from .compiled import build, record
 from .compiled.collocation import run_collocation
 from .compiled.energy import run_energy
 from .compiled.law import FELT
+from .compiled.stretched import run_stretched
 from .contact import Contact, acting_stiffness, wall_time
 from .quantities import asked_for
 from .response import Dip, Error, History, Response
 from .state import State
+from .stretched import Stretched
 from .striker import Striker
 
 TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
 SCHEMES = ("A", "A4", "collocation")
 MAX_STEPS = 500_000  # [-] of one run: takes about one second
 MAX_WORK = 500_000_000  # [-] modes times steps of one run: takes about one second
+STRETCHED_WORK = 1_000_000_000  # [-] entries of the forms times steps of one run with stretching: some ten seconds
 PLAIN_WORK = 300_000  # [-] modes times steps of one run, if the kernels are not compiled
 REACHED = 20.0  # [-] tolerance advised over the error reached: the steps it leads to may be twice as long
 SOONER = 0.2  # [-] of a run that was given up, what is advised: the last run of a blow halves the steps twice
@@ -102,6 +106,7 @@ class _System:
     law: np.ndarray
     start_q: np.ndarray
     start_p: np.ndarray
+    stretched: Stretched | None = None  # if one of the bodies stretches
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)  # always: numba would compile the kernels again for writable arrays
@@ -146,6 +151,7 @@ class _Part:
     force: float  # [N] constant force at its first contact
     points: np.ndarray  # (n_ends, dimension) [m] contact points
     pressed: np.ndarray  # (2, n_ends) [N], [N/s] contact forces at the start and their rates
+    stretching: Stretching | None = None
 
 
 @check.typed
@@ -166,6 +172,7 @@ def strike(
     striker_force: float = 0.0,
     target_force: float = 0.0,
     start: State | Response | None = None,
+    stretching: bool = False,
 ) -> Response:
     """Strike a body with known modes; see `fi.strike`."""
     if speed is None and start is None:
@@ -182,6 +189,8 @@ def strike(
     struck = _part(modes, ((0, -1.0),), point, rows, rest, forces[1])
     if before is not None:
         struck = _moving(struck, *before.of(-1, "modes", modes))
+    if check.flag("stretching", stretching) or modes.stretches:
+        struck = replace(struck, stretching=stretch(modes))
 
     def blow(striker: Striker, speed: float, own: tuple[np.ndarray, np.ndarray] | None = None) -> Response:
         touch = Touch(contact, 0, 1, striker.at[None], point)
@@ -437,8 +446,10 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
     shape = np.zeros((len(contacts), n_modes))
     # frequency, damping ratio, signed shape (n_contacts,), constant force, static deflection and its rate
     extra: list[tuple[float, float, np.ndarray, float, float, float]] = []
-    start = 0
+    start, stretched = 0, None
     for part in parts:
+        if part.stretching is not None:
+            stretched = Stretched(part.stretching.forms, start)
         for (i, sign), row in zip(part.touched, part.rows):
             shape[i, start : start + len(row)] += sign * row
         start += len(part.omega)
@@ -463,7 +474,7 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
         shape = np.ascontiguousarray(np.hstack([shape, *(mode[2][:, None] for mode in extra)]))
         lists = [[*one, np.array([mode[k] for mode in extra])] for one, k in zip(lists, (0, 1, 3, 4, 5))]
     omega, zeta, bias, q, p = (np.concatenate(one) for one in lists)
-    return _System(omega, zeta, shape, offset, bias, law, q, p)
+    return _System(omega, zeta, shape, offset, bias, law, q, p, stretched)
 
 
 def _rated(law: np.ndarray) -> np.ndarray:
@@ -487,7 +498,8 @@ def _poorer(part: _Part, modes: Modes) -> _Part:
     turned = here @ left @ right
     rows, velocity = rows.copy(), velocity.copy()
     rows[:, rigid], velocity[rigid] = turned[:-1], turned[-1]
-    return _part(modes, part.touched, part.points, rows, rest, part.force, velocity)
+    poorer = _part(modes, part.touched, part.points, rows, rest, part.force, velocity)
+    return replace(poorer, stretching=None if part.stretching is None else stretch(modes))
 
 
 def _may_touch(history: History, other: History, duration: float) -> bool:
@@ -541,6 +553,7 @@ def _thinned(part: _Part, wanted: float) -> tuple[_Part, float]:
     thin = replace(
         part, omega=part.omega[:n], zeta=part.zeta[:n], rows=part.rows[:, :n], rest=part.rest + gone @ gone.T,
         q=part.q[:n], p=part.p[:n], bias=part.bias[:n],
+        stretching=None if part.stretching is None else part.stretching.truncated(n),
     )  # fmt: skip
     return thin, float(flexible[-1] / part.omega[n - 1])
 
@@ -646,6 +659,10 @@ def _controlled(
     differ = partial(_difference, quantities)
     missed = _force_missed if "force" in quantities else lambda _: 0.0
     free = scheme is None and dt is None if free is None else free
+    if system.stretched is not None:
+        if scheme == "collocation":
+            raise ValueError("scheme collocation knows no stretching; use A4")
+        scheme = scheme or "A4"
     scheme = scheme or _scheme_for(tolerance, float(system.law[:, 1].min()))
     if scheme == "collocation" and (system.law[:, 1] < 1.0).any():
         raise ValueError(f"scheme collocation needs exponents of at least 1, got {system.law[:, 1].min():g}; use A4")
@@ -683,7 +700,7 @@ def _controlled(
             break
     if met is not None:
         return met
-    if free and scheme == "A4" and (system.law[:, 1] >= 1.0).all():
+    if free and scheme == "A4" and (system.law[:, 1] >= 1.0).all() and system.stretched is None:
         return _controlled(system, "collocation", dt, tolerance, quantities, pace, horizon, n_max, True)
     hint, enough = "", min(REACHED * best, 1.0)
     advice = f"raise tolerance to {float(f'{enough:.1e}'):g}" if free else "leave out scheme"
@@ -730,9 +747,11 @@ def _longest_lossy(system: _System, pace: tuple[float, float], tolerance: float)
 
 def _most_steps(system: _System) -> int:
     """Steps after which a run gives up."""
-    if build.COMPILED:
-        return min(MAX_STEPS, max(1000, MAX_WORK // len(system.omega)))
-    return max(100, PLAIN_WORK // len(system.omega))
+    if not build.COMPILED:
+        return max(100, PLAIN_WORK // len(system.omega))
+    if system.stretched is not None:
+        return min(MAX_STEPS, max(1000, STRETCHED_WORK // system.stretched.forms.size))
+    return min(MAX_STEPS, max(1000, MAX_WORK // len(system.omega)))
 
 
 def _run(
@@ -745,24 +764,32 @@ def _run(
     )  # fmt: skip
     noise = NOISE * pace[0] * pace[1], STILL * pace[1]
     most = _most_steps(system)
-    if scheme == "collocation":
+    stretched = system.stretched
+    if stretched is not None:
+        stretched = replace(stretched, base=float(size), ramp=scheme == "A4")
+        result = run_stretched(
+            *parts, stretched.forms, stretched.first, int(stretched.ramp), float(size), *noise, float(horizon), n_max,
+            most,
+        )  # fmt: skip
+    elif scheme == "collocation":
         nodes, powers = _gauss(NODES)
         result = run_collocation(
             *parts, nodes, powers, pace[0] / 2.0, pace[1], float(size), *noise, float(horizon), n_max, most
         )
     else:
         result = run_energy(*parts, int(scheme == "A4"), float(size), *noise, float(horizon), n_max, most)
+    history = replace(History(*parts, *result), stretched=stretched)
     time, status = result[5], result[6]
     if status == record.EXHAUSTED:
         raise SimulationError(
             f"no final separation was reached in {most} steps, up to {time:.4g} s; raise {chosen_by}, or give "
-            f"{_sooner(History(*parts, *result))}"
+            f"{_sooner(history)}"
         )
     if status == record.FAILED:
         raise SimulationError(
             f"scheme {scheme} found no valid next step at {time:.4g} s; use scheme A4, or check the units of the scene"
         )
-    return History(*parts, *result)
+    return history
 
 
 def _sooner(history: History) -> str:
@@ -774,12 +801,12 @@ def _sooner(history: History) -> str:
     )
 
 
-def again(history: History, **changed: np.ndarray) -> History:
+def again(history: History, **changed: Any) -> History:
     """The same blow with other modes or contacts, by A4 in the steps of a first run, to compare with another such run.
 
     ``changed`` are fields of the history; without any, it is the blow to compare with.
     """
-    fields = ("omega", "zeta", "shape", "offset", "bias", "law", "start_q", "start_p")
+    fields = ("omega", "zeta", "shape", "offset", "bias", "law", "start_q", "start_p", "stretched")
     before = _System(*(getattr(history, name) for name in fields))
     system = replace(before, **changed)
     pace = _pace(before)

@@ -11,12 +11,14 @@ import numpy as np
 from .._base import check, markup
 from ..fe import plausible
 from ..modes.modal import Modes, SampledShapes, at_rest
+from ..modes.stretching import stretch
 from . import assumption, force_spectrum, promise
 from .assumption import Assumption
 from .compiled import law, propagation, record
 from .contact import Contact
 from .quantities import USUAL, words
 from .state import State
+from .stretched import Stretched
 from .striker import Striker
 
 CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more than this factor
@@ -103,6 +105,8 @@ class History:
     status: int  # why the run ended, see `record`
     n_fallback: int  # [-] steps in which scheme A4 fell back to A
     n_blind: int  # [-] steps that passed over contact events without locating them
+    stretched: Stretched | None = None  # if one of the bodies stretches
+    reached: dict[str, Any] = field(default_factory=dict, init=False, repr=False)  # where its motion goes on
 
     __repr__ = check.brief
 
@@ -166,6 +170,8 @@ class History:
 
     def states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Modal displacements and velocities (n_times, n_modes) at ascending times; free motion after the end."""
+        if self.stretched is not None:
+            return self.stretched.states(self, times)
         q, p = np.empty((len(times), len(self.omega))), np.empty((len(times), len(self.omega)))
         propagation.replay(
             self.omega, self.zeta, self.shape, self.bias, self.start_q, self.start_p, self.steps, self.n_coefficients,
@@ -228,7 +234,8 @@ class History:
 
     def energy(self, q: np.ndarray, p: np.ndarray, modes: slice = slice(None)) -> float:
         """Energy [J] of some modes at a state, in the field of the constant forces."""
-        return float(mode_energy(self.omega[modes], q[modes], p[modes]).sum() - self.bias[modes] @ q[modes])
+        linear = float(mode_energy(self.omega[modes], q[modes], p[modes]).sum() - self.bias[modes] @ q[modes])
+        return linear if self.stretched is None else linear + self.stretched.energy(q, modes)
 
 
 def mode_energy(omega: np.ndarray, q: np.ndarray, p: np.ndarray) -> np.ndarray:
@@ -378,6 +385,8 @@ class Response:
         bias = -self._push * shape[0]
         rest = {"start_q": still, "start_p": still, "end_q": still, "end_p": still, "bias": bias}
         driven: dict[str, Any] = {"omega": modes.omega, "zeta": modes.damping_ratio, "shape": shape, **rest}
+        if self.history.stretched is not None:
+            driven["stretched"] = replace(self.history.stretched, forms=stretch(modes).forms, first=0)
         return replace(self.history, **driven)
 
     @property

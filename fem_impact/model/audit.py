@@ -69,6 +69,8 @@ def required(target: Target, hit: Response) -> tuple[Target, str] | None:
             return replace(target, theory=theory), f"the target has shear and rotary inertia ({theory}), {because}"
         if each.name == "still air" and target.mesh.dimension == 2 and target.air is None:
             return replace(target, air=BOTH), f"the target moves air on both sides, {because}"
+        if each.name == "small deflections" and target.can_stretch and not target.stretching:
+            return replace(target, stretching=True), f"the target stiffens as it stretches, {because}"
     return None
 
 

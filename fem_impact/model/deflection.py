@@ -11,6 +11,8 @@ Berger (1955), J. Appl. Mech. 22, 465-472; Chu and Herrmann (1956), J. Appl. Mec
 (1950), J. Appl. Mech. 17, 35-36 (beams).
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..fe.section import Plate
@@ -29,7 +31,11 @@ DENT = 0.7  # [-] stiffening of a wide plate under a point force over (deflectio
 SLOWER = 3.0  # [-] a mode that is slower or faster than bending waves by this rocks or is pulled; wood differs by less
 NUMBER = "deflection over thickness"
 GONG = 1.0  # [-] deflection over thickness beyond which no first-order estimate of the stretching helps
+SOFTER = 0.14  # [-] of Berger's stiffness of a plate: what it has too much, from a hinged square
+PERIODS, PER_PERIOD = 2.0, 64.0  # [-] periods of the first mode after a blow that are looked through for its deflection
 REMEDY = "take a softer blow or a thicker body: stretching is not modelled"
+BETTER = "let it stretch, stretching = true, or take a softer blow or a thicker body"
+LOCAL = "take a softer blow or a thicker body: local stretching is not modelled"
 A_GONG = "this is a gong: large deflections are not modelled"
 
 
@@ -38,8 +44,11 @@ def of_target(struck: Struck) -> Assumption:
     body, quantities = struck.target, struck.quantities
 
     def told(value: float | None, effect: dict, unknown: str = "") -> Assumption:
-        remedy = "give material and section" if unknown else A_GONG if value is not None and value > GONG else REMEDY
-        return Assumption("small deflections", value, LIMIT, effect, quantities, remedy, NUMBER, unknown)
+        remedy, limit = REMEDY if body is None or body.held != 1.0 else BETTER, LIMIT
+        if struck.hit.history.stretched is not None:
+            remedy, limit = LOCAL, GONG
+        remedy = "give material and section" if unknown else A_GONG if value is not None and value > GONG else remedy
+        return Assumption("small deflections", value, limit, effect, quantities, remedy, NUMBER, unknown)
 
     if struck.hit.bodies[-1].dimension == 0:
         return told(0.0, dict.fromkeys(quantities, 0.0))
@@ -49,6 +58,8 @@ def of_target(struck: Struck) -> Assumption:
         return told(*_simplified(struck, body))
     hit, integrals = struck.hit, struck.bending
     assert integrals is not None
+    if hit.history.stretched is not None:
+        return told(*_stretched(struck, body, integrals))
     history, mine = hit.history, struck.mine
     end = max((impact.end for impact in hit.impacts), default=history.end_time)
     times = np.linspace(0.0, end, TIMES + 1)[1:]
@@ -76,6 +87,40 @@ def of_target(struck: Struck) -> Assumption:
     return told(
         max(largest, ringing) / body.thickness, effect, "the thickness" if effect.get("sound", 0.0) is None else ""
     )
+
+
+def _stretched(struck: Struck, body: Known, integrals: Bending) -> tuple[float, dict[str, float | None]]:
+    """A blow that has Berger's tension in it: how large it gets, and what that tension misses.
+
+    Berger's stiffness of a plate is SOFTER too large where the whole plate bends, and too small where a part of it does
+    that is held by the part around it.
+    """
+    hit, mine, history = struck.hit, struck.mine, struck.hit.history
+    assert history.stretched is not None and body.thickness is not None
+    end = max((impact.end for impact in hit.impacts), default=history.end_time)
+    after = PERIODS * 2.0 * np.pi / float(history.omega[mine][0])
+    times = np.linspace(0.0, end, TIMES + 1)[1:]
+    moved = history.states(np.append(times, np.linspace(end, end + after, int(PERIODS * PER_PERIOD))))[0][:, mine]
+    value = float(np.abs(moved @ history.shape[0, mine]).max(initial=0.0)) / body.thickness
+    effect: dict[str, float | None] = dict.fromkeys(struck.quantities, 0.0)
+    if isinstance(body.section, Plate):
+        stretch = moved[: len(times)] ** 2 @ integrals.slope
+        whole = _tension(body, stretch, np.full(len(times), body.extent))
+        more = _tension(body, stretch, _bent_area(body, integrals, times)) - whole
+        held = float(more @ stretch / stretch.sum()) if stretch.any() else 0.0
+        omega = np.sqrt(history.omega[mine] ** 2 + held * integrals.slope)
+        less = replace(history.stretched, forms=np.sqrt(1.0 - SOFTER) * history.stretched.forms)
+        both = struck.changes(omega=struck.of_target(omega)), struck.changes(stretched=less)
+        for name in effect:
+            parts = [change[name] for change in both]
+            effect[name] = None if None in parts else max(x for x in parts if x is not None)
+    if "sound" in effect:
+        soft = integrals.slope / history.omega[mine] ** 2
+        mean = float(np.mean(_tension(body, moved[len(times) :] ** 2 @ integrals.slope, np.array([body.extent]))))
+        rise = np.sqrt(1.0 + mean * soft) - 1.0
+        weight = struck.energy / (struck.energy.sum() or 1.0)
+        effect["sound"] = SOFTER * float(weight @ rise) if isinstance(body.section, Plate) else 0.0
+    return value, effect
 
 
 def _tension(body: Known, stretch: np.ndarray, extent: np.ndarray) -> np.ndarray:

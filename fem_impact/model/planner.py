@@ -240,6 +240,7 @@ class _Asked:
             options = collision.Options.checked(values.get("tolerance", collision.TOLERANCE), *wanted)
             values |= {"dt": options.dt, "duration": options.horizon if np.isfinite(options.horizon) else None}
             speed = check.positive("speed", values["speed"], "m/s")
+            values["stretching"] = check.flag("stretching", values.get("stretching", False)) or blow.target.stretching
             for name in ("striker_force", "target_force"):
                 values[name] = check.number(name, values.get(name, 0.0), "N")
         duration = accuracy.contact_duration(blow.contact, blow.striker.felt_mass, speed)
@@ -458,10 +459,11 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
 def _idealised(asked: _Asked, target: str | None, stages: Stages) -> Plan | None:
     """The plan with a rigid or infinite target, if that is accurate enough or the user asks for it; else None."""
     blow, values = asked.blow, asked.values
-    if blow.target.thick or blow.target.air:
+    if blow.target.thick or blow.target.air or values["stretching"]:
         if target is not None:
             raise ValueError(
-                f"{blow.name}target = {target!r} is known for thin bodies in a vacuum only; use target = 'modal'"
+                f"{blow.name}target = {target!r} is known for thin bodies in a vacuum that do not stretch; "
+                "use target = 'modal'"
             )
         return None
     pressed = values.get("striker_force") or values.get("target_force") or blow.contact.gap < 0.0
@@ -563,13 +565,14 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     blow, values = asked.blow, asked.values
     if target == "modal":
         return None
-    fits = vectors.usable(blow.target) and values.get("residual", True)
+    fits = vectors.usable(blow.target) and values.get("residual", True) and not values["stretching"]
     fits = fits and not {"n_modes", "max_frequency"} & set(asked.pieces)
     if not fits:
         if target == "vectors":
             raise ValueError(
                 f"{blow.name}target = 'vectors' needs a thin plate in a vacuum by elements that can be meshed again, "
-                "its residual, no n_modes or max_frequency, and no damping ratios mode by mode; use target = 'modal'"
+                "its residual, no stretching, no n_modes or max_frequency, and no damping ratios mode by mode; use "
+                "target = 'modal'"
             )
         return None
     band = asked.quantities.get("sound")
@@ -679,6 +682,8 @@ def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: fl
     why = f"the contact lasts about {asked.duration:.3g} s"
     if band > needed:
         kept += f" ({band:g} Hz requested, {needed:.4g} Hz needed for the blow)"
+    if asked.values["stretching"]:
+        kept += "; it stiffens as it stretches"
     plan = _plan(
         asked, target="modal", errors={"target modes left out": left}, reasons=(why, kept), mass=modes.mass,
         n_modes=number, max_frequency=limit, first=first, margin=margin,
@@ -728,7 +733,8 @@ def _plan(
         bending, whole = kept - modes.n_rigid, modes.n_modes - modes.n_rigid
         stiff = "is treated as rigid" if bending == 0 else f"keeps {bending} of its {whole} bending modes"
         reasons = (*reasons, f"the striker {stiff}")
-    fixed = asked.values.get("scheme"), asked.values.get("dt")
+    scheme = asked.values.get("scheme") or ("A4" if asked.values["stretching"] else None)
+    fixed = scheme, asked.values.get("dt")
     scheme, dt = collision.steps_for(
         asked.blow.contact, asked.duration, steps * asked.tolerance, asked.quantities, *fixed
     )
@@ -843,6 +849,9 @@ def strike(
         Time step in contact. If given, the step error is only estimated and may exceed the tolerance.
     striker_force, target_force : float [N]
         Constant forces at the contact points, positive along the blow; for example the weight of a falling ball.
+    stretching : bool
+        Whether deflections that are not small stretch a body held all round, and so stiffen it: Berger's tension, good
+        up to deflections of about the thickness. Scheme A or A4; the motion after the blow stretches, too.
     damping_ratio : float or function of frequency [Hz], optional
         Damping of a system, which has none of its own.
     strict : bool

@@ -12,12 +12,23 @@ import numpy as np
 from .._base import check
 from .._base.remembered import Remembered
 from ..fe import plausible, refinement
-from ..fe.assembly import THEORIES, THICK, System, assemble, notes_on, reassemble, unknowns_near
+from ..fe.assembly import (
+    THEORIES,
+    THICK,
+    System,
+    assemble,
+    notes_on,
+    reassemble,
+    support_of_facets,
+    support_words,
+    unknowns_near,
+)  # fmt: skip
 from ..fe.section import Beam, Plate
 from ..mesh.meshes import Mesh
 from ..modes import analytic, modal
 from ..modes.air import in_air
 from ..modes.modal import Damping, FieldShapes, Modes
+from ..modes.stretching import HELD
 
 MODELS = ("stated", "auto")  # whether the theory and the air of a target are chosen
 BOTH = "both sides"
@@ -69,8 +80,9 @@ class Target:
     theory: str | None = None  # "kirchhoff", "mindlin", "euler", "timoshenko"; None is the thin one
     system: System | None = None  # assembled by the user
     modes: Modes | None = None  # found by the user
-    model: str = "stated"  # "auto" takes a thick theory and the air around where the tolerance requires them
+    model: str = "stated"  # "auto" takes a thick theory, air and stretching where the tolerance requires them
     air: str | None = None  # which sides face open air in a rigid wall, of AIR; None is a vacuum
+    stretching: bool = False  # whether large deflections stretch and stiffen it
     blame: Blame = _nobody
 
     def __post_init__(self) -> None:
@@ -105,6 +117,13 @@ class Target:
         return self.theory in THICK
 
     @property
+    def can_stretch(self) -> bool:
+        """Whether it is known how it stretches: material and section are stated, and supports hold its whole edge."""
+        if self.mesh is None or self.section is None or self.scale:
+            return False
+        return set(support_of_facets(self.mesh, dict(self.supports), support_words(self.theory))) <= set(HELD)
+
+    @property
     def kind(self) -> str:
         """Where the modes come from: "modes", "fe" or "analytic"."""
         if self.modes is not None:
@@ -135,7 +154,8 @@ class Target:
     def surrounded(self, modes: Modes) -> Modes:
         """The modes as struck: scaled, damped and in the air around."""
         modes = self.finished(modes)
-        return modes if self.air is None else in_air(modes, sides=AIR[self.air])
+        modes = modes if self.air is None else in_air(modes, sides=AIR[self.air])
+        return replace(modes, stretches=True) if self.stretching else modes
 
     @cached_property
     def stretch(self) -> float:

@@ -36,10 +36,10 @@ MOST_VECTORS = 2000  # [-] limit on their number: a mesh of 20 000 unknowns take
 
 
 def usable(target: Target) -> bool:
-    """Whether vectors can describe the target: a thin plate in a vacuum that can be meshed again."""
+    """Whether vectors can describe the target: a thin plate in a vacuum, not stretched, that can be meshed again."""
     if target.kind != "fe" or target.mesh is None or target.mesh.dimension != 2 or target.mesh.recipe is None:
         return False
-    if target.thick or target.air:
+    if target.thick or target.air or target.stretching:
         return False
     ratio = target.damping_ratio
     by_mode = not callable(ratio) and np.ndim(ratio if ratio is not None else 0.0) > 0

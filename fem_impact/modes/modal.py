@@ -226,6 +226,7 @@ class Modes:
     section: Plate | Beam | None = field(default=None, repr=False)  # None if not known, as that of a scaled body
     thick: bool = field(default=False, repr=False)  # whether shear and rotary inertia are in them
     air: bool = field(default=False, repr=False)  # whether the air around the body is in them
+    stretches: bool = field(default=False, repr=False)  # whether a blow lets them stretch the body, see `stretching`
 
     __repr__ = check.brief
 

@@ -98,12 +98,13 @@ def target_values(
     source="auto",
     theory=None,
     air=None,
+    stretching=False,
     model="stated",
 ) -> dict[str, Any]:
     """Check the table [target].
 
     It has mass and first frequency to scale to, nu without a material, damping, point masses, the source of modes,
-    the theory, the sides in air and whether these two are chosen.
+    the theory, the sides in air, whether it stretches and whether these three are chosen.
     """
     check.between("nu", nu, LOWEST_NU, 0.5)
     scale = {"mass": (mass, "kg"), "first_frequency": (first_frequency, "Hz")}
@@ -115,6 +116,7 @@ def target_values(
         "point_masses": tuple(_weight(i, entry) for i, entry in enumerate(point_masses)),
         "source": check.one_of("source", source, SOURCES),
         "model": check.one_of("model", model, MODELS),
+        "stretching": check.flag("stretching", stretching),
         "air": None if air is None else check.one_of("air", air, list(AIR)),
         "theory": None if theory is None else check.one_of("theory", theory, [*THEORIES[2], *THEORIES[1]]),
     }
@@ -193,15 +195,8 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
 }  # fmt: skip
 TABLES = [*MAKERS, "supports"]
 REQUIRED = ("mesh", "striker", "contact", "strike")
-SUPPLIED = {
-    "material",
-    "modes",
-    "striker",
-    "contact",
-    "sphere",
-    "plate",
-    "start",
-}  # arguments that come from other tables
+# arguments that come from other tables
+SUPPLIED = {"material", "modes", "striker", "contact", "sphere", "plate", "stretching", "start"}
 PATHS = ("source", "path")  # keys that name a file, relative to the scene file
 
 

@@ -151,6 +151,9 @@ def _parts(response: Response | Strokes, times: np.ndarray) -> list[tuple[Respon
 
 def _velocity(response: Response, heard: np.ndarray, shape: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Velocity [m/s] of a point at equally spaced times of one blow, (n_times,)."""
+    if response.history.stretched is not None:  # the modes pull on each other: none rings on its own
+        blocks = [response.modal_state(times[i : i + BLOCK])[1] for i in range(0, len(times), BLOCK)]
+        return np.concatenate([p @ np.where(heard, shape, 0.0) for p in blocks])
     flights = _flights(response, times)
     alone = np.ones(len(times), bool)  # samples whose states are asked for: all but those within the flights
     for first, last in flights:
@@ -226,6 +229,7 @@ def radiate(
     pressure = []
     for hit, part, local in _parts(response, times):
         n_first = int(np.searchsorted(local, hit.time[-1] + way.max() / speed, side="right"))
+        n_first = n_first if hit.history.stretched is None else len(local)
         pressure.append(_arrival(response, times[part][:n_first], heard, shapes, way / speed, 1.0 / rate))
         if n_first < len(local):
             q, p = (state[0, heard] for state in hit.modal_state(local[n_first : n_first + 1]))

@@ -83,7 +83,8 @@ class Grid:
         """Whether all cells are computed together."""
         exponents = self.axes.get("exponent", [self.base.contact.exponent])
         layered = self.base.contact.hard_stiffness or "hard_stiffness" in self.axes
-        return not (self.lossy or layered or self.extra) and min(exponents) >= 1.0
+        alone = self.lossy or layered or self.extra or self.base.modes.stretches
+        return not alone and min(exponents) >= 1.0
 
     @property
     def layers(self) -> list[str]:

@@ -185,6 +185,7 @@ def choose_on(
     target: Target, at: Any, bandwidth: float, masses: Any, *, drop: float = 10.0, stages: Stages | None = None
 ) -> tuple[Hammer, ...]:
     """As `choose`, on a body however it is known."""
+    target = replace(target, stretching=False)  # hammers are chosen for small blows
     masses, centre = _checked(masses), _centre(bandwidth, drop)
     modes, hardest = _body(target, at, masses, centre, stages or Stages())
     flexible = modes.frequencies[modes.omega > 0.0]

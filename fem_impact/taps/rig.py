@@ -209,6 +209,8 @@ def measure(
     check.one_of("quantity", quantity, ("acceleration", "velocity", "displacement"))
     if len(hit.contacts) != 1:
         raise ValueError(f"hit must have one contact, between hammer and structure, got {len(hit.contacts)}")
+    if hit.history.stretched is not None:
+        raise ValueError("hit must be on a structure that does not stretch; strike it with stretching=False")
     last = max((impact.end for impact in hit.impacts), default=0.0)
     span = last + 0.02 if duration is None else check.positive("duration", duration, "s") - before
     if span <= 0.0:

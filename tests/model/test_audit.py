@@ -9,6 +9,7 @@ import pytest
 import fem_impact as fi
 from fem_impact.impact import assumption, collision
 from fem_impact.model import audit, restrike
+from fem_impact.model.target import Target
 
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0, yield_strength=2e9)
@@ -254,6 +255,34 @@ def test_a_scene_takes_the_better_model_that_its_tolerance_requires(tmp_path, bo
     assert any(name in note for note in plans[1]) and not any(f"because '{name}'" in note for note in plans[0])
     assert hits[1].restitution == pytest.approx(better.restitution, abs=1e-9)
     assert abs(hits[0].restitution - better.restitution) > 1e-3
+
+
+@pytest.mark.xdist_group("stretched")
+def test_a_scene_takes_the_stretching_that_its_tolerance_requires(tmp_path):
+    path = tmp_path / "scene.toml"
+    body = {**THICK, "thickness": 1e-3, "mass": 0.05, "stiffness": 1e4}
+    runs = {}
+    for model, key in (("stated", ""), ("auto", ""), ("stated", "stretching = true\n")):
+        text = AUTO.format(model=model, **body).replace("speed = 0.1", "speed = 1.0")
+        path.write_text(text.replace("[supports]", f"{key}[supports]"))
+        runs[model + key] = fi.load_scene(path).run()
+    plain, auto, stated = runs.values()
+    assert named(plain.response.assumptions)["small deflections"].worst > 1e-2
+    note = next(note for note in auto.notes if "stiffens as it stretches" in note)
+    assert "because 'small deflections' would change the blow" in note and auto.plan.blow.target.stretching
+    assert auto.response.restitution == pytest.approx(stated.response.restitution, abs=1e-9)
+    assert abs(plain.response.restitution - stated.response.restitution) > 1e-3
+    assert plain.response.history.stretched is None and stated.plan.target == "modal"
+    path.write_text(text.replace("speed = 1.0", "speed = 1.0\nstretching = true"))
+    with pytest.raises(ValueError, match="stretching is not a key of this table"):  # it belongs to the target
+        fi.load_scene(path)
+
+
+def test_an_edge_that_may_slip_is_not_taken_for_one_that_stretches():
+    plate = fi.Plate(STEEL, 1e-3)
+    for supports, can in (({"boundary": "hinged"}, True), ({"left": "clamped"}, False)):
+        assert Target(fi.mesh.rectangle(0.3, 0.2), plate, supports, source="fe").can_stretch == can
+    assert not Target(fi.mesh.rectangle(0.3, 0.2), plate, {"boundary": "hinged"}, scale={"mass": 1.0}).can_stretch
 
 
 def test_a_scene_keeps_the_simple_model_where_it_is_enough(tmp_path):

@@ -101,6 +101,44 @@ def test_effect_on_a_blow_is_that_of_a_direct_integration(speed):
     )
 
 
+@pytest.mark.xdist_group("stretched")
+@pytest.mark.parametrize("speed", [0.1, 0.3, 0.6])
+def test_effect_on_many_modes_is_that_of_a_blow_with_stretching(speed):
+    how = {"at": (0.08, 0.09), "speed": speed, "tolerance": 1e-4, "max_impacts": 1, "residual": False}
+    hammer, law = fi.Striker.rigid(0.3), fi.Contact.linear(2e4)
+    plain, better = (fi.strike(square(20), hammer, law, stretching=on, **how) for on in (False, True))
+    told = found(plain)
+    for name, key in (("restitution", "restitution"), ("contact_time", "contact_time"), ("force", "peak_force")):
+        size = abs(getattr(better, key) - getattr(plain, key)) / (1.0 if name == "restitution" else getattr(plain, key))
+        assert told.effect[name] > 0.33 * min(size, 0.2)
+        assert size > 0.2 or told.effect[name] < 3.0 * max(size, 0.3 * told.worst)  # where the mean tension is cautious
+
+
+@pytest.mark.xdist_group("stretched")
+def test_what_berger_misses_of_a_blow_is_less_than_what_he_adds():
+    how = {"at": (0.08, 0.09), "tolerance": 1e-3, "residual": False}
+    hammer, law = fi.Striker.rigid(0.1), fi.Contact.linear(2e4)
+    for speed, gong in ((0.5, False), (3.0, True)):
+        plain, better = (fi.strike(square(20), hammer, law, speed=speed, stretching=on, **how) for on in (False, True))
+        told = found(better)
+        times = np.linspace(0.0, better.impacts[-1].end + 0.02, 600)
+        true = np.abs(better.displacement([how["at"]], times)).max() / H
+        assert told.limit == 1.0 and told.value == pytest.approx(true, rel=0.1)
+        assert told.doubtful == gong and ("this is a gong" in told.sentence) == gong
+        assert 0.0 < told.worst < 0.5 * found(plain).worst
+
+
+@pytest.mark.xdist_group("stretched")
+def test_a_beam_between_walls_has_all_its_stretching():
+    bar = fi.Beam.rectangular(STEEL, width=0.02, height=H)
+    beam = fi.analytic.beam(0.3, ends=("hinged", "clamped"), section=bar, n_modes=10)
+    how = {"at": 0.1, "speed": 0.3, "tolerance": 1e-2, "residual": False, "quantity": ("force", "sound=2000")}
+    plain, better = (
+        fi.strike(beam, fi.Striker.rigid(0.01), fi.Contact.linear(1e4), stretching=on, **how) for on in (False, True)
+    )
+    assert found(plain).worst > 1e-3 and found(better).worst == 0.0  # Berger's tension is exact
+
+
 def test_a_thick_plate_keeps_silent():
     hit = fi.strike(square(30, 0.02), fi.Striker.rigid(0.01), fi.Contact.hertz(1e7), at=(0.07, 0.08), speed=0.5)
     assert found(hit).worst < 1e-6 and found(hit).value < 1e-2
