@@ -173,7 +173,8 @@ def table() -> dict[str, dict[str, Any]]:
         "Contact.force": {"self": t["law"], "approach": [1e-4, 2e-4], "rate": 0.1},
         "assemble": {
             "mesh": t["square"], "section": t["plate"], "supports": {"boundary": "hinged"}, "element": "argyris",
-            "point_masses": [((0.1, 0.1), 0.01)], "near": [(0.1, 0.1)], "graded": True,
+            "point_masses": [((0.1, 0.1), 0.01)], "point_supports": [((0.2, 0.2), "hinged")], "near": [(0.1, 0.1)],
+            "graded": True,
         },
         "in_air": {"modes": t["modes"], "density": 1.2, "speed": 343.0, "sides": 1, "baffled": False},
         "ritz_modes": {

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import qr
@@ -18,7 +18,7 @@ from .elements import ArgyrisSpace, Bent, BentMapping, MorleySpace, numbering, q
 from .section import KINDS, SOFT, Beam, Elastic, Plate, evaluate
 from .shear_beam import TimoshenkoSpace
 from .splitting import towards_points
-from .springs import beam_springs, check_masses, edge_springs, plate_springs
+from .springs import beam_springs, check_masses, check_posts, edge_springs, plate_springs
 from .supports import Rim, cells_of_facets, constrain
 from .thick import MindlinSpace, ThickStrain
 
@@ -36,6 +36,17 @@ TINY = 4e-3  # [-] the same if the smallest triangle is below this fraction of t
 CHUNK = 256  # [-] triangles whose strain is computed together, to limit memory
 RESTS = 1e-12  # [-] a point moves if some unknown moves it by more than this; rounding leaves 1e-15
 RIGID = 1e-9  # [-] a rigid motion is free if supports suppress less than this share of it, which is rounding
+
+
+class Attached(NamedTuple):
+    """What is attached to a body at points."""
+
+    masses: list[tuple[np.ndarray, float]]  # points [m] and masses [kg]
+    posts: list[tuple[np.ndarray, float]]  # points [m] and stiffnesses [N/m] of what holds them; infinite if hinged
+
+    @property
+    def points(self) -> list[np.ndarray]:
+        return [point for point, _ in (*self.masses, *self.posts)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +133,7 @@ class System:
     order: float = np.inf  # [-] power of the element size with which corners let the frequency error fall
     softness: float = 1.0  # [-] largest inertia over stiffness on the body, in the frame; sets the shortest waves
     point_masses: tuple = ()  # pairs of point [m] and mass [kg]
+    point_supports: tuple = ()  # pairs of point [m] and stiffness [N/m], infinite if hinged
     strain: Strain | ThickStrain | None = field(default=None, repr=False)
     near: np.ndarray | None = None  # (n_points, 2) [m] points towards which the triangles shrink
     layer: float = 1.0  # [-] size of triangles along free edges of a thick plate, over the usual one
@@ -167,6 +179,7 @@ def assemble(
     *,
     theory: str | None = None,
     point_masses: Sequence = (),
+    point_supports: Sequence = (),
     near: Any = None,
     graded: bool = True,
 ) -> System:
@@ -188,6 +201,9 @@ def assemble(
         a disk of radius 0.325 times the thickness, because under a point it would give way without limit.
     point_masses : sequence of (point [m], mass [kg])
         Masses without extent that move with the plate or beam.
+    point_supports : sequence of (point [m], "hinged" or stiffness [N/m])
+        Points held at rest, free to turn, or by a spring: cords at the nodes of a marimba bar, a post, the feet of a
+        panel. For a clamp of a small radius, give the mesh a hole and clamp its edge.
     near : array_like, shape (n_points, dimension) [m], optional
         Points where forces act, such as the strike point; triangles shrink towards them, and a beam gets a node there.
     graded : bool
@@ -216,18 +232,18 @@ def assemble(
     supports = {} if supports is None else supports
     if callable(getattr(section, "thickness", None)):
         mesh = aligned(mesh)
-    masses = check_masses(point_masses, mesh.dimension)
+    masses = Attached(check_masses(point_masses, mesh.dimension), check_posts(point_supports, mesh.dimension))
     near = None if near is None else check.array("near", near, (None, mesh.dimension), "m", lift=True)
     return _made(mesh, section, supports, element, masses, None if near is None or not len(near) else near, graded)
 
 
 def _made(
-    mesh: Mesh, section: Any, supports: dict, element: str, masses: list, near: np.ndarray | None, graded: bool,
+    mesh: Mesh, section: Any, supports: dict, element: str, masses: Attached, near: np.ndarray | None, graded: bool,
     layer: float = 1.0,
 ) -> System:  # fmt: skip
     """`assemble` with checked arguments, and `System.layer`."""
     none = np.zeros((0, mesh.dimension))
-    marked = np.vstack([none if near is None else near, none, *(point for point, _ in masses)])  # forces act here
+    marked = np.vstack([none if near is None else near, none, *masses.points])  # forces act here
     if mesh.dimension == 1 and isinstance(section, Beam):
         made = _assemble_beam(mesh, section, supports, masses, marked[:, 0], element)
     elif isinstance(section, Plate) and element == "morley":
@@ -293,7 +309,8 @@ def reassemble(
     ``near`` (n_points, dimension) [m], ``layer`` and ``element`` replace those of the system.
     """
     near, layer = system.near if near is None else near, system.layer if layer is None else layer
-    rest = list(system.point_masses), near, system.graded, layer
+    attached = Attached(list(system.point_masses), list(system.point_supports))
+    rest = attached, near, system.graded, layer
     return _made(mesh, system.section, system.supports, element or system.element, *rest)
 
 
@@ -375,16 +392,18 @@ def _plain(space: Any, element_dofs: np.ndarray, n_all: int, local: np.ndarray) 
     return csr_matrix((values.ravel(), (rows, dofs.ravel())), shape=(len(local), n_all))
 
 
-def _supported(masses: list[tuple[np.ndarray, float]], matrices: tuple, maps: tuple, **known: Any) -> System:
-    """The system of a body from matrices for all unknowns, with point masses and supports applied.
+def _supported(attached: Attached, matrices: tuple, maps: tuple, **known: Any) -> System:
+    """The system of a body from matrices for all unknowns, with point masses, point supports and supports applied.
 
     ``matrices`` are K, M and the stiffness of elastic supports and tension, each (n_all, n_all). ``maps`` go from the
     unknowns not fixed by supports to all, (n_all, n_dofs), and back. ``known`` are the other fields of `System`.
     """
     (K, M, springs), (expand, project) = matrices, maps
     space, dofs, frame, n_all = known["space"], known["element_dofs"], known["frame"], expand.shape[0]
-    if masses:
-        points, weights = (np.array(column) for column in zip(*masses))
+    if attached.posts:
+        springs, expand, project = _on_posts(attached.posts, springs, expand, project, known)
+    if attached.masses:
+        points, weights = (np.array(column) for column in zip(*attached.masses))
         for i, point in enumerate(points):
             _check_on(space, frame, f"point of point_masses[{i}]", point[None])
         rows = _interpolation(space, dofs, expand, frame, known["section"], points)
@@ -404,7 +423,33 @@ def _supported(masses: list[tuple[np.ndarray, float]], matrices: tuple, maps: tu
         rigid = np.linalg.solve(factor, rigid.T).T
     K, M = (0.5 * (matrix + matrix.T).tocsc() for matrix in (K, M))
     expand = (expand @ even).tocsr()
-    return System(K=K, M=M, expand=expand, rigid=rigid, held=held, point_masses=tuple(masses), **known)
+    masses, posts = (tuple(each) for each in attached)
+    return System(K=K, M=M, expand=expand, rigid=rigid, held=held, point_masses=masses, point_supports=posts, **known)
+
+
+def _on_posts(posts: list, springs: csc_matrix, expand: csr_matrix, project: csr_matrix, known: dict[str, Any]):
+    """`_supported`'s springs and maps with points held: each hinged one fixes the unknown that moves it most."""
+    space, dofs, frame = known["space"], known["element_dofs"], known["frame"]
+    for i, (point, stiffness) in enumerate(posts):
+        _check_on(space, frame, f"point of point_supports[{i}]", point[None])
+        row = _interpolation(space, dofs, expand, frame, known["section"], point[None])
+        if np.isfinite(stiffness):
+            springs = springs + stiffness / (frame.mass * frame.rate**2) * (row.T @ row)
+            continue
+        moves = (row @ expand).toarray()[0]
+        most = int(np.abs(moves).argmax())
+        if not abs(moves[most]) > RESTS:
+            continue  # at rest already
+        others = np.delete(np.arange(len(moves)), most)
+        shares = -moves[others] / moves[most]
+        given = np.flatnonzero(shares)
+        place = np.concatenate([others, np.full(len(given), most)]), np.concatenate([np.arange(len(others)), given])
+        entries = np.concatenate([np.ones(len(others)), shares[given]])
+        expand = expand @ csr_matrix((entries, place), shape=(len(moves), len(others)))
+        project = project[others]
+    if known.get("strain") is not None:
+        known["strain"] = replace(known["strain"], springs=springs.tocsc())
+    return springs.tocsc(), expand.tocsr(), project.tocsr()
 
 
 def _rigid(every: np.ndarray, springs: csc_matrix, expand: csr_matrix, project: csr_matrix) -> np.ndarray:
@@ -463,7 +508,9 @@ def beam_fields(mesh: Mesh, section: Beam, frame: Frame) -> list[shear_beam.Fiel
     return [field(*kind) for kind in (*kinds, (section.rotary, heavy * square))]
 
 
-def _assemble_timoshenko(mesh: Mesh, section: Beam, supports: dict, masses: list, line: Any, frame: Frame) -> System:
+def _assemble_timoshenko(
+    mesh: Mesh, section: Beam, supports: dict, masses: Attached, line: Any, frame: Frame
+) -> System:
     """Assemble a Timoshenko beam on the elements ``line``."""
     space, fields = TimoshenkoSpace(line), beam_fields(mesh, section, frame)
     dofs, n_all = space.numbering(numbering(line, space.bend))
@@ -481,7 +528,9 @@ def _assemble_timoshenko(mesh: Mesh, section: Beam, supports: dict, masses: list
     )  # fmt: skip
 
 
-def _assemble_beam(mesh: Mesh, section: Beam, supports: dict, masses: list, marked: np.ndarray, element: str) -> System:
+def _assemble_beam(
+    mesh: Mesh, section: Beam, supports: dict, masses: Attached, marked: np.ndarray, element: str
+) -> System:
     """Assemble a beam; ``marked`` are places (n,) [m] where the shear force jumps."""
     centre, length, points = _centred(mesh)
 
@@ -552,7 +601,7 @@ def _bent(mesh: Mesh, centre: np.ndarray, length: float, points: np.ndarray, pla
     return Bent(curves, facets, *cells_of_facets(facets, plane.t.T), plane.t.T)
 
 
-def _assemble_plate(mesh: Mesh, section: Plate, supports: dict, masses: list) -> System:
+def _assemble_plate(mesh: Mesh, section: Plate, supports: dict, masses: Attached) -> System:
     centre, length, points = _centred(mesh)
     plane = triangles(points, mesh.cells)
     bent = _bent(mesh, centre, length, points, plane)
@@ -596,7 +645,7 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict, masses: list) ->
     )  # fmt: skip
 
 
-def _assemble_thick(mesh: Mesh, section: Plate, supports: dict, masses: list) -> System:
+def _assemble_thick(mesh: Mesh, section: Plate, supports: dict, masses: Attached) -> System:
     centre, length, points = _centred(mesh)
     plane = triangles(points, mesh.cells)
     bent = _bent(mesh, centre, length, points, plane)
@@ -635,7 +684,7 @@ def _assemble_thick(mesh: Mesh, section: Plate, supports: dict, masses: list) ->
     )  # fmt: skip
 
 
-def _assemble_morley(mesh: Mesh, section: Plate, supports: dict, masses: list) -> System:
+def _assemble_morley(mesh: Mesh, section: Plate, supports: dict, masses: Attached) -> System:
     if mesh.curved.any():
         raise ValueError("element 'morley' needs straight edges; use 'argyris', or a polygon")
     held = support_of_facets(mesh, supports)

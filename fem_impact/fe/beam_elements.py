@@ -5,7 +5,7 @@ the fourth power of their number, would spoil the lowest modes. One element of d
 rounding.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -193,8 +193,9 @@ def _misfit(fields: Callable, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def energy_errors(
-    space: HermiteSpace, stiffness: np.ndarray, curvature: np.ndarray, load: np.ndarray, moments: np.ndarray
-) -> np.ndarray:
+    space: HermiteSpace, stiffness: np.ndarray, curvature: np.ndarray, load: np.ndarray, moments: np.ndarray,
+    hinges: Sequence = (),
+) -> np.ndarray:  # fmt: skip
     """Error (n,) of the squared energy norm of solutions, from moments in equilibrium with the loads.
 
     The bending moment that balances a load is its double integral plus a linear function. The least difference
@@ -207,6 +208,7 @@ def energy_errors(
     curvature : ndarray, shape (n_cells, n_q, n), of n solutions
     load : ndarray, shape (n_cells, n_q, n), force per length
     moments : ndarray, shape (n_cells, n_q, n), of point forces: each force times the distance beyond its point
+    hinges : sequence of ndarray, shape (n_cells, n_q), distance beyond each point held at rest, by an unknown force
     """
     x, dx = quadrature(space)
     half, upto = 0.5 * space.length[:, None, None], running_integral()
@@ -218,7 +220,9 @@ def energy_errors(
     missed = stiffness[..., None] * curvature - before[:, None] - half * (upto @ shear) - moments
     weight = (dx / stiffness).ravel()
     flat = missed.reshape(weight.size, -1)
-    free = np.sqrt(weight)[:, None] * np.column_stack([np.ones(weight.size), x.ravel()])
+    free = np.sqrt(weight)[:, None] * np.column_stack(
+        [np.ones(weight.size), x.ravel(), *(beyond.ravel() for beyond in hinges)]
+    )
     rest = np.sqrt(weight)[:, None] * flat
     rest -= free @ np.linalg.lstsq(free, rest, rcond=None)[0]
     return (rest**2).sum(axis=0)

@@ -358,7 +358,13 @@ def enclosure(found: Spectrum) -> np.ndarray | None:
     plate, mesh = system.section, system.mesh
     if not isinstance(plate, Plate) or callable(plate.thickness) or plate.material.E_across is not None:
         return None
-    if mesh.curved.any() or system.point_masses or system.element != "argyris" or plate.tension:
+    if (
+        mesh.curved.any()
+        or system.point_masses
+        or system.point_supports
+        or system.element != "argyris"
+        or plate.tension
+    ):
         return None
     if system.rim is None or not all(isinstance(kind, str) for kind in system.supports.values()):
         return None

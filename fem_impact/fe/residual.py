@@ -213,11 +213,19 @@ def energy_errors(
             (frame.local(point[None])[0, 0], mass / frame.mass * np.asarray(system.interpolate(point[None]) @ loads)[0])
             for point, mass in system.point_masses
         ]
+        hinges = []
+        for point, spring in system.point_supports:
+            place = frame.local(point[None])[0, 0]
+            if np.isinf(spring):
+                hinges.append(place)
+            else:
+                pull = spring / (frame.mass * frame.rate**2)
+                pushed.append((place, -pull * np.asarray(system.interpolate(point[None]) @ vectors)[0]))
         if forced is not None:
             pushed += list(zip(frame.local(forced)[:, 0], np.eye(len(forced))))
         errors = shear_beam.energy_errors(
             space, beam_fields(system.mesh, system.section, frame), _of_cells(system, vectors),
-            _of_cells(system, loads), pushed,
+            _of_cells(system, loads), pushed, hinges,
         )  # fmt: skip
         return np.stack([errors, np.zeros_like(errors)])
     x, _ = beam_elements.quadrature(space)
@@ -229,10 +237,18 @@ def energy_errors(
     for point, mass in system.point_masses:
         beyond = (x - frame.local(point[None])[0, 0]).clip(0.0)
         moments += mass / frame.mass * beyond[..., None] * (system.interpolate(point[None]) @ loads)
+    hinges = []
+    for point, spring in system.point_supports:
+        beyond = (x - frame.local(point[None])[0, 0]).clip(0.0)
+        if np.isinf(spring):
+            hinges.append(beyond)
+        else:
+            pull = spring / (frame.mass * frame.rate**2)
+            moments -= pull * beyond[..., None] * (system.interpolate(point[None]) @ vectors)
     if forced is not None:
         moments += (x[..., None] - frame.local(forced)[:, 0]).clip(0.0)
     load = inertia[..., None] * (value @ _of_cells(system, loads))
-    errors = beam_elements.energy_errors(space, stiffness, bend @ _of_cells(system, vectors), load, moments)
+    errors = beam_elements.energy_errors(space, stiffness, bend @ _of_cells(system, vectors), load, moments, hinges)
     return np.stack([errors, np.zeros_like(errors)])
 
 

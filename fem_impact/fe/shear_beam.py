@@ -125,7 +125,7 @@ def springs(sprung: list[tuple[dict[int, float], int, Elastic]], units: np.ndarr
 
 
 def energy_errors(
-    space: TimoshenkoSpace, fields: list[Field], unknowns: np.ndarray, loads: np.ndarray, forces: list
+    space: TimoshenkoSpace, fields: list[Field], unknowns: np.ndarray, loads: np.ndarray, forces: list, hinges: list
 ) -> np.ndarray:
     """Error (n,) of the squared energy norm of solutions, from moments and shear forces in equilibrium with the loads.
 
@@ -138,6 +138,7 @@ def energy_errors(
     unknowns : ndarray, shape (n_cells, LOCAL, n), of the solutions
     loads : ndarray, shape (n_cells, LOCAL, n), fields whose inertia drives them
     forces : list of pairs of place and force (n,)
+    hinges : list of places held at rest, by an unknown force
     """
     x, dx = quadrature(space)
     bending, shear, inertia, rotary = (field(x.ravel()).reshape(x.shape)[..., None] for field in fields)
@@ -156,7 +157,11 @@ def energy_errors(
     rest = np.concatenate([part.reshape(x.size, -1) for part in missed])
     one, none = np.ones((x.size, 1)), np.zeros((x.size, 1))
     scale = np.concatenate([(weight / np.sqrt(field)).reshape(-1, 1) for field in (bending, shear)])
-    free = scale * np.block([[-x.reshape(-1, 1), one], [one, none]])  # the constants of equilibrium
+    free = np.block([[-x.reshape(-1, 1), one], [one, none]])  # the constants of equilibrium
+    for place in hinges:
+        beyond = np.concatenate([(x - place).clip(0.0).ravel(), -(x > place).ravel().astype(float)])
+        free = np.column_stack([free, beyond])
+    free = scale * free
     rest -= free @ np.linalg.lstsq(free, rest, rcond=None)[0]
     return (rest**2).sum(axis=0)
 

@@ -52,6 +52,26 @@ def beam_springs(dofs: list[tuple[int, int]], held: list[Elastic], frame: Any, n
     return coo_matrix((values, (numbers, numbers)), shape=(n_all, n_all)).tocsr()
 
 
+def check_posts(point_supports: Any, dimension: int) -> list[tuple[np.ndarray, float]]:
+    """Check (point, support) pairs; return points (dimension,) [m] and stiffnesses [N/m], infinite if hinged."""
+    if isinstance(point_supports, (str, dict)) or not isinstance(point_supports, Sequence):
+        raise ValueError(f"point_supports must be a list of (point, support) pairs, got {check.shown(point_supports)}")
+    result: list[tuple[np.ndarray, float]] = []
+    for i, entry in enumerate(point_supports):
+        if not isinstance(entry, Sequence) or isinstance(entry, str) or len(entry) != 2:
+            raise ValueError(
+                f"point_supports[{i}] must be a pair (point in m, 'hinged' or a stiffness in N/m), got "
+                f"{check.shown(entry)}"
+            )
+        point = check.array(f"point of point_supports[{i}]", entry[0], (dimension,), "m", lift=True)
+        if isinstance(entry[1], str):
+            check.one_of(f"support of point_supports[{i}]", entry[1], ("hinged",))
+            result.append((point, np.inf))
+        else:
+            result.append((point, check.positive(f"stiffness of point_supports[{i}]", entry[1], "N/m")))
+    return result
+
+
 def check_masses(point_masses: Any, dimension: int) -> list[tuple[np.ndarray, float]]:
     """Check a sequence of (point, mass) pairs; return points (dimension,) [m] and masses [kg]."""
     if isinstance(point_masses, (str, dict)) or not isinstance(point_masses, Sequence):

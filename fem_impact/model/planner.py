@@ -530,7 +530,7 @@ def _unfit(asked: _Asked) -> str:
             raise ValueError(f"at must lie on the body, got {check.shown(asked.values['at'])} m")
     if "first_frequency" in target.scale:
         return "needs E, nu, rho and thickness: first_frequency gives the rigidity only once the modes are known"
-    return "is known for plates of constant thickness only, without tension and without point masses"
+    return "is known for plates of constant thickness only, without tension, point masses and point supports"
 
 
 def _fewer(asked: _Asked, first: Modes, banded: bool) -> str:

@@ -74,6 +74,7 @@ class Target:
     section: Plate | Beam | None = None
     supports: Mapping[str, Any] = field(default_factory=dict)
     point_masses: tuple = ()
+    point_supports: tuple = ()
     scale: Mapping[str, float] = field(default_factory=dict)  # mass [kg], first_frequency [Hz] to scale to
     damping_ratio: Damping | None = None  # None keeps that of the modes
     source: str = "auto"  # "fe", "analytic" or "auto": closed formulas if there are any and no size is stated
@@ -93,7 +94,8 @@ class Target:
         if self.source == "analytic" and self.closed is None:
             raise ValueError(
                 "source = 'analytic' covers beams of constant section, thin rectangles hinged all round and thin disks "
-                "without a hole held alike all round, isotropic and without springs or masses; use source = 'fe'"
+                "without a hole held alike all round, isotropic and without springs, masses or point supports; use "
+                "source = 'fe'"
             )
 
     @classmethod
@@ -101,13 +103,14 @@ class Target:
         """The target that a user has assembled, or whose modes a user has found."""
         if isinstance(body, Modes):
             return cls(modes=body, damping_ratio=damping_ratio)
+        posts = tuple((at, "hinged" if np.isinf(stiffness) else stiffness) for at, stiffness in body.point_supports)
         held, masses = body.supports, body.point_masses
-        return cls(body.mesh, body.section, held, masses, {}, damping_ratio, "fe", body.theory, body)
+        return cls(body.mesh, body.section, held, masses, posts, {}, damping_ratio, "fe", body.theory, body)
 
     @cached_property
     def closed(self) -> Callable[..., Modes] | None:
         """Closed formulas for this body, see `analytic.closed_form`; None if there are none."""
-        if self.mesh is None or self.section is None or self.point_masses:
+        if self.mesh is None or self.section is None or self.point_masses or self.point_supports:
             return None
         return analytic.closed_form(self.mesh, self.section, dict(self.supports), self.theory)
 
@@ -232,8 +235,9 @@ class Target:
         mesh, graded = self._meshed(size, stages), self.system is None or self.system.graded
         with stages("assembly"), self.blame("supports"), np.errstate(all="ignore"):
             return assemble(
-                mesh, self.section, dict(self.supports), point_masses=self.point_masses, near=at, graded=graded
-            )
+                mesh, self.section, dict(self.supports), point_masses=self.point_masses,
+                point_supports=self.point_supports, near=at, graded=graded,
+            )  # fmt: skip
 
     def find(
         self,
@@ -302,8 +306,9 @@ class Target:
         if self.system is not None:
             return self.system if size is None else reassemble(self.system, mesh)
         with stages("assembly"), self.blame("supports"), np.errstate(all="ignore"):
-            held = dict(self.supports)
-            return assemble(mesh, self.section, held, theory=self.theory, point_masses=self.point_masses)
+            held, posts = dict(self.supports), self.point_supports
+            masses = self.point_masses
+            return assemble(mesh, self.section, held, theory=self.theory, point_masses=masses, point_supports=posts)
 
 
 def _squared_wave(bending: Any, tension: float, inertia: Any, frequency: float) -> Any:

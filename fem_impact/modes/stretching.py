@@ -81,10 +81,9 @@ def _integrals(shapes: Shapes, modes: Modes, moduli: np.ndarray) -> tuple[np.nda
         if loose or system.element == "morley":
             edge = "an edge is free or elastic" if loose else "of element 'morley' the slopes are not known"
             raise ValueError(f"{CANNOT}, but {edge}; hold it, or leave stretching out")
-        if isinstance(shapes, FieldShapes):
-            vectors = shapes.vectors
-        else:
-            vectors = (shapes.basis.T @ shapes.turn)[:, : shapes.kept]
+        vectors = (
+            shapes.vectors if isinstance(shapes, FieldShapes) else (shapes.basis.T @ shapes.turn)[:, : shapes.kept]
+        )
         return slopes.products(system, vectors, moduli), slopes.softness(system)
     section = modes.section
     assert section is not None

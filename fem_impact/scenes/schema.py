@@ -95,6 +95,7 @@ def target_values(
     nu=0.3,
     damping_ratio=0.0,
     point_masses=(),
+    point_supports=(),
     source="auto",
     theory=None,
     air=None,
@@ -103,8 +104,8 @@ def target_values(
 ) -> dict[str, Any]:
     """Check the table [target].
 
-    It has mass and first frequency to scale to, nu without a material, damping, point masses, the source of modes,
-    the theory, the sides in air, whether it stretches and whether these three are chosen.
+    It has mass and first frequency to scale to, nu without a material, damping, what is attached at points, the
+    source of modes, the theory, the sides in air, whether it stretches and whether these three are chosen.
     """
     check.between("nu", nu, LOWEST_NU, 0.5)
     scale = {"mass": (mass, "kg"), "first_frequency": (first_frequency, "Hz")}
@@ -114,6 +115,7 @@ def target_values(
         "nu": nu,
         "damping_ratio": over_frequency("damping_ratio", damping_ratio),
         "point_masses": tuple(_weight(i, entry) for i, entry in enumerate(point_masses)),
+        "point_supports": tuple(_post(i, entry) for i, entry in enumerate(point_supports)),
         "source": check.one_of("source", source, SOURCES),
         "model": check.one_of("model", model, MODELS),
         "stretching": check.flag("stretching", stretching),
@@ -126,6 +128,14 @@ def _weight(i: int, entry: Any) -> tuple[Any, float]:
     if not isinstance(entry, dict) or set(entry) != {"at", "mass"}:
         raise ValueError(f"point_masses[{i}] must have at and mass, got {check.shown(entry)}")
     return entry["at"], check.positive(f"point_masses[{i}].mass", entry["mass"], "kg")
+
+
+def _post(i: int, entry: Any) -> tuple[Any, Any]:
+    if not isinstance(entry, dict) or not {"at"} <= set(entry) <= {"at", "stiffness"}:
+        raise ValueError(f"point_supports[{i}] must have at and perhaps stiffness, got {check.shown(entry)}")
+    if "stiffness" not in entry:
+        return entry["at"], "hinged"
+    return entry["at"], check.positive(f"point_supports[{i}].stiffness", entry["stiffness"], "N/m")
 
 
 def supports_of(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -122,6 +122,22 @@ def test_contacts_that_lose_and_a_hammer_in_a_scene(tmp_path, text, law):
     assert float(table.restitution[1]) == pytest.approx(hit.restitution, abs=2e-2)
 
 
+def test_a_panel_on_posts_in_a_scene(tmp_path):
+    posts = "point_supports = [{ at = [0.1, 0.1] }, { at = [0.3, 0.2], stiffness = 1e4 }]"
+    told = TEXT.replace('source = "analytic"', posts)
+    loaded = scene.load_scene(write(tmp_path, told))
+    free, held = scene.load_scene(write(tmp_path, TEXT)).modes(3), loaded.modes(3)
+    assert held.frequencies[0] == pytest.approx(100.0)  # the scale is that of the body on its posts
+    assert abs(held.frequencies[1] / held.frequencies[0] - free.frequencies[1] / free.frequencies[0]) > 0.01
+    assert np.abs(held.shape_at([(0.1, 0.1)])).max() < 1e-6 * np.abs(held.shape_at([(0.25, 0.1)])).max()
+    for wrong, text in (
+        ("[{ stiffness = 1e4 }]", "must have at"),
+        ("[{ at = [0.1, 0.1], stiffness = 0 }]", "positive"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            scene.load_scene(write(tmp_path, told.replace(posts, f"point_supports = {wrong}")))
+
+
 def test_a_held_striker_in_a_scene_comes_back(tmp_path):
     held = 'kind = "rigid"\nmass = 0.03\nhand = { stiffness = 100.0, damping = 0.1, force = -0.3 }'
     loaded = scene.load_scene(write(tmp_path, TEXT.replace('kind = "rigid"\nmass = 0.03', held)))
