@@ -31,7 +31,7 @@ from .scene import Scene, load_scene
 
 CHECKED = 16  # [-] blows struck again one by one
 TAILS = (0.05, 0.95)  # [-] levels of an input of the body at which the body is made anew
-MOST_BLOWS = 10**7  # [-] of a spread: 1 GB of numbers
+MOST_BLOWS = 10**7  # [-] default limit of a spread: some minutes of work, 1 GB of numbers
 PLACES = ("strike.x", "strike.y")  # inputs that move the strike point
 SIZE = "target.size"  # [-] factor on all lengths in the plane of a plate, or along a beam
 # Inputs of the body's modes by dimension: powers of its mass and of its frequencies; Kirchhoff, Euler and Bernoulli
@@ -65,6 +65,7 @@ def spread(
     store: str | Path | None = None,
     watch: Callable[[int, int], Any] | None = None,
     stage: Watch | None = None,
+    max_blows: float = MOST_BLOWS,
 ) -> Spread:
     """Strike with uncertain inputs: how every quantity of the blow is distributed, and which input matters.
 
@@ -96,6 +97,8 @@ def spread(
     workers, client, store, watch : as in `sweep`
     stage : callable, optional
         Called with the name of each stage; returns a context manager.
+    max_blows : float
+        More blows are refused before the start.
 
     Returns
     -------
@@ -124,7 +127,9 @@ def spread(
     """
     told, blow = _told(scene, striker, contact, at, speed, damping_ratio)
     inputs = read(vary)
-    n = check.count("n", n, high=MOST_BLOWS)
+    n = check.count("n", n)
+    if n > (most := check.number("max_blows", max_blows)):
+        raise ValueError(f"n must be at most {most:g} blows, got {n}; raise max_blows")
     mixer = mixing(inputs, correlation)
     seed = check.count("seed", seed, low=0)
     workers = None if workers is None else check.count("workers", workers)
