@@ -496,12 +496,13 @@ def _spread(options: argparse.Namespace) -> None:
         raise ValueError("--correlate must look like contact.stiffness,striker.mass=0.5") from None
     with fi.export.staged(folder) as staging:
         display = Display()
-        found = uncertainty.spread(
-            scene, vary, n=options.blows, correlation=correlation or None, sobol=False if options.no_sobol else None,
-            seed=options.seed, tolerance=options.tolerance, max_frequency=options.max_frequency,
-            workers=options.workers, client=options.cluster, store=options.store,
-            watch=partial(display.report, "blows"), stage=display,
-        )  # fmt: skip
+        with display("blows"):
+            found = uncertainty.spread(
+                scene, vary, n=options.blows, correlation=correlation or None, seed=options.seed,
+                sobol=False if options.no_sobol else None, tolerance=options.tolerance,
+                max_frequency=options.max_frequency, workers=options.workers, client=options.cluster,
+                store=options.store, watch=partial(display.report, "blows"),
+            )  # fmt: skip
         with display("files"):
             names = uncertainty.write(staging, found)
     if options.json:

@@ -275,7 +275,7 @@ def table() -> dict[str, dict[str, Any]]:
         "spread": {
             "scene": t["scene"], "vary": {"striker.mass": ("lognormal", 0.03, 0.1)}, "n": 8, "correlation": None,
             "sobol": False, "seed": 1, "tolerance": 1e-1, "max_frequency": 1e3, "workers": 1, "store": None,
-            "watch": None, "stage": None, "max_blows": 100.0,
+            "watch": None, "max_blows": 100.0,
         },
         "spread body": {
             "scene": t["modes"], "vary": {"mass": "lognormal(0.03, 0.1)", "speed": "uniform(1, 2)"}, "n": 8,
