@@ -291,6 +291,10 @@ def _parser() -> argparse.ArgumentParser:
     add("--port", metavar="N", type=int, default=0, help="port on 127.0.0.1 (default: any free port)")
     add("--no-open", action="store_true", help="print the address, but do not open it in a browser")
 
+    add = verb(_new, "new", "write a commented scene to begin with", scene="")
+    add("kind", metavar="KIND", nargs="?", default="plate", help="plate, disk, beam or map (default: plate)")
+    add("--out", metavar="FILE", type=_place, help="the file to write (default: KIND.toml)")
+
     verb(_doctor, "doctor", "check this installation and suggest a remedy for each failure", scene="")
 
     add = verb(
@@ -611,6 +615,15 @@ def _modes(options: argparse.Namespace) -> None:
     _print_table(rows, ("mode", "frequency", "damping ratio"))
     if options.vtk is not None:
         _say(f"Files: {options.vtk}")
+
+
+def _new(options: argparse.Namespace) -> None:
+    from .scenes import templates  # imported only when needed
+
+    path = options.out if options.out is not None else Path(f"{options.kind}.toml")
+    templates.write(path, options.kind)
+    verb = "map" if options.kind == "map" else "strike"
+    _say(f"Files: {path}", f"Next: fem-impact {verb} {path}")
 
 
 def _doctor(options: argparse.Namespace) -> None:
