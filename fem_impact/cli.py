@@ -295,6 +295,8 @@ def _parser() -> argparse.ArgumentParser:
     add("kind", metavar="KIND", nargs="?", default="plate", help="plate, disk, beam or map (default: plate)")
     add("--out", metavar="FILE", type=_place, help="the file to write (default: KIND.toml)")
 
+    verb(_schema, "schema", "print a JSON schema of scenes, by which editors complete and check them", scene="")
+
     verb(_doctor, "doctor", "check this installation and suggest a remedy for each failure", scene="")
 
     add = verb(
@@ -624,6 +626,12 @@ def _new(options: argparse.Namespace) -> None:
     templates.write(path, options.kind)
     verb = "map" if options.kind == "map" else "strike"
     _say(f"Files: {path}", f"Next: fem-impact {verb} {path}")
+
+
+def _schema(options: argparse.Namespace) -> None:
+    from .scenes import editor_schema  # imported only when needed
+
+    _print_json(editor_schema.schema())
 
 
 def _doctor(options: argparse.Namespace) -> None:
