@@ -282,6 +282,7 @@ def table() -> dict[str, dict[str, Any]]:
             "striker": t["striker"], "contact": t["law"], "at": at, "speed": 1.0, "damping_ratio": 0.01,
             "correlation": {("mass", "speed"): 0.5}, "tolerance": 1e-1, "max_blows": 100.0,
         },
+        "figures.edges": {"mesh": t["square"]},
         "figures.spread": {"found": t["spread"]},
         "mesh.Mesh.refined": {"self": t["square"], "factor": 2.0},
         "mesh.rectangle": {"length": 0.4, "width": 0.3, "size": 0.2},
