@@ -291,6 +291,19 @@ def _parser() -> argparse.ArgumentParser:
     add("--port", metavar="N", type=int, default=0, help="port on 127.0.0.1 (default: any free port)")
     add("--no-open", action="store_true", help="print the address, but do not open it in a browser")
 
+    add = verb(_new, "new", "write a commented scene to begin with", scene="")
+    add("kind", metavar="KIND", nargs="?", default="plate", help="plate, disk, beam or map (default: plate)")
+    add("--out", metavar="FILE", type=_place, help="the file to write (default: KIND.toml)")
+
+    add = verb(
+        _mesh, "mesh", "list the edges, sizes and units of a mesh, drawing or scene before supports are written",
+        scene="a mesh file, an .svg or .dxf drawing, or a scene, a .toml file", called="FILE",
+    )  # fmt: skip
+    add("--unit", metavar="U", help="unit of the numbers in the file: m, cm, mm, um, in or km (default: the file's)")
+    add("--out", metavar="FILE", type=_place, help="draw elements and named edges to this file: .png, .pdf or .svg")
+
+    verb(_schema, "schema", "print a JSON schema of scenes, by which editors complete and check them", scene="")
+
     verb(_doctor, "doctor", "check this installation and suggest a remedy for each failure", scene="")
 
     add = verb(
@@ -496,12 +509,13 @@ def _spread(options: argparse.Namespace) -> None:
         raise ValueError("--correlate must look like contact.stiffness,striker.mass=0.5") from None
     with fi.export.staged(folder) as staging:
         display = Display()
-        found = uncertainty.spread(
-            scene, vary, n=options.blows, correlation=correlation or None, sobol=False if options.no_sobol else None,
-            seed=options.seed, tolerance=options.tolerance, max_frequency=options.max_frequency,
-            workers=options.workers, client=options.cluster, store=options.store,
-            watch=partial(display.report, "blows"), stage=display,
-        )  # fmt: skip
+        with display("blows"):
+            found = uncertainty.spread(
+                scene, vary, n=options.blows, correlation=correlation or None, seed=options.seed,
+                sobol=False if options.no_sobol else None, tolerance=options.tolerance,
+                max_frequency=options.max_frequency, workers=options.workers, client=options.cluster,
+                store=options.store, watch=partial(display.report, "blows"),
+            )  # fmt: skip
         with display("files"):
             names = uncertainty.write(staging, found)
     if options.json:
@@ -610,6 +624,50 @@ def _modes(options: argparse.Namespace) -> None:
     _print_table(rows, ("mode", "frequency", "damping ratio"))
     if options.vtk is not None:
         _say(f"Files: {options.vtk}")
+
+
+def _new(options: argparse.Namespace) -> None:
+    from .scenes import templates  # imported only when needed
+
+    path = options.out if options.out is not None else Path(f"{options.kind}.toml")
+    templates.write(path, options.kind)
+    verb = "map" if options.kind == "map" else "strike"
+    _say(f"Files: {path}", f"Next: fem-impact {verb} {path}")
+
+
+def _mesh(options: argparse.Namespace) -> None:
+    from .mesh import edge_table  # imported only when needed
+
+    ending = options.scene.suffix.lower()
+    with Display()("mesh"):
+        if ending == ".toml":
+            if options.unit is not None:
+                raise ValueError("--unit must be left out for a scene, which states it")
+            mesh = fi.load_scene(options.scene).body()
+        else:
+            read = fi.mesh.outline if ending in (".svg", ".dxf") else fi.mesh.load
+            mesh = read(options.scene, unit=options.unit)
+        if options.out is not None:
+            options.out.parent.mkdir(parents=True, exist_ok=True)
+            fi.figures.save(options.out, fi.figures.edges(mesh))
+    _say(str(options.scene))
+    _print_notes(mesh.notes)
+    _print_table(edge_table.rows(mesh))
+    print()
+    rows = [
+        (edge.name, f"{edge.length:.4g} m", edge.n_facets, "curved" if edge.curved else "straight",
+         f"({', '.join(f'{x:.4g}' for x in edge.middle)}) m", ", ".join(edge.twins) or "-")
+        for edge in edge_table.edges(mesh)
+    ]  # fmt: skip
+    _print_table(rows, ("edge", "length", "facets", "form", "half way at", "the same as"))
+    if options.out is not None:
+        _say(f"Files: {options.out}")
+
+
+def _schema(options: argparse.Namespace) -> None:
+    from .scenes import editor_schema  # imported only when needed
+
+    _print_json(editor_schema.schema())
 
 
 def _doctor(options: argparse.Namespace) -> None:

@@ -288,13 +288,14 @@ def table() -> dict[str, dict[str, Any]]:
         "spread": {
             "scene": t["scene"], "vary": {"striker.mass": ("lognormal", 0.03, 0.1)}, "n": 8, "correlation": None,
             "sobol": False, "seed": 1, "tolerance": 1e-1, "max_frequency": 1e3, "workers": 1, "store": None,
-            "watch": None, "stage": None,
+            "watch": None, "max_blows": 100.0,
         },
         "spread body": {
             "scene": t["modes"], "vary": {"mass": "lognormal(0.03, 0.1)", "speed": "uniform(1, 2)"}, "n": 8,
             "striker": t["striker"], "contact": t["law"], "at": at, "speed": 1.0, "damping_ratio": 0.01,
-            "correlation": {("mass", "speed"): 0.5}, "tolerance": 1e-1,
+            "correlation": {("mass", "speed"): 0.5}, "tolerance": 1e-1, "max_blows": 100.0,
         },
+        "figures.edges": {"mesh": t["square"]},
         "figures.spread": {"found": t["spread"]},
         "mesh.Mesh.refined": {"self": t["square"], "factor": 2.0},
         "mesh.rectangle": {"length": 0.4, "width": 0.3, "size": 0.2},

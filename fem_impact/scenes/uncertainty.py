@@ -18,7 +18,7 @@ from ..fe.section import Beam, Elastic, Plate
 from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..model.planner import Blow
-from ..model.target import CLOSE, FIRST_FLEXIBLE, Stages, Target, Watch
+from ..model.target import CLOSE, FIRST_FLEXIBLE, Target
 from ..modes.modal import Damping, Modes
 from ..show import export, figures
 from ..sweeps import bodies, cloud, grid
@@ -31,7 +31,7 @@ from .scene import Scene, load_scene
 
 CHECKED = 16  # [-] blows struck again one by one
 TAILS = (0.05, 0.95)  # [-] levels of an input of the body at which the body is made anew
-MOST_BLOWS = 10**7  # [-] of a spread: 1 GB of numbers
+MOST_BLOWS = 10**7  # [-] default limit of a spread: some minutes of work, 1 GB of numbers
 PLACES = ("strike.x", "strike.y")  # inputs that move the strike point
 SIZE = "target.size"  # [-] factor on all lengths in the plane of a plate, or along a beam
 # Inputs of the body's modes by dimension: powers of its mass and of its frequencies; Kirchhoff, Euler and Bernoulli
@@ -64,7 +64,7 @@ def spread(
     client: Any = None,
     store: str | Path | None = None,
     watch: Callable[[int, int], Any] | None = None,
-    stage: Watch | None = None,
+    max_blows: float = MOST_BLOWS,
 ) -> Spread:
     """Strike with uncertain inputs: how every quantity of the blow is distributed, and which input matters.
 
@@ -94,8 +94,8 @@ def spread(
         Adds the spectral centroid up to this frequency; that takes far longer than all other quantities.
     at, speed, damping_ratio : as in `strike`, for a body
     workers, client, store, watch : as in `sweep`
-    stage : callable, optional
-        Called with the name of each stage; returns a context manager.
+    max_blows : float
+        More blows are refused before the start.
 
     Returns
     -------
@@ -124,7 +124,9 @@ def spread(
     """
     told, blow = _told(scene, striker, contact, at, speed, damping_ratio)
     inputs = read(vary)
-    n = check.count("n", n, high=MOST_BLOWS)
+    n = check.count("n", n)
+    if n > (most := check.number("max_blows", max_blows)):
+        raise ValueError(f"n must be at most {most:g} blows, got {n}; raise max_blows")
     mixer = mixing(inputs, correlation)
     seed = check.count("seed", seed, low=0)
     workers = None if workers is None else check.count("workers", workers)
@@ -136,16 +138,12 @@ def spread(
     values = drawn(inputs, points, mixer)
     if not np.isfinite(values).all() or np.abs(values).max() > REACH:
         raise ValueError(f"vary must stay finite and below {REACH:g}; choose distributions with shorter tails")
-    stages = Stages(stage)
-    asked = _Asked(blow, told, inputs, values, limit, band, stages, grid.kept_beside(store))
+    asked = _Asked(blow, told, inputs, values, limit, band, grid.kept_beside(store))
     base, axes = asked.cases()
     exact = Cloud(base, axes, limit, blow.arguments.get("residual", True), band)
     rough = replace(exact, axes=cloud.few(base, axes), kernels={})
-    with stages("blows"):
-        numbers, texts = cloud.solve_all(rough, workers, client, store, watch)
-    with stages("checks"):
-        checks = _checked(exact, numbers, workers)
-        rescaled = asked.rescaled(base)
+    numbers, texts = cloud.solve_all(rough, workers, client, store, watch)
+    checks, rescaled = _checked(exact, numbers, workers), asked.rescaled(base)
     notes = plausible.together(base.modes.notes, base.striker.notes)
     table = _table(inputs, values, rough.layers, numbers, texts, d + 2 if groups else 1, base, band)
     title = told.title or told.path.name if told is not None else ""
@@ -197,7 +195,6 @@ class _Asked:
     values: np.ndarray  # (n_cases, n_inputs)
     tolerance: float
     band: float | None
-    stages: Stages
     keep: Path | None
     own: dict[str, np.ndarray] = field(default_factory=dict)  # what `_sort` finds: axis of a map -> values
     body: dict[str, np.ndarray] = field(default_factory=dict)  # input of the body -> value over its own [-]
@@ -277,8 +274,7 @@ class _Asked:
             return base, axes
         first = None
         if self.body:
-            with self.stages("modes"):
-                first = target.surrounded(target.find(FIRST_FLEXIBLE, tolerance=CLOSE))
+            first = target.surrounded(target.find(FIRST_FLEXIBLE, tolerance=CLOSE))
         over = dict(axes)
         if first is not None:
             over["target_mass"] = first.mass * mass
@@ -289,7 +285,7 @@ class _Asked:
         with self._blamed(axes):
             base, _ = bodies.body_of(
                 target, blow.striker, blow.contact, **given, over=over or {"speed": np.array([speed])},
-                tolerance=self.tolerance, keep=self.keep, stages=self.stages,
+                tolerance=self.tolerance, keep=self.keep,
                 alone=blow.arguments.get("residual", True) and not self.places,
             )  # fmt: skip
         base = replace(base, speed=speed)
@@ -383,7 +379,7 @@ class _Asked:
                 other, _ = bodies.body_of(
                     _made(self.blow.target, name, ratio), self.blow.striker, self.blow.contact,
                     at=self.blow.arguments["at"], speed=self.blow.arguments["speed"], over={"speed": [base.speed]},
-                    tolerance=self.tolerance, alone=self.blow.arguments.get("residual", True), stages=self.stages,
+                    tolerance=self.tolerance, alone=self.blow.arguments.get("residual", True),
                 )  # fmt: skip
                 try:
                     one, two = (grid.numbers_of(grid.struck_alone(alone, case), None) for case in (mine, other))

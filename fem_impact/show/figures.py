@@ -17,7 +17,9 @@ from .._base import check
 from .._base.files import replacing
 from ..impact import spectra
 from ..impact.response import Response
+from ..mesh import edge_table
 from ..mesh.mesh_files import boundary
+from ..mesh.meshes import Mesh
 from ..model.playing import Strokes
 from ..modes.modal import Modes
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Spread
@@ -26,6 +28,7 @@ from .canvas import COLOURS, VERMILION
 
 # Okabe and Ito's palette: distinct for all common kinds of colour vision, and in print.
 BLUE, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
+PALETTE = [BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY]
 STYLE: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 10.0,
@@ -35,7 +38,7 @@ STYLE: Any = {
     "axes.axisbelow": True,
     "axes.titlesize": 10.0,
     "axes.titlelocation": "left",
-    "axes.prop_cycle": cycler(color=[BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY]),
+    "axes.prop_cycle": cycler(color=PALETTE),
     "grid.color": "#DDDDDD",
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.5,
@@ -303,6 +306,49 @@ def _unflattened(shape: np.ndarray, cells: np.ndarray) -> np.ndarray:
         np.add.at(total, cells[:, i], shape[cells].sum(axis=1))
         np.add.at(count, cells[:, i], 3.0)
     return np.where(np.abs(shape) < FLAT, FLAT * total / np.maximum(count, 1.0), shape)
+
+
+@check.typed
+def edges(mesh: Mesh) -> Figure:
+    """Draw the elements of a mesh and its named edges, each in its colour; of edges that coincide, the first.
+
+    Parameters
+    ----------
+    mesh : Mesh
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    low, size = mesh.points.min(axis=0), np.ptp(mesh.points, axis=0)
+    with styled(7.0, 7.0 * min(1.4, max(0.35, size[1] / size[0])) + 0.6 if mesh.dimension == 2 else 2.2) as figure:
+        axes = figure.subplots()
+        x, y = mesh.points.T if mesh.dimension == 2 else (mesh.points[:, 0], np.zeros(len(mesh.points)))
+        if mesh.dimension == 2:
+            axes.triplot(x, y, mesh.cells, color="#CCCCCC", lw=0.4)
+            axes.set_aspect("equal")
+        else:
+            axes.plot(np.sort(x), y, "|-", color="#777777")
+            axes.set_yticks([])
+        drawn: set[int] = set()
+        for edge in edge_table.edges(mesh):
+            facets = [int(i) for i in mesh.edges[edge.name] if int(i) not in drawn]
+            if not facets:
+                continue
+            drawn |= set(facets)
+            middles = np.column_stack([mesh.middles[facets], np.zeros(len(facets))])[:, :2]
+            if mesh.dimension == 2:
+                ends = mesh.points[mesh.facets[facets]]
+                lines = np.stack([ends[:, 0], middles, ends[:, 1]], axis=1)  # (n_facets, 3, 2)
+                colour = PALETTE[len(axes.collections) % len(PALETTE)]
+                axes.add_collection(LineCollection(list(lines), colors=colour, linewidths=2.5, label=edge.name))
+            else:
+                axes.plot(*middles.T, "o", ms=8, label=edge.name)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        axes.set(xlabel="x", ylabel="y" if mesh.dimension == 2 else "")
+        axes.set_xlim(low[0] - MARGIN * size[0] / 2, low[0] + (1.0 + MARGIN / 2) * size[0])
+        _units(axes, "m", "m" if mesh.dimension == 2 else "")
+    return figure
 
 
 @check.typed
