@@ -59,12 +59,14 @@ def missed(hit, truth):
         ("free", 1.2e-3, 0.15, 1.2, 4e-4, "linear", (0.041, -0.095)),
         ("clamped", 1.3e-3, 0.05, 10.0, 2e-3, "hertz", (-0.142, -0.059)),
         ("free", 2e-3, 0.05, 8.0, 1e-2, "hertz", (0.19, 0.0)),  # near the rim
+        ("rectangle", 3e-3, 0.02, 8.0, 4e-2, "hertz", (0.13, 0.1)),  # many pairs act as a spring
     ],
 )
 def test_blow_is_that_of_all_modes(kind, thickness, mass_ratio, pitch, tolerance, law, at):
     run, truth = compared(kind, thickness, mass_ratio, pitch, tolerance, law, at)
     hit = run.response
-    assert hit.tolerance_met and missed(hit, truth) <= float(hit.error)
+    # twenty times the truth is what `studies/effectivity.py` calls honest
+    assert hit.tolerance_met and missed(hit, truth) <= float(hit.error) <= 20.0 * missed(hit, truth)
     assert run.plan.target == "vectors" and hit.finished and hit.energy_error < 1e-12
 
 
