@@ -139,3 +139,18 @@ def test_what_is_not_known_gets_a_question_mark():
     hit = right.fi.load_scene(STUDIES / "scenes" / "everyday" / "marimba_yarn.toml").strike()
     assert np.isnan(right.effects(hit)["no yielding"])
     assert right.table([{"scene": "a", "still air": "?"}]) == "| scene | still air |\n| --- | --- |\n| a | ? |"
+
+
+@pytest.mark.slow
+def test_a_stiffer_hand_buzzes_faster_and_a_damped_one_stops_sooner(monkeypatch):
+    monkeypatch.syspath_prepend(str(STUDIES))
+    roll = study("roll")
+    struck = {name: body for name, body in roll.bodies(highest=600.0).items() if name != "cymbal"}
+    found = roll.compute(struck, np.array([10.0, 1000.0]))
+    for name in struck:
+        loose, firm = found[name, "loose"], found[name, "firm"]
+        assert loose[1].rate > 1.15 * loose[0].rate  # 41 to 63 Hz on the drumhead, 80 to 103 Hz on the table
+        assert len(firm[0].bounces) < 0.6 * len(loose[0].bounces)  # 3 of 13, 5 of 13
+    omega = np.sqrt(1000.0 / (roll.STICK / 3.0))
+    assert roll.alone(1e-6) == pytest.approx(roll.FORCE / (2.0 * roll.SPEED * roll.STICK / 3.0))  # F / 2 m v
+    assert roll.alone(1000.0) > 0.5 * omega / (0.5 * np.pi)  # half a swing at most

@@ -152,6 +152,7 @@ class _Part:
     points: np.ndarray  # (n_ends, dimension) [m] contact points
     pressed: np.ndarray  # (2, n_ends) [N], [N/s] contact forces at the start and their rates
     stretching: Stretching | None = None
+    held: int = 0  # [-] first modes that only a hand makes swing: within a contact they move like a mass
 
 
 @check.typed
@@ -196,7 +197,7 @@ def strike(
         touch = Touch(contact, 0, 1, striker.at[None], point)
         rest = striker.left_out if residual and striker.modes.dimension else None
         arriving = _part(striker.body, ((0, 1.0),), striker.at[None], striker.shape[None], rest, forces[0])
-        arriving = replace(arriving, bias=arriving.bias + striker.push)
+        arriving = replace(arriving, bias=arriving.bias + striker.push, held=int(striker.hand is not None))
 
         def start(one: float = 1.0, other: float = 1.0) -> list[_Part]:
             """Both bodies at the start, each as fast as it is known times a factor."""
@@ -293,7 +294,11 @@ def met(
             raise ValueError("states must be left out if start is given, which has the states of all bodies")
         states = before.states(bodies, [touch.law for touch in contacts])
     parts, arriving = _parts(bodies, contacts, speeds, states, forces, residual)
-    parts = [*(replace(part, bias=part.bias + push) for part, push in zip(parts, pushes)), *parts[len(pushes) :]]
+    pushed = zip(parts, pushes)
+    parts = [
+        *(replace(part, bias=part.bias + push, held=int(part.omega[0] > 0.0)) for part, push in pushed),
+        *parts[len(pushes) :],
+    ]
     others = []
     if before is not None:
         ends = [[i for i, _ in part.touched] for part in parts]
@@ -323,7 +328,8 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
         raise ValueError(
             "duration or max_impacts must be given, because a constant force keeps pressing the bodies together"
         )
-    pace = _pace(system)
+    held = np.concatenate([np.arange(len(part.omega)) < part.held for part in parts])
+    pace = _pace(system, np.append(held, np.zeros(len(system.omega) - len(held), bool)))
     _check_way(system, pace[0] * pace[1], options.tolerance)
     last = options.horizon, options.n_max
     differ = partial(_difference, options.quantities)
@@ -558,9 +564,13 @@ def _thinned(part: _Part, wanted: float) -> tuple[_Part, float]:
     return thin, float(flexible[-1] / part.omega[n - 1])
 
 
-def _pace(system: _System) -> tuple[float, float]:
-    """Shortest expected duration [s] of an undisturbed contact, and its approach speed [m/s]."""
+def _pace(system: _System, held: np.ndarray | bool = False) -> tuple[float, float]:
+    """Shortest expected duration [s] of an undisturbed contact, and its approach speed [m/s].
+
+    ``held`` (n_modes,) says which modes count as masses, though a hand makes them swing.
+    """
     rate = system.omega * np.maximum(1.0, 2.0 * system.zeta)  # an overdamped mode acts as a dashpot, not as a mass
+    rate = np.where(held, 0.0, rate)
     order = np.argsort(rate, kind="stable")
     omega = rate[order]
     last = np.concatenate([omega[1:] > omega[:-1], [True]])  # the last mode of each distinct frequency
