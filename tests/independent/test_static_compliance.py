@@ -251,7 +251,7 @@ def test_a_polygon_gives_what_mixed_elements_say(name, all_cases):
 
 @pytest.mark.xdist_group("static few")
 def test_claims_cover_the_error():
-    covered, worst = share_covered([(name, FAST) for name in PLATES])
+    covered, worst = share_covered([(name, FAST) for name in PLATES if name not in ALIKE])
     assert covered >= 0.99, worst
 
 
