@@ -45,6 +45,7 @@ PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_st
 ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
 TARGETS = ("rigid", "infinite", "vectors", "modal")
 DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow
+THICK_DOFS_AT_BLOW = 7500  # [-] the same of a thick plate
 MANY = 2  # [-] impacts up to which the first two meshes suffice; each multiplies the error that a mesh makes before it
 ROUGH, LONGEST = 1e-2, 100.0  # [-] tolerance and length, in undisturbed contacts, of the blow that foresees the cost
 FAINTEST = 8.0  # [-] frequency up to which a force has the fraction FAINT of its impulse, times the contact's duration
@@ -704,9 +705,15 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
     n_dofs = round(refinement.unknowns(system.element, mesh, size))
     error = max(float(first.frequency_error.max()), SHORT_WAVES[system.element])
     reason = f"{system.element} elements of {size:.3g} m, about {n_dofs} unknowns, resolve the shortest wave"
-    work = cost.by_modes(n_dofs, plan.n_modes) if plan.n_modes > first.n_modes else cost.NOTHING
-    if mesh.dimension == 2:
-        work += cost.compliance(n_dofs + DOFS_AT_BLOW)
+    work = cost.NOTHING  # if the plan has found all modes, and their compliance
+    if plan.n_modes > first.n_modes:
+        thick = system.element == "argyris and shear"  # its errors come from a second mesh
+        coarser = [n_dofs / refinement.COARSER**2] if thick else []
+        work = sum((cost.by_modes(n, plan.n_modes) for n in [n_dofs, *coarser]), cost.NOTHING)
+        if mesh.dimension == 2:
+            finer = [n_dofs * refinement.COARSER**2] if thick else []
+            at_blow = THICK_DOFS_AT_BLOW if thick else DOFS_AT_BLOW
+            work = sum((cost.compliance(n + at_blow) for n in [n_dofs, *finer]), work)
     return replace(
         plan, element=system.element, size=size, n_dofs=n_dofs, errors={**plan.errors, "mesh": error},
         reasons=(*plan.reasons, reason), seconds=plan.seconds + work.seconds, memory=plan.memory + work.memory,

@@ -178,6 +178,7 @@ def test_quick_hand_does_not_queue_up_blows(opened):
     assert shown.errors == []
 
 
+@pytest.mark.slow
 def test_button_plays_the_sound(opened):
     shown = opened()
     shown.tab.get_by_role("button", name="Strike and listen").click()
@@ -186,7 +187,8 @@ def test_button_plays_the_sound(opened):
     shown.until("document.getElementById('heard').innerText.includes('Full scale is 10 m/s')")
 
 
-@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_page_fits_a_phone(opened, scheme):
     shown = opened(width=375, height=700, color_scheme=scheme)
     assert shown.tab.evaluate("document.documentElement.scrollWidth") == 375

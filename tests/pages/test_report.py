@@ -185,6 +185,7 @@ def test_nothing_fails_and_nothing_is_asked_for(desktop):
     assert shown.requests[0].startswith("file:") and shown.tab.title() == SCRIPT
 
 
+@pytest.mark.slow
 def test_slider_and_list_change_the_picture(opened):
     shown = opened()
     tab = shown.tab
@@ -249,7 +250,8 @@ def test_sounds_load(desktop):
     assert len(lengths) >= 2 and all(0.4 < length < 4.0 for length in lengths)
 
 
-@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_page_fits_a_phone(opened, scheme):
     shown = opened(width=375, height=700, color_scheme=scheme, reduced_motion="reduce")
     assert shown.tab.evaluate("document.documentElement.scrollWidth") == 375
