@@ -11,7 +11,7 @@ import numpy as np
 from .._base import check, markup
 from ..fe import plausible
 from ..modes.modal import Modes, SampledShapes, at_rest
-from . import assumption, force_spectrum, promise
+from . import assumption, datasets, force_spectrum, promise
 from .assumption import Assumption
 from .compiled import law, propagation, record
 from .contact import Contact
@@ -753,6 +753,13 @@ class Response:
             lines += [f"Model: {self.model_verdict[0]}", *(f"  {line}" for line in self.model_verdict[1:])]
         lines += [f"Note: {note}" for note in self.notes]
         return "\n".join(lines)
+
+    def to_xarray(self) -> Any:
+        """The response as an `xarray.Dataset`: force [N] over time [s], impacts, scalars, errors and energies.
+
+        For several contacts the force has a column for each; units are in the attributes of every variable.
+        """
+        return datasets.dataset(self)
 
     @property
     def outcome(self) -> str:
