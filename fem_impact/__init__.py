@@ -1,7 +1,10 @@
 """Strike anything thin with anything, and know how far to trust the answer."""
 
+import logging
 from importlib import import_module
 from typing import Any
+
+logging.getLogger(__name__).addHandler(logging.NullHandler())  # silent unless the user listens to "fem_impact"
 
 # Public names and their modules, imported at first use so that the command line starts quickly.
 _NAMES = {

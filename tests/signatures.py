@@ -47,6 +47,7 @@ INNER = {
     "Scene.blame", "Scene.heard_from", "Scene.kept", "Modes.point", "sound.beside", "mesh.aligned",
      "Scene.body", "Scene.closed_form", "Scene.fault", "Scene.finder", "Scene.make_contact",
     "Scene.make_section", "Scene.make_striker", "Scene.data",
+    "Response.to_xarray", "Modes.to_pyvista",  # no arguments
     "Plan.data", "Plan.run", "Plan.strike", "Response.body_slice", "Response.summary", "Scene.picture",
     "mesh.Mesh", "mesh.straight", "mesh.fill", "Modes.points", "Modes.stretched",
     "analytic.RectangleShapes", "analytic.BeamShapes", "analytic.DiskShapes",  # behind the checks of Modes

@@ -12,7 +12,7 @@ from .._base import check, markup
 from ..fe import plausible
 from ..modes.modal import Modes, SampledShapes, at_rest
 from ..modes.stretching import stretch
-from . import assumption, force_spectrum, promise
+from . import assumption, datasets, force_spectrum, promise
 from .assumption import Assumption
 from .compiled import law, propagation, record
 from .contact import Contact
@@ -845,6 +845,13 @@ class Response:
             lines += [f"Model: {self.model_verdict[0]}", *(f"  {line}" for line in self.model_verdict[1:])]
         lines += [f"Note: {note}" for note in self.notes]
         return "\n".join(lines)
+
+    def to_xarray(self) -> Any:
+        """The response as an `xarray.Dataset`: force [N] over time [s], impacts, scalars, errors and energies.
+
+        For several contacts the force has a column for each; units are in the attributes of every variable.
+        """
+        return datasets.dataset(self)
 
     @property
     def outcome(self) -> str:

@@ -1,5 +1,6 @@
 """What is struck: a body to assemble, an assembled `System` or finished `Modes`, and how its modes are found."""
 
+import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
@@ -30,6 +31,7 @@ from ..modes.air import in_air
 from ..modes.modal import Damping, FieldShapes, Modes
 from ..modes.stretching import HELD
 
+LOG = logging.getLogger(__name__)
 MODELS = ("stated", "auto")  # whether the theory and the air of a target are chosen
 BOTH = "both sides"
 AIR = {"one side": 1, BOTH: 2}  # sides of a plate in open air
@@ -50,7 +52,7 @@ def _nobody(*_: Any) -> AbstractContextManager[Any]:
 
 
 class Stages:
-    """Wall time of each stage; ``watch`` may display the stages."""
+    """Wall time of each stage; ``watch`` may display the stages, and the log of the package tells them."""
 
     def __init__(self, watch: Watch | None = None) -> None:
         self.watch = watch or (lambda name: nullcontext())
@@ -63,7 +65,9 @@ class Stages:
             with self.watch(name):
                 yield
         finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
+            spent = perf_counter() - start
+            self.seconds[name] = self.seconds.get(name, 0.0) + spent
+            LOG.info("%s: %.3f s", name, spent)
 
 
 @dataclass(frozen=True, eq=False)

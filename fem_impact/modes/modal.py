@@ -14,7 +14,7 @@ from ..fe import plausible, point_load, refinement
 from ..fe.assembly import THICK, System
 from ..fe.eigenvalues import Flexibility
 from ..fe.section import Beam, Plate
-from . import universal_files
+from . import universal_files, viewing
 
 HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 2 pi times it must stay in reach
 SHOWN = 10  # [-] modes listed in a notebook: a table without scrolling
@@ -349,6 +349,13 @@ class Modes:
         more = f" The first {SHOWN}:" if self.n_modes > SHOWN else ""
         span = f"{self.n_modes} modes up to {self.frequencies[-1]:.5g} Hz of a body of {self.mass:.4g} kg."
         return f"<p>{span}{more}</p>{markup.table(rows, head)}{markup.notes(self.notes)}"
+
+    def to_pyvista(self) -> Any:
+        """The body as a `pyvista.UnstructuredGrid`, refined until smooth to the eye.
+
+        Point arrays ``mode_001`` ... hold the shapes [kg**-0.5], field data ``frequency`` [Hz] and ``damping_ratio``.
+        """
+        return viewing.pyvista_grid(self)
 
     def points(self, name: str, points: Any) -> np.ndarray:
         """Return points as (n_points, dimension) [m]; raise ValueError if one is not on the body."""

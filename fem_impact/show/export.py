@@ -19,7 +19,7 @@ from ..impact.assumption import table
 from ..impact.response import Response
 from ..model.planner import Run
 from ..model.playing import Strokes
-from ..modes import universal_files
+from ..modes import universal_files, viewing
 from ..modes.modal import Modes
 from . import sampling, sound
 
@@ -66,7 +66,7 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
     """
     path = check.path("path", path)
     suffix = vtk_ending(path)
-    points, cells = sampling.grid(modes)
+    points, cells = viewing.grid(modes)
     if response is None:
         parts = _mode_parts(modes, points)
         stamps = _distinct(modes.frequencies)
@@ -113,7 +113,7 @@ def write_animation(path: str | Path, modes: Modes, mode: int, *, frames: int = 
     if frequency == 0.0:
         raise ValueError(f"mode must be a flexible mode, but mode {mode} is a rigid motion; take a higher one")
     turns = np.arange(check.count("frames", frames, low=2, high=sampling.MOST_FRAMES)) / frames
-    points, cells = sampling.grid(modes)
+    points, cells = viewing.grid(modes)
     arrays, fields = _mode_parts(modes, points)[mode - 1]
     parts = [({"warp": np.cos(2.0 * np.pi * turn) * arrays["warp"]}, fields) for turn in turns]
     _write_collection(path, points, cells, parts, turns / frequency)

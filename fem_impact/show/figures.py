@@ -347,6 +347,7 @@ def edges(mesh: Mesh) -> Figure:
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         axes.set(xlabel="x", ylabel="y" if mesh.dimension == 2 else "")
         axes.set_xlim(low[0] - MARGIN * size[0] / 2, low[0] + (1.0 + MARGIN / 2) * size[0])
+        axes.xaxis.set_major_locator(MaxNLocator(TICKS + 1))
         _units(axes, "m", "m" if mesh.dimension == 2 else "")
     return figure
 

@@ -1,33 +1,16 @@
-"""Points and cells fine enough to draw mode shapes smoothly, whatever the finite elements."""
+"""Surfaces, frames and times to draw the motion of a body."""
 
 import numpy as np
 
 from .._base import check
 from ..impact.response import Response
 from ..impact.striker import Striker
-from ..mesh.mesh_files import quartered
 from ..modes.modal import Modes
+from ..modes.viewing import grid
 
-ENOUGH = 2500  # [-] points on a plate: several per half wave in the first hundred modes
 RIBBON = 0.06  # [-] a beam is drawn as a ribbon: width over length
 AFTER = 1.35  # [-] end of the animation over the end of the last contact
 MOST_FRAMES = 1000  # [-] most frames of an animation: 0.2 GB or minutes of work
-HALVINGS = 5  # [-] most refinements; each splits a triangle into four
-
-
-def grid(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n_points, dimension) [m] and cells (n_cells, dimension + 1) of a body, refined until smooth to the eye.
-
-    New points lie on the straight sides of the elements, so a curved edge stays as coarse as the mesh. Shapes known at
-    points only are not refined.
-    """
-    points, cells = modes.shapes.grid()
-    for _ in range(HALVINGS if modes.continuous else 0):
-        if modes.dimension != 2 or cells.shape[1] != 3 or len(points) >= ENOUGH:
-            break
-        cells, sides = quartered(cells, len(points))
-        points = np.vstack([points, points[sides].mean(axis=1)])
-    return points, cells
 
 
 def surface(modes: Modes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,6 +1,7 @@
 """Maps: one blow for every combination of parameters, returned as an xarray Dataset."""
 
 import json
+import logging
 import math
 import os
 from collections.abc import Callable, Mapping
@@ -30,6 +31,7 @@ from . import batches, bodies
 from .cells import AXES, FAMILY_AXES, REACH, Case, checked_axes
 from .store import LARGEST_BLOCK, Texts, block_size, by_cluster, by_store
 
+LOG = logging.getLogger(__name__)
 TOLERANCE = 1e-3  # [-] default error limit of a map
 LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
     "n_impacts": ("", "number of separate contacts"),
@@ -396,6 +398,7 @@ def solve_all(
     grid: Any, solve: Callable[..., Any], workers: int | None, client: Any, store: Any, watch: Watch | None
 ) -> tuple[np.ndarray, Texts]:
     """Compute all cells of a grid or a cloud, block by block, on a cluster or in threads of this process."""
+    LOG.info("%d blows at the tolerance %g", grid.n_cases, grid.tolerance)
     if client is not None:
         return by_cluster(grid, client, store, partial(solve, workers=1), watch)
     if store is not None:

@@ -10,7 +10,7 @@ from fem_impact.fe.section import Material, Plate
 from fem_impact.impact.collision import strike
 from fem_impact.impact.contact import Contact
 from fem_impact.impact.striker import Striker
-from fem_impact.modes import analytic
+from fem_impact.modes import analytic, viewing
 from fem_impact.modes.modal import Modes, find_modes
 from fem_impact.show import sampling
 
@@ -29,7 +29,7 @@ def coarse():
 
 def test_refined_triangles_cover_the_body_once_and_fit_together(coarse):
     points, cells = sampling.grid(coarse)
-    assert len(points) >= sampling.ENOUGH
+    assert len(points) >= viewing.ENOUGH
     assert_allclose(np.abs(areas(points, cells)).sum(), 1.5, rtol=1e-12)
     assert len(np.unique(points.round(12), axis=0)) == len(points)  # no point twice: neighbours share their sides
     assert_allclose([points.min(axis=0), points.max(axis=0)], [[0, 0], [1.5, 1.0]], atol=1e-12)

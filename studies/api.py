@@ -1,0 +1,91 @@
+"""Writes `api.md`, the page of all public names, from their docstrings.
+
+    python studies/api.py
+
+`tests/test_api_page.py` fails while the page is not the one that this script would write.
+"""
+
+import inspect
+from pathlib import Path
+from types import ModuleType
+
+import fem_impact as fi
+
+PAGE = Path(__file__).parent / "api.md"
+HEAD = """# Public names
+
+Written by `python studies/api.py` from the docstrings: do not edit. All numbers are in SI units. `import fem_impact as
+fi` comes first everywhere.
+"""
+MADE = {"Impact", "Plan", "Response", "Scene"}  # results, which users do not construct
+
+
+def parameters(item):
+    """The parameters of a function with their defaults, without types: the docstring tells these better."""
+    try:
+        found = inspect.signature(item).parameters.values()
+    except (TypeError, ValueError):
+        return "..."
+    plain = [each.replace(annotation=inspect.Parameter.empty) for each in found if each.name not in ("self", "cls")]
+    told = [each if simple(each.default) else each.replace(default=...) for each in plain]
+    return str(inspect.Signature(told))[1:-1].replace("Ellipsis", "...")
+
+
+def simple(default):
+    """Whether a default is its own description."""
+    return default is inspect.Parameter.empty or default is None or isinstance(default, (bool, int, float, str, tuple))
+
+
+def fenced(text):
+    """Text as it is."""
+    return f"```text\n{text.strip()}\n```\n"
+
+
+def first(item):
+    """The first paragraph of a docstring on one line."""
+    return " ".join((inspect.getdoc(item) or "").partition("\n\n")[0].split())
+
+
+def members(name, kind):
+    """A line for each public method and property of a class."""
+    lines = []
+    for key, raw in vars(kind).items():
+        said = first(raw.__func__ if isinstance(raw, (classmethod, staticmethod)) else raw)
+        if key.startswith("_") or not said or not (callable(raw) or isinstance(raw, (property, classmethod)) or
+                                                   hasattr(raw, "func")):  # fmt: skip
+            continue
+        call = f"({parameters(getattr(kind, key))})" if inspect.isroutine(getattr(kind, key)) else ""
+        place = f"fi.{name}" if isinstance(raw, (classmethod, staticmethod)) else f".{key}"
+        lines.append(f"- `{place}{f'.{key}' if place != f'.{key}' else ''}{call}`: {said}")
+    return "\n".join(lines) + "\n" if lines else ""
+
+
+def entry(name, item):
+    """The part of the page about one name."""
+    call = "" if name in MADE else f"({parameters(item)})"
+    text = f"### fi.{name}\n\n`fi.{name}{call}`\n\n" + fenced(inspect.getdoc(item) or "")
+    return text + ("\n" + members(name, item) if inspect.isclass(item) and not issubclass(item, Exception) else "")
+
+
+def page():
+    """The whole page."""
+    names = [name for name in fi.__all__ if name != "__version__"]
+    alone = {name: item for name in names if not isinstance(item := getattr(fi, name), ModuleType)}
+    parts = [HEAD, "## Functions and classes\n", *(entry(name, alone[name]) for name in sorted(alone))]
+    for name in sorted(set(names) - set(alone)):
+        home = getattr(fi, name)
+        own = {
+            key: item
+            for key, item in vars(home).items()
+            if not key.startswith("_")
+            and inspect.isfunction(item)
+            and f"{item.__module__}.".startswith(f"{home.__name__}.")
+        }
+        parts.append(f"## fi.{name}\n\n{first(home)}\n")
+        parts += [entry(f"{name}.{key}", own[key]) for key in sorted(own)]
+    return "\n".join(parts)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
+    print(f"{PAGE}: {page().count(chr(10))} lines")

@@ -1,0 +1,40 @@
+"""A response as labelled arrays: the same numbers as its own, and a file that reads back."""
+
+import numpy as np
+import xarray
+
+import fem_impact as fi
+
+
+def blow():
+    plate = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=40)
+    return fi.strike(plate, fi.Striker.rigid(0.05), fi.Contact.linear(1e6), at=(0.13, 0.1), speed=1.0, tolerance=1e-2)
+
+
+def test_a_dataset_has_the_numbers_of_its_response():
+    hit = blow()
+    found = hit.to_xarray()
+    np.testing.assert_array_equal(found.time, hit.time)
+    np.testing.assert_array_equal(found.force, hit.force)
+    assert found.sizes["impact"] == hit.n_impacts == found.n_impacts
+    for name in ("contact_time", "impulse", "peak_force", "restitution"):
+        assert float(found[name]) == getattr(hit, name)
+    np.testing.assert_array_equal(found.impact_end, [impact.end for impact in hit.impacts])
+    assert found.force.attrs["units"] == "N" and found.attrs["verdict"] == hit.verdict
+    assert float(found.error_total) == hit.error.total
+    assert float(found.energy_striker) == hit.energies["striker"]
+
+
+def test_a_dataset_survives_a_file(tmp_path):
+    found = blow().to_xarray()
+    found.to_netcdf(tmp_path / "hit.nc", engine="scipy")
+    xarray.testing.assert_allclose(xarray.load_dataset(tmp_path / "hit.nc", engine="scipy"), found)
+
+
+def test_several_contacts_have_a_column_each():
+    balls = [fi.Modes.rigid(0.1)] * 3
+    law = fi.Contact.linear(1e6)
+    hit = fi.collide(balls, [fi.Touch(law, 0, 1), fi.Touch(law, 1, 2)], speeds=[1.0, 0.0, 0.0], tolerance=1e-3)
+    found = hit.to_xarray()
+    assert found.force.dims == ("time", "contact") and found.sizes["contact"] == 2
+    assert found.sizes["impact"] == hit.n_impacts
