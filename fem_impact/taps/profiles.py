@@ -76,7 +76,7 @@ class Profile:
         if len(x) < 3:
             return self.values[keep], np.maximum(self.rise[keep], 0.0)
         fine = np.linspace(x[0], x[-1], n_points)
-        found = PchipInterpolator(x, root[keep])(fine)
+        found = PchipInterpolator(x, np.maximum.accumulate(root[keep]))(fine)
         return (np.exp(fine) if self.log else fine), found**2
 
     @property
