@@ -21,6 +21,7 @@ from .unknowns import TIME, Setting, Unknown, checked
 STARTS = 5  # [-] searches, from the best of `solver.SCREENED` points
 QUICK = 12  # [-] iterations of every search before the best two go on
 OUTLIER = 4.0  # [-] a tap that the others predict worse than this times the median of their own errors does not agree
+UNEQUAL = 1.5  # [-] ratio of noise over peak from which taps count differently: less is how well noise is known
 MOST_OUTLIERS = 0.34  # [-] of the taps may disagree
 FEWEST = 3  # [-] taps, to tell which one disagrees
 
@@ -159,13 +160,20 @@ def _fit(
             points = target.points("response_at", response_at)
             if len(points) != n_points:
                 raise ValueError(f"response_at must be {n_points} points, one for each response, got {len(points)}")
-    cut = windows.cut(taps, window)
+    if taps.cut_short.any():
+        whole = np.flatnonzero(~taps.cut_short)
+        short = ", ".join(taps.labels[i] for i in np.flatnonzero(taps.cut_short))
+        notes.append(f"left out, because their record begins or ends within a pulse: {short}")
+        if not whole.size:
+            raise ValueError("taps must hold one at least whose record holds its whole pulse; trigger earlier")
+        taps = taps.pick(whole)
+    cut, noise = windows.cut(taps, window), taps.noise / taps.peak
     if cut.overload.any():
         bad = np.flatnonzero(cut.overload)
         notes.append(f"left out, because their force is cut off: {', '.join(cut.labels[i] for i in bad)}")
         if len(bad) == cut.n_taps:
             raise ValueError("taps must hold one at least whose force is not cut off")
-        cut = cut.pick(~cut.overload)
+        noise, cut = noise[~cut.overload], cut.pick(~cut.overload)
     place = None if target is None else target.point("at", at)[0]
     setting = Setting(
         target, place, striker, contact, rig, names, points, n_points, float(np.mean(cut.impulse))
@@ -176,7 +184,7 @@ def _fit(
         for each in names
     )
     own = tuple(each.name for each, name in zip(free, unknown) if name in per_tap) if cut.n_taps > 1 else ()
-    weights = np.ones(1 + n_points)
+    weights = np.ones((1, 1 + n_points))
     data = windows.data(cut, n_points, weights)
     for name in known:
         if name in unknown:
@@ -186,10 +194,12 @@ def _fit(
         raise ValueError(f"taps hold {data.values.size} samples, too few for {problem.n_values} values")
     used = list(range(cut.n_taps))
     best, minima = _search(problem, cut, length, starts, rng, watch)
+    part = problem.residual(best.x).reshape(data.values.shape)
     if n_points:
-        part = problem.residual(best.x).reshape(data.values.shape)
         spread = np.sqrt(np.square(part).mean(axis=(0, 2)))
-        weights = spread[0] / np.maximum(spread, 1e-300)
+        weights = weights * spread[0] / np.maximum(spread, 1e-300)
+    weights = weights * _sureness(part[:, 0], noise)[:, None]
+    if (weights != 1.0).any():
         data = windows.data(cut, n_points, weights)
         problem = replace(problem, data=data, _last={})
         best = solver.solve(problem, best.x)
@@ -208,6 +218,15 @@ def _fit(
         outliers[cut.labels[used[worst]]] = float(each[worst])
         used, problem, best, minima = fewer, without, solved, (solved.cost,)
     return Found(cut, tuple(used), outliers, problem, best, minima, tuple(notes), {}, watch)
+
+
+def _sureness(residual: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Weights (n_taps,) [-] of taps whose noise over the peak differs: that of residuals (n_taps, n_times) of a first
+    fit beyond the noise (n_taps,) is the model's and counts alike for all."""
+    model = max(0.0, float(np.median(np.square(residual).mean(axis=1) - noise**2)))
+    weights = 1.0 / np.sqrt(np.maximum(noise**2 + model, 1e-300))
+    weights /= np.sqrt(np.mean(weights**2))
+    return weights if weights.max() > UNEQUAL * weights.min() else np.ones(len(noise))
 
 
 def _search(problem: Problem, taps: Taps, length: float, starts: int, rng: Any, watch: Watch | None):

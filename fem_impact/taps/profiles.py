@@ -76,7 +76,7 @@ class Profile:
         if len(x) < 3:
             return self.values[keep], np.maximum(self.rise[keep], 0.0)
         fine = np.linspace(x[0], x[-1], n_points)
-        found = PchipInterpolator(x, root[keep])(fine)
+        found = PchipInterpolator(x, np.maximum.accumulate(root[keep]))(fine)
         return (np.exp(fine) if self.log else fine), found**2
 
     @property
@@ -124,8 +124,9 @@ def variance(residual: np.ndarray, n_values: int) -> tuple[float, int, float]:
     total = float(np.square(residual).sum())
     n_times = residual.shape[1]
     lags = min(LAGS, n_times - 2)
-    power = total / n or 1e-300
-    rho = np.array([float((residual[:, k:] * residual[:, :-k]).sum()) / n / power for k in range(1, lags + 1)])
+    size = np.sqrt(np.square(residual).mean(axis=1, keepdims=True))
+    rows = residual / np.maximum(size, 1e-300)  # each counts alike, whatever its noise
+    rho = np.array([float((rows[:, k:] * rows[:, :-k]).sum()) / n for k in range(1, lags + 1)])
     statistic = n * (n + 2.0) * float((rho**2 / (n - np.arange(1, lags + 1))).sum())
     white = float(chi2.sf(statistic, lags))
     factor = 1.0
@@ -174,8 +175,8 @@ def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int,
             guess = np.clip(guess, low, high)
             try:
                 moved = solve(problem, guess, ITERATIONS, CLOSE, held=(j,))
-                if not moved.ended and moved.cost - best.cost > target**2 * noise:  # slow along a ridge by a bound
-                    moved = solve(problem, moved.x, MORE, CLOSE, held=(j,))
+                if not moved.ended and moved.cost - best.cost > target**2 * noise:
+                    moved = solve(problem, moved.x, MORE, CLOSE, held=(j,), method="dogbox")  # quicker along a ridge
             except SimulationError:
                 held[side] = "the simulation"
                 break

@@ -165,7 +165,7 @@ class Taps:
     @cached_property
     def n_pulses(self) -> np.ndarray:
         """Pulses of each tap, (n_taps,); more than one of a double hit."""
-        return np.array([triggers.n_pulses(row) for row in self.force])
+        return np.array([triggers.n_pulses(row, noise) for row, noise in zip(self.force, self.noise)])
 
     @property
     def peak(self) -> np.ndarray:
@@ -174,12 +174,17 @@ class Taps:
 
     @property
     def impulse(self) -> np.ndarray:
-        """Impulse of each tap between its first and last sample above `triggers.PULSE` of its peak, (n_taps,) [N s]."""
-        above = self.force > triggers.PULSE[1] * self.peak[:, None]
-        first = above.argmax(axis=1)
-        last = above.shape[1] - above[:, ::-1].argmax(axis=1)
-        inside = (np.arange(above.shape[1]) >= first[:, None] - 1) & (np.arange(above.shape[1]) <= last[:, None])
-        return (self.force * inside).sum(axis=1) / self.rate
+        """Impulse of each tap from the begin of its first to the end of its last pulse, (n_taps,) [N s]."""
+        found = np.zeros(self.n_taps)
+        for i, (row, noise) in enumerate(zip(self.force, self.noise)):
+            each = triggers.pulses(row, noise)
+            found[i] = row[max(0, each[0][0] - 1) : each[-1][1] + 1].sum() / self.rate if each else 0.0
+        return found
+
+    @property
+    def cut_short(self) -> np.ndarray:
+        """Whether the record of each tap begins or ends within a pulse, (n_taps,) bool."""
+        return np.maximum(self.force[:, 0], self.force[:, -1]) > triggers.ENDS * self.peak
 
     @property
     def noise(self) -> np.ndarray:
@@ -336,16 +341,18 @@ def read_taps(
         (flip * row, segment[:, others] * np.array(factors)) for row, segment in zip(raw, found.segments)
     ]  # each (n_samples,), (n_samples, n_responses)
     options = {"trigger": trigger, "before": before, "length": length, "together": together}
-    rows, responses, labels, said = triggers.cut(segments, stated, name, **options)
+    rows, responses, full, labels, said = triggers.cut(segments, stated, name, **options)
     cut = [
-        [triggers.clipped(row, full_scale), *(triggers.clipped(column) for column in other.T)]
-        for row, other in zip(rows, responses)
+        [bool(top) or triggers.clipped(row, full_scale), *(triggers.clipped(column) for column in other.T)]
+        for row, other, top in zip(rows, responses, full)
     ]
     taps = Taps.from_arrays(
         rows, responses, rate=stated, names=[found.names[i] for i in others], units=kinds, overload=cut, labels=labels
     )
     double = [label for label, n in zip(taps.labels, taps.n_pulses) if n > 1]
     said += [f"{', '.join(double)}: more than one pulse, kept as one tap"] if double else []
+    late = [label for label, cut_short in zip(taps.labels, taps.cut_short) if cut_short]
+    said += [f"{', '.join(late)}: the record begins or ends within a pulse"] if late else []
     flat = [f"{label} ({', '.join(taps._cut(i))})" for i, label in enumerate(taps.labels) if any(cut[i])]
     said += [f"cut off by the range of the channel: {', '.join(flat)}"] if flat else []
     return Taps(taps.table, tuple(notes + said))

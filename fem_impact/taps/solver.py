@@ -260,9 +260,10 @@ class Solution:
 
 
 def solve(
-    problem: Problem, x: np.ndarray, iterations: int = ENOUGH, close: float = CLOSE, held: Sequence[int] = ()
-) -> Solution:
-    """Least squares from a start; the coordinates ``held`` stay."""
+    problem: Problem, x: np.ndarray, iterations: int = ENOUGH, close: float = CLOSE, held: Sequence[int] = (),
+    method: str = "trf",
+) -> Solution:  # fmt: skip
+    """Least squares from a start, by a method of scipy; the coordinates ``held`` stay."""
     low, high = problem.bounds
     held = [*held, *problem.needless]
     inner = 1e-9 + 1e-9 * np.abs(x)
@@ -278,6 +279,7 @@ def solve(
     found = least_squares(
         lambda part: problem.residual(whole(part)), start[free], lambda part: problem.jacobian(whole(part), held),
         (low[free], high[free]), x_scale="jac", max_nfev=iterations, ftol=close, xtol=close, gtol=1e-12,
+        method=method,
     )  # fmt: skip
     return Solution(whole(found.x), 2.0 * float(found.cost), found.jac, found.status > 0)
 

@@ -1,6 +1,7 @@
 """Find taps in a record of the force: where they begin, how many pulses they have, what is wrong; and cut them out."""
 
 import numpy as np
+from scipy.interpolate import interp1d
 
 from .._base import check
 
@@ -8,13 +9,17 @@ LEVEL = 0.05  # [-] of the largest force: a tap begins where the force rises abo
 NOISE = 8.0  # [-] standard deviations of the noise that the trigger stays above at least
 GAUSS = 1.4826  # [-] standard deviation over median absolute deviation of Gaussian noise
 PULSE = 0.1, 0.05  # [-] of a tap's largest force: a pulse rises above the first and ends below the second
+CLEAR = 6.0, 3.0  # [-] standard deviations of the noise: the same, if they are larger
+MOST = 0.5, 0.25  # [-] of the largest force: what a pulse rises above and ends below at most
+DRIFT = 0.2  # [-] of the trigger: less drift within a record is not mentioned
+REST = 0.2  # [s] over which the force is at rest for more than half the time: slower changes are drift
 CLIPPED = 3  # [-] equal largest samples in a row that count as clipped
 SAME = 1e-9  # [-] relative difference of samples that count as equal
 BEFORE = 0.02  # [s] longest record before a tap
 LONGEST = 10.0  # [s] longest record of one tap
 FEWEST = 8  # [-] samples before a tap from which an offset is estimated
 MOST_TAPS = 10_000  # [-] of one file: more are noise
-ENDS = 0.5  # [-] of a pulse's peak: a record that begins or ends above this cuts the pulse
+ENDS = 0.3  # [-] of a pulse's peak: a record that begins or ends above this cuts the pulse
 
 
 def noise(force: np.ndarray) -> float:
@@ -36,18 +41,41 @@ def starts(force: np.ndarray, trigger: float, together: int) -> np.ndarray:
     return above[np.concatenate([[True], np.diff(above) > together])]
 
 
-def n_pulses(force: np.ndarray) -> int:
-    """Number of pulses of one tap (n_times,): two of a double hit."""
+def pulses(force: np.ndarray, noise: float = 0.0) -> list[tuple[int, int]]:
+    """First sample of every pulse of a tap (n_times,), and the one after its last; two of a double hit.
+
+    Samples of noise, of standard deviation ``noise`` [N], are no pulses.
+    """
     peak = float(force.max(initial=0.0))
     if peak <= 0.0:
-        return 0
-    count, up = 0, False
-    for value in force / peak:
-        if not up and value > PULSE[0]:
-            count, up = count + 1, True
-        elif up and value < PULSE[1]:
-            up = False
-    return count
+        return []
+    up, down = (min(max(part * peak, wide * noise), most * peak) for part, wide, most in zip(PULSE, CLEAR, MOST))
+    state = np.where(force > up, 1, np.where(force < down, -1, 0))
+    last = np.maximum.accumulate(np.where(state != 0, np.arange(len(force)), 0))
+    inside = state[last] == 1
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
+    quiet = np.flatnonzero(force < down)
+    found = []
+    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist()):
+        before = quiet[quiet < first]
+        found.append((int(before[-1]) + 1 if before.size else 0, end))
+    return found
+
+
+def n_pulses(force: np.ndarray, noise: float = 0.0) -> int:
+    """Number of pulses of one tap (n_times,): two of a double hit."""
+    return len(pulses(force, noise))
+
+
+def level_of_rest(force: np.ndarray, block: int) -> np.ndarray:
+    """What a record (n_samples,) would be without taps: medians of blocks of samples, joined by straight lines."""
+    parts = np.array_split(force, max(1, len(force) // block))
+    middle = np.cumsum([0, *(len(part) for part in parts[:-1])]) + [0.5 * (len(part) - 1) for part in parts]
+    values = np.array([np.median(part) for part in parts])
+    if len(parts) == 1:
+        return np.full(len(force), values[0])
+    ends = interp1d(middle, values, fill_value="extrapolate")([0, len(force) - 1])
+    return np.interp(np.arange(len(force)), [0, *middle, len(force) - 1], [ends[0], *values, ends[1]])
 
 
 def clipped(values: np.ndarray, full_scale: float | None = None) -> bool:
@@ -62,14 +90,27 @@ def clipped(values: np.ndarray, full_scale: float | None = None) -> bool:
     return bool(runs.max(initial=0) >= CLIPPED)
 
 
+def ceiling(rows: list[np.ndarray]) -> float:
+    """Largest value that a channel can show, if its segments (n_samples,) reach it; else infinity.
+
+    That is a largest value which `CLIPPED` samples share, two of them neighbours.
+    """
+    top = max(float(row.max()) for row in rows)
+    reached = [row >= top * (1.0 - SAME) for row in rows]
+    count = sum(int(each.sum()) for each in reached)
+    return top if count >= CLIPPED and any((each[1:] & each[:-1]).any() for each in reached) else np.inf
+
+
 def cut(segments, rate, name, *, trigger, before, length, together):
-    """Records of equal length around every tap: force, responses, labels and notes."""
+    """Records of equal length around every tap: force, responses, whether the force is cut off, labels and notes."""
     pause = max(1, round(check.positive("together", together, "s") * rate))
-    whole = np.concatenate([row - np.median(row) for row, _ in segments])
+    rests = [level_of_rest(row, max(1, round(REST * rate))) for row, _ in segments]
+    moved = [row - rest for (row, _), rest in zip(segments, rests)]
+    whole = np.concatenate(moved)
     limit = level(whole) if trigger is None else check.positive("trigger", trigger, "N")
     places = []  # segment, first sample above the trigger, samples free before and after
     for k, (row, _) in enumerate(segments):
-        begun = starts(row - np.median(row), limit, pause)
+        begun = starts(moved[k], limit, pause)
         for i, start in enumerate(begun):
             last = begun[i - 1] if i else 0
             end = begun[i + 1] if i + 1 < len(begun) else len(row)
@@ -77,7 +118,7 @@ def cut(segments, rate, name, *, trigger, before, length, together):
             after = int(end - start) if i + 1 == len(begun) else int(0.5 * (end - start))
             places.append((k, int(start), free, after))
     if not places:
-        top = max(float(row.max()) for row, _ in segments)
+        top = float(whole.max())
         raise ValueError(
             f"no tap was found in {name}: its force reaches {top:.3g} N and the trigger is {limit:.3g} N; check scale "
             "and trigger"
@@ -85,12 +126,15 @@ def cut(segments, rate, name, *, trigger, before, length, together):
     if len(places) > MOST_TAPS:
         raise ValueError(f"{name} has {len(places)} places above {limit:.3g} N; give trigger= and together=")
     wanted = BEFORE if before is None else check.positive("before", before, "s")
-    lead = min(round(wanted * rate), min(free for _, _, free, _ in places) if before is None else 10**9)
+    frees = [free for _, _, free, _ in places]
+    some = [free for free in frees if free >= FEWEST]  # a few taps that a record begins with cut those of others short
+    least = min(some) if 2 * len(some) > len(frees) else min(frees)
+    lead = min(round(wanted * rate), least if before is None else 10**9)
     tail = min(after for _, _, _, after in places)
     if length is not None:
         tail = max(1, round(check.positive("length", length, "s") * rate) - lead)
     tail = min(tail, round(LONGEST * rate))
-    rows, responses, labels, notes, offsets = [], [], [], [], []
+    rows, responses, labels, notes, offsets, tops, drift = [], [], [], [], [], [], 0.0
     for number, (k, start, _, _) in enumerate(places):
         row, other = segments[k]
         first, last = start - lead, start + tail
@@ -98,17 +142,24 @@ def cut(segments, rate, name, *, trigger, before, length, together):
             notes.append(f"tap {number + 1} is left out: its record is not complete")
             continue
         quiet = slice(max(0, first), max(0, start - max(3, (start - first) // 4)))
-        rest = row[quiet], other[quiet]
+        slope = rests[k] - rests[k][start]  # (n_samples,) [N]
+        flat = row - slope
+        rest = flat[quiet], other[quiet]
         base = (np.median(rest[0]), np.median(rest[1], axis=0)) if len(rest[0]) >= FEWEST else (0.0, 0.0)
         offsets.append(float(base[0]))
-        rows.append(row[first:last] - base[0])
+        drift = max(drift, float(np.ptp(slope[first:last])))
+        rows.append(flat[first:last] - base[0])
         responses.append(other[first:last] - base[1])
         labels.append(f"tap {number + 1}")
+        tops.append(float(row[first:last].max()))
     if not rows:
         raise ValueError(f"no tap in {name} has a complete record; give a shorter length or before, or check rate")
     largest = max(offsets, key=abs)
     if largest:
         notes.append(f"offsets before the taps were removed, of the force up to {abs(largest):.2g} N")
+    if drift > DRIFT * limit:
+        notes.append(f"drift of the force was removed, up to {drift:.2g} N within a record")
     if lead < FEWEST:
         notes.append(f"only {lead} samples before the taps: offsets are not removed")
-    return np.array(rows), np.array(responses), labels, notes
+    top = ceiling([row for row, _ in segments])
+    return np.array(rows), np.array(responses), np.array(tops) >= top * (1.0 - SAME), labels, notes

@@ -15,6 +15,10 @@ DISPLACEMENT = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
 KINDS = {"N": FORCE, "m/s^2": ACCELERATION, "m/s": VELOCITY, "m": DISPLACEMENT}  # SI unit -> factors
 FORCE_NAMES = re.compile(r"force|hammer|kraft|excit|\bexc\b|input|^f$", re.IGNORECASE)
 RESPONSE_NAMES = re.compile(r"accel|resp|veloc|displ|vibro|^a\d*$|^acc", re.IGNORECASE)
+OTHERS = (  # not known by `known`: such a channel needs a scale
+    "V", "mV", "uV", "µV", "kV", "pC", "A", "mA", "counts", "count", "LSB", "bits", "digits", "%", "dB", "Hz", "kHz",
+    "s", "ms", "us", "µs", "-", "a.u.",
+)  # fmt: skip
 LABEL = re.compile(r"^(.*?)\s*[\[(]([^\])]*)[\])]\s*$")  # "Force [N]", "Force (N)"
 
 
@@ -32,6 +36,6 @@ def known(unit: str) -> tuple[str, float] | None:
 def label(text: str) -> tuple[str, str]:
     """Name and unit of a heading such as "Force [N]"; a bracket that holds no unit stays in the name."""
     found = LABEL.match(text.strip())
-    if found and (known(found[2]) or found[2].strip() in ("V", "s", "ms", "-")):
+    if found and (known(found[2]) or found[2].strip() in OTHERS):
         return found[1].strip(), found[2].strip()
     return text.strip(), ""

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check
+from . import triggers
 from .records import Taps
 from .solver import Data
 
@@ -47,11 +48,10 @@ def cut(taps: Taps, window: Any) -> Taps:
     else:
         first = BEFORE / taps.rate
         ends = []
-        for row, onset in zip(taps.force, taps.onset):
-            above = np.flatnonzero(row > 0.05 * row.max())
+        for row, onset, noise in zip(taps.force, taps.onset, taps.noise):
             begin = int(onset * taps.rate)
-            later = above[above >= begin]
-            ends.append((later[-1] - begin + 1) if later.size else 1)
+            later = triggers.pulses(row[begin:], noise)
+            ends.append(later[-1][1] if later else 1)
         last = (1.0 + AFTER) * max(max(ends), BEFORE) / taps.rate
     starts = np.round(taps.onset * taps.rate).astype(int)
     before, after = round(float(first) * taps.rate), round(float(last) * taps.rate)

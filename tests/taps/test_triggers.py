@@ -27,6 +27,26 @@ def test_pulses_are_counted_once_each():
     assert triggers.n_pulses(np.zeros(30)) == 0
 
 
+def test_noise_is_no_pulse_and_drift_no_rest():
+    rng = np.random.default_rng(2)
+    pulse = np.pad(np.sin(np.pi * np.arange(11) / 10), (500, 3000))
+    noisy = pulse + 0.04 * rng.standard_normal(len(pulse))
+    assert triggers.n_pulses(noisy) > 1  # without knowledge of the noise
+    ((first, end),) = triggers.pulses(noisy, 0.04)
+    assert abs(first - 501) <= 2 and abs(end - 510) <= 2
+    assert triggers.pulses(np.zeros(30)) == []
+    drift = np.linspace(-5.0, 3.0, len(pulse))
+    left = pulse + drift - triggers.level_of_rest(pulse + drift, 200)
+    assert np.abs(left - pulse).max() < 0.03  # the pulse moves a median of 200 by 5 ranks of 0.0023
+
+
+def test_a_ceiling_is_reached_by_several_samples_two_of_them_neighbours():
+    pulse = np.sin(np.pi * np.arange(11) / 10)
+    low = np.minimum(pulse, 0.95)  # three samples at the top of each
+    assert triggers.ceiling([low, 0.5 * pulse, low]) == 0.95
+    assert triggers.ceiling([pulse, pulse, pulse]) == np.inf  # three taps of the same peak
+
+
 def test_a_flat_top_is_clipping_and_a_round_one_is_not():
     pulse = np.sin(np.pi * np.arange(101) / 100)
     assert not triggers.clipped(pulse) and triggers.clipped(np.minimum(pulse, 0.9))

@@ -15,5 +15,6 @@ def test_known_units(text, si, factor):
 
 
 def test_headings():
+    assert units.label("Hammer [mV]") == ("Hammer", "mV") and units.known("mV") is None
     assert units.label("Force [N]") == ("Force", "N") and units.label("Hammer (lbf)") == ("Hammer", "lbf")
     assert units.label("Force (Trigger)") == ("Force (Trigger)", "") and units.known("furlong") is None

@@ -1,0 +1,190 @@
+"""Records as other people have them: noise, drift, commas, late triggers, double hits, all the way to a prediction."""
+
+import numpy as np
+import pytest
+from hammer_taps import RATE
+
+import fem_impact as fi
+
+LAW = fi.Contact.power(2e11, 1.9, loss=0.15)  # six to eight samples of contact
+SPEEDS = (0.3, 0.42, 0.5, 0.65, 0.8)  # m/s
+GAP, BEFORE = 0.25, 0.1  # s between taps, and before the first
+RANGES = {"contact.stiffness": (1e3, 1e16), "contact.exponent": (1.0, 4.0), "contact.loss": (0.0, 20.0)}
+WALL = fi.Modes.rigid(1e9)
+
+
+def struck(target, place, mass=0.15, law=LAW, speeds=SPEEDS, **given):
+    return [fi.strike(target, fi.Striker.rigid(mass), law, at=place, speed=v, **given) for v in speeds]
+
+
+def record(hits, noise=0.005, seed=0):
+    """One long record of the force of all hits (n_samples,) [N]; noise over the largest peak."""
+    rng = np.random.default_rng(seed)
+    force = np.zeros(int(RATE * (BEFORE + GAP * len(hits))))
+    for i, hit in enumerate(hits):
+        tap = fi.measure(hit, rate=RATE, duration=0.9 * GAP, onset=rng.uniform() / RATE)
+        first = int(RATE * (BEFORE + GAP * i))
+        force[first : first + len(tap.time)] += tap.force[0]
+    return force + noise * force.max() * rng.standard_normal(len(force))
+
+
+def written(path, force, heading="Zeit [s];Kraft [N]"):
+    """The record as a German spreadsheet writes it."""
+    time = np.arange(len(force)) / RATE
+    rows = (f"{t:.7f};{f:.6e}".replace(".", ",") for t, f in zip(time, force))
+    path.write_text("\n".join([heading, *rows]) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def force():
+    return record(struck(WALL, None))
+
+
+def fitted(taps, **changes):
+    given = {"striker": fi.Striker.rigid(0.15), "contact": fi.Contact.hertz(1e7), "unknown": RANGES, "starts": 2,
+             "profiles": False}  # fmt: skip
+    return fi.fit(taps, **given | changes)
+
+
+def test_drift_and_offset_beyond_the_trigger_make_no_taps(force, tmp_path):
+    slow = np.linspace(0.0, 0.3 * force.max(), len(force)) - 0.1 * force.max()
+    taps = fi.read_taps(written(tmp_path / "a.csv", 1e-3 * (force + slow), "Zeit [s];Kraft [kN]"))
+    plain = fi.read_taps(written(tmp_path / "b.csv", force))
+    assert taps.n_taps == plain.n_taps == 5 and (taps.n_pulses == 1).all()
+    assert np.allclose(taps.peak, plain.peak, atol=2e-3 * force.max())  # a median of 400 samples of 0.5 % of noise
+    assert any("drift of the force was removed" in note for note in taps.notes) and len(plain.notes) == 1
+
+
+def test_a_tap_that_a_record_begins_with_does_not_cost_the_others_their_rest(force, tmp_path):
+    late = force[int(np.flatnonzero(force > 0.1 * force.max())[0]) :]
+    taps = fi.read_taps(written(tmp_path / "a.csv", late))
+    assert taps.labels == ("tap 2", "tap 3", "tap 4", "tap 5") and taps.onset[0] > 0.01
+    assert any("tap 1 is left out" in note for note in taps.notes)
+
+
+@pytest.mark.parametrize("noise", [pytest.param(0.005, marks=pytest.mark.slow), 0.02])
+def test_noise_neither_makes_pulses_nor_widens_the_window(tmp_path, noise):
+    taps = fi.read_taps(written(tmp_path / "a.csv", record(struck(WALL, None), noise)))
+    assert taps.n_pulses.tolist() == [1] * 5
+    made = fitted(taps)
+    assert len(made.taps.time) < 60  # some 8 samples of contact, 12 before, and 1.5 times 12 after
+    # 2 % of the largest peak is 13 % of the rms force of a tap in the middle
+    assert made.whiteness > 0.01 and made.predict(4).error < 4.0 * noise + 0.01
+    assert made.point["contact.exponent"] == pytest.approx(1.9, abs=0.05 + 10.0 * noise)  # this seed's noise
+
+
+@pytest.mark.slow
+def test_taps_count_by_how_sure_they_are(force, tmp_path):
+    made = fitted(fi.read_taps(written(tmp_path / "a.csv", force)))
+    size = np.sqrt(np.square(made.problem.residual(made.best.x)).reshape(5, -1).mean(axis=1))
+    assert size.max() < 2.0 * size.min()  # weighted residuals; of the peak they differ by the peaks, a factor of 3.4
+
+
+def test_two_taps_at_the_same_ceiling_are_cut_off(force, tmp_path):
+    low = np.minimum(force, 0.7 * force.max())  # two or three samples of each, on different offsets
+    taps = fi.read_taps(written(tmp_path / "a.csv", low))
+    assert taps.overload.tolist() == [False, False, False, True, True]
+    made = fitted(taps)
+    assert made.taps.n_taps == 3 and any("cut off: tap 4, tap 5" in note for note in made.notes)
+
+
+@pytest.mark.slow
+def test_a_trigger_in_the_pulse_is_said_and_left_out(force, tmp_path):
+    starts = [int(np.flatnonzero(force[int(RATE * t) :] > 0.1 * force.max())[0]) + int(RATE * t)
+              for t in BEFORE - 0.01 + GAP * np.arange(5)]  # fmt: skip
+    for shift, said in ((-4, None), (1, "begins or ends within a pulse")):
+        rows = np.array([force[start + shift : start + shift + 200] for start in starts])
+        np.savez(tmp_path / "a.npz", force=rows, rate=RATE)
+        taps = fi.read_taps(tmp_path / "a.npz")
+        assert any("begins or ends within a pulse" in note for note in taps.notes) == (said is not None)
+        if said:
+            with pytest.raises(ValueError, match="trigger earlier"):
+                fitted(taps)
+        else:
+            assert fitted(taps).point["contact.exponent"] == pytest.approx(1.9, abs=0.15)
+    mixed = np.array([force[start + (1 if i == 2 else -4) :][:200] for i, start in enumerate(starts)])
+    made = fitted(fi.Taps.from_arrays(mixed, rate=RATE))
+    assert made.taps.labels == ("tap 1", "tap 2", "tap 4", "tap 5") and any("tap 3" in note for note in made.notes)
+
+
+def test_a_voltage_is_not_taken_for_newtons(force, tmp_path):
+    place = written(tmp_path / "a.csv", 2.25 * force, "Zeit [s];Hammer [mV]")
+    with pytest.raises(ValueError, match=r"scale must be given for 'Hammer'.*in 'mV'"):
+        fi.read_taps(place)
+    assert fi.read_taps(place, scale=1.0 / 2.25).peak[4] == pytest.approx(force.max(), rel=5e-3)
+
+
+@pytest.mark.slow
+def test_a_spike_is_no_tap_of_this_hammer(force, tmp_path):
+    sparks = force.copy()
+    sparks[[1000, 20000]] = 0.5 * force.max(), -0.5 * force.max()
+    made = fitted(fi.read_taps(written(tmp_path / "a.csv", sparks)))
+    assert list(made.outliers) == ["tap 1"] and made.point["contact.exponent"] == pytest.approx(1.9, abs=0.15)
+
+
+@pytest.mark.slow
+def test_five_taps_on_an_unknown_structure_are_predicted_to_their_noise(tmp_path):
+    body = fi.Modes.from_arrays(
+        [700.0, 2100.0, 5200.0], [[1.1, 0.9, 0.8]], points=[[0.0]], mass=1.0, damping_ratio=0.03
+    )
+    force = record(struck(body, [0.0]))
+    time = np.arange(len(force)) / RATE
+    force += 0.002 * force.max() * np.sin(2.0 * np.pi * 0.7 * time)  # what a charge amplifier drifts
+    taps = fi.read_taps(written(tmp_path / "a.csv", force))
+    mode = {"mode1.frequency": (500.0, 1e4), "mode1.mass": (0.05, 20.0)}
+    made = fitted(taps, unknown=RANGES | mode, starts=3)
+    assert made.outliers == {} and made.whiteness > 1e-3
+    for one, peak in zip(made.left_out(), taps.peak):
+        assert (
+            np.sqrt(np.mean(one.residual**2)) < 1.6 * 0.005 * taps.peak.max()
+        )  # the noise, and a little of the others'
+        assert one.error_of_peak < 1.6 * 0.005 * taps.peak.max() / peak
+
+
+WOODEN = """
+[mesh]
+shape = "rectangle"
+length = 0.4
+width = 0.3
+[material]
+E = 11e9
+nu = 0.37
+rho = 430.0
+E_across = 0.8e9
+G = 0.7e9
+[section]
+kind = "plate"
+thickness = 4e-3
+[target]
+damping_ratio = 0.01
+[supports]
+boundary = "free"
+[striker]
+kind = "rigid"
+mass = 0.02
+[contact]
+kind = "hertz"
+stiffness = 4e8
+[strike]
+at = [0.17, 0.12]
+speed = 0.5
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
+def test_double_hits_on_a_known_wooden_plate_tell_the_hammer(tmp_path):
+    (tmp_path / "wood.toml").write_text(WOODEN)
+    plate, place = fi.load_scene(tmp_path / "wood.toml").modes(60), (0.17, 0.12)
+    law = fi.Contact.power(4e8, 1.5, loss=0.2)
+    hits = struck(plate, place, 0.02, law, (0.15, 0.25, 0.4, 0.6, 0.9), max_impacts=6, tolerance=1e-3, duration=0.05)
+    taps = fi.read_taps(written(tmp_path / "a.csv", record(hits)))
+    assert (taps.n_pulses > 1).all() and any("more than one pulse" in note for note in taps.notes)
+    made = fitted(taps, target=plate, at=place, striker=fi.Striker.rigid(0.04),
+                  unknown=RANGES | {"striker.mass": (5e-3, 0.3)})  # fmt: skip
+    assert made.outliers == {} and made.whiteness > 1e-3
+    assert made.point["striker.mass"] == pytest.approx(0.02, rel=0.01)  # the second rise tells it
+    assert made.point["contact.exponent"] == pytest.approx(1.5, abs=0.05)
+    rise = made.left_out(rise_only=True)[4]  # the later pulses follow from the rise of the first
+    assert rise.error < 0.05  # 2.2 % of the rms force is noise
