@@ -707,13 +707,14 @@ def _run(
     if status == record.EXHAUSTED:
         raise SimulationError(
             f"no final separation was reached in {most} steps, up to {time:.4g} s; raise {chosen_by}, or give "
-            f"{_sooner(History(*parts, *result, stretched=stretched))}"
+            f"{_sooner(History(*parts, *result))}"
         )
     if status == record.FAILED:
         raise SimulationError(
             f"scheme {scheme} found no valid next step at {time:.4g} s; use scheme A4, or check the units of the scene"
         )
-    return History(*parts, *result, stretched=stretched)
+    history = History(*parts, *result)
+    return history if stretched is None else replace(history, stretched=stretched)
 
 
 def _sooner(history: History) -> str:

@@ -210,6 +210,8 @@ class Grid:
 
     def sampled(self) -> "Grid":
         """The same grid with each body reduced to its contact points: small enough to send to a cluster."""
+        if self.base.modes.stretches:
+            return replace(self, kernels={})  # slopes are not known from points
         return replace(self, base=self.base.sampled(self.axes.get("at", self.base.at[None])), kernels={})
 
     def without_speed(self) -> "Grid | None":
@@ -218,7 +220,7 @@ class Grid:
         law = self.base.contact
         if "speed" not in self.axes or (exponents != 1.0).any() or self.lossy or law.gap or self.extra:
             return None
-        if law.hard_stiffness or "hard_stiffness" in self.axes:
+        if law.hard_stiffness or "hard_stiffness" in self.axes or self.base.modes.stretches:
             return None
         return replace(self, axes={**self.axes, "speed": self.axes["speed"][:1]})
 
@@ -466,6 +468,7 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
         for name, value in base.items()
     }
     quick = (column["exponent"] >= 1.0) & (column["gap"] >= 0.0) & (not grid.extra)
+    quick &= not grid.base.modes.stretches
     for name in ("hard_stiffness", "yield_approach", "hysteresis"):
         quick &= column[name] == 0.0
     cells = np.flatnonzero(quick)
