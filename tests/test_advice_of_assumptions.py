@@ -2,7 +2,7 @@
 
 import re
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import pytest
 
@@ -51,6 +51,7 @@ def blow(target=None, striker=BALL, law=None, *, speed=0.05, at=(0.12, 0.1), **h
     return fi.strike(target, striker, law, at=at, speed=speed, tolerance=1e-2, **how)
 
 
+@cache
 def flapping():
     """A plate with one edge that may slip in its plane."""
     edges = {"left": "clamped", "right": "clamped", "bottom": "hinged"}

@@ -134,6 +134,17 @@ def test_the_model_of_a_wooden_bar_struck_fast_fails_first_as_it_yields(tmp_path
     assert (tmp_path / "is_the_model_right.csv").read_text().count("\n") == 5
 
 
+@pytest.mark.slow
+@pytest.mark.xdist_group("stretched")
+def test_a_plate_with_and_without_stretching_is_drawn(tmp_path, capsys):
+    study("is_the_model_right").stretched(tmp_path / "stretching.png")
+    rows = [[float(x) for x in line.split()] for line in capsys.readouterr().out.splitlines()[2:]]
+    assert (tmp_path / "stretching.png").stat().st_size > 10_000 and len(rows) == 13
+    for _, linear, depth, true, told, left in rows[:8]:  # up to half a thickness
+        assert depth <= linear and true / 3.0 < told < 3.0 * true and 0.1 * true < left < 0.2 * true
+    assert all(np.isnan(left) == (depth > 1.0) for _, _, depth, _, _, left in rows)
+
+
 def test_what_is_not_known_gets_a_question_mark():
     right = study("is_the_model_right")
     hit = right.fi.load_scene(STUDIES / "scenes" / "everyday" / "marimba_yarn.toml").strike()

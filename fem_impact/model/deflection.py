@@ -46,7 +46,7 @@ def of_target(struck: Struck) -> Assumption:
     def told(value: float | None, effect: dict, unknown: str = "") -> Assumption:
         remedy, limit = REMEDY if body is None or body.held != 1.0 else BETTER, LIMIT
         if struck.hit.history.stretched is not None:
-            remedy, limit = LOCAL, GONG
+            return Assumption("small deflections", value, GONG, effect, quantities, LOCAL, NUMBER, unknown)
         remedy = "give material and section" if unknown else A_GONG if value is not None and value > GONG else remedy
         return Assumption("small deflections", value, limit, effect, quantities, remedy, NUMBER, unknown)
 
@@ -89,7 +89,7 @@ def of_target(struck: Struck) -> Assumption:
     )
 
 
-def _stretched(struck: Struck, body: Known, integrals: Bending) -> tuple[float, dict[str, float | None]]:
+def _stretched(struck: Struck, body: Known, integrals: Bending) -> tuple[float, dict[str, float | None], str]:
     """A blow that has Berger's tension in it: how large it gets, and what that tension misses.
 
     Berger's stiffness of a plate is SOFTER too large where the whole plate bends, and too small where a part of it does
@@ -103,6 +103,8 @@ def _stretched(struck: Struck, body: Known, integrals: Bending) -> tuple[float, 
     moved = history.states(np.append(times, np.linspace(end, end + after, int(PERIODS * PER_PERIOD))))[0][:, mine]
     value = float(np.abs(moved @ history.shape[0, mine]).max(initial=0.0)) / body.thickness
     effect: dict[str, float | None] = dict.fromkeys(struck.quantities, 0.0)
+    if value > GONG:
+        return value, dict.fromkeys(struck.quantities), A_GONG
     if isinstance(body.section, Plate):
         stretch = moved[: len(times)] ** 2 @ integrals.slope
         whole = _tension(body, stretch, np.full(len(times), body.extent))
@@ -110,9 +112,11 @@ def _stretched(struck: Struck, body: Known, integrals: Bending) -> tuple[float, 
         held = float(more @ stretch / stretch.sum()) if stretch.any() else 0.0
         omega = np.sqrt(history.omega[mine] ** 2 + held * integrals.slope)
         less = replace(history.stretched, forms=np.sqrt(1.0 - SOFTER) * history.stretched.forms)
-        both = struck.changes(omega=struck.of_target(omega)), struck.changes(stretched=less)
+        changes = [struck.changes(omega=struck.of_target(omega)), struck.changes(stretched=less)]
+        whole_effect = struck.changes(stretched=None)  # a part of it may cancel by chance, but not be counted on to
+        changes.append({name: None if x is None else SOFTER * x for name, x in whole_effect.items()})
         for name in effect:
-            parts = [change[name] for change in both]
+            parts = [change[name] for change in changes]
             effect[name] = None if None in parts else max(x for x in parts if x is not None)
     if "sound" in effect:
         soft = integrals.slope / history.omega[mine] ** 2
@@ -120,7 +124,7 @@ def _stretched(struck: Struck, body: Known, integrals: Bending) -> tuple[float, 
         rise = np.sqrt(1.0 + mean * soft) - 1.0
         weight = struck.energy / (struck.energy.sum() or 1.0)
         effect["sound"] = SOFTER * float(weight @ rise) if isinstance(body.section, Plate) else 0.0
-    return value, effect
+    return value, effect, ""
 
 
 def _tension(body: Known, stretch: np.ndarray, extent: np.ndarray) -> np.ndarray:

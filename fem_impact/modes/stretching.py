@@ -81,10 +81,7 @@ def _integrals(shapes: Shapes, modes: Modes, moduli: np.ndarray) -> tuple[np.nda
         if loose or system.element == "morley":
             edge = "an edge is free or elastic" if loose else "of element 'morley' the slopes are not known"
             raise ValueError(f"{CANNOT}, but {edge}; hold it, or leave stretching out")
-        vectors = (
-            shapes.vectors if isinstance(shapes, FieldShapes) else (shapes.basis.T @ shapes.turn)[:, : shapes.kept]
-        )
-        return slopes.products(system, vectors, moduli), slopes.softness(system)
+        return slopes.products(system, _vectors(shapes), moduli), slopes.softness(system)
     section = modes.section
     assert section is not None
     if isinstance(shapes, (RectangleShapes, DiskShapes)):
@@ -103,6 +100,13 @@ def _integrals(shapes: Shapes, modes: Modes, moduli: np.ndarray) -> tuple[np.nda
         area = float(section.inertia(np.zeros((1, 1)))[0]) / section.material.rho
         return _beam(shapes), shapes.length / (section.material.E * area)
     raise ValueError(f"{CANNOT}, but its shapes are known at points only; leave it out")
+
+
+def _vectors(shapes: FieldShapes | RitzShapes) -> np.ndarray:
+    """The shapes in the unknowns of their system, (n_dofs, n)."""
+    if isinstance(shapes, FieldShapes):
+        return shapes.vectors
+    return (shapes.basis.T @ shapes.turn)[:, : shapes.kept]
 
 
 def _disk(shapes: DiskShapes) -> np.ndarray:

@@ -206,7 +206,8 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
 TABLES = [*MAKERS, "supports"]
 REQUIRED = ("mesh", "striker", "contact", "strike")
 # arguments that come from other tables
-SUPPLIED = {"material", "modes", "striker", "contact", "sphere", "plate", "stretching", "start"}
+SUPPLIED = {"material", "modes", "striker", "contact", "sphere", "plate", "start"}
+OF_TARGET = {"stretching"}  # arguments of the strike that are keys of the table [target]
 PATHS = ("source", "path")  # keys that name a file, relative to the scene file
 
 
@@ -300,7 +301,8 @@ def read_part(path: Path, table: str, values: dict[str, Any], folder: Path) -> P
 
 
 def _check_keys(selector: str, kind: str, values: dict[str, Any], maker: Callable[..., Any]) -> None:
-    arguments = {n: p for n, p in inspect.signature(maker).parameters.items() if n not in SUPPLIED}
+    supplied = SUPPLIED | OF_TARGET if maker is collision.strike else SUPPLIED
+    arguments = {n: p for n, p in inspect.signature(maker).parameters.items() if n not in supplied}
     known = [selector, *arguments] if selector else list(arguments)
     for key in values:
         if key not in arguments:

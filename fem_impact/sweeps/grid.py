@@ -189,6 +189,8 @@ class Grid:
 
     def sampled(self) -> "Grid":
         """The same grid with each body reduced to its contact points: small enough to send to a cluster."""
+        if self.base.modes.stretches:
+            return replace(self, kernels={})  # slopes are not known from points
         return replace(self, base=self.base.sampled(self.axes.get("at", self.base.at[None])), kernels={})
 
     def without_speed(self) -> "Grid | None":
@@ -197,7 +199,7 @@ class Grid:
         law = self.base.contact
         if "speed" not in self.axes or (exponents != 1.0).any() or self.lossy or law.gap or self.extra:
             return None
-        if law.hard_stiffness or "hard_stiffness" in self.axes:
+        if law.hard_stiffness or "hard_stiffness" in self.axes or self.base.modes.stretches:
             return None
         return replace(self, axes={**self.axes, "speed": self.axes["speed"][:1]})
 
@@ -446,7 +448,7 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
         name: grid.axes[name][place[name]] if name in place else np.full(stop - start, value)
         for name, value in base.items()
     }
-    quick = together(column) & (not grid.extra)
+    quick = together(column) & (not grid.extra) & (not grid.base.modes.stretches)
     cells = np.flatnonzero(quick)
     if cells.size:
         kind = np.zeros(stop - start, int)

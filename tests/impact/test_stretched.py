@@ -237,3 +237,39 @@ def test_a_blow_again_is_the_same_blow():
     again = collision.again(hit.history)
     assert again.end_p[0] == pytest.approx(hit.history.end_p[0], rel=1e-3)
     assert again.stretched.forms is hit.history.stretched.forms
+
+
+def test_a_map_on_a_body_that_stretches_is_made_of_such_blows():
+    modes, law = replace(plate(8), stretches=True), fi.Contact.linear(2e5)
+    table = fi.sweep(modes, HAMMER, law, at=AT, speed=1.0, over={"speed": [1e-3, 1.0]}, residual=False, tolerance=1e-4)
+    alone = blow(plate(8), law, tolerance=1e-4)
+    assert table.restitution.values[1] == pytest.approx(alone.restitution, abs=2e-4)
+    assert abs(table.restitution.values[1] - table.restitution.values[0]) > 1e-2  # a linear contact knows no speed
+
+
+def test_sound_after_a_hard_blow_is_that_of_the_motion_that_stretches():
+    # the pitch falls as the sound fades: the periods of the first mode get longer
+    modes = plate(1, 0.002, sides=(0.2, 0.2))
+    hit = blow(modes, fi.Contact.linear(1e5), 3.0, tolerance=1e-4)
+    sound = fi.sound.synthesise(hit, duration=0.6)
+    up = np.flatnonzero((sound.samples[:-1] < 0.0) & (sound.samples[1:] >= 0.0)) / sound.rate
+    early, late = (np.diff(some).mean() for some in (up[:6], up[-6:]))
+    times = np.arange(1000, 1400) / sound.rate
+    velocity = hit.velocity([AT], hit.time[0] + times)[:, 0]
+    assert sound.samples[1000:1400] * sound.full_scale == pytest.approx(velocity, abs=1e-9)
+    assert 1.02 * early < late < 1.0 / modes.frequencies[0]
+
+
+def test_sound_in_air_of_a_plate_that_stretches():
+    hits = [blow(plate(4, 0.01), fi.Contact.linear(1e5), speed, tolerance=1e-3) for speed in (1e-3, 1.0)]
+    still = blow(plate(4, 0.01), fi.Contact.linear(1e5), 1e-3, tolerance=1e-3, stretching=False)
+    one, hard, linear = (fi.sound.radiate(hit, (0.1, 0.1, 0.5), duration=0.02) for hit in (*hits, still))
+    size = np.abs(linear.samples).max()
+    # finite differences at eight instants per sample against exact derivatives
+    assert one.samples == pytest.approx(linear.samples, abs=0.02 * size)
+    assert np.abs(hard.samples / 1e3 - linear.samples).max() > 0.05 * size
+
+
+def test_a_rig_measures_no_body_that_stretches():
+    with pytest.raises(ValueError, match="does not stretch"):
+        fi.measure(blow(plate(4), fi.Contact.linear(1e5), tolerance=1e-3), rate=25600.0)

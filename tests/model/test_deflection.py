@@ -125,7 +125,7 @@ def test_what_berger_misses_of_a_blow_is_less_than_what_he_adds():
         true = np.abs(better.displacement([how["at"]], times)).max() / H
         assert told.limit == 1.0 and told.value == pytest.approx(true, rel=0.1)
         assert told.doubtful == gong and ("this is a gong" in told.sentence) == gong
-        assert 0.0 < told.worst < 0.5 * found(plain).worst
+        assert told.state == "not known" if gong else 0.0 < told.worst < 0.5 * found(plain).worst
 
 
 @pytest.mark.xdist_group("stretched")
