@@ -19,6 +19,7 @@ from .compiled.law import FELT
 from .contact import Contact, acting_stiffness, wall_time
 from .quantities import asked_for
 from .response import Dip, Error, History, Response
+from .sensitivity import gauss as _gauss
 from .striker import Striker
 
 TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
@@ -270,8 +271,9 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None) -> R
     laws = tuple(touch.law for touch in contacts)
     dips = tuple(_dip(part, system) for part in parts)
     return Response(
-        tuple(bodies), laws, history, speed, options.tolerance, ran, error, striker, at, dips, options.quantities
-    )
+        tuple(bodies), laws, history, speed, options.tolerance, ran, error, striker, at, dips, options.quantities,
+        coarse=coarse,
+    )  # fmt: skip
 
 
 def _check_way(system: _System, depth: float, tolerance: float) -> None:
@@ -711,13 +713,6 @@ def again(history: History, **changed: np.ndarray) -> History:
     horizon = history.end_time if history.status == record.HORIZON else np.inf
     most = len(history.contacts) if history.status == record.IMPACTS else 0
     return _run(system, "A4", pace[0] / FIRST_STEPS, pace, horizon, most)
-
-
-def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss nodes on [0, 1] with 1 appended, (count + 1,), and Lagrange polynomials in powers, (count, count)."""
-    nodes = 0.5 * (np.polynomial.legendre.leggauss(count)[0] + 1.0)
-    powers = np.linalg.inv(np.vander(nodes, increasing=True)).T
-    return np.append(nodes, 1.0), np.ascontiguousarray(powers)
 
 
 def _difference(
