@@ -3,6 +3,7 @@
 import html
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -171,8 +172,8 @@ def _slopes(
     if name == "modal_energy":
         part = hit.body_slice(1)
         h = hit.history
-        value = 0.5 * (h.end_p[part] ** 2 + (h.omega[part] * h.end_q[part]) ** 2)
-        return value, found.energies(part).T
+        energy = 0.5 * (h.end_p[part] ** 2 + (h.omega[part] * h.end_q[part]) ** 2)
+        return energy, found.energies(part).T
     if name == "spectral_centroid":
         assert band is not None
         frequencies, spectrum = hit.band_spectrum(band)
@@ -219,7 +220,7 @@ def _check_grazing(found: Sensitivity) -> None:
 
 def _cubic(found: Sensitivity) -> np.ndarray:
     """Approach [m] at fractions `WITHIN` of every piece, (n_pieces, 9)."""
-    return _between(*found.found.way.T, found.pieces.length)
+    return _between(found.found.way[:, 0], found.found.way[:, 1], found.pieces.length)
 
 
 def _between(d: np.ndarray, v: np.ndarray, h: np.ndarray) -> np.ndarray:
@@ -247,7 +248,7 @@ def _narrowest(found: Sensitivity) -> float:
     turns = found.pieces.closed & (v[:-1] < 0.0) & (v[1:] > 0.0)
     least = float(np.abs(depth[turns]).min(initial=np.inf))
     parts = _impact_pieces(found)
-    for one, two in zip(parts, parts[1:]):
+    for one, two in pairwise(parts):
         if two.start > one.stop:
             times, d, v = _flight(found, one.stop, found.time[two.start])
             least = min(least, float(-_between(d, v, np.diff(times)).min(initial=0.0)))
@@ -257,7 +258,7 @@ def _narrowest(found: Sensitivity) -> float:
 def _nearest_miss(found: Sensitivity) -> float:
     """Least gap at which the bodies pass each other without touching [m], later ones too if the run saw the end."""
     history, parts = found.history, _impact_pieces(found)
-    spans = [(one.stop, found.time[two.start]) for one, two in zip(parts, parts[1:])]
+    spans = [(one.stop, found.time[two.start]) for one, two in pairwise(parts)]
     if history.status == record.FINISHED:
         spans.append((len(found.time) - 1, history.end_time + _ahead(history)))
     elif parts and not found.pieces.closed[-1]:
@@ -283,9 +284,8 @@ def _ahead(history: "History") -> float:
 def _flight(found: Sensitivity, begin: int, end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times from the end of an impact, a piece, to another time [s], approach [m] and rate [m/s] there."""
     mark, start = found.pieces.mark[begin], found.time[begin]
-    free = replace(
-        found.history, start_q=found.found.q[mark].copy(), start_p=found.found.p[mark].copy(), steps=found.history.steps[:0],
-    )  # fmt: skip
+    q, p = found.found.q[mark].copy(), found.found.p[mark].copy()
+    free = replace(found.history, start_q=q, start_p=p, steps=found.history.steps[:0])
     duration = max(impact.duration for impact in found.history.impacts)
     count = int(np.clip(LOOKS[0] * (end - start) / max(duration, 1e-300), 16, LOOKS[1]))
     times = np.linspace(0.0, end - start, count + 1)

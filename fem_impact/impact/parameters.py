@@ -194,7 +194,7 @@ class Parameters:
         if name.endswith(".first_frequency"):
             return 1.0, 0.0
         section = self.hit.bodies[-1].section
-        return SCALE[type(section)] if name == "target.scale" else self._powers[name]  # type: ignore[index]
+        return SCALE[type(section)] if name == "target.scale" else self._powers[name]
 
     @property
     def _bodies(self) -> tuple[slice, slice]:

@@ -36,9 +36,8 @@ def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 def no_change(history: "History", n: int) -> Change:
     """Room for the changes that ``n`` parameters make, all zero."""
-    n_modes = len(history.omega)
-    each = [np.zeros((n, n_modes)) for _ in range(6)]
-    return Change(*each, np.zeros(n), np.zeros((n, N_LAW)))
+    omega, zeta, shape, bias, start_q, start_p = np.zeros((6, n, len(history.omega)))
+    return Change(omega, zeta, shape, bias, start_q, start_p, np.zeros(n), np.zeros((n, N_LAW)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,25 +207,27 @@ class Sensitivity:
     @cached_property
     def _late(self) -> float:
         """How much later than `peak` [s] the force is largest: one step of Newton's method."""
-        return -_force_rate(*self.found.base[self._top, :3], self.history.law) / self._bend if self._bend else 0.0
+        return -_force_rate(self.found.base[self._top, :3], self.history.law) / self._bend if self._bend else 0.0
 
     @cached_property
     def _bend(self) -> float:
         """Second rate of the force at its peak [N/s^2]; zero if the force is largest at an end of the blow."""
         if self.peak <= 0 or self.peak == len(self.time) - 1:
             return 0.0
-        d, v, a, turn = self.found.base[self._top, :4]
-        return self._slope(v, a, turn, np.zeros(N_LAW))
+        return self._slope(self.found.base[self._top, 1:4], np.zeros(N_LAW))
 
     @cached_property
     def _rate_change(self) -> np.ndarray:
         """Change (n,) of the rate of the force at its peak."""
         ends = self.found.ends[self._top]
-        return np.array([self._slope(*each[:3], law) for each, law in zip(ends.T, self.change.law)])
+        return np.array([self._slope(each[:3], law) for each, law in zip(ends.T, self.change.law)])
 
-    def _slope(self, dd: float, dv: float, da: float, dlaw: np.ndarray) -> float:
-        """Slope of the force's rate at its peak along a direction, by a central difference."""
-        now, along = self.found.base[self._top, :3], np.array([dd, dv, da])
+    def _slope(self, along: np.ndarray, dlaw: np.ndarray) -> float:
+        """Slope of the force's rate at its peak along changes (3,) of the approach and its rates, and of the law.
+
+        By a central difference.
+        """
+        now = self.found.base[self._top, :3]
         law, law_along = self.history.law, np.zeros(self.history.law.shape)
         width = min(len(dlaw), law.shape[1])
         law_along[0, :width] = dlaw[:width]
@@ -235,7 +236,7 @@ class Sensitivity:
         if not max(sizes):
             return 0.0
         step = NUDGE / max(sizes)
-        high, low = (_force_rate(*(now + side * step * along), law + side * step * law_along) for side in (1.0, -1.0))
+        high, low = (_force_rate(now + side * step * along, law + side * step * law_along) for side in (1.0, -1.0))
         return float((high - low) / (2.0 * step))
 
     @property
@@ -245,8 +246,9 @@ class Sensitivity:
         return float(fastest[0]), float(fastest[1])
 
 
-def _force_rate(d: float, v: float, a: float, law: np.ndarray) -> float:
-    """Rate [N/s] of the contact force at an approach and its first two rates."""
+def _force_rate(state: np.ndarray, law: np.ndarray) -> float:
+    """Rate [N/s] of the contact force at an approach and its first two rates, (3,)."""
+    d, v, a = state.tolist()
     _, by_d, by_v = law_at(d, v, law, np.zeros(N_LAW))
     return by_d * v + by_v * a
 
@@ -293,15 +295,15 @@ def _cut(history: "History", peak: float | None) -> tuple[np.ndarray, np.ndarray
     if peak is not None:
         cut(peak)
     time, row, part = [], [], []
-    for i, fractions in enumerate(inside):
-        least = EDGE + ROUNDING * history.end_time / steps[i, 1]
+    for k, fractions in enumerate(inside):
+        least = EDGE + ROUNDING * history.end_time / steps[k, 1]
         begins = [0.0]
         for fraction in sorted(fractions):
             if begins[-1] + least < fraction < 1.0 - least:
                 begins.append(fraction)
         for begin in begins:
-            time.append(steps[i, 0] + begin * steps[i, 1])
-            row.append(i)
+            time.append(steps[k, 0] + begin * steps[k, 1])
+            row.append(k)
             part.append(begin)
     time.append(history.end_time if len(steps) else 0.0)
     return np.array(time), np.array(row, int), np.array(part)

@@ -227,9 +227,9 @@ def test_what_has_no_gradient_says_why():
     felt = fi.Contact.felt(1e10, 2.5, hysteresis=0.4, relaxation=1e-3)
     with pytest.raises(fi.SimulationError, match="the contact yields or remembers"):
         fi.strike(wall, rigid, felt, at=None, speed=1.0).gradient("impulse")
-    with pytest.raises(fi.SimulationError, match="no gradient in contact.gap: the bodies touch at the start"):
+    with pytest.raises(fi.SimulationError, match=r"no gradient in contact\.gap: the bodies touch at the start"):
         ball(fi.Contact.hertz(1e6)).gradient("impulse", "contact.gap")
-    with pytest.raises(fi.SimulationError, match="no gradient in section.thickness: section and material"):
+    with pytest.raises(fi.SimulationError, match=r"no gradient in section\.thickness: section and material"):
         ball(fi.Contact.hertz(1e6)).gradient("impulse", "section.thickness")
     with pytest.raises(fi.SimulationError, match="never touched"):
         fi.strike(wall, rigid, fi.Contact.hertz(1e6, gap=1.0), at=None, speed=1.0, duration=0.1).gradient("impulse")

@@ -5,8 +5,8 @@ A change of a number changes the motion of each mode by dq, the approach d by dd
 ``dd = doffset + sum (u dq + q du)``, ``df = f_d dd + f_v dd' + f_p dp``. These equations are linear, whatever the law:
 where the force starts and ends it is zero, so that df has no peaks there although these times move.
 
-The force of the record is a polynomial in each piece of time, and so is df, through s Gauss nodes. The modes follow both
-exactly: with m_k the moments of the impulse response (see `propagation`) and m_(-1) its rate,
+The force of the record is a polynomial in each piece of time, and so is df, through s Gauss nodes. The modes follow
+both exactly: with m_k the moments of the impulse response (see `propagation`) and m_(-1) its rate,
 ``omega dm_k/domega = m_(k-1) - (k+1) m_k`` and
 ``(1 - zeta**2) dm_k/dzeta = zeta ((k+1) m_k - m_(k-1)) - omega h (m_k - k m_(k+1))``.
 """
@@ -414,10 +414,10 @@ def law_at(d, v, law, out_slopes):
 @inner()
 def any_in(values):
     """Whether any of some values is not zero."""
+    found = False
     for n in range(values.size):
-        if values[n] != 0.0:
-            return True
-    return False
+        found = found or values[n] != 0.0
+    return found
 
 
 @outer()
