@@ -14,6 +14,7 @@ _NAMES = {
     "impact.contact": "Contact",
     "impact.striker": "Striker",
     "impact.response": "Response Impact",
+    "impact.gradient": "Gradient",
     "impact.collision": "Touch collide",
     "impact.spectra": "mobility",
     "impact.threshold": "threshold_frequency",

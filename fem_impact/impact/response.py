@@ -500,7 +500,7 @@ class Response:
         >>> hit = fi.strike(plate, ball, law, at=(0.45, 0.3), speed=1.0)
         >>> slopes = hit.gradient("contact_time", wrt=("striker.mass", "contact.stiffness"))
         >>> slopes.relative.round(3).tolist()  # 0.4 and -0.4 on a rigid wall
-        [0.344, -0.369]
+        [0.423, -0.355]
         """
         found = gradient.gradients(self, quantity, wrt)
         return next(iter(found.values())) if isinstance(quantity, str) else found
