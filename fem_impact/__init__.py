@@ -17,6 +17,7 @@ _NAMES = {
     "impact.contact": "Contact",
     "impact.striker": "Striker Hand",
     "impact.response": "Response Impact",
+    "impact.gradient": "Gradient",
     "impact.collision": "Touch collide",
     "impact.spectra": "mobility",
     "impact.threshold": "threshold_frequency",

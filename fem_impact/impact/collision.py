@@ -21,6 +21,7 @@ from .compiled.stretched import run_stretched
 from .contact import Contact, acting_stiffness, wall_time
 from .quantities import asked_for
 from .response import Dip, Error, History, Response
+from .sensitivity import gauss as _gauss
 from .state import State
 from .stretched import Stretched
 from .striker import Striker
@@ -354,8 +355,9 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
     laws = tuple(touch.law for touch in contacts)
     dips = tuple(_dip(part, system) for part in parts)
     return Response(
-        tuple(bodies), laws, history, speed, options.tolerance, ran, error, striker, at, dips, options.quantities
-    )
+        tuple(bodies), laws, history, speed, options.tolerance, ran, error, striker, at, dips, options.quantities,
+        coarse=coarse,
+    )  # fmt: skip
 
 
 def _check_way(system: _System, depth: float, tolerance: float) -> None:
@@ -823,13 +825,6 @@ def again(history: History, **changed: Any) -> History:
     horizon = history.end_time if history.status == record.HORIZON else np.inf
     most = len(history.contacts) if history.status == record.IMPACTS else 0
     return _run(system, "A4", pace[0] / FIRST_STEPS, pace, horizon, most)
-
-
-def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss nodes on [0, 1] with 1 appended, (count + 1,), and Lagrange polynomials in powers, (count, count)."""
-    nodes = 0.5 * (np.polynomial.legendre.leggauss(count)[0] + 1.0)
-    powers = np.linalg.inv(np.vander(nodes, increasing=True)).T
-    return np.append(nodes, 1.0), np.ascontiguousarray(powers)
 
 
 def _difference(

@@ -171,7 +171,7 @@ def solve(cloud: Cloud, start: int, stop: int, *, workers: int | None = None) ->
         name: np.array(cloud.axes[name][some]) if name in cloud.axes else np.full(stop - start, value)
         for name, value in shared.items()
     }
-    quick = grid.together(column)
+    quick = grid.together(column) & (not base.modes.stretches)
     kinds, one = cloud.families
     ratio, kind = cloud.ratio[some], kinds[some]
     bands = _bands(ratio, cloud.band)

@@ -1,0 +1,293 @@
+"""`hit.gradient`: derivatives of what a blow does in the numbers that make it, each with its error."""
+
+import html
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._base import check, markup
+from .._base.check import SimulationError
+from .compiled import record
+from .compiled.law import KIND
+from .parameters import POSSIBLE, UNITS, Parameters
+from .sensitivity import Sensitivity
+
+if TYPE_CHECKING:
+    from .response import History, Response
+
+QUANTITIES = (
+    "restitution", "impulse", "contact_time", "peak_force", "peak_time", "spectral_centroid", "modal_energy",
+)  # fmt: skip
+UNIT_OF = {
+    "impulse": "N s", "contact_time": "s", "peak_force": "N", "peak_time": "s", "spectral_centroid": "Hz",
+    "modal_energy": "J",
+}  # fmt: skip
+GRAZE = 1e-3  # [-] of the deepest approach: a touch or gap below it may come or go with a small change
+TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a small change may make the other the largest
+LOOKS = 16.0, 20_000  # [-] times per contact at which a flight is searched for near misses, and their largest number
+WITHIN = np.linspace(0.0, 1.0, 9)  # [-] fractions of a piece of time at which its cubic is looked at
+# [-] difference of two runs over the error of the finer one, for schemes A, A4 and collocation
+RICHARDSON = {"A": 3.0, "A4": 3.0, "collocation": 1.0}
+LEAST = 1e-9  # [-] of a derivative: what is left of differences of shapes, and two runs may agree by chance
+
+
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """Derivatives of one quantity of a blow in n of its numbers.
+
+    `gradient["striker.mass"]` is one of them, in units of the quantity over units of the number.
+    """
+
+    quantity: str
+    value: Any  # of the quantity; (n_modes,) for the modal energy
+    names: tuple[str, ...]  # (n,)
+    numbers: np.ndarray  # (n,) their values
+    slopes: np.ndarray  # (n,), or (n, n_modes), quantity over number
+    error: np.ndarray  # like slopes, their estimated error from the time steps
+
+    __repr__ = check.brief
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+
+    def __getitem__(self, name: str) -> Any:
+        return self.slopes[self.names.index(check.one_of("name", name, self.names))]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    @property
+    def relative(self) -> np.ndarray:
+        """Relative change of the quantity per relative change of each number [-], shaped like `slopes`."""
+        numbers = self.numbers.reshape(-1, *[1] * (self.slopes.ndim - 1))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.value == 0.0, 0.0, self.slopes * numbers / self.value)
+
+    def change(self, **relative: float) -> Any:
+        """First-order change of the quantity for relative changes of numbers, "." in their names written "_".
+
+        Examples
+        --------
+        >>> modes, law = fi.Modes.rigid(1e6), fi.Contact.linear(1e5)
+        >>> hit = fi.strike(modes, fi.Striker.rigid(0.1), law, at=None, speed=1.0, tolerance=1e-8)
+        >>> slopes = hit.gradient("contact_time", wrt=("striker.mass", "contact.stiffness"))
+        >>> round(slopes.change(striker_mass=0.02, contact_stiffness=0.02) / slopes.value, 6)
+        0.0
+        """
+        known = {name.replace(".", "_"): i for i, name in enumerate(self.names)}
+        for name in relative:
+            check.one_of("relative", name, known)
+        return sum(part * self.numbers[known[name]] * self.slopes[known[name]] for name, part in relative.items())
+
+    def __str__(self) -> str:
+        unit = UNIT_OF.get(self.quantity.partition("=")[0], "")
+        if self.slopes.ndim > 1:
+            return f"{self.quantity} of {self.slopes.shape[1]} modes [{unit}] in {', '.join(self.names)}"
+        lines = [f"{self.quantity} {self.value:.6g}{f' {unit}' if unit else ''}"]
+        for name, number, slope, error, part in zip(self.names, self.numbers, self.slopes, self.error, self.relative):
+            at = f"{name} = {number:.6g} {UNITS.get(name, '')}".rstrip()
+            lines.append(f"  {slope:+.5e} +- {error:.0e} per unit, {part:+.4f} % per %, in {at}")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """Table for notebooks."""
+        if self.slopes.ndim > 1:
+            return f"<p>{html.escape(str(self))}</p>"
+        rows = [
+            (name, f"{number:.5g} {UNITS.get(name, '')}", f"{slope:.5g}", f"{error:.0e}", f"{part:.4f}")
+            for name, number, slope, error, part in zip(
+                self.names, self.numbers, self.slopes, self.error, self.relative
+            )
+        ]
+        head = ["number", "value", f"slope of {self.quantity}", "error", "% per %"]
+        return markup.table(rows, head)
+
+
+def gradients(hit: "Response", quantity: Any, wrt: Any) -> dict[str, Gradient]:
+    """The gradient of each quantity, see `Response.gradient`."""
+    wanted = [_asked(item) for item in ((quantity,) if isinstance(quantity, str) else quantity)]
+    if hit.striker is None or len(hit.bodies) != 2:
+        raise ValueError("gradient needs a blow of `strike`, with one striker and one target")
+    if hit.history.law.shape[1] > KIND and hit.history.law[0, KIND] not in POSSIBLE:
+        raise SimulationError("no gradient: the contact yields or remembers, and its past is not followed yet")
+    if not hit.n_impacts:
+        raise SimulationError("no gradient: the bodies never touched; check gap and speed")
+    parameters = Parameters(hit)
+    names = parameters.checked(wrt)
+    change = parameters.change(names)
+    coarse = hit.coarse
+    if coarse is not None and (len(coarse.contacts) != len(hit.history.contacts) or coarse.n_blind):
+        raise SimulationError(
+            f"no gradient: runs of different steps find {len(coarse.contacts)} and {hit.n_impacts} impacts; give a "
+            "smaller tolerance or max_impacts"
+        )
+    fine = Sensitivity.of(hit.history, change)
+    _check_grazing(fine)
+    rough = None if coarse is None else Sensitivity.of(coarse, change)
+    numbers = np.array([parameters.values[name] for name in names])
+    found = {}
+    for name, band in wanted:
+        if name.startswith("peak"):
+            _check_tie(hit.history)
+        if name == "modal_energy" and hit.rings is not None:
+            raise SimulationError("no gradient of modal_energy: vectors told the blow; strike modes, of find_modes")
+        value, slopes = _slopes(hit, fine, names, name, band)
+        if rough is None:
+            error = np.full(slopes.shape, np.inf)
+        else:
+            apart = np.abs(slopes - _slopes(hit, rough, names, name, band)[1])
+            error = apart / RICHARDSON[hit.scheme] + LEAST * np.abs(slopes)
+        label = name if band is None else f"{name}={band:g}"
+        found[label] = Gradient(label, value, names, numbers, slopes, error)
+    return found
+
+
+def _asked(item: Any) -> tuple[str, float | None]:
+    """A quantity and its band [Hz]."""
+    name, equals, band = str(item).partition("=")
+    name = {"force": "peak_force"}.get(name.strip(), name.strip())
+    check.one_of("quantity", name, QUANTITIES)
+    if (name == "spectral_centroid") != bool(equals):
+        rule = "needs a band, such as 'spectral_centroid=5000'" if not equals else f"has no band, write {name!r}"
+        raise ValueError(f"quantity {name} {rule}")
+    if not equals:
+        return name, None
+    try:
+        return name, check.positive("band of spectral_centroid", float(band), "Hz")
+    except ValueError:
+        raise ValueError(f"band of {name} must be a positive number in Hz, got {check.shown(band.strip())}") from None
+
+
+def _slopes(
+    hit: "Response", found: Sensitivity, names: tuple[str, ...], name: str, band: float | None
+) -> tuple[Any, np.ndarray]:
+    """Value of a quantity, and its derivatives (n,) or (n, n_modes)."""
+    if name == "restitution":
+        rigid = np.arange(hit.bodies[0].n_rigid)
+        faster = np.array([float(other == "strike.speed") for other in names])
+        return hit.restitution, -(found.speed(rigid) + hit.restitution * faster) / hit.speed
+    if name == "modal_energy":
+        part = hit.body_slice(1)
+        h = hit.history
+        energy = 0.5 * (h.end_p[part] ** 2 + (h.omega[part] * h.end_q[part]) ** 2)
+        return energy, found.energies(part).T
+    if name == "spectral_centroid":
+        assert band is not None
+        frequencies, spectrum = hit.band_spectrum(band)
+        size = np.abs(spectrum)
+        unit = np.conj(spectrum) / np.where(size > 0.0, size, 1.0)
+        change = np.real(unit[:, None] * found.spectrum(frequencies))  # (n_frequencies, n)
+        whole = np.trapezoid(size, frequencies)
+        centre = float(np.trapezoid(frequencies * size, frequencies) / whole)
+        return centre, np.trapezoid((frequencies - centre)[:, None] * change, frequencies, axis=0) / whole
+    if name == "peak_time":
+        return found.when_largest, found.peak_time
+    value: float = getattr(hit, name)
+    return value, getattr(found, name)
+
+
+def _check_tie(history: "History") -> None:
+    """Raise SimulationError where two maxima of the force are so alike that either may be the largest."""
+    rows = np.flatnonzero(history.pressed[:, 0])
+    force = history.force(rows, 0, np.arange(16) / 16.0).ravel()
+    before, after = np.append(0.0, force[:-1]), np.append(force[1:], 0.0)
+    tops = np.sort(force[(force > before) & (force >= after)])[::-1]
+    if len(tops) > 1 and tops[0] - tops[1] < TIE * tops[0]:
+        raise SimulationError(
+            f"no gradient of the largest force: two maxima differ by {(tops[0] - tops[1]) / tops[0]:.1e} of it, and a "
+            "small change may make the other the largest"
+        )
+
+
+def _check_grazing(found: Sensitivity) -> None:
+    """Raise SimulationError next to a contact or a separation that barely happens, or barely does not."""
+    for what, least in (("touch", _shallowest(found)), ("gap", _narrowest(found)), ("miss", _nearest_miss(found))):
+        if least < GRAZE * found.deepest:
+            words = {
+                "touch": "an impact is only {} m deep, and would vanish",
+                "gap": "the bodies come within {} m of parting, or part by no more, and one impact would be two",
+                "miss": "the bodies pass each other at {} m, and would touch once more",
+            }[what]
+            raise SimulationError(
+                f"no gradient next to a grazing contact: {words.format(f'{least:.2g}')} with a small change of some "
+                "number, at which contact time, peak and count have no derivative; strike a little harder, softer or "
+                "elsewhere"
+            )
+
+
+def _cubic(found: Sensitivity) -> np.ndarray:
+    """Approach [m] at fractions `WITHIN` of every piece, (n_pieces, 9)."""
+    return _between(found.found.way[:, 0], found.found.way[:, 1], found.pieces.length)
+
+
+def _between(d: np.ndarray, v: np.ndarray, h: np.ndarray) -> np.ndarray:
+    t = WITHIN
+    d0, d1, v0, v1 = (x[:, None] for x in (d[:-1], d[1:], v[:-1] * h, v[1:] * h))
+    return d0 + t * (v0 + t * (3.0 * (d1 - d0) - 2.0 * v0 - v1 + t * (2.0 * (d0 - d1) + v0 + v1)))
+
+
+def _impact_pieces(found: Sensitivity) -> list[slice]:
+    """The pieces of every impact."""
+    closed = np.concatenate([[False], found.pieces.closed, [False]]).astype(int)
+    edges = np.flatnonzero(np.diff(closed))
+    return [slice(a, b) for a, b in zip(edges[::2], edges[1::2])]
+
+
+def _shallowest(found: Sensitivity) -> float:
+    """Depth of the least deep impact [m]."""
+    depth = _cubic(found)
+    return float(min((depth[part].max() for part in _impact_pieces(found)), default=np.inf))
+
+
+def _narrowest(found: Sensitivity) -> float:
+    """Least approach at which a contact nearly opens, or least gap between two impacts [m]."""
+    depth, v = _cubic(found), found.found.way[:, 1]
+    turns = found.pieces.closed & (v[:-1] < 0.0) & (v[1:] > 0.0)
+    least = float(np.abs(depth[turns]).min(initial=np.inf))
+    parts = _impact_pieces(found)
+    for one, two in pairwise(parts):
+        if two.start > one.stop:
+            times, d, v = _flight(found, one.stop, found.time[two.start])
+            least = min(least, float(-_between(d, v, np.diff(times)).min(initial=0.0)))
+    return least
+
+
+def _nearest_miss(found: Sensitivity) -> float:
+    """Least gap at which the bodies pass each other without touching [m], later ones too if the run saw the end."""
+    history, parts = found.history, _impact_pieces(found)
+    spans = [(one.stop, found.time[two.start]) for one, two in pairwise(parts)]
+    if history.status == record.FINISHED:
+        spans.append((len(found.time) - 1, history.end_time + _ahead(history)))
+    elif parts and not found.pieces.closed[-1]:
+        spans.append((parts[-1].stop, history.end_time))
+    least = np.inf
+    for begin, end in spans:
+        times, d, v = _flight(found, begin, end)
+        depth = _between(d, v, np.diff(times))
+        turns = (v[:-1] > 0.0) & (v[1:] < 0.0)
+        least = min(least, float((-depth[turns].max(axis=1, initial=-np.inf)).min(initial=np.inf)))
+    return least
+
+
+def _ahead(history: "History") -> float:
+    """How long after the end of a run its modes together could bridge the gap between the bodies [s]."""
+    rigid, shape = history.omega == 0.0, history.shape
+    size = np.hypot(history.end_q, history.end_p / np.where(rigid, 1.0, history.omega))
+    gap = -float(history.offset[0] + shape[0, rigid] @ history.end_q[rigid])
+    apart = -float(shape[0, rigid] @ history.end_p[rigid])  # [m/s]
+    return max(0.0, (float(np.abs(shape[0, ~rigid]) @ size[~rigid]) - gap) / apart) if apart > 0.0 else 0.0
+
+
+def _flight(found: Sensitivity, begin: int, end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times from the end of an impact, a piece, to another time [s], approach [m] and rate [m/s] there."""
+    mark, start = found.pieces.mark[begin], found.time[begin]
+    q, p = found.found.q[mark].copy(), found.found.p[mark].copy()
+    free = replace(found.history, start_q=q, start_p=p, steps=found.history.steps[:0])
+    duration = max(impact.duration for impact in found.history.impacts)
+    count = int(np.clip(LOOKS[0] * (end - start) / max(duration, 1e-300), 16, LOOKS[1]))
+    times = np.linspace(0.0, end - start, count + 1)
+    q, p = free.states(times)
+    return times, free.offset[0] + q @ free.shape[0], p @ free.shape[0]

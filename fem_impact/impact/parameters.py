@@ -1,0 +1,280 @@
+"""The numbers of a blow that a gradient can be taken in, and what each changes in the modes and contact of the run."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._base import check
+from ..fe.section import Beam, Elastic, Plate
+from ..modes.modal import Modes, left_out
+from .compiled.law import LAYERS, POWER
+from .compiled.tangents import Change
+from .sensitivity import no_change
+
+if TYPE_CHECKING:
+    from .response import Response
+
+LAW = {"stiffness": 0, "exponent": 1, "loss": 2, "depth": 5, "hard_stiffness": 6, "hard_exponent": 7}  # columns
+UNITS = {
+    "contact.stiffness": "N/m**exponent", "contact.loss": "s/m", "contact.gap": "m", "contact.depth": "m",
+    "contact.hard_stiffness": "N/m**hard_exponent", "strike.speed": "m/s", "strike.x": "m", "strike.y": "m",
+    "striker.mass": "kg", "striker.first_frequency": "Hz", "target.mass": "kg", "target.first_frequency": "Hz",
+    "section.thickness": "m", "section.height": "m", "section.width": "m", "section.diameter": "m",
+    "material.E": "Pa", "material.rho": "kg/m^3",
+}  # fmt: skip
+# powers with which frequencies and mass of a thin body grow with a number of it
+PLATE = {"section.thickness": (1.0, 1.0), "material.E": (0.5, 0.0), "material.rho": (-0.5, 1.0)}
+BEAM = {"material.E": (0.5, 0.0), "material.rho": (-0.5, 1.0)}
+BAR = {"section.height": (1.0, 1.0), "section.width": (0.0, 1.0), **BEAM}
+ROD = {"section.diameter": (1.0, 2.0), **BEAM}
+SCALE = {Plate: (-2.0, 2.0), Beam: (-2.0, 1.0)}  # all lengths along the body, at the same thickness
+SHIFT = 1e-3  # [rad] of the shortest wave kept: distance of the points whose shapes give the slope of each shape
+STATIC_SHIFT = 1e-3  # [-] of the body: the same for the static compliance, which has no short waves
+# fourth-order differences over points at these multiples of the distance: about the point, and to one side of it
+DIFFERENCES = (
+    ((-2, -1, 1, 2), (1 / 12, -2 / 3, 2 / 3, -1 / 12)),
+    ((0, 1, 2, 3, 4), (-25 / 12, 4.0, -3.0, 4 / 3, -1 / 4)),
+    ((0, -1, -2, -3, -4), (25 / 12, -4.0, 3.0, -4 / 3, 1 / 4)),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """The numbers of one blow of `strike`, by the names that scene files give them."""
+
+    hit: "Response"
+
+    __repr__ = check.brief
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """Every number in which a gradient can be taken, and its value."""
+        hit = self.hit
+        law, striker, target = hit.contact, hit.striker, hit.bodies[-1]
+        assert striker is not None
+        found = {f"contact.{name}": float(getattr(law, name)) for name in ("stiffness", "exponent", "loss", "gap")}
+        if law.hard_stiffness:
+            found |= {f"contact.{name}": float(getattr(law, name)) for name in list(LAW)[3:]}
+        found["strike.speed"] = hit.speed
+        if not self.why_still:
+            found |= {f"strike.{name}": float(x) for name, x in zip("xy", hit.at if hit.at is not None else ())}
+        for name, modes in (("striker", striker.modes), ("target", target)):
+            if name == "target" and self.why_no_target:
+                continue
+            found[f"{name}.mass"] = modes.mass
+            flexible = modes.omega > 0.0
+            if flexible.any():
+                found[f"{name}.first_frequency"] = float(modes.frequencies[flexible][0])
+                found[f"{name}.damping_ratio"] = float(modes.damping_ratio[flexible][0])
+        if not self.why_no_section:
+            section = target.section
+            assert section is not None
+            for name in self._powers:
+                home, _, part = name.partition(".")
+                part = "width" if part == "diameter" else part
+                value = getattr(section.material if home == "material" else section, part)
+                if not callable(value):
+                    found[name] = float(value)
+            found["target.scale"] = 1.0
+        return {name: value for name, value in found.items() if name not in self._barred}
+
+    @cached_property
+    def _barred(self) -> dict[str, str]:
+        """Numbers in which this blow has no gradient although it has them, and why."""
+        barred, hit = {}, self.hit
+        if hit.contact.gap == 0.0:
+            barred["contact.gap"] = "the bodies touch at the start, and no gap is unlike a small one; give a gap"
+        if hit.contact.loss == 0.0 and hit.history.law[0, 3] > 0.0:
+            barred["contact.loss"] = (
+                "without loss the modes left out act as a spring in series, with loss they cannot; give the contact a "
+                "small loss"
+            )
+        if hit.speed == 0.0:
+            barred["strike.speed"] = "the speed is zero"
+        return barred
+
+    @property
+    def why_no_target(self) -> str:
+        """Why numbers of the target have no gradient; empty if they have."""
+        if self.hit.error.idealisation > 0.0:
+            return "the target is treated as rigid or infinite; strike its modes, with target = 'modal'"
+        return ""
+
+    @property
+    def why_still(self) -> str:
+        """Why the strike point has no gradient; empty if it has."""
+        target = self.hit.bodies[-1]
+        if self.why_no_target:
+            return self.why_no_target
+        return "" if target.continuous else "the shapes of the target are known at single points only"
+
+    @property
+    def why_no_section(self) -> str:
+        """Why numbers of section and material have no gradient; empty if they have."""
+        target = self.hit.bodies[-1]
+        section = target.section
+        system = getattr(target.shapes, "system", None)
+        if self.why_no_target:
+            return self.why_no_target
+        if section is None:
+            return "section and material of the target are not known"
+        if target.thick or target.air:
+            return "a thick target, or one in air, does not scale by powers of its numbers"
+        if isinstance(section, Plate) and (section.tension or section.material.E_across is not None):
+            return "tension and materials with a grain are not told from E; rescale modes instead"
+        held = () if system is None else system.supports.values()
+        if any(isinstance(each, Elastic) for each in held) or (system is not None and system.point_masses):
+            return "springs and point masses on the target do not grow with it"
+        return ""
+
+    @property
+    def _powers(self) -> dict[str, tuple[float, float]]:
+        section = self.hit.bodies[-1].section
+        if isinstance(section, Plate):
+            return PLATE
+        return ROD if isinstance(section, Beam) and section.round else BAR
+
+    def checked(self, wrt: Any) -> tuple[str, ...]:
+        """Names as a tuple; all that there are if None. ValueError tells which there are, and why one is not."""
+        if wrt is None:
+            return tuple(self.values)
+        names = (wrt,) if isinstance(wrt, str) else tuple(wrt)
+        for name in names:
+            if name in self._barred:
+                raise check.SimulationError(f"no gradient in {name}: {self._barred[name]}")
+            if name in self.values:
+                continue
+            reason = self._reason(str(name))
+            if reason:
+                raise check.SimulationError(f"no gradient in {name}: {reason}")
+            check.one_of("wrt", name, self.values)
+        return names
+
+    def _reason(self, name: str) -> str:
+        """Why a number that other blows have is not among those of this one."""
+        home = name.partition(".")[0]
+        if name in ("strike.x", "strike.y"):
+            return self.why_still
+        if home == "target" and name != "target.scale":
+            return self.why_no_target
+        if home in ("section", "material") or name == "target.scale":
+            return self.why_no_section
+        return ""
+
+    def change(self, names: tuple[str, ...]) -> Change:
+        """What a unit of each number changes in the run."""
+        found = no_change(self.hit.history, len(names))
+        for i, name in enumerate(names):
+            self._enter(found, i, name)
+        return found
+
+    def _enter(self, found: Change, i: int, name: str) -> None:
+        home, _, part = name.partition(".")
+        value = self.values[name]
+        if name == "contact.gap":
+            found.offset[i] = -1.0
+        elif home == "contact":
+            found.law[i, LAW[part]] = 1.0
+        elif name == "strike.speed":
+            found.start_p[i] = self.hit.history.start_p / value
+        elif home == "strike":
+            self._shift(found, i, "xy".index(part))
+        elif part == "damping_ratio":
+            body = self._bodies[home == "target"]
+            found.zeta[i, body] = self.hit.history.omega[body] > 0.0
+        else:
+            self._stretch(found, i, home, *self._growth(name), value)
+
+    def _growth(self, name: str) -> tuple[float, float]:
+        """Powers with which frequencies and mass of a body grow with a number."""
+        if name.endswith(".mass"):
+            return 0.0, 1.0
+        if name.endswith(".first_frequency"):
+            return 1.0, 0.0
+        section = self.hit.bodies[-1].section
+        return SCALE[type(section)] if name == "target.scale" else self._powers[name]
+
+    @property
+    def _bodies(self) -> tuple[slice, slice]:
+        return self.hit.body_slice(0), self.hit.body_slice(1)
+
+    @cached_property
+    def _rest(self) -> tuple[float, float]:
+        """Residual compliance of striker and target [m/N] that acts in the run."""
+        hit, found = self.hit, [0.0, 0.0]
+        dips = hit.dips or (None, None)
+        if dips[0] is not None and hit.striker is not None:
+            found[0] = float(hit.striker.left_out[0][0, 0])
+        if dips[1] is not None and hit.at is not None:
+            target, place = hit.bodies[1], hit.at[None]
+            found[1] = float(left_out(target, place, target.shapes.at(place))[0][0, 0])
+        return found[0], found[1]
+
+    def _extra(self, body: int) -> int | None:
+        """Index of the mode that stands for the modes left out of a body; None if a spring does, or nothing."""
+        first, n_modes = self._bodies[1].stop, len(self.hit.history.omega)
+        if n_modes == first or not self._rest[body]:
+            return None
+        return first if body == 0 else n_modes - 1
+
+    def _soften(self, found: Change, i: int, body: int, change: float) -> None:
+        """Enter a change of a residual compliance [m/N]."""
+        extra, h = self._extra(body), self.hit.history
+        if extra is not None:
+            found.shape[i, extra] += 0.5 * change / self._rest[body] * h.shape[0, extra]
+        elif self._rest[body]:
+            found.law[i, 3] += change
+            dip = self.hit.dips[body]
+            assert dip is not None
+            found.offset[i] += dip.touched[0][1] * dip.force * change
+
+    def _stretch(self, found: Change, i: int, home: str, faster: float, heavier: float, value: float) -> None:
+        """A body whose frequencies and mass grow with these powers of a number."""
+        body, h = int(home not in ("striker",)), self.hit.history
+        part, extra = self._bodies[body], self._extra(body)
+        found.omega[i, part] = faster / value * h.omega[part]
+        for name in ("shape", "bias", "start_p"):
+            now = getattr(h, name)
+            power = 0.5 if name == "start_p" else -0.5
+            getattr(found, name)[i, part] = power * heavier / value * (now[0] if name == "shape" else now)[part]
+        if extra is not None:
+            found.omega[i, extra] = faster / value * h.omega[extra]
+            found.shape[i, extra] = faster / value * h.shape[0, extra]
+        self._soften(found, i, body, -(heavier + 2.0 * faster) / value * self._rest[body])
+
+    def _shift(self, found: Change, i: int, axis: int) -> None:
+        """The target struck further along an axis."""
+        hit, target, part = self.hit, self.hit.bodies[1], self._bodies[1]
+        assert hit.at is not None
+        corners = target.shapes.grid()[0]
+        span = float(np.ptp(corners, axis=0).max())
+        waves = np.pi * float(len(target.omega)) ** (1.0 / target.dimension) / span  # [rad/m] of the shortest wave
+        slope = _slope(target, hit.at, axis, SHIFT / waves, target.shapes.at)
+        force = hit._push
+        found.shape[i, part] = -slope
+        found.bias[i, part] = force * slope
+        if self._rest[1]:
+            whole = _slope(target, hit.at, axis, STATIC_SHIFT * span, _softness(target, hit.at))[0]
+            flexible = target.omega > 0.0
+            carried = target.shapes.at(hit.at[None])[0, flexible] / target.omega[flexible] ** 2
+            self._soften(found, i, 1, float(whole - 2.0 * carried @ slope[flexible]))
+
+
+def _softness(target: Modes, at: np.ndarray) -> Any:
+    """Twice the deflection of a body at points under a force at a fixed one: it changes as the compliance there."""
+    return lambda points: 2.0 * target.shapes.deflection(at[None], points)
+
+
+def _slope(target: Modes, at: np.ndarray, axis: int, distance: float, function: Any) -> np.ndarray:
+    """Derivative along an axis of a function of points (n, dimension) that returns (n, m), (m,)."""
+    for multiples, weights in DIFFERENCES:
+        points = np.tile(at, (len(multiples), 1))
+        points[:, axis] += distance * np.array(multiples)
+        if target.shapes.contains(points).all():
+            return np.array(weights) @ function(points) / distance
+    raise check.SimulationError("no gradient in the strike point: the body is too narrow there")
+
+
+POSSIBLE = POWER, LAYERS  # kinds of contact laws with a gradient: their forces depend on nothing they remember

@@ -1,0 +1,253 @@
+"""`hit.gradient` against central differences and closed forms, and where it refuses."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.impact.sensitivity import Sensitivity, no_change
+
+TIGHT = 1e-10  # [-] tolerance of the blows whose differences are taken
+STEP = 2e-4  # [-] relative change
+BAND = 2000.0  # [Hz] of the centroid
+QUANTITIES = ("restitution", "impulse", "contact_time", "peak_force", "peak_time", f"spectral_centroid={BAND:g}")
+
+
+def random_numbers(rng):
+    """Numbers of a random blow on a plate; its stick bends or not, its law has loss or not."""
+    exponent = rng.choice([1.0, 1.5, float(rng.uniform(1.2, 3.0))])
+    mass, speed = 10.0 ** rng.uniform(-2, -0.5), 10.0 ** rng.uniform(-0.5, 0.5)
+    duration = 10.0 ** rng.uniform(-3.5, -2.3)
+    stiffness = mass / 3.0 * (np.pi / duration) ** 2 * (speed * duration / np.pi) ** (1.0 - exponent)
+    return {
+        "target.mass": mass * 10.0 ** rng.uniform(-0.3, 1.5), "target.first_frequency": 10.0 ** rng.uniform(1.3, 2.3),
+        "target.damping_ratio": float(rng.choice([0.0, 0.01, 0.2])), "striker.mass": mass,
+        "striker.first_frequency": 10.0 ** rng.uniform(2.8, 4), "striker.damping_ratio": 0.02,
+        "contact.stiffness": stiffness, "contact.exponent": exponent,
+        "contact.loss": float(rng.choice([0.0, 0.3 / speed])), "contact.gap": 0.02 * speed * duration,
+        "strike.x": rng.uniform(0.3, 1.2), "strike.y": rng.uniform(0.2, 0.8), "strike.speed": speed,
+    }  # fmt: skip
+
+
+def strike(numbers, tolerance=TIGHT, n_modes=20):
+    plate = fi.analytic.rectangle(
+        1.55, 1.0, mass=numbers["target.mass"], first_frequency=numbers["target.first_frequency"], n_modes=n_modes,
+        damping_ratio=numbers["target.damping_ratio"],
+    )  # fmt: skip
+    stick = fi.Striker.stick(numbers["striker.mass"], numbers["striker.first_frequency"], n_modes=2)
+    stick = fi.Striker.flexible(stick.modes.damped(numbers["striker.damping_ratio"]), at=stick.at)
+    law = fi.Contact.power(
+        numbers["contact.stiffness"], numbers["contact.exponent"], loss=numbers["contact.loss"],
+        gap=numbers["contact.gap"],
+    )  # fmt: skip
+    at = (numbers["strike.x"], numbers["strike.y"])
+    return fi.strike(plate, stick, law, at=at, speed=numbers["strike.speed"], tolerance=tolerance, max_impacts=4)
+
+
+def told(hit, frequencies):
+    """The quantities as numbers, the centroid from its spectrum at the same frequencies whatever the blow.
+
+    The largest force and its time are sharper here than in the response, which reads them from the steps: these differ
+    between two blows, and so do its errors.
+    """
+    size = np.abs(hit.spectrum(frequencies))
+    centroid = np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies)
+    found = Sensitivity.of(hit.history, no_change(hit.history, 0))
+    peak = found.found.base[found.pieces.mark[found.peak], 4]
+    assert_allclose(peak, hit.peak_force, rtol=1e-7)
+    return np.array([hit.restitution, hit.impulse, hit.contact_time, peak, found.when_largest, centroid])
+
+
+def compare(seed):
+    """Slopes of a random blow along a random change of all its numbers, by gradient and by differences.
+
+    Returns them relative to the sum of the parts that each number contributes, and how far differences of steps one to
+    two disagree; None where the blow has no impact or more than three, no gradient, or cannot be run so finely.
+    """
+    rng = np.random.default_rng(seed)
+    numbers = random_numbers(rng)
+    try:
+        hit = strike(numbers)
+        if not 1 <= hit.n_impacts <= 3:
+            return None
+        slopes = hit.gradient(QUANTITIES)
+        names = slopes["impulse"].names
+        turn = dict(zip(names, rng.uniform(-1.0, 1.0, len(names))))
+        frequencies = hit.band_spectrum(BAND)[0]
+
+        def value(step):
+            changed = {name: numbers[name] * (1.0 + step * part) for name, part in turn.items()}
+            return told(strike(numbers | changed), frequencies)
+
+        near, far = ([value(-size), value(size)] for size in (STEP, 2.0 * STEP))
+    except fi.SimulationError:
+        return None
+    near, far = (near[1] - near[0]) / (2.0 * STEP), (far[1] - far[0]) / (4.0 * STEP)
+    parts = np.array([[slopes[name][other] * numbers[other] * turn[other] for other in names] for name in slopes])
+    scale = np.abs(parts).sum(axis=1)
+    return (
+        parts.sum(axis=1) / scale,
+        (4.0 * near - far) / (3.0 * scale),
+        np.abs(near - far) / scale,
+        numbers["contact.loss"] > 0.0,
+    )
+
+
+def check_seeds(seeds):
+    """Compare blows; how many had a gradient."""
+    n = 0
+    for seed in seeds:
+        found = compare(seed)
+        if found is None:
+            continue
+        slopes, differences, doubt, lossy = found
+        message = f"seed {seed}, {QUANTITIES}"
+        assert_allclose(slopes[:4], differences[:4], rtol=0, atol=1e-6, err_msg=message)
+        # the magnitude of a spectrum has corners at its zeros, which differences of finite steps run over
+        assert_allclose(slopes[5], differences[5], rtol=0, atol=1e-5, err_msg=message)
+        # a lossy force rings with every mode, so that its peak is early or late by up to 1e-7 of the blow in either run
+        late = 1e-3 if lossy else 1e-6
+        assert abs(slopes[4] - differences[4]) <= late + 2.0 * doubt[4], message
+        n += 1
+    return n
+
+
+def test_gradients_are_central_differences():
+    assert check_seeds(range(14)) >= 9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(100, 700, 50))
+def test_gradients_of_many_blows_are_central_differences(first):
+    assert check_seeds(range(first, first + 50)) >= 35
+
+
+def ball(law, *, mass=0.2, speed=1.3, tolerance=1e-8, **blow):
+    """A mass on a target so heavy that it is a wall."""
+    return fi.strike(
+        fi.Modes.rigid(1e12), fi.Striker.rigid(mass), law, at=None, speed=speed, tolerance=tolerance, **blow
+    )
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.5])
+def test_ball_on_a_wall_has_the_powers_of_its_closed_form(exponent):
+    """Contact time as m**q k**-q v**((1-a) q), peak force as k**q (m v**2)**(a q), q = 1 / (a + 1); impulse 2 m v."""
+    q = 1.0 / (exponent + 1.0)
+    slopes = ball(fi.Contact.power(1e6, exponent)).gradient(
+        ("contact_time", "peak_time", "peak_force", "impulse", "restitution"),
+        wrt=("striker.mass", "contact.stiffness", "strike.speed"),
+    )
+    time = [q, -q, (1.0 - exponent) * q]
+    # 1e-8 was asked of the blow; a mass of 1e12 kg is a wall to 2e-13
+    assert_allclose(slopes["contact_time"].relative, time, rtol=0, atol=1e-7)
+    assert_allclose(slopes["peak_time"].relative, time, rtol=0, atol=1e-6)  # the peak is flat
+    assert_allclose(slopes["peak_force"].relative, [exponent * q, q, 2.0 * exponent * q], rtol=0, atol=1e-7)
+    assert_allclose(slopes["impulse"].relative, [1.0, 0.0, 1.0], rtol=0, atol=1e-7)
+    assert_allclose(slopes["restitution"].relative, 0.0, rtol=0, atol=1e-7)
+
+
+def test_restitution_falls_with_loss_as_hunt_and_crossley_have_it():
+    """``L (1 + e) = ln((1 + L) / (1 - e L))`` with L = loss speed, for any mass, stiffness and exponent."""
+    loss, speed = 0.3, 1.3
+    found = ball(fi.Contact.hertz(1e6, loss=loss), speed=speed).gradient("restitution")
+    e, number = found.value, loss * speed
+    by_number = (1.0 + e) - 1.0 / (1.0 + number) - e / (1.0 - e * number)
+    by_e = number - number / (1.0 - e * number)
+    assert_allclose(found["contact.loss"], -by_number / by_e * speed, rtol=1e-6)
+    assert_allclose(found["strike.speed"], -by_number / by_e * loss, rtol=1e-6)
+    for name in ("striker.mass", "contact.stiffness", "contact.exponent"):
+        assert abs(found.relative[found.names.index(name)]) < 1e-6
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
+def test_errors_of_slopes_are_of_the_size_they_say(tolerance):
+    numbers = random_numbers(np.random.default_rng(12))
+    numbers["contact.loss"] = 0.0
+    names = ("striker.mass", "contact.stiffness", "strike.x", "target.mass", "strike.speed")
+    truth, rough = (strike(numbers, each).gradient(QUANTITIES[:4], names) for each in (1e-9, tolerance))
+    for name, found in rough.items():
+        wrong = np.abs(found.slopes - truth[name].slopes).max()
+        scale = np.abs(truth[name].slopes).max()
+        assert wrong <= 3.0 * found.error.max() + 1e-8 * scale, name
+        assert found.error.max() <= 50.0 * tolerance * scale, name
+
+
+def test_energy_left_in_modes_adds_up():
+    numbers = random_numbers(np.random.default_rng(4)) | {"contact.loss": 0.0, "target.damping_ratio": 0.0}
+    numbers["striker.first_frequency"] = 1e6  # does not bend: all energy is the striker's motion, or in the plate
+    hit = strike(numbers, 1e-9)
+    found = hit.gradient(("modal_energy", "restitution"), wrt=("strike.speed", "target.mass"))
+    assert found["modal_energy"].slopes.shape == (2, 20)
+    assert_allclose(found["modal_energy"].value, hit.modal_energy([hit.history.end_time])[0], rtol=1e-9)
+    mass, e = numbers["striker.mass"] / 3.0, hit.restitution
+    start = np.array([mass * hit.speed, 0.0])  # of the energy at the start in speed and in the target's mass
+    left = start * e**2 + mass * hit.speed**2 * e * found["restitution"].slopes
+    assert_allclose(found["modal_energy"].slopes.sum(axis=1), start - left, rtol=1e-6)
+
+
+def test_body_numbers_are_those_of_a_rebuilt_body():
+    numbers = {"thickness": 3e-3, "E": 70e9, "rho": 2700.0, "scale": 1.0}
+
+    def blow(thickness, E, rho, scale):
+        section = fi.Plate(fi.Material(E=E, nu=0.33, rho=rho), thickness)
+        plate = fi.analytic.rectangle(0.5 * scale, 0.35 * scale, section=section, n_modes=25)
+        at = (0.2 * scale, 0.1 * scale)
+        return fi.strike(plate, fi.Striker.rigid(0.05), fi.Contact.hertz(1e7), at=at, speed=1.0, tolerance=1e-9)
+
+    slopes = blow(**numbers).gradient(("contact_time", "restitution"))
+    for name, value in numbers.items():
+        full = {"thickness": "section.thickness", "scale": "target.scale"}.get(name, f"material.{name}")
+        sides = [blow(**numbers | {name: value * (1.0 + side * 1e-4)}) for side in (-1.0, 1.0)]
+        for quantity, found in slopes.items():
+            change = (getattr(sides[1], quantity) - getattr(sides[0], quantity)) / 2e-4
+            # differences of second order: 1e-8 times the third derivative
+            assert_allclose(found[full] * value, change, rtol=1e-5, err_msg=f"{quantity} in {name}")
+
+
+def test_a_grazing_contact_has_no_gradient():
+    """Two blows of one family, whose second impact comes and goes: next to the border, both sides are refused."""
+    numbers = random_numbers(np.random.default_rng(3))
+    numbers |= {"contact.loss": 0.0, "contact.exponent": 1.5}
+
+    def count(mass):
+        return strike(numbers | {"target.mass": float(mass)}, 1e-8).n_impacts
+
+    low, high = numbers["target.mass"], numbers["target.mass"] * 30.0
+    few = count(high)
+    assert count(low) != few
+    while high - low > 1e-7 * high:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if count(middle) == few else (middle, high)
+    for mass in (low, high):
+        with pytest.raises(fi.SimulationError, match="no gradient next to a grazing contact"):
+            strike(numbers | {"target.mass": float(mass)}, 1e-8).gradient("contact_time")
+
+
+def test_what_has_no_gradient_says_why():
+    wall, rigid = fi.Modes.rigid(1e6), fi.Striker.rigid(0.1)
+    felt = fi.Contact.felt(1e10, 2.5, hysteresis=0.4, relaxation=1e-3)
+    with pytest.raises(fi.SimulationError, match="the contact yields or remembers"):
+        fi.strike(wall, rigid, felt, at=None, speed=1.0).gradient("impulse")
+    with pytest.raises(fi.SimulationError, match=r"no gradient in contact\.gap: the bodies touch at the start"):
+        ball(fi.Contact.hertz(1e6)).gradient("impulse", "contact.gap")
+    with pytest.raises(fi.SimulationError, match=r"no gradient in section\.thickness: section and material"):
+        ball(fi.Contact.hertz(1e6)).gradient("impulse", "section.thickness")
+    with pytest.raises(fi.SimulationError, match="never touched"):
+        fi.strike(wall, rigid, fi.Contact.hertz(1e6, gap=1.0), at=None, speed=1.0, duration=0.1).gradient("impulse")
+    with pytest.raises(ValueError, match="wrt must be one of"):
+        ball(fi.Contact.hertz(1e6)).gradient("impulse", "striker.colour")
+    with pytest.raises(ValueError, match="quantity must be one of"):
+        ball(fi.Contact.hertz(1e6)).gradient("loudness")
+    with pytest.raises(ValueError, match="needs a band, such as 'spectral_centroid=5000'"):
+        ball(fi.Contact.hertz(1e6)).gradient("spectral_centroid")
+    chain = [fi.Touch(fi.Contact.linear(1e6), 0, 1), fi.Touch(fi.Contact.linear(1e6, gap=1e-3), 1, 2)]
+    with pytest.raises(ValueError, match="gradient needs a blow of `strike`"):
+        fi.collide([fi.Modes.rigid(0.1)] * 3, chain, speeds=[1.0, 0.0, 0.0]).gradient("impulse")
+
+
+def test_a_gradient_reads_as_a_table():
+    found = ball(fi.Contact.hertz(1e6)).gradient("contact_time", ("striker.mass", "contact.stiffness"))
+    assert "+0.4000 % per %, in striker.mass = 0.2 kg" in str(found)
+    assert "<table" in found._repr_html_()
+    assert found["striker.mass"] == found.slopes[0]
+    assert list(found) == ["striker.mass", "contact.stiffness"]

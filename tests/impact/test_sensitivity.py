@@ -1,0 +1,142 @@
+"""The linear equations of small changes against closed forms and exact propagation."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numba import njit
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.impact.compiled import tangents
+from fem_impact.impact.sensitivity import Sensitivity, gauss, no_change
+
+
+@njit
+def moments_of(omega, zeta, t, out_moments):
+    tangents.moments_of(omega, zeta, t, out_moments)
+
+
+@njit
+def moment_slopes(omega, zeta, t, moments, out_faster, out_damped):
+    tangents.moment_slopes(omega, zeta, t, moments, out_faster, out_damped)
+
+
+@pytest.mark.slow  # compiles for half a minute
+@pytest.mark.parametrize("count", [4, 6])
+@pytest.mark.parametrize("zeta", [0.0, 0.02, 0.95, 1.0, 3.0])
+def test_changes_of_moments_are_differences_of_moments(zeta, count):
+    omega = np.array([0.0, 1e-3, 0.3, 2.0, 40.0, 700.0])
+    damping = np.where(omega > 0.0, zeta, 0.0)
+
+    def moments(omega, damping):
+        found = np.empty((count + 2, len(omega)))
+        moments_of(omega, damping, 1.0, found)
+        return found
+
+    faster, damped = np.empty((count + 1, 6)), np.empty((count + 1, 6))
+    moment_slopes(omega, damping, 1.0, moments(omega, damping), faster, damped)
+    near, far = ((moments(omega * (1 + h), damping) - moments(omega * (1 - h), damping)) / h for h in (1e-5, 2e-5))
+    # four-point differences of numbers of order one; they move fast where the phase is 700
+    assert_allclose(faster * omega, ((4.0 * near - far) / 6.0)[:-1], atol=1e-9)
+    if zeta == 0.0:
+        return  # no damping below zero
+    flexible = omega > 0.0
+    near, far = (
+        (moments(omega, damping + h * flexible) - moments(omega, damping - h * flexible)) / h for h in (1e-5, 2e-5)
+    )
+    assert_allclose(damped, ((4.0 * near - far) / 6.0)[:-1], atol=2e-7)  # in zeta a phase of 700 moves fast, too
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.3])
+@pytest.mark.parametrize(
+    "law",
+    [
+        fi.Contact.linear(1e5), fi.Contact.hertz(1e6), fi.Contact.power(1e8, 2.7),
+        fi.Contact.layers(1e5, 1.2, depth=5e-4, hard_stiffness=1e8),
+    ],
+    ids=["linear", "hertz", "power", "layers"],
+)  # fmt: skip
+def test_slopes_of_the_law_are_its_differences(law, loss):
+    numbers = np.array([law.numbers])
+    numbers[0, 2] = loss
+    d, v, slopes = 1.3e-3, -0.4, np.zeros(8)
+    if law.hard_stiffness == 0.0:
+        numbers[0, 3] = 1e-6  # a spring in series, as the modes left out are
+    force, by_d, by_v = tangents.law_at(d, v, numbers, slopes)
+
+    def change(i, step):
+        near = [numbers.copy() for _ in range(2)]
+        for side, each in zip((-1.0, 1.0), near):
+            each[0, i] += side * step
+        return np.diff([tangents.law_at(d, v, each, np.zeros(8))[0] for each in near])[0] / (2.0 * step)
+
+    def along(dd, dv):
+        ends = [tangents.law_at(d + side * dd, v + side * dv, numbers, np.zeros(8))[0] for side in (-1.0, 1.0)]
+        return np.diff(ends)[0] / (2.0 * max(dd, dv))
+
+    scale = force * 1e-7  # differences of second order
+    assert_allclose(by_d, along(1e-5 * d, 0.0), atol=scale / d)
+    assert_allclose(by_v, along(0.0, 1e-5), atol=scale)
+    for i in (0, 1, 2, 3, 5, 6, 7):
+        if numbers[0, i] != 0.0:
+            step = 1e-5 * numbers[0, i]
+            assert_allclose(slopes[i], change(i, step), atol=scale / numbers[0, i], err_msg=f"number {i}")
+
+
+def linear_blow(tolerance):
+    """A mass on a wall behind a linear spring, and its changes with mass and stiffness."""
+    mass, stiffness, speed = 0.2, 1e5, 1.3
+    touch = fi.Touch(fi.Contact.linear(stiffness, gap=1e-4), 0, None)
+    hit = fi.collide([fi.Modes.rigid(mass)], [touch], speeds=[speed], tolerance=tolerance)
+    change = no_change(hit.history, 2)
+    change.shape[0], change.start_p[0] = -0.5 * hit.history.shape[0] / mass, 0.5 * hit.history.start_p / mass
+    change.law[1, 0] = 1.0
+    return SimpleNamespace(mass=mass, stiffness=stiffness, speed=speed), Sensitivity.of(hit.history, change)
+
+
+def test_linear_spring_meets_its_half_sine():
+    blow, found = linear_blow(1e-9)
+    omega = np.sqrt(blow.stiffness / blow.mass)
+    time, peak = np.pi / omega, blow.speed * np.sqrt(blow.stiffness * blow.mass)
+    # steps of some tenths of the contact, each a polynomial of degree 4: exact to the tolerance
+    assert_allclose(found.contact_time, [0.5 * time / blow.mass, -0.5 * time / blow.stiffness], rtol=1e-8)
+    assert_allclose(found.impulse, [2.0 * blow.speed, 0.0], atol=1e-8)
+    assert_allclose(found.peak_force, [0.5 * peak / blow.mass, 0.5 * peak / blow.stiffness], rtol=1e-8)
+    assert_allclose(found.peak_time, found.contact_time / 2.0, rtol=1e-6)  # the peak is flat
+    frequencies = np.array([0.0, 100.0, 400.0])
+    spectrum = found.spectrum(frequencies)
+    start, w = 1e-4 / blow.speed, 2.0 * np.pi * frequencies
+
+    def transform(mass, stiffness):  # of F sin(omega t) from the start of the contact on
+        omega = np.sqrt(stiffness / mass)
+        delayed = np.exp(-1j * w * start) * (1.0 + np.exp(-1j * w * np.pi / omega))
+        return blow.speed * np.sqrt(stiffness * mass) * omega / (omega**2 - w**2) * delayed
+
+    for i, (dm, dk) in enumerate([(1e-5, 0.0), (0.0, 1e-5)]):
+        ends = [transform(blow.mass * (1 + s * dm), blow.stiffness * (1 + s * dk)) for s in (-1.0, 1.0)]
+        exact = (ends[1] - ends[0]) / 2e-5 / (blow.mass if dm else blow.stiffness)
+        # differences of second order, and what the tolerance leaves
+        assert_allclose(spectrum[:, i], exact, atol=1e-7 * np.abs(exact).max())
+
+
+def test_smaller_steps_make_changes_exact():
+    errors = []
+    for tolerance in (1e-3, 1e-6):
+        blow, found = linear_blow(tolerance)
+        exact = 0.5 * np.pi / np.sqrt(blow.stiffness * blow.mass)
+        errors.append(abs(found.contact_time[0] / exact - 1.0))
+    assert errors[1] < 1e-6 and errors[1] < 0.1 * errors[0]
+
+
+def test_gauss_polynomials_are_one_at_their_node():
+    nodes, powers = gauss(4)
+    assert nodes[-1] == 1.0
+    assert_allclose(powers @ np.vander(nodes[:-1], increasing=True).T, np.eye(4), atol=1e-12)  # rounding
+
+
+def test_a_blow_that_chatters_is_refused():
+    hit = fi.strike(fi.Modes.rigid(1e6), fi.Striker.rigid(0.1), fi.Contact.hertz(1e6), at=None, speed=1.0)
+    blind = SimpleNamespace(n_blind=3)
+    with pytest.raises(fi.SimulationError, match="the bodies chatter"):
+        Sensitivity.of(blind, no_change(hit.history, 1))
