@@ -10,6 +10,9 @@ import numpy as np
 from .build import LOOSE, ZERO, inner, outer
 from .energy import LEVELS
 from .events import (
+    AGAIN,
+    CORNER,
+    CROSSING,
     EVENT_LIMIT,
     LOCATE_LIMIT,
     begin,
@@ -501,14 +504,23 @@ def run_collocation(
             level += shorter
             guess[:] = 0.0
             continue
-        if target >= 0:
-            if misfit > limit and root > 0.25 * h and root < 0.9 * h:
-                level += 1
-                if level >= LEVELS:
-                    status = FAILED
+        corner = -1
+        for event in (CROSSING, CORNER):  # the step is repeated so that it ends at the first crossing, then corner
+            if event == CORNER:
+                if not special:
                     break
+                corner, which, root = first_corner(now, law, y, rate, after, h, False, bracket)
+                if corner < 0 or which == AGAIN:
+                    break
+                target = -1
+            elif target < 0:
                 continue
-            enclose(now, y, rate, h, target, bracket)
+            again = misfit > limit and level < LEVELS - 2 and root > 0.25 * h and root < 0.9 * h
+            if again:
+                level += 1
+                break
+            if event == CROSSING:
+                enclose(now, y, rate, h, target, bracket)
             free = odd_free
             last = odd_last
             inner = odd_inner
@@ -525,51 +537,24 @@ def run_collocation(
                 )  # fmt: skip
                 if misfit == np.inf:
                     break
-                target, root = narrow(now, pressed, y, rate, h, depth, still, target, bracket)
+                if event == CROSSING:
+                    target, root = narrow(now, pressed, y, rate, h, depth, still, target, bracket)
+                else:
+                    root = nearer(law, corner, which, h, y[corner], rate[corner], after[corner], bracket)
                 if root == 0.0:
                     break
-            if misfit == np.inf or not abs(y[target]) <= 1e-9 * bracket[2]:
+            again = misfit == np.inf or (event == CROSSING and not abs(y[target]) <= 1e-9 * bracket[2])
+            if again:
                 level += 1
-                if level >= LEVELS:
-                    status = FAILED
-                    break
-                continue
-        corner = -1
-        if special:
-            corner, which, root = first_corner(now, law, y, rate, after, h, False, bracket)
-        if corner >= 0 and which == 4:
+                break
+        if level >= LEVELS:
+            status = FAILED
+            break
+        if again:
+            continue
+        if corner >= 0 and which == AGAIN:
             law[corner, MEMORY] = abs(law[corner, MEMORY])
             continue
-        if corner >= 0:
-            target = -1
-            if misfit > limit and level < LEVELS - 2 and root > 0.25 * h and root < 0.9 * h:
-                level += 1
-                continue
-            free = odd_free
-            last = odd_last
-            inner = odd_inner
-            for _ in range(LOCATE_LIMIT):
-                h = root
-                collocation_table(omega, zeta, shape, h, nodes, powers, odd_free, odd_last, odd_inner)
-                for i in range(m):
-                    small[i] = weight_of(inner, mobility, h, i)
-                    for a in range(s):
-                        guess[a, i] = max(0.0, f[a, i])
-                misfit = collocate(
-                    shape, offset, bias, law, pressed, beyond, now, nodes, powers, edges, h, free, last, inner, q, p,
-                    guess, small, lag, x, free_d, free_v, f, matrix, vector, new_q, new_p, y, rate, after,
-                )  # fmt: skip
-                if misfit == np.inf:
-                    break
-                root = nearer(law, corner, which, h, y[corner], rate[corner], after[corner], bracket)
-                if root == 0.0:
-                    break
-            if misfit == np.inf:
-                level += 1
-                if level >= LEVELS:
-                    status = FAILED
-                    break
-                continue
         if misfit > limit and level < LEVELS - 2 and h > 1e-9 * base:
             level += 1
             while level < LEVELS - 2 and base * 0.5**level > 0.6 * h:

@@ -10,6 +10,9 @@ import numpy as np
 from . import arrays
 from .build import LOOSE, WHOLE, ZERO, inner, outer
 from .events import (
+    AGAIN,
+    CORNER,
+    CROSSING,
     EVENT_LIMIT,
     LOCATE_LIMIT,
     begin,
@@ -341,8 +344,19 @@ def run_energy(
                     events = EVENT_LIMIT + 1
                 continue
             target, guess = first_crossing(now, pressed, y, rate, h, depth, still)
-        if target >= 0:
-            enclose(now, y, rate, h, target, bracket)
+        corner = -1
+        for event in (CROSSING, CORNER):  # the step is repeated so that it ends at the first crossing, then corner
+            if event == CORNER:
+                if not cornered or blind:
+                    break
+                corner, which, guess = first_corner(now, law, y, rate, after, h, True, bracket)
+                if corner < 0 or which == AGAIN:
+                    break
+                target = -1
+            elif target < 0:
+                continue
+            else:
+                enclose(now, y, rate, h, target, bracket)
             slot = odd
             for _ in range(LOCATE_LIMIT):
                 h = guess
@@ -352,35 +366,23 @@ def run_energy(
                 fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
                 if special:
                     keep_in_mind(h, law, now, y, f, s, rate, ramp and fine, after)
-                target, guess = narrow(now, pressed, y, rate, h, depth, still, target, bracket)
+                if event == CROSSING:
+                    target, guess = narrow(now, pressed, y, rate, h, depth, still, target, bracket)
+                else:
+                    guess = nearer(law, corner, which, h, y[corner], rate[corner], after[corner], bracket)
                 if guess == 0.0:
                     break
-            if not abs(y[target]) <= 1e-9 * bracket[2]:
-                if h < 1e-3 * base:
-                    events = EVENT_LIMIT + 1
-                    continue
-                target = -1
+            if event == CROSSING and not abs(y[target]) <= 1e-9 * bracket[2]:
                 blind = True
-        corner = -1
-        if cornered and not blind:
-            corner, which, guess = first_corner(now, law, y, rate, after, h, True, bracket)
-        if corner >= 0 and which == 4:
+                if h >= 1e-3 * base:
+                    target = -1
+                break
+        if blind and target >= 0:  # not located in a tiny step: pass the events that follow
+            events = EVENT_LIMIT + 1
+            continue
+        if corner >= 0 and which == AGAIN:
             law[corner, MEMORY] = abs(law[corner, MEMORY])
             continue
-        if corner >= 0:
-            target = -1
-            slot = odd
-            for _ in range(LOCATE_LIMIT):
-                h = guess
-                lane_table(omega, zeta, h, WHOLE, tables[slot])
-                contact_sums(shape, tables[slot], h, all_sums[slot])
-                predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, end)
-                fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
-                if special:
-                    keep_in_mind(h, law, now, y, f, s, rate, ramp and fine, after)
-                guess = nearer(law, corner, which, h, y[corner], rate[corner], after[corner], bracket)
-                if guess == 0.0:
-                    break
         total = 0.0
         for i in range(m):
             total += abs(y[i]) + abs(rate[i]) + f[i]

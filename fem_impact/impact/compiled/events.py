@@ -36,6 +36,8 @@ TURNED = 1e-8  # [-] of the rates about a turn: so far from zero, the approach t
 DIPPED = 1e-6  # [-] of what makes it push: a body that leaves its felt by less within a step has not left it
 AT_ONCE = 1e-3  # [-] of a step: a body that parts from its felt and meets it again within that has not parted
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
+CROSSING, CORNER = 0, 1  # what a step is to end at: a contact that opens or closes, or a corner of its force
+AGAIN = 4  # kind of corner: a body meets its felt again at once, and the step is to be taken pressed
 EVENT_LIMIT = 64  # [-] events within one step's time: chatter, passed with unlocated steps, each time for twice as long
 
 
@@ -193,8 +195,6 @@ def corner_value(law, i, which, d, v, memory):
 def first_corner(now, law, y, rate, after, h, lossy, out_bracket):
     """The first corner within a step: contact, which (see `corner_value`), and when; -1, 0 and h where there is none.
 
-    4 stands for felt that its body meets again at once: the step is to be taken pressed.
-
     ``out_bracket`` receives two times with the corner in between and, for secants, a third time and the value there
     and at the start. ``after`` (n_contacts,) is what they remember at the end. Loss is left out unless ``lossy``.
     """
@@ -224,7 +224,7 @@ def first_corner(now, law, y, rate, after, h, lossy, out_bracket):
                 root = h * start / (start - end)
                 if root < AT_ONCE * h:
                     if apart:
-                        return i, 4, h
+                        return i, AGAIN, h
                 elif root < at:
                     at, target, kind = root, i, 3
                     out_bracket[1], out_bracket[3], out_bracket[4], out_bracket[5] = h, h, end, start
@@ -362,9 +362,10 @@ def remembered(law, now):
     """Count the approaches at the end of a run from no dent, and add the memory: row 5 of ``now``."""
     if law.shape[1] == WIDTH:
         for i in range(now.shape[1]):
+            low = dent(law, i, law[i, MEMORY])  # as long as the last step: what it pressed deeper is not yet counted
             harden(law, i, now[0, i])
             now[5, i] = law[i, MEMORY]
-            now[0, i] += dent(law, i, law[i, MEMORY])
+            now[0, i] += low
 
 
 @inner()
