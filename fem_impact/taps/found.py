@@ -13,12 +13,12 @@ from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes.modal import Modes
-from . import predictions, profiles, solver, spreads, windows
+from . import predictions, profiles, solver, windows
 from .predictions import Prediction
 from .profiles import Profile
 from .records import Taps
+from .scatter import Scatter, scatter
 from .solver import Problem, Solution
-from .spreads import Spread
 from .unknowns import changed, unit_of
 
 LUCK = 0.05  # [-] probability of a spread by noise alone, above which taps do not count as different
@@ -71,11 +71,11 @@ class Found:
         return tuple(name for name, each in zip(self.names, self.problem.free) if each.name in self.problem.own)
 
     @cached_property
-    def spreads(self) -> dict[str, Spread]:
+    def spreads(self) -> dict[str, Scatter]:
         """How much the taps used differ in each unknown that was freed for them."""
         noise, freedom, _ = self._noise
         return {
-            name: spreads.spread(*_coordinate(self.problem, self.best.x, name), noise, freedom) for name in self.per_tap
+            name: scatter(*_coordinate(self.problem, self.best.x, name), noise, freedom) for name in self.per_tap
         }  # fmt: skip
 
     def profile(self, name: str) -> Profile:
@@ -358,7 +358,7 @@ class Found:
         }
 
 
-def differ(each: Spread) -> str:
+def differ(each: Scatter) -> str:
     """How much the taps differ in an unknown, in words."""
     size, noise = (
         (f"{100.0 * each.deviation:.2g} %", f"{100.0 * each.by_noise:.2g} %") if each.relative

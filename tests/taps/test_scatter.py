@@ -1,9 +1,9 @@
-"""The spread over taps that noise alone makes, on a problem whose answer is known."""
+"""The scatter over taps that noise alone makes, on a problem whose answer is known."""
 
 import numpy as np
 import pytest
 
-from fem_impact.taps.spreads import Spread, spread
+from fem_impact.taps.scatter import Scatter, scatter
 from fem_impact.taps.unknowns import Unknown
 
 
@@ -34,11 +34,11 @@ class Straight:
 def test_noise_makes_the_spread_of_independent_means():
     problem, noise = Straight(5), 0.04
     x = np.concatenate([[np.log(2.0)], np.zeros(10), [0.1, -0.1, 0.2, 0.0, 0.3]])
-    made = spread(problem, x, 0, noise, 200)
+    made = scatter(problem, x, 0, noise, 200)
     assert made.by_noise == pytest.approx(np.sqrt(noise / 50), rel=1e-9)  # standard error of a mean of 50
     assert made.deviation == pytest.approx(np.std([0.1, -0.1, 0.2, 0.0, 0.3], ddof=1)) and made.mean == 2.0
     assert made.chance < 1e-3
 
 
 def test_a_spread_as_noise_makes_it_is_no_surprise():
-    assert Spread("a", np.ones(5), 1.0, 0.1, 0.1, True, 200).chance == pytest.approx(0.41, abs=0.01)  # F(1; 4, 200)
+    assert Scatter("a", np.ones(5), 1.0, 0.1, 0.1, True, 200).chance == pytest.approx(0.41, abs=0.01)  # F(1; 4, 200)

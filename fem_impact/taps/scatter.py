@@ -12,7 +12,7 @@ NONE = 1e-12  # [-] singular values below this part of the largest are direction
 
 
 @dataclass(frozen=True, eq=False)
-class Spread:
+class Scatter:
     """One unknown over the taps."""
 
     name: str
@@ -31,8 +31,8 @@ class Spread:
         return float(f.sf((self.deviation / max(self.by_noise, 1e-300)) ** 2, len(self.values) - 1, self.freedom))
 
 
-def spread(problem: Problem, x: np.ndarray, i: int, noise: float, freedom: int) -> Spread:
-    """The spread of the free unknown number ``i``, which every tap has its own value of.
+def scatter(problem: Problem, x: np.ndarray, i: int, noise: float, freedom: int) -> Scatter:
+    """The scatter of the free unknown number ``i``, which every tap has its own value of.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def spread(problem: Problem, x: np.ndarray, i: int, noise: float, freedom: int) 
     size = 1.0 if unknown.log else unknown.high - unknown.low
     apart = problem.apart(x)[place]
     values = np.array([problem.values(x, tap)[unknown.name] for tap in range(n_taps)])
-    return Spread(
+    return Scatter(
         unknown.name, values, problem.values(x)[unknown.name], size * float(np.std(apart, ddof=1)),
         size * float(np.sqrt(variance)), unknown.log, freedom,
     )  # fmt: skip
