@@ -104,7 +104,7 @@ def check_seeds(seeds):
         message = f"seed {seed}, {QUANTITIES}"
         assert_allclose(slopes[:4], differences[:4], rtol=0, atol=1e-6, err_msg=message)
         # the magnitude of a spectrum has corners at its zeros, which differences of finite steps run over
-        assert_allclose(slopes[5], differences[5], rtol=0, atol=1e-5, err_msg=message)
+        assert abs(slopes[5] - differences[5]) <= 1e-5 + 2.0 * doubt[5], message
         # a lossy force rings with every mode, so that its peak is early or late by up to 1e-7 of the blow in either run
         late = 1e-3 if lossy else 1e-6
         assert abs(slopes[4] - differences[4]) <= late + 2.0 * doubt[4], message
