@@ -72,3 +72,13 @@ def test_the_prompt_refuses_and_replaces_nothing(tmp_path, monkeypatch, capsys, 
     assert text in captured.err and captured.err.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["there.toml"]
     assert (tmp_path / "there.toml").read_text() == "mine"
+
+
+def test_a_new_scene_replaces_no_file(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["new"]) == 0
+    assert cli.main(["new"]) == 2
+    assert "plate.toml exists already; name another file with --out, or remove it" in capsys.readouterr().err
+    assert cli.main(["new", "--out", "other.toml"]) == 0
+    (tmp_path / "plate.toml").unlink()
+    assert cli.main(["new"]) == 0
