@@ -372,6 +372,7 @@ def energy_of(result):
     return 0.5 * (p @ p + (omega * q) @ (omega * q)) - 5.0 * q[0] + laws.stored(now[0], law)
 
 
+@pytest.mark.slow
 def test_chaos_is_judged_by_invariants_and_statistics():
     """Two runs apart by a rounding error part ways; energy and averages do not."""
     one, two = chaotic(), chaotic(nudge=1e-14)
@@ -399,6 +400,7 @@ def test_chaos_is_judged_by_invariants_and_statistics():
     assert (np.abs(groups[0].mean(axis=0) - groups[1].mean(axis=0)) < 6.0 * spread).all()
 
 
+@pytest.mark.slow
 def test_chaotic_runs_do_not_depend_on_threads():
     alone = [chaotic(nudge=n * 1e-3) for n in range(6)]
     for workers in (2, 4):
