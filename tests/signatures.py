@@ -48,6 +48,7 @@ INNER = {
      "Scene.body", "Scene.closed_form", "Scene.fault", "Scene.finder", "Scene.make_contact",
     "Scene.make_section", "Scene.make_striker", "Scene.data",
     "Response.to_xarray", "Modes.to_pyvista",  # no arguments
+    "Gradient", "Gradient.change", "Response.band_spectrum",  # made by Response.gradient; its arguments are any words
     "Plan.data", "Plan.run", "Plan.strike", "Response.body_slice", "Response.summary", "Scene.picture",
     "mesh.Mesh", "mesh.straight", "mesh.fill", "Modes.points", "Modes.stretched",
     "analytic.RectangleShapes", "analytic.BeamShapes", "analytic.DiskShapes",  # behind the checks of Modes
@@ -266,6 +267,7 @@ def table() -> dict[str, dict[str, Any]]:
             "start": fi.collide([t["free"]] * 2, [fi.Touch(t["law"], 0, 1)], speeds=[1.0, 0.0], tolerance=1e-1),
         },
         "Response.state": {"self": t["hit"], "time": 1e-3},
+        "Response.gradient": {"self": t["hit"], "quantity": "impulse", "wrt": ("striker.mass", "contact.stiffness")},
         "strokes": {
             "modes": t["modes"], "strokes": [(0.0, t["striker"], t["law"], at, 1.0, 0.1)], "tolerance": 1e-1,
             "quantity": None, "residual": True, "duration": 1.0, "start": t["hit"].state(0.05), "strict": False,
