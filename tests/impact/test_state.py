@@ -161,7 +161,7 @@ def test_errors_of_the_blow_before_count():
     exact = pair(1e-7, 1e-7)
     with pytest.warns(fi.ToleranceWarning, match="mostly from the blow before .*; give the blow before a smaller tol"):
         rough = pair(1e-3, 1e-4)
-    assert pair(1e-6, 1e-4).tolerance_met
+    assert pair(1e-6, 1e-4).error.inherited < 0.2 * rough.error.inherited  # the rest is from modes left out
     off = max(
         abs(rough.restitution - exact.restitution),
         *(abs(getattr(rough, name) / getattr(exact, name) - 1.0) for name in ("impulse", "contact_time", "peak_force")),
