@@ -7,6 +7,7 @@ from pathlib import Path
 from test_advice import ADVICE
 from test_advice_of_assumptions import REMEDIES
 from test_advice_of_files import FILES
+from test_advice_of_gradients import GRADIENTS
 
 TESTS = Path(__file__).parent
 HOME = TESTS.parent / "fem_impact"
@@ -109,7 +110,8 @@ def messages(path):
 
 def covering():
     """Patterns of the messages that a test provokes and whose advice it follows."""
-    yield from (words for _, words, _ in [*ADVICE.values(), *FILES.values(), *REMEDIES.values()])
+    tables = ADVICE, FILES, REMEDIES, GRADIENTS
+    yield from (words for table in tables for _, words, _ in table.values())
     for name, patterns in ELSEWHERE.items():
         file, test = name.split("::")
         assert f"def {test}(" in (TESTS / file).read_text(), name

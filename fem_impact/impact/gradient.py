@@ -119,10 +119,10 @@ def gradients(hit: "Response", quantity: Any, wrt: Any) -> dict[str, Gradient]:
     names = parameters.checked(wrt)
     change = parameters.change(names)
     coarse = hit.coarse
-    if coarse is not None and (len(coarse.contacts) != len(hit.history.contacts) or coarse.n_blind):
+    if coarse is not None and len(coarse.contacts) != len(hit.history.contacts):
         raise SimulationError(
             f"no gradient: runs of different steps find {len(coarse.contacts)} and {hit.n_impacts} impacts; give a "
-            "smaller tolerance or max_impacts"
+            "smaller tolerance and no dt, or max_impacts"
         )
     fine = Sensitivity.of(hit.history, change)
     _check_grazing(fine)
@@ -132,8 +132,10 @@ def gradients(hit: "Response", quantity: Any, wrt: Any) -> dict[str, Gradient]:
     for name, band in wanted:
         if name.startswith("peak"):
             _check_tie(hit.history)
-        if name == "modal_energy" and hit.rings is not None:
-            raise SimulationError("no gradient of modal_energy: vectors told the blow; strike modes, of find_modes")
+        if name == "modal_energy" and (hit.rings is not None or hit.ringing is not None):
+            raise SimulationError(
+                "no gradient of modal_energy: the modes that ring did not tell the blow; strike modes, of find_modes"
+            )
         value, slopes = _slopes(hit, fine, names, name, band)
         if rough is None:
             error = np.full(slopes.shape, np.inf)
@@ -213,8 +215,8 @@ def _check_grazing(found: Sensitivity) -> None:
             }[what]
             raise SimulationError(
                 f"no gradient next to a grazing contact: {words.format(f'{least:.2g}')} with a small change of some "
-                "number, at which contact time, peak and count have no derivative; strike a little harder, softer or "
-                "elsewhere"
+                "number, at which contact time, peak and count have no derivative; take a slightly heavier or lighter "
+                "striker, or strike elsewhere"
             )
 
 

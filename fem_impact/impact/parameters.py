@@ -178,7 +178,9 @@ class Parameters:
         elif home == "contact":
             found.law[i, LAW[part]] = 1.0
         elif name == "strike.speed":
-            found.start_p[i] = self.hit.history.start_p / value
+            striker = self.hit.striker
+            assert striker is not None
+            found.start_p[i, self._bodies[0]] = striker.motion  # the target may move already, whatever that speed
         elif home == "strike":
             self._shift(found, i, "xy".index(part))
         elif part == "damping_ratio":
@@ -235,9 +237,9 @@ class Parameters:
         body, h = int(home not in ("striker",)), self.hit.history
         part, extra = self._bodies[body], self._extra(body)
         found.omega[i, part] = faster / value * h.omega[part]
-        for name in ("shape", "bias", "start_p"):
+        for name in ("shape", "bias", "start_q", "start_p"):  # displacement and velocity at the start stay
             now = getattr(h, name)
-            power = 0.5 if name == "start_p" else -0.5
+            power = 0.5 if name.startswith("start") else -0.5
             getattr(found, name)[i, part] = power * heavier / value * (now[0] if name == "shape" else now)[part]
         if extra is not None:
             found.omega[i, extra] = faster / value * h.omega[extra]
@@ -255,6 +257,9 @@ class Parameters:
         force = hit._push
         found.shape[i, part] = -slope
         found.bias[i, part] = force * slope
+        striker = hit.striker
+        assert striker is not None  # it starts at the surface, which may be displaced
+        found.start_q[i, self._bodies[0]] = float(slope @ hit.history.start_q[part]) * striker.motion
         if self._rest[1]:
             whole = _slope(target, hit.at, axis, STATIC_SHIFT * span, _softness(target, hit.at))[0]
             flexible = target.omega > 0.0

@@ -494,7 +494,8 @@ class Response:
             "material.E", "material.rho", "target.scale" and others. By default all in which this blow has a gradient.
             A mass changes at fixed frequencies and damping ratios, a first frequency takes all others of its body with
             it, a damping ratio is added to all of them. Numbers of section and material change at a fixed contact law;
-            the scale multiplies all lengths along the target, the strike point moves along.
+            the scale multiplies all lengths along the target, the strike point moves along. A body that moves already
+            keeps its displacement and velocity at the start.
 
         Returns
         -------

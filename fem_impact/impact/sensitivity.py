@@ -24,6 +24,7 @@ NUDGE = 1e-5  # [-] relative change at which the curvature of a contact law is t
 SLOW, MORE = 0.3, 12  # [rad], [-] half the phase over a piece up to which its own nodes make a spectrum; else so many
 EDGE = 1e-9  # [-] of a step: what lies nearer to its ends is at them
 ROUNDING = 1e-14  # [-] of the duration: the same
+CANCELS = 1e-12  # [-] of the changes of the approach at the start: what they leave if they cancel
 AT_ZERO = 1e-7  # [-] of the deepest approach: a contact that ends deeper lets go by its loss
 
 
@@ -59,7 +60,7 @@ class Sensitivity:
         if history.n_blind:
             raise SimulationError(
                 "no gradient: the bodies chatter, and the run passed over contacts without locating them; give "
-                "max_impacts or a shorter duration"
+                "max_impacts, a shorter duration or no dt"
             )
         peak = _peak(history)
         time, row, part = _cut(history, peak)
@@ -108,7 +109,7 @@ class Sensitivity:
         still = np.zeros(dd.shape)
         near = abs(d) <= AT_ZERO * self.deepest
         if k == 0:
-            if near and dd.any():
+            if near and (np.abs(dd) > CANCELS * self._start_terms).any():
                 raise SimulationError(
                     "no gradient: the bodies touch at the start already, and a change would press or part them; "
                     "give a gap"
@@ -120,6 +121,12 @@ class Sensitivity:
             return still
         loss = self.history.law[0, 2]
         return -(self.change.law[:, 2] * v + loss * dv) / (loss * a)
+
+    @property
+    def _start_terms(self) -> np.ndarray:
+        """Sum (n,) of the sizes of what changes the approach at the start [m]; all that may cancel."""
+        h, change = self.history, self.change
+        return np.abs(change.shape) @ np.abs(h.start_q) + np.abs(change.start_q) @ np.abs(h.shape[0])
 
     @cached_property
     def end(self) -> np.ndarray:

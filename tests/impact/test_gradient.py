@@ -112,14 +112,20 @@ def check_seeds(seeds):
     return n
 
 
-def test_gradients_are_central_differences():
-    assert check_seeds(range(14)) >= 9
+def test_gradients_of_some_blows_are_central_differences():
+    assert check_seeds(range(3)) == 3
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(100, 700, 50))
+def test_gradients_are_central_differences():
+    assert check_seeds(range(3, 14)) >= 6
+
+
+@pytest.mark.slow
+@pytest.mark.thin(4)
+@pytest.mark.parametrize("first", range(100, 700, 25))
 def test_gradients_of_many_blows_are_central_differences(first):
-    assert check_seeds(range(first, first + 50)) >= 35
+    assert check_seeds(range(first, first + 25)) >= 11
 
 
 def ball(law, *, mass=0.2, speed=1.3, tolerance=1e-8, **blow):

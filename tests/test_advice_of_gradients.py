@@ -1,0 +1,127 @@
+"""Every message about a gradient that gives advice: following it works."""
+
+from functools import cache, partial
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+
+STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
+PLATE = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=20)
+HARD = fi.Contact.linear(1e6)
+
+
+@cache
+def system():
+    return fi.assemble(fi.mesh.rectangle(0.4, 0.3), fi.Plate(STEEL, 1e-3), {"boundary": "clamped"})
+
+
+def struck(body=PLATE, law=None, *, mass=0.03, at=(0.13, 0.1), speed=1.0, tolerance=1e-4, **how):
+    law = fi.Contact.linear(1e4) if law is None else law
+    return fi.strike(body, fi.Striker.rigid(mass), law, at=at, speed=speed, tolerance=tolerance, **how)
+
+
+def slopes(quantity, wrt=None, body=PLATE, law=None, **how):
+    """The gradient of one quantity of a blow, which is a number."""
+    found = struck(body, law, **how).gradient(quantity, wrt)
+    assert np.isfinite(found.slopes).all() and np.isfinite(found.error).all()
+    return found
+
+
+often = partial(slopes, "impulse", "striker.mass", law=HARD, mass=0.2)
+chatter = partial(often, law=fi.Contact.power(1e4, 0.5), mass=1.0, tolerance=1e-2)
+by_steps = partial(chatter, law=fi.Contact.power(1e5, 0.7))
+grazing = partial(often, mass=0.5)  # an impact of 50 nm, at any speed
+energy = partial(slopes, "modal_energy", "striker.mass")
+in_loss = partial(slopes, "impulse", "contact.loss")
+
+
+def from_outside(wrt, target):
+    return slopes("impulse", wrt, system(), tolerance=1e-2, target=target)
+
+
+pushed = partial(slopes, "contact_time", "target.mass", target_force=-1e-6, max_impacts=1)  # [N] the modes left out dip
+
+GRADIENTS = {  # what fails, the message, and what it advises
+    "two runs of other counts, dt": (
+        lambda _: often(dt=1e-4),
+        "runs of different steps find .* impacts; give a smaller tolerance and no dt, or max_impacts$",
+        lambda _: (often(tolerance=1e-5), often(dt=1e-4, max_impacts=1)),
+    ),
+    "energy of vectors": (
+        lambda _: energy(body=system(), target="vectors"),
+        "the modes that ring did not tell the blow; strike modes, of find_modes$",
+        lambda _: energy(body=fi.find_modes(system(), n_modes=20)),
+    ),
+    "energy of other modes": (
+        lambda _: struck().on(PLATE).gradient("modal_energy"),
+        "the modes that ring did not tell the blow; strike modes, of find_modes$",
+        lambda _: energy(),
+    ),
+    "grazing": (
+        lambda _: grazing(),
+        "grazing contact: .*; take a slightly heavier or lighter striker, or strike elsewhere$",
+        lambda _: (grazing(mass=0.52), grazing(mass=0.48), grazing(at=(0.14, 0.1))),
+    ),
+    "no gap": (
+        lambda _: slopes("peak_time", "contact.gap"),
+        "the bodies touch at the start, and no gap is unlike a small one; give a gap$",
+        lambda _: slopes("peak_time", "contact.gap", law=fi.Contact.linear(1e4, gap=1e-4)),
+    ),
+    "no loss": (
+        lambda _: in_loss(),
+        "without loss the modes left out act as a spring .*; give the contact a small loss$",
+        lambda _: in_loss(law=fi.Contact.linear(1e4, loss=1e-3)),
+    ),
+    "a rigid target": (
+        lambda _: from_outside("target.mass", target="rigid"),
+        "the target is treated as rigid or infinite; strike its modes, with target = 'modal'$",
+        lambda _: from_outside(("target.mass", "strike.x"), target="modal"),
+    ),
+    "chatter": (
+        lambda _: chatter(),
+        "the bodies chatter, .*; give max_impacts, a shorter duration or no dt$",
+        lambda _: (chatter(max_impacts=1), chatter(duration=6e-3)),
+    ),
+    "chatter of a step given": (
+        lambda _: by_steps(dt=5e-4),
+        "the bodies chatter, .*; give max_impacts, a shorter duration or no dt$",
+        lambda _: (by_steps(dt=5e-4, max_impacts=1), by_steps(dt=5e-4, duration=6e-3), by_steps()),
+    ),
+    "touching under a force": (
+        lambda _: pushed(),
+        "the bodies touch at the start already, and a change would press or part them; give a gap$",
+        lambda _: pushed(law=fi.Contact.linear(1e4, gap=1e-5)),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", GRADIENTS)
+@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")  # of steps given and of few modes
+def test_following_the_advice_gives_a_gradient(name):
+    wrong, words, right = GRADIENTS[name]
+    with pytest.raises(fi.SimulationError, match=words):
+        wrong(None)
+    right(None)
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-5])
+def test_gradients_on_a_body_that_moves_already_are_differences(gap):
+    """The striker starts at the surface, displaced where it strikes; its speed is not that of the body."""
+    first = struck(PLATE, at=(0.2, 0.1), tolerance=1e-8)
+    numbers = {"striker.mass": 0.01, "strike.x": 0.13, "strike.y": 0.1, "strike.speed": 0.8}
+
+    def again(numbers):
+        law, at = fi.Contact.hertz(1e6, gap=gap), (numbers["strike.x"], numbers["strike.y"])
+        blow = {"mass": numbers["striker.mass"], "speed": numbers["strike.speed"], "tolerance": 1e-9, "start": first}
+        return struck(PLATE, law, at=at, max_impacts=1, **blow)
+
+    found = again(numbers).gradient(("impulse", "contact_time", "peak_force"), tuple(numbers))
+    for name, value in numbers.items():
+        low, high = (again(numbers | {name: value * (1.0 + side * 1e-4)}) for side in (-1.0, 1.0))
+        for quantity, slope in found.items():
+            change = (getattr(high, quantity) - getattr(low, quantity)) / 2e-4
+            # differences of second order of blows told to 1e-9
+            assert_allclose(slope[name] * value, change, rtol=1e-5, err_msg=f"{quantity} in {name}")
