@@ -8,6 +8,7 @@ from test_advice import ADVICE
 from test_advice_of_assumptions import REMEDIES
 from test_advice_of_files import FILES
 from test_advice_of_gradients import GRADIENTS
+from test_advice_of_stretching import STRETCHING
 
 TESTS = Path(__file__).parent
 HOME = TESTS.parent / "fem_impact"
@@ -52,6 +53,9 @@ ELSEWHERE = {  # advice followed in a test of its own: the test, and patterns of
     "test_advice_of_files.py::test_a_unit_that_was_assumed_can_be_passed": ("assumed .*, pass unit= to change that",),
     "test_advice_of_files.py::test_a_body_that_the_mesher_cannot_fill_is_filled_as_advised": (
         "remove very thin necks or spikes",
+    ),
+    "test_advice_of_stretching.py::test_steps_too_long_for_the_motion_to_settle_are_shortened": (
+        "^the stretching did not settle in",
     ),
     "base/test_isolated.py::test_reader_that_never_ends_is_stopped": ("reading took longer than .*; export it again",),
     "fe/test_eigenvalues.py::test_where_a_pivot_vanishes_another_number_of_modes_is_counted": ("a pivot vanished",),
@@ -110,7 +114,7 @@ def messages(path):
 
 def covering():
     """Patterns of the messages that a test provokes and whose advice it follows."""
-    tables = ADVICE, FILES, REMEDIES, GRADIENTS
+    tables = ADVICE, FILES, REMEDIES, GRADIENTS, STRETCHING
     yield from (words for table in tables for _, words, _ in table.values())
     for name, patterns in ELSEWHERE.items():
         file, test = name.split("::")

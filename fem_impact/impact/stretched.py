@@ -47,5 +47,6 @@ class Stretched:
         )  # fmt: skip
         history.reached["last"] = time, step, state, hint
         if failed:
-            raise SimulationError(f"the stretching did not settle in {failed} steps of the motion; lower the tolerance")
+            steps = f"{failed} steps of the motion"
+            raise SimulationError(f"the stretching did not settle in {steps}; lower dt, or the tolerance without a dt")
         return q, p

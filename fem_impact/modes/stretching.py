@@ -29,6 +29,7 @@ from .air import MixedShapes
 from .analytic import BeamShapes, DiskShapes, RectangleShapes
 from .modal import FieldShapes, Modes, ScaledShapes, Shapes
 from .ritz import RitzShapes
+from .timoshenko import TimoshenkoShapes
 
 HELD = "clamped", "hinged", SOFT  # supports that hold an edge in the plane, too
 NODES = 40  # [-] Gauss points along a radius or a beam, and so many more for each mode
@@ -78,9 +79,10 @@ def _integrals(shapes: Shapes, modes: Modes, moduli: np.ndarray) -> tuple[np.nda
         system = shapes.system
         words = support_words(system.theory)
         loose = set(support_of_facets(system.mesh, dict(system.supports), words)) - set(HELD)
-        if loose or system.element == "morley":
-            edge = "an edge is free or elastic" if loose else "of element 'morley' the slopes are not known"
-            raise ValueError(f"{CANNOT}, but {edge}; hold it, or leave stretching out")
+        if loose:
+            raise ValueError(f"{CANNOT}, but an edge is free or elastic; hold it, or leave stretching out")
+        if system.element == "morley":
+            raise ValueError("stretching=True is unknown for element 'morley'; take 'argyris', or leave stretching out")
         return slopes.products(system, _vectors(shapes), moduli), slopes.softness(system)
     section = modes.section
     assert section is not None
@@ -91,10 +93,8 @@ def _integrals(shapes: Shapes, modes: Modes, moduli: np.ndarray) -> tuple[np.nda
             area = shapes.length * shapes.width
             wave = np.pi * shapes.numbers / (shapes.length, shapes.width)
             return np.diag(area * (wave**2 @ moduli.diagonal())), area / h
-        if shapes.edge == "free":
-            raise ValueError(f"{CANNOT}, but the edge is free; hold it, or leave stretching out")
         return moduli[0, 0] * _disk(shapes), np.pi * shapes.radius**2 / h
-    if isinstance(shapes, BeamShapes):
+    if isinstance(shapes, (BeamShapes, TimoshenkoShapes)):
         if not set(shapes.ends) <= set(HELD):
             raise ValueError(f"{CANNOT}, but an end is free; hold it, or leave stretching out")
         area = float(section.inertia(np.zeros((1, 1)))[0]) / section.material.rho
@@ -124,10 +124,14 @@ def _disk(shapes: DiskShapes) -> np.ndarray:
     return np.where(alike, angle * shapes.scale[:, None] * shapes.scale * gram, 0.0)
 
 
-def _beam(shapes: BeamShapes) -> np.ndarray:
+def _beam(shapes: BeamShapes | TimoshenkoShapes) -> np.ndarray:
     """``int w_i' w_j'`` (n, n) of a uniform beam, by quadrature along it."""
-    k, (a, b, c, d) = shapes.k, shapes.weights.T
+    k = shapes.k if isinstance(shapes, BeamShapes) else shapes.stoutness.waves(shapes.p)[0]
     node, weight = np.polynomial.legendre.leggauss(NODES + int(k.max()))
-    x = 0.5 * (node + 1.0)[:, None]
-    slope = k * (b * np.cos(k * x) - a * np.sin(k * x) - c * np.exp(-k * x) + d * np.exp(k * (x - 1.0)))
+    x = 0.5 * (node + 1.0)
+    if isinstance(shapes, BeamShapes):
+        (a, b, c, d), x = shapes.weights.T, x[:, None]
+        slope = k * (b * np.cos(k * x) - a * np.sin(k * x) - c * np.exp(-k * x) + d * np.exp(k * (x - 1.0)))
+    else:
+        slope = shapes.slopes(x)
     return (0.5 * weight[:, None] * slope).T @ slope / shapes.length

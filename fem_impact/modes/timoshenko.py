@@ -167,6 +167,16 @@ class TimoshenkoShapes(BeamlikeShapes):
         values[:, ~flexible] = self.weights[~flexible, 0] + x[:, None] * self.weights[~flexible, 1]
         return values
 
+    def slopes(self, x: np.ndarray) -> np.ndarray:
+        """w' (n_points, n_modes) at x (n_points,) of a beam that cannot move rigidly: rotation and shear."""
+        blocks = np.array_split(np.arange(len(self.p)), max(1, -(-len(self.p) // BLOCK)))
+        parts = []
+        for block in blocks:
+            fields = self.stoutness.fields(self.p[block], x)
+            steep = fields[:, :, 1] + self.stoutness.S * fields[:, :, 3]
+            parts.append(np.einsum("npk,nk->pn", steep, self.weights[block]))
+        return np.hstack(parts)
+
     def green(self, load: float, x: np.ndarray) -> np.ndarray:
         return _green(self.ends, self.stoutness, load, x)
 

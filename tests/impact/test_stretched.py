@@ -19,7 +19,7 @@ H, SIDES = 1e-3, (0.2, 0.3)
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
 PLATE = fi.Plate(STEEL, H)
 AT, HAMMER = (0.09, 0.13), fi.Striker.rigid(0.1)
-pytestmark = pytest.mark.xdist_group("stretched")  # one worker compiles its kernels
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("stretched")]  # one worker compiles its kernels
 CHU_HERRMANN = {0.2: 1.0195, 0.4: 1.0757, 0.6: 1.1625}  # amplitude / h: frequency ratio, hinged square, edges held
 
 

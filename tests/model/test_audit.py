@@ -257,6 +257,7 @@ def test_a_scene_takes_the_better_model_that_its_tolerance_requires(tmp_path, bo
     assert abs(hits[0].restitution - better.restitution) > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.xdist_group("stretched")
 def test_a_scene_takes_the_stretching_that_its_tolerance_requires(tmp_path):
     path = tmp_path / "scene.toml"

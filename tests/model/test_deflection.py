@@ -101,6 +101,7 @@ def test_effect_on_a_blow_is_that_of_a_direct_integration(speed):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.xdist_group("stretched")
 @pytest.mark.parametrize("speed", [0.1, 0.3, 0.6])
 def test_effect_on_many_modes_is_that_of_a_blow_with_stretching(speed):
@@ -114,6 +115,7 @@ def test_effect_on_many_modes_is_that_of_a_blow_with_stretching(speed):
         assert size > 0.2 or told.effect[name] < 3.0 * max(size, 0.3 * told.worst)  # where the mean tension is cautious
 
 
+@pytest.mark.slow
 @pytest.mark.xdist_group("stretched")
 def test_what_berger_misses_of_a_blow_is_less_than_what_he_adds():
     how = {"at": (0.08, 0.09), "tolerance": 1e-3, "residual": False}
@@ -128,6 +130,7 @@ def test_what_berger_misses_of_a_blow_is_less_than_what_he_adds():
         assert told.state == "not known" if gong else 0.0 < told.worst < 0.5 * found(plain).worst
 
 
+@pytest.mark.slow
 @pytest.mark.xdist_group("stretched")
 def test_a_beam_between_walls_has_all_its_stretching():
     bar = fi.Beam.rectangular(STEEL, width=0.02, height=H)
