@@ -113,6 +113,9 @@ def gradients(hit: "Response", quantity: Any, wrt: Any) -> dict[str, Gradient]:
         raise ValueError("gradient needs a blow of `strike`, with one striker and one target")
     if hit.history.law.shape[1] > KIND and hit.history.law[0, KIND] not in POSSIBLE:
         raise SimulationError("no gradient: the contact yields or remembers, and its past is not followed yet")
+    if hit.history.stretched is not None or hit.striker.hand is not None:
+        why = "the target stretches" if hit.history.stretched is not None else "a hand holds the striker"
+        raise SimulationError(f"no gradient: {why}, and what that changes is not followed yet")
     if not hit.n_impacts:
         raise SimulationError("no gradient: the bodies never touched; check gap and speed")
     parameters = Parameters(hit)

@@ -77,7 +77,10 @@ def compare(seed):
 
         def value(step):
             changed = {name: numbers[name] * (1.0 + step * part) for name, part in turn.items()}
-            return told(strike(numbers | changed), frequencies)
+            other = strike(numbers | changed)
+            if other.n_impacts != hit.n_impacts:
+                raise fi.SimulationError("no difference: another impact within the step")
+            return told(other, frequencies)
 
         near, far = ([value(-size), value(size)] for size in (STEP, 2.0 * STEP))
     except fi.SimulationError:
@@ -257,3 +260,22 @@ def test_a_gradient_reads_as_a_table():
     assert "<table" in found._repr_html_()
     assert found["striker.mass"] == found.slopes[0]
     assert list(found) == ["striker.mass", "contact.stiffness"]
+
+
+def test_a_striker_that_a_hand_holds_has_no_gradient():
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=50.0, n_modes=10)
+    held = fi.Striker.rigid(0.05).held(fi.Hand(stiffness=100.0))
+    hit = fi.strike(plate, held, fi.Contact.hertz(1e6), at=(0.4, 0.3), speed=1.0, tolerance=1e-2, max_impacts=1)
+    with pytest.raises(fi.SimulationError, match="no gradient: a hand holds the striker"):
+        hit.gradient("impulse")
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("stretched")
+def test_a_target_that_stretches_has_no_gradient():
+    plate = fi.Plate(fi.Material(E=70e9, nu=0.3, rho=2700.0), 1e-3)
+    modes = fi.find_modes(fi.assemble(fi.mesh.rectangle(0.4, 0.3), plate, {"boundary": "hinged"}), n_modes=8)
+    law = fi.Contact.hertz(1e5)
+    hit = fi.strike(modes, fi.Striker.rigid(0.01), law, at=(0.1, 0.1), speed=1.0, tolerance=1e-1, stretching=True)
+    with pytest.raises(fi.SimulationError, match="no gradient: the target stretches"):
+        hit.gradient("impulse")
