@@ -242,7 +242,7 @@ LIGHT = {
 def test_a_scene_takes_the_better_model_that_its_tolerance_requires(tmp_path, body, name, given):
     """The thin body in a vacuum, the same with the choice left open, and with the better model stated."""
     path = tmp_path / "scene.toml"
-    stated = {"theory": 'theory = "mindlin"', "air": 'air = "both sides"'}[given]
+    stated = {"theory": 'theory = "mindlin"', "air": 'air = "both sides"\nstretching = true'}[given]
     hits, plans = [], []
     for text in (AUTO.format(model="stated", **body), AUTO.format(model="auto", **body)):
         path.write_text(text)
