@@ -97,7 +97,7 @@ def test_cells_of_a_map_are_single_strikes(body, striker, law):
 
 
 @pytest.mark.slow
-@pytest.mark.thin(3)
+@pytest.mark.thin(5)
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("striker", STRIKERS)
 @pytest.mark.parametrize("body", TARGETS)
@@ -136,7 +136,7 @@ def test_centroids_of_a_map_are_those_of_exact_strikes(striker, law):
 
 
 @pytest.mark.slow
-@pytest.mark.thin(3)
+@pytest.mark.thin(5)
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("body", TARGETS)
 def test_centroids_of_a_wide_map_are_those_of_exact_strikes(body, law):

@@ -367,7 +367,7 @@ def test_frequencies(name, telling):
     compare(one, other, claim + other_claim)
 
 
-@pytest.mark.thin(3)
+@pytest.mark.thin(5)
 @pytest.mark.parametrize(("name", "telling", "point"), list(cases(with_points=True)))
 def test_static_compliance_and_blow(name, telling, point):
     """Inside, on free edges and in corners."""
@@ -381,7 +381,7 @@ def each_point():
             yield pytest.param(name, point, marks=marks_of(name, body.dimension == 1))
 
 
-@pytest.mark.thin(2)
+@pytest.mark.thin(4)
 @pytest.mark.parametrize(("name", "point"), list(each_point()))
 def test_more_modes(name, point):
     """Twice as many: the static rest gives way to modes, and the blow stays."""
