@@ -419,7 +419,7 @@ def cases(names: Any = None) -> Iterator[tuple[str, str, str]]:
 # --- the judge -------------------------------------------------------------------------------------------------------
 
 INFINITE = {"threshold_frequency", "mobility", "Response.motion_error"}  # documented to give inf
-ENDLESS = {"order"}  # fields documented to be infinite now and then
+ENDLESS = {"order", "point_supports"}  # fields documented to be infinite now and then
 OTHER_NAMES = {  # parameter: words under which an error may speak of it besides its own name
     **dict.fromkeys(("length", "width", "radius", "factor", "corners", "hole"), ("size", "outline", "max_frequency")),
     **dict.fromkeys(("frequencies", "points"), ("shapes",)),
