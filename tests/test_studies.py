@@ -61,6 +61,7 @@ def test_a_wrong_answer_at_the_extremes_would_be_seen(monkeypatch):
 
 @pytest.mark.slow
 def test_the_tolerance_walks_along_the_edge_of_what_is_possible(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(STUDIES))
     frontier = study("frontier")
     monkeypatch.setattr(frontier, "TOLERANCES", [1e-2, 1e-3, 1e-4])
     monkeypatch.setattr(frontier, "REPEATS", 1)

@@ -108,7 +108,8 @@ class Gradient:
 
 def gradients(hit: "Response", quantity: Any, wrt: Any) -> dict[str, Gradient]:
     """The gradient of each quantity, see `Response.gradient`."""
-    wanted = [_asked(item) for item in ((quantity,) if isinstance(quantity, str) else quantity)]
+    several = (quantity,) if isinstance(quantity, str) else check.several("quantity", quantity, str)
+    wanted = [_asked(item) for item in several]
     if hit.striker is None or len(hit.bodies) != 2:
         raise ValueError("gradient needs a blow of `strike`, with one striker and one target")
     if hit.history.law.shape[1] > KIND and hit.history.law[0, KIND] not in POSSIBLE:

@@ -140,7 +140,7 @@ class Parameters:
         """Names as a tuple; all that there are if None. ValueError tells which there are, and why one is not."""
         if wrt is None:
             return tuple(self.values)
-        names = (wrt,) if isinstance(wrt, str) else tuple(wrt)
+        names = (wrt,) if isinstance(wrt, str) else check.several("wrt", wrt, str)
         for name in names:
             if name in self._barred:
                 raise check.SimulationError(f"no gradient in {name}: {self._barred[name]}")

