@@ -106,7 +106,8 @@ def check_seeds(seeds):
         slopes, differences, doubt, lossy = found
         message = f"seed {seed}, {QUANTITIES}"
         # each blow has steps of its own, so that differences err, too: the worst of 200 blows is off by 2.3e-6
-        assert_allclose(slopes[:4], differences[:4], rtol=0, atol=1e-5, err_msg=message)
+        off = np.abs(slopes - differences)
+        assert (off[:4] <= 1e-5 + doubt[:4]).all(), f"{message}: off by {off}, doubt {doubt}"
         # the magnitude of a spectrum has corners at its zeros, which differences of finite steps run over
         assert abs(slopes[5] - differences[5]) <= 5e-5 + 2.0 * doubt[5], message
         # a lossy force rings with every mode, so that its peak is early or late by up to 1e-7 of the blow in either run
