@@ -49,7 +49,8 @@ def first(item):
 def members(name, kind):
     """A line for each public method and property of a class."""
     lines = []
-    for key, raw in vars(kind).items():
+    own = [each for each in reversed(kind.__mro__) if each.__module__.startswith(fi.__name__)]
+    for key, raw in {key: raw for each in own for key, raw in vars(each).items()}.items():
         said = first(raw.__func__ if isinstance(raw, (classmethod, staticmethod)) else raw)
         if key.startswith("_") or not said or not (callable(raw) or isinstance(raw, (property, classmethod)) or
                                                    hasattr(raw, "func")):  # fmt: skip

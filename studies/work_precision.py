@@ -34,7 +34,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import fem_impact as fi
-from fem_impact.impact import collision
+from fem_impact.impact import collision, sensitivity
 from fem_impact.impact.compiled import collocation, energy
 
 MASS, SPEED = 0.005, 1.0  # [kg], [m/s]
@@ -114,7 +114,7 @@ def kernel(blow: Blow, scheme: str, size: float) -> Callable[[], Answer]:
         np.array([[blow.stiffness, 1.0, 0.0, 0.0]]),
         np.zeros(n), blow.start[n:].copy(),
     )  # fmt: skip
-    nodes, contact = collision._gauss(collision.NODES), np.pi * np.sqrt(MASS / blow.stiffness)
+    nodes, contact = sensitivity.gauss(collision.NODES), np.pi * np.sqrt(MASS / blow.stiffness)
     noise = (1e-19, 1e-12)
 
     def run() -> Answer:

@@ -21,7 +21,7 @@ from .compiled.stretched import run_stretched
 from .contact import Contact, acting_stiffness, wall_time
 from .quantities import asked_for
 from .response import Dip, Error, History, Response
-from .sensitivity import gauss as _gauss
+from .sensitivity import gauss
 from .state import State
 from .stretched import Stretched
 from .striker import Striker
@@ -784,7 +784,7 @@ def _run(
             most,
         )  # fmt: skip
     elif scheme == "collocation":
-        nodes, powers = _gauss(NODES)
+        nodes, powers = gauss(NODES)
         result = run_collocation(
             *parts, nodes, powers, pace[0] / 2.0, pace[1], float(size), *noise, float(horizon), n_max, most
         )

@@ -255,8 +255,34 @@ class Dip:
         check.lock_arrays(self)
 
 
+class Totals:
+    """What the impacts of a blow, or of several, add up to."""
+
+    impacts: Any  # of Impact, in order of their start
+
+    @property
+    def n_impacts(self) -> int:
+        """Number of impacts."""
+        return len(self.impacts)
+
+    @property
+    def contact_time(self) -> float:
+        """Total time in contact [s]."""
+        return float(sum(impact.duration for impact in self.impacts))
+
+    @property
+    def impulse(self) -> float:
+        """Total impulse of the contact forces [N s]."""
+        return float(sum(impact.impulse for impact in self.impacts))
+
+    @property
+    def peak_force(self) -> float:
+        """Largest contact force [N]."""
+        return max((impact.peak_force for impact in self.impacts), default=0.0)
+
+
 @dataclass(frozen=True, eq=False)
-class Response:
+class Response(Totals):
     """The result of `strike` or `collide`. Histories are exact between steps and after the end."""
 
     bodies: tuple[Modes, ...]
@@ -401,16 +427,6 @@ class Response:
         return self.history.impacts
 
     @property
-    def n_impacts(self) -> int:
-        """Number of impacts."""
-        return len(self.impacts)
-
-    @property
-    def contact_time(self) -> float:
-        """Total time in contact [s]."""
-        return float(sum(impact.duration for impact in self.impacts))
-
-    @property
     def contact_times(self) -> tuple[float, ...]:
         """Time in contact [s] of each contact; they add up to `contact_time`."""
         return tuple(
@@ -426,16 +442,6 @@ class Response:
             total += max(0.0, impact.end - max(impact.start, until))
             until = max(until, impact.end)
         return float(total)
-
-    @property
-    def impulse(self) -> float:
-        """Total impulse of the contact forces [N s]."""
-        return float(sum(impact.impulse for impact in self.impacts))
-
-    @property
-    def peak_force(self) -> float:
-        """Largest contact force [N]."""
-        return max((impact.peak_force for impact in self.impacts), default=0.0)
 
     @cached_property
     def _samples(self) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from ..impact.collision import TOLERANCE, Touch
 from ..impact.compiled import record
 from ..impact.contact import Contact
 from ..impact.quantities import words
-from ..impact.response import Impact, Response
+from ..impact.response import Impact, Response, Totals
 from ..impact.state import State
 from ..impact.striker import Striker
 from ..modes.modal import Modes
@@ -40,7 +40,7 @@ class Stroke(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Strokes:
+class Strokes(Totals):
     """Blows one after another on one body: what `fi.strokes` found."""
 
     target: Modes
@@ -76,26 +76,6 @@ class Strokes:
                     peak = max(found[i].peak_force, each.peak_force)
                     found[i] = Impact(found[i].start, end, peak, found[i].impulse + each.impulse, stroke)
         return tuple(sorted(found, key=lambda impact: (impact.start, impact.contact)))
-
-    @property
-    def n_impacts(self) -> int:
-        """Number of impacts."""
-        return len(self.impacts)
-
-    @property
-    def contact_time(self) -> float:
-        """Total time in contact [s]."""
-        return float(sum(impact.duration for impact in self.impacts))
-
-    @property
-    def impulse(self) -> float:
-        """Total impulse of the contact forces [N s]."""
-        return float(sum(impact.impulse for impact in self.impacts))
-
-    @property
-    def peak_force(self) -> float:
-        """Largest force of one striker [N]."""
-        return max((impact.peak_force for impact in self.impacts), default=0.0)
 
     @cached_property
     def _samples(self) -> tuple[np.ndarray, np.ndarray]:

@@ -16,8 +16,9 @@ from test_kernels import drift, plate, run
 
 import fem_impact as fi
 from fem_impact.impact import collision
-from fem_impact.impact.collision import Touch, _gauss, collide
+from fem_impact.impact.collision import Touch, collide
 from fem_impact.impact.compiled import collocation, propagation, record
+from fem_impact.impact.sensitivity import gauss
 
 EPS = np.finfo(float).eps
 SCHEMES = ["A", "A4"]
@@ -158,7 +159,7 @@ def test_eight_nodes_and_ten_agree(exponent):
     speeds = []
     for count in (8, 10):
         out = collocation.run_collocation(
-            omega, still, shape[None], np.zeros(1), still, law, still, p, *_gauss(count), 1e-4, 1.0, 1e-13, 0.0, 0.0,
+            omega, still, shape[None], np.zeros(1), still, law, still, p, *gauss(count), 1e-4, 1.0, 1e-13, 0.0, 0.0,
             np.inf, 0, 5000,
         )  # fmt: skip
         speeds.append(10.0 * out[2][0])

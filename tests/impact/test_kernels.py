@@ -16,9 +16,9 @@ from numba import njit
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
-from fem_impact.impact.collision import _gauss
 from fem_impact.impact.compiled import arrays, build, collocation, energy, propagation, record, schemes
 from fem_impact.impact.compiled import law as laws
+from fem_impact.impact.sensitivity import gauss
 
 EPS = np.finfo(float).eps
 
@@ -67,7 +67,7 @@ def run(
     p = np.asarray(p, float)
     state = (omega, zeta, shape, offset, bias, np.ascontiguousarray(law), q, p)
     if scheme == "collocation":
-        tail = (*_gauss(5), h, abs(speed), 1e-10, *noise, horizon, n_max, max_steps)
+        tail = (*gauss(5), h, abs(speed), 1e-10, *noise, horizon, n_max, max_steps)
         out = collocation.run_collocation(*state, *tail)
     else:
         out = energy.run_energy(*state, int(scheme == "A4"), h, *noise, horizon, n_max, max_steps)
@@ -674,7 +674,7 @@ def test_many_scenes_keep_the_invariants(scene):
 PLAIN = """
 import json
 import numpy as np
-from fem_impact.impact.collision import _gauss
+from fem_impact.impact.sensitivity import gauss
 from fem_impact.impact.compiled.collocation import run_collocation
 from fem_impact.impact.compiled.energy import run_energy
 from fem_impact.impact.compiled.propagation import replay
@@ -695,8 +695,8 @@ for m, zeta, bias in (
 ):
     u, laws, offset = shapes[:m].copy(), law[:m].copy(), np.array([-1e-5, -3e-5])[:m].copy()
     found += after(run_energy(w, zeta, u, offset, bias, laws, z, start, 1, 5e-5, 0.0, 0.0, 3e-3, 0, 500), 2)
-    gauss = *_gauss(4), 2e-4, 1.0, 1e-4
-    found += after(run_collocation(w, zeta, u, offset, bias, laws, z, start, *gauss, 0.0, 0.0, 3e-3, 0, 500), 4)
+    rule = *gauss(4), 2e-4, 1.0, 1e-4
+    found += after(run_collocation(w, zeta, u, offset, bias, laws, z, start, *rule, 0.0, 0.0, 3e-3, 0, 500), 4)
 print(json.dumps(list(map(float, found))))
 """
 
