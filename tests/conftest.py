@@ -8,6 +8,7 @@ from zlib import crc32
 
 import pytest
 from hypothesis import settings
+from warming import compile_all
 
 settings.register_profile("same", derandomize=True)  # the same cases in every run
 settings.load_profile("same")
@@ -94,13 +95,7 @@ def pytest_configure(config):
 
     isolated.PATIENCE = 120.0  # [s] a busy machine must not refuse a file; tests of the limit set their own
     if not hasattr(config, "workerinput"):
-        import fem_impact as fi
-
-        plate = fi.analytic.rectangle(1.0, 0.7, mass=1.0, first_frequency=100.0, n_modes=20)
-        blow = {"at": (0.3, 0.3), "speed": 1.0, "tolerance": 1e-2}
-        for scheme in ("A4", "collocation"):
-            fi.strike(plate, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), scheme=scheme, **blow)
-        fi.sweep(plate, fi.Striker.rigid(0.02), fi.Contact.linear(1e5), over={"mass": [0.02, 0.03]}, **blow)
+        compile_all()
 
 
 @pytest.fixture

@@ -80,6 +80,7 @@ def test_sound_radiated_to_a_listener_rings_at_the_modes_and_decays_with_them(sc
     assert_allclose(said["level"], 20 * np.log10(np.abs(pressure).max() / 20e-6), atol=1e-5)  # 32-bit samples
 
 
+@pytest.mark.slow
 def test_twice_the_speed_sounds_six_decibel_louder(scene, tmp_path):
     (soft, low), (loud, high) = (hear(scene, tmp_path / str(speed), speed=speed) for speed in (1.0, 2.0))
     # a linear contact scales exactly; what is left is the 32 bits of a sample
@@ -87,6 +88,7 @@ def test_twice_the_speed_sounds_six_decibel_louder(scene, tmp_path):
     assert_allclose(high["level"] - low["level"], 20 * np.log10(2.0), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_listener_of_the_command_is_the_one_of_the_scene(scene, tmp_path, capsys):
     _, said = hear(scene, tmp_path / "one")
     scene.write_text(scene.read_text().partition("[observe]")[0])
@@ -235,6 +237,7 @@ def test_count_of_modes_must_be_positive(scene, capsys, count):
 
 
 @pytest.mark.parametrize("columns", [20, 40, 200])
+@pytest.mark.slow
 def test_summary_keeps_to_the_width_of_the_terminal(scene, tmp_path, capsys, monkeypatch, columns):
     monkeypatch.setenv("COLUMNS", str(columns))
     monkeypatch.chdir(tmp_path)

@@ -45,6 +45,7 @@ def run(folder, command, path=(), **environment):
         ("mkdir gone; cd gone; rmdir ../gone; $FEM strike ../scene.toml", 2, None),
     ],
 )
+@pytest.mark.slow
 def test_streams_and_places_that_fail_are_a_sentence(tmp_path, command, status, said):
     done = run(tmp_path, command)
     assert done.returncode == status or (said is None and done.returncode in (1, 2))
@@ -55,6 +56,7 @@ def test_streams_and_places_that_fail_are_a_sentence(tmp_path, command, status, 
     assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
 
 
+@pytest.mark.slow
 def test_text_that_a_terminal_cannot_show_is_escaped(tmp_path):
     poor = {"LANG": "C", "LC_ALL": "C", "PYTHONIOENCODING": "ascii", "COLUMNS": "20", "TERM": "dumb", "NO_COLOR": "1"}
     (tmp_path / "title.toml").write_text('title = "Plaque frappée ☃"\n' + SCENE, encoding="utf-8")

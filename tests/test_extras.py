@@ -28,6 +28,7 @@ def scene(tmp_path):
     return str(tmp_path / "small.toml")
 
 
+@pytest.mark.slow
 def test_package_loads_without_any_extra():
     paths = [path.relative_to(ROOT).with_suffix("") for path in (ROOT / "fem_impact").rglob("*.py")]
     modules = [".".join(path.parts) for path in paths if path.stem not in ("__init__", "__main__", "isolated")]

@@ -106,6 +106,7 @@ def test_number_of_modes_follows_weyl(n_modes):
 
 
 @pytest.mark.parametrize("supports", [{"boundary": "hinged"}, {"edge0": "clamped"}, {}])
+@pytest.mark.slow
 def test_compliance_stays_that_of_the_plate_where_corners_are_graded(supports):
     # narrow and wide corners, one short side: rings down to 1e-10 of the plate
     corners = [(0, 0), (1, 0), (1.02, 0.05), (0.3, 0.35), (0.25, 0.6), (0.1, 0.3)]

@@ -42,6 +42,7 @@ def test_samples_are_read_before_they_are_mutated(category, tmp_path, read_here)
 
 
 @pytest.mark.parametrize("category", HERE)
+@pytest.mark.slow
 def test_mutated_inputs_give_a_result_or_one_clear_error(category, tmp_path):
     known = samples(category)
     raws = [raw for _, raw in known]

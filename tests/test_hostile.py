@@ -144,6 +144,7 @@ DRAWINGS = {
 
 
 @pytest.mark.parametrize("name, words", [("pieces", "numbers"), ("comment", "a comment"), ("shapes", "shapes")])
+@pytest.mark.slow
 def test_a_huge_drawing_is_refused_in_seconds(tmp_path, name, words):
     pytest.importorskip("svgelements")
     (tmp_path / "a.svg").write_text(DRAWINGS[name])

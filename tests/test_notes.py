@@ -66,6 +66,7 @@ def test_plan_and_run_carry_the_notes_whatever_the_model(scene, target):
     assert found.notes == found.response.notes == found.plan.notes
 
 
+@pytest.mark.slow
 def test_every_command_says_the_notes(scene, tmp_path, capsys):
     def said(*words):
         assert cli.main([*words[:1], str(scene), *words[1:]]) == 0

@@ -46,6 +46,7 @@ def test_python_example_of_uncertain_inputs_runs(monkeypatch, tmp_path, capsys):
     assert names["found"].n_failed == 0 and (tmp_path / "spread.png").is_file()
 
 
+@pytest.mark.slow
 def test_python_example_of_a_fit_runs(monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     names = {"fi": fi}

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import fem_impact
 
 SCRIPT = """
@@ -19,6 +21,7 @@ print(nearest_turn(steps, np.array([[1.0], [0.0], [0.0], [0.0], [-5.0]]), np.arr
 """
 
 
+@pytest.mark.slow
 def test_an_edit_in_another_file_is_noticed(tmp_path):
     shutil.copytree(Path(fem_impact.__file__).parent, tmp_path / "fem_impact", ignore=shutil.ignore_patterns("*.nb?"))
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}

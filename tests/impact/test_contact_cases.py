@@ -7,6 +7,7 @@ import pytest
 from linear_blow import exact
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
+from warming import locked
 
 import fem_impact as fi
 from fem_impact.impact import accuracy
@@ -22,12 +23,11 @@ SCHEMES = {"A": 0, "A4": 1}
 def run(omega, shape, p, *, k, exponent=1.0, scheme="A4", h, q=None, bias=None, offset=0.0, n_max=0, horizon=np.inf):
     """One lossless contact between undamped modes, followed by a fixed step: what `run_energy` returns."""
     still = np.zeros(len(omega))
-    return energy.run_energy(
-        np.asarray(omega, float), still, np.atleast_2d(np.asarray(shape, float)), np.array([float(offset)]),
-        still if bias is None else np.asarray(bias, float), np.array([[float(k), float(exponent), 0.0, 0.0]]),
-        still if q is None else np.asarray(q, float), np.asarray(p, float), SCHEMES[scheme], h, 0.0, 0.0,
-        float(horizon), n_max, 400_000,
+    scene = locked(
+        omega, still, np.atleast_2d(shape), [offset], still if bias is None else bias, [[k, exponent, 0.0, 0.0]],
+        still if q is None else q, p,
     )  # fmt: skip
+    return energy.run_energy(*scene, SCHEMES[scheme], h, 0.0, 0.0, float(horizon), n_max, 400_000)
 
 
 def struck(n_modes=20, u_striker=10.0, u_plate=2.0):

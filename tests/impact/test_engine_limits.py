@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 from test_collision import measured, wall_duration
 from test_kernels import drift, plate, run
+from warming import locked
 
 import fem_impact as fi
 from fem_impact.impact import collision
@@ -158,10 +159,8 @@ def test_eight_nodes_and_ten_agree(exponent):
     law, p = np.array([[1e6 if exponent == 1.0 else 1e8, exponent, 0.0, 0.0]]), np.append(0.1, still[1:])
     speeds = []
     for count in (8, 10):
-        out = collocation.run_collocation(
-            omega, still, shape[None], np.zeros(1), still, law, still, p, *gauss(count), 1e-4, 1.0, 1e-13, 0.0, 0.0,
-            np.inf, 0, 5000,
-        )  # fmt: skip
+        scene = locked(omega, still, shape[None], np.zeros(1), still, law, still, p)
+        out = collocation.run_collocation(*scene, *gauss(count), 1e-4, 1.0, 1e-13, 0.0, 0.0, np.inf, 0, 5000)
         speeds.append(10.0 * out[2][0])
     # onset and release are located to 1e-11 of the approach about them, which leaves 2e-12 of the speed
     assert_allclose(speeds[0], speeds[1], rtol=0, atol=5e-12)

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from numba import njit
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
+from warming import locked
 
 from fem_impact.impact.compiled import arrays, build, collocation, energy, propagation, record, schemes
 from fem_impact.impact.compiled import law as laws
@@ -65,7 +66,7 @@ def run(
         p = np.zeros_like(omega)
         p[0] = speed / shape[0, 0]
     p = np.asarray(p, float)
-    state = (omega, zeta, shape, offset, bias, np.ascontiguousarray(law), q, p)
+    state = locked(omega, zeta, shape, offset, bias, law, q, p)
     if scheme == "collocation":
         tail = (*gauss(5), h, abs(speed), 1e-10, *noise, horizon, n_max, max_steps)
         out = collocation.run_collocation(*state, *tail)
@@ -674,6 +675,7 @@ def test_many_scenes_keep_the_invariants(scene):
 PLAIN = """
 import json
 import numpy as np
+from warming import locked
 from fem_impact.impact.sensitivity import gauss
 from fem_impact.impact.compiled.collocation import run_collocation
 from fem_impact.impact.compiled.energy import run_energy
@@ -682,7 +684,7 @@ from fem_impact.impact.compiled.propagation import replay
 def after(run, n_coefficients):
     times = np.linspace(0.0, 2e-3, 9)
     q, p = np.empty((9, 3)), np.empty((9, 3))
-    replay(w, zeta, u, bias, z, start, run[0], n_coefficients, times, q, p)
+    replay(*body, *locked(bias, z, start, run[0]), n_coefficients, times, q, p)
     return [len(run[0]), *run[2], *(1e3 * q).ravel(), *p.ravel()]
 
 w, z = np.array([0.0, 4e3, 9e3]), np.zeros(3)
@@ -693,10 +695,10 @@ found = []
 for m, zeta, bias in (
     (1, z, z), (1, np.array([0.0, 0.95, 1.3]), z), (2, np.array([0.0, 0.01, 0.2]), np.array([0.1, 1.0, -2.0]))
 ):
-    u, laws, offset = shapes[:m].copy(), law[:m].copy(), np.array([-1e-5, -3e-5])[:m].copy()
-    found += after(run_energy(w, zeta, u, offset, bias, laws, z, start, 1, 5e-5, 0.0, 0.0, 3e-3, 0, 500), 2)
-    rule = *gauss(4), 2e-4, 1.0, 1e-4
-    found += after(run_collocation(w, zeta, u, offset, bias, laws, z, start, *rule, 0.0, 0.0, 3e-3, 0, 500), 4)
+    body = locked(w, zeta, shapes[:m])
+    scene = *body, *locked(np.array([-1e-5, -3e-5])[:m], bias, law[:m], z, start)
+    found += after(run_energy(*scene, 1, 5e-5, 0.0, 0.0, 3e-3, 0, 500), 2)
+    found += after(run_collocation(*scene, *gauss(4), 2e-4, 1.0, 1e-4, 0.0, 0.0, 3e-3, 0, 500), 4)
 print(json.dumps(list(map(float, found))))
 """
 
@@ -706,7 +708,7 @@ def test_plain_python_form_agrees():
     answers = [
         subprocess.run(
             [sys.executable, "-c", PLAIN], capture_output=True, text=True, check=True, timeout=600,
-            env={**os.environ, "NUMBA_DISABLE_JIT": flag},
+            env={**os.environ, "NUMBA_DISABLE_JIT": flag, "PYTHONPATH": os.pathsep.join(sys.path)},
         ).stdout
         for flag in ("0", "1")
     ]  # fmt: skip

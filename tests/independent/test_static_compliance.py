@@ -305,6 +305,7 @@ def test_claims_of_beams_cover_the_error():
 
 
 @pytest.mark.parametrize("name", ["hinged rectangle", "clamped disk", "hinged disk", "ring clamped at both rims"])
+@pytest.mark.slow
 def test_points_on_a_support_rest(name):
     rng = stream("rest " + name)
     size, plate, D, _ = section_of(rng)
@@ -342,6 +343,7 @@ def test_levy_series_against_naviers(point):
 
 
 @pytest.mark.parametrize("edge", SIDES)
+@pytest.mark.slow
 def test_fourier_series_against_sums_over_modes(edge):
     rho, nu, reach = 0.6, 0.3, 45.0
     total = sum(

@@ -50,6 +50,7 @@ def test_the_quantities_asked_for_are_those_that_get_an_effect():
 
 
 @pytest.mark.parametrize("target", ["vectors", "modal", "infinite", "rigid"])
+@pytest.mark.slow
 def test_the_examination_knows_every_kind_of_target(target):
     mesh = fi.mesh.rectangle(0.8, 0.6)
     system = fi.assemble(mesh, PLATE, {"boundary": "hinged"})
@@ -65,6 +66,7 @@ def test_the_examination_knows_every_kind_of_target(target):
     assert 0.0 < found["thin target"].worst < 0.1
 
 
+@pytest.mark.slow
 def test_simple_targets_agree_with_modes_on_what_thickness_does():
     system = fi.assemble(fi.mesh.rectangle(0.8, 0.6), PLATE, {"boundary": "hinged"})
     found = []

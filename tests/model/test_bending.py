@@ -48,6 +48,7 @@ def test_frequencies_of_a_thick_beam_drop_as_timoshenko_says(ends, height):
 @pytest.mark.parametrize("edge", ["clamped", "hinged", "free"])
 @pytest.mark.parametrize("h", [0.005, 0.02])
 @pytest.mark.parametrize("order", [0, 2, 3])
+@pytest.mark.slow
 def test_frequencies_of_a_thick_disk_drop_as_mindlin_says(edge, h, order):
     plate = fi.Plate(STEEL, h)
     modes = fi.analytic.disk(SIDE, edge=edge, section=plate, n_modes=24)
@@ -139,6 +140,7 @@ def test_bodies_without_shapes_are_not_known(body):
     assert module.known(modes) is None
 
 
+@pytest.mark.slow
 def test_a_drumhead_has_the_waves_of_its_membrane():
     skin = fi.Plate(fi.Material(E=4e9, nu=0.38, rho=1390.0), 0.1e-3, tension=4000.0)
     modes = by_elements(fi.mesh.disk(0.3), skin, {"boundary": "hinged"}, 3)

@@ -184,6 +184,7 @@ def test_the_benchmark_finds_a_machine_that_people_use():
 
 
 @pytest.mark.parametrize("name", ["marked_linear", "guitar_top", "drumstick"])
+@pytest.mark.slow
 def test_predicted_time_is_of_the_right_size(name):
     """Within four, and not two as in studies/cost_predictions.py: a busy machine doubles even the processor time."""
     scene = fi.load_scene(SCENES / f"{name}.toml")

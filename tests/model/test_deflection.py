@@ -176,6 +176,7 @@ def test_a_plate_that_rocks_on_soft_springs_does_not_bend():
     assert (held == 1.0).all() and (loose == 1.0).all()
 
 
+@pytest.mark.slow
 def test_a_drumhead_may_swing_by_many_thicknesses():
     skin = fi.Plate(fi.Material(E=4e9, nu=0.38, rho=1390.0), 0.1e-3, tension=4000.0)
     bends, loose = shares(fi.mesh.disk(0.3), skin, {"boundary": "hinged"}, 5)

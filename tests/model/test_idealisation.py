@@ -241,6 +241,7 @@ def test_error_of_random_endless_orthotropic_plates_is_bounded():
     assert np.median(found) <= 20.0  # single ones are larger: the echoes of several edges can cancel
 
 
+@pytest.mark.slow
 def test_a_spruce_top_counts_as_endless_and_is_struck_as_by_its_modes():
     """Elements, a grain at an angle and clamped edges: the contact is over before the echo returns."""
     body, at = mesh.rectangle(0.4, 0.3), (0.2, 0.15)

@@ -142,6 +142,7 @@ def test_sound_and_spectrum_bring_the_modes_they_need(scene):
     assert fi.plan(SCENES / "heavy_plate.toml", quantity={"spectrum": 5e3}).target == "rigid"
 
 
+@pytest.mark.slow
 def test_points_of_observation_want_motion(scene):
     """That of the vectors if they tell it while the blow lasts, otherwise that of modes, found at once."""
     assert scene(PLATE + "[observe]\npoints = [[0.1, 0.1]]\n", mass=500e3).plan().target == "vectors"
@@ -227,6 +228,7 @@ def test_costly_plan_says_so():
     assert not fi.plan(SCENES / "drumstick_map.toml").costly
 
 
+@pytest.mark.slow
 def test_modes_of_a_costly_plan_are_kept_and_taken_up_again(tmp_path, monkeypatch):
     """Broken off after the modes were found, the next run starts with them; other modes are found anew."""
     monkeypatch.setattr(planner, "COSTLY", (0.0, 0.0))

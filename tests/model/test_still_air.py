@@ -46,6 +46,7 @@ def rayleigh(modes, mode, n=48):
 
 @pytest.mark.parametrize("mode", [0, 1, 3, 8])
 @pytest.mark.parametrize("h", [1e-3, 3e-3])
+@pytest.mark.slow
 def test_air_on_a_baffled_plate_is_that_of_rayleighs_integral(mode, h):
     modes = fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(SPRUCE, h), n_modes=12)
     mass, damping = (each[mode] for each in loading(modes))

@@ -52,6 +52,7 @@ def test_system_is_struck_as_its_modes_are(body):
     assert_allclose(hit.target.damping_ratio[hit.target.omega > 0.0], 5e-3)
 
 
+@pytest.mark.slow
 def test_plan_of_objects_is_that_of_the_same_scene_and_runs(tmp_path):
     text = """
 [mesh]

@@ -99,6 +99,7 @@ def test_motion_after_the_blow_is_that_of_modes(more):
     assert hit.energy_error < 1e-12 and hit.energies == pytest.approx(other.energies, rel=1e-2, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_modes_of_another_body_do_not_ring():
     hit = fi.strike(plate({"boundary": "hinged"}), BALL, WOODEN, **BLOW)
     mine = fi.find_modes(plate({"boundary": "hinged"}), n_modes=12)
@@ -109,6 +110,7 @@ def test_modes_of_another_body_do_not_ring():
         hit.on(fi.find_modes(fi.assemble(fi.mesh.disk(0.1), fi.Plate(WOOD, 3e-3), {"outer": "hinged"}), n_modes=12))
 
 
+@pytest.mark.slow
 def test_responses_by_vectors_can_be_copied():
     hit = fi.strike(plate({"boundary": "hinged"}), BALL, WOODEN, **BLOW)
     other = pickle.loads(pickle.dumps(hit))
@@ -170,6 +172,7 @@ def test_plan_knows_the_mass():
 
 @pytest.mark.parametrize("velocity", [False, True])
 @pytest.mark.parametrize(("mass", "stiffness"), [(0.03, 1e6), (0.005, 1e8)])
+@pytest.mark.slow
 def test_vectors_tell_the_motion_while_the_blow_lasts(mass, stiffness, velocity):
     """Within their stated error and without any mode; a point that the wave has hardly reached is left to modes."""
     body, striker, law = plate({"boundary": "hinged"}), fi.Striker.rigid(mass), fi.Contact.hertz(stiffness)

@@ -1,6 +1,7 @@
 """A plate seen from several points: each as if alone, and factorised once for all."""
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
@@ -16,6 +17,7 @@ def body():
     return fi.assemble(fi.mesh.rectangle(0.465, 0.3), PLATE, {"boundary": "hinged"}, near=POINTS)
 
 
+@pytest.mark.slow
 def test_each_point_has_the_vectors_that_it_would_have_alone(monkeypatch):
     system, shift, made = body(), 2e4, []
     once = ritz.factorise
@@ -28,6 +30,7 @@ def test_each_point_has_the_vectors_that_it_would_have_alone(monkeypatch):
         assert_allclose(found.modes(30, 0.01).shape_at([point]), alone.shape_at([point]), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_views_of_a_body_are_as_soft_as_the_body_is_there():
     """Vectors start with the static deflection under the load, so that the compliance is that of the mesh."""
     target = Target.of(body())

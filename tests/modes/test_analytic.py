@@ -67,6 +67,7 @@ def test_beam_modes_are_orthonormal_up_to_high_order(ends):
 
 
 @pytest.mark.parametrize("edge", analytic.KINDS)
+@pytest.mark.slow
 def test_disk_modes_are_orthonormal(edge):
     modes = analytic.disk(0.7, edge=edge, mass=0.3, first_frequency=50.0, n_modes=120)
     points, weight = disk_quadrature(0.7)

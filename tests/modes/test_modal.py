@@ -189,6 +189,7 @@ def shooting_frequencies(height, length, n, guess):
         lambda x: np.interp(x[:, 0], [0.0, 0.11, 0.29, 0.5], [0.01, 0.012, 0.004, 0.01]),  # kinks
     ],
 )
+@pytest.mark.slow
 def test_tapered_beams_meet_an_integration_of_their_equation(height):
     bar = Beam.rectangular(STEEL, width=0.02, height=height)
     modes = find_modes(assemble(mesh.line(0.5), bar, {"left": "clamped"}), n_modes=5)
@@ -281,6 +282,7 @@ def test_tolerance_is_kept_and_the_estimate_is_honest(shape, supports, wanted, t
         (mesh.polygon([(0, 0), (1, 0), (0, 1)]), "clamped", [93.789178, 157.786324, 194.765341]),
     ],
 )
+@pytest.mark.slow
 def test_bounds_enclose_the_exact_frequencies(shape, supports, wanted):
     modes = find_modes(assemble(shape, PLATE, {"boundary": supports}), n_modes=len(wanted), bounds=True)
     bounds = modes.bounds * 2 * np.pi * PER_RATE
@@ -423,6 +425,7 @@ RINGS = [  # one kind of each edge with another, the others are alike
 
 
 @pytest.mark.parametrize("inner, outer", RINGS)
+@pytest.mark.slow
 def test_rings_meet_the_roots_of_their_bessel_determinant(inner, outer):
     exact = ring_roots(inner, outer, 0.4)[:8]
     supports = {"inner": inner, "outer": outer}

@@ -96,6 +96,7 @@ def test_result_of_a_strike_gives_the_same_blow(page, tmp_path):
         assert again.strike().impulse == report.read(scene).strike().impulse
 
 
+@pytest.mark.slow
 def test_result_carries_its_mesh_wherever_it_goes(tmp_path, capsys, monkeypatch):
     text = TEXT.replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', 'shape = "file"\npath = "plate.msh"')
     (tmp_path / "scene.toml").write_text(text.replace('"analytic"', '"fe"').replace("1e-2", "1e-1"))

@@ -167,6 +167,7 @@ def test_what_a_file_holds_is_what_data_gives_back(load):
     assert {name: told[name] for name in given} == given
 
 
+@pytest.mark.slow
 def test_a_scene_says_that_its_plate_is_thick(load):
     stout = HEAD + PLATE.replace('right = "hinged"', 'right = "soft hinged"').replace("e-3]", "e-2]")
     thin = load(stout.replace("soft hinged", "hinged")).built.target.find(3, tolerance=1e-3)

@@ -314,6 +314,7 @@ def test_bad_scene_is_told_in_one_line_with_file_table_and_key(tmp_path, old, ne
         (b"a = " + b"[" * 50_000, "not valid TOML"),
         (b"#" * 2_000_000, "must be smaller than"),
     ],
+    ids=["no text", "nothing", "no table", "nested", "huge"],
 )
 def test_file_that_is_no_scene_is_told_so(tmp_path, raw, text):
     (tmp_path / "scene.toml").write_bytes(raw)

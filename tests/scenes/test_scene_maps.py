@@ -130,6 +130,7 @@ def test_stores_of_an_axis_for_which_the_body_is_built_anew(scene, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["map-0", "map-1", "map-2"]
 
 
+@pytest.mark.slow
 def test_map_at_the_prompt(tmp_path, capsys):
     text = (SCENES / "drumstick_map.toml").read_text().replace("count = 20", "count = 3")
     (tmp_path / "few.toml").write_text(text)
@@ -171,6 +172,7 @@ def test_a_map_that_needs_too_many_modes_says_what_to_leave_out():
         maps.map_scene(found, over=over, tolerance=1e-3)
 
 
+@pytest.mark.slow
 def test_hammer_at_the_prompt(capsys):
     arguments = ["hammer", str(SCENES / "drumstick_map.toml"), "--bandwidth", "400", "--masses", "0.002", "0.2"]
     assert cli.main([*arguments, "--json"]) == 0

@@ -301,6 +301,7 @@ def test_the_centroid_is_one_of_the_quantities():
     assert_allclose(found.values("centroid")[2], hit.spectral_centroid(2e3), rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_the_prompt_writes_numbers_and_a_picture_and_says_what_to_measure(scene, tmp_path, capsys):
     made, out = scene(), tmp_path / "out"
     words = ["spread", str(made.path), "--vary", "contact.stiffness=lognormal(1e5, 0.2)", "--vary",

@@ -45,6 +45,7 @@ def test_an_animation_keeps_every_picture_and_its_size(tmp_path):
             assert film.convert("RGB").getpixel((20, 15)) == colour
 
 
+@pytest.mark.slow
 def test_pictures_are_drawn_from_arrays_alone(tmp_path):
     if not pictures.can_render():
         pytest.skip(f"nothing renders here: {pictures.REMEDY}")

@@ -32,6 +32,7 @@ def hit(modes):
     return strike(modes, Striker.rigid(0.03), Contact.hertz(695e3), at=(0.1395, 0.09), speed=2.0, tolerance=1e-3)
 
 
+@pytest.mark.slow
 def test_motion_of_a_plate_with_a_hole_opens_though_chords_leave_it(tmp_path):
     plate = Plate(Material(E=70e9, nu=0.33, rho=2700.0), 2e-3)
     ring = find_modes(assemble(mesh.disk(0.2, 0.05, size=0.06), plate, {"outer": "clamped"}), n_modes=6)

@@ -95,6 +95,7 @@ def test_other_endings_are_refused(hit, tmp_path, name):
         pictures.wave(tmp_path / name, hit)
 
 
+@pytest.mark.slow
 def test_strike_writes_them_when_asked(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(painter.sys, "executable", "/bin/false")  # the other process fails
     monkeypatch.setattr(pictures, "can_render", lambda: False)

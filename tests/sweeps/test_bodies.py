@@ -110,6 +110,7 @@ def test_points_off_the_body_and_wrong_axes_are_told_before_the_work():
         fi.sweep(plate(), BALL, fi.Contact.hertz(1e6), at=AT, over={"weight": [0.1]}, **shared)
 
 
+@pytest.mark.slow
 def test_kept_vectors_serve_the_same_map_only(tmp_path):
     def found(tolerance=1e-2, mass=0.03, keep=tmp_path / "kept.npz"):
         over = {"mass": [0.01, mass], "at": [AT, (0.1, 0.2)]}

@@ -23,6 +23,7 @@ def impacts(modes, at, mass, tip):
 
 
 @pytest.mark.parametrize("name", BODIES)
+@pytest.mark.slow
 def test_the_tips_that_hit_once_end_where_a_bisection_over_single_blows_ends(name):
     modes, at, mass = BODIES[name]
     (hammer,) = hammers.choose(modes, at, 300.0, [mass])
