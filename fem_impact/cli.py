@@ -131,31 +131,31 @@ def _prepare(environment: MutableMapping[str, str], once: bool) -> bool:
         environment.setdefault(name, "1")
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # users need not read about fonts or cache folders
     package = Path(str(fi.__file__)).parent
-    if "numba" not in sys.modules:
-        _find_cache(environment, package)
-    if not once or "numba" in sys.modules or "NUMBA_DISABLE_JIT" in environment:
+    if "numba" in sys.modules:
         return False
-    compiled = package / "impact" / "compiled"
-    source = max(file.stat().st_mtime for file in compiled.glob("*.py"))
-    kept = (compiled / "__pycache__").glob("energy.run_energy-*.nbi")
-    if any(file.stat().st_mtime >= source for file in kept):
+    cache = _find_cache(environment, package)
+    if not once or "NUMBA_DISABLE_JIT" in environment:
+        return False
+    source = max(file.stat().st_mtime for file in (package / "impact" / "compiled").glob("*.py"))
+    if any(file.stat().st_mtime >= source for file in cache.rglob("energy.run_energy-*.nbi")):
         return False
     # A single strike takes 0.3 to 1 s in plain Python; compiling takes 15 to 30 s, and `doctor` does it once.
     environment["NUMBA_DISABLE_JIT"] = "1"
     return True
 
 
-def _find_cache(environment: MutableMapping[str, str], package: Path) -> None:
-    """Give numba a temporary cache folder if it can write to none of its own: it refuses to work without one."""
+def _find_cache(environment: MutableMapping[str, str], package: Path) -> Path:
+    """The folder where numba keeps what it compiles; a temporary one if it can write to none, or it would not work."""
     given = environment.get("NUMBA_CACHE_DIR")
-    home = environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    home = os.path.join(environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "numba")
     for place in [given] if given else [str(package / "impact" / "compiled" / "__pycache__"), home]:
         with suppress(OSError):
             os.makedirs(place, exist_ok=True)
             tempfile.TemporaryFile(dir=place).close()
-            return
+            return Path(place)
     environment["NUMBA_CACHE_DIR"] = folder = tempfile.mkdtemp(prefix="fem-impact-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
 
 
 def _complain(error: object, status: int) -> int:

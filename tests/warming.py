@@ -18,8 +18,10 @@ def strike(**how):
 
 
 def blow(scheme):
-    """A blow and the motion after it, by one scheme."""
-    strike(scheme=scheme).displacement([(0.1, 0.1)], [0.0, 1e-4])
+    """A blow by one scheme, and what is asked of it afterwards."""
+    hit = strike(scheme=scheme)
+    hit.summary()
+    hit.displacement([(0.1, 0.1)], [0.0, 1e-4])
 
 
 def stretching():

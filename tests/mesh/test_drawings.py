@@ -148,9 +148,9 @@ def test_entities_are_refused_not_expanded(tmp_path, head, encoding):
 
 
 def test_what_refers_to_itself_or_multiplies_is_a_sentence(tmp_path, monkeypatch):
-    monkeypatch.setattr(isolated, "PATIENCE", 2.0)
     with pytest.raises(ValueError, match=r"plate\.svg cannot be read as SVG \(maximum recursion"):
         mesh.outline(svg(tmp_path, '<g id="a"><use href="#a"/></g>'))
+    monkeypatch.setattr(isolated, "PATIENCE", 2.0)
     uses = "".join(f'<g id="a{i}">' + f'<use href="#a{i - 1}"/>' * 10 + "</g>" for i in range(1, 9))
     with pytest.raises(ValueError, match=r"plate\.svg cannot be read as SVG \(reading took longer|its reader crashed"):
         mesh.outline(svg(tmp_path, f'<g id="a0"><rect width="1" height="1"/></g>{uses}'))
