@@ -34,7 +34,11 @@ def test_values_go_by_powers_along_a_ridge(trail):
 
 def test_the_nearest_bound_ends_the_way(trail):
     up, meets = trail.reach(1.0)
-    assert up == pytest.approx(0.5 * np.log(15.0)) and meets.tolist() == [False, False, True]  # c reaches 30 at sqrt(15) times a
+    assert up == pytest.approx(0.5 * np.log(15.0)) and meets.tolist() == [
+        False,
+        False,
+        True,
+    ]  # c reaches 30 at sqrt(15) times a
     down, meets = trail.reach(-1.0)
     assert down == pytest.approx(0.5 * np.log(20.0)) and meets.tolist() == [False, False, True]  # c reaches 0.1
     stopped = ridges.way(Products(), trail.x, 0, Products.bounds, 1e-6, 0.1, meets)
