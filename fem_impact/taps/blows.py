@@ -178,14 +178,29 @@ def records(
     step = longest_step(bodies, duration)
     n_points = len(bodies.rows)
     out = np.zeros((len(speeds), 1 + n_points, n_fine))
-    moves = bool(bodies.omega[bodies.striker].any())
+    moves = bool(tip_mass) and bool(bodies.omega[bodies.striker].any())
     for one, speed in zip(out, speeds):
         history = run(bodies, float(speed), step, times[-1])
-        until = len(times) if moves and tip_mass else int(np.searchsorted(times, history.end_time, side="right"))
-        with np.errstate(all="ignore"):  # the rate of the force, not used here, is infinite at the onset of soft laws
-            one[0, first : first + until] = rigs.cell_force(history, bodies.striker, tip_mass, times[:until])
+        until = int(np.searchsorted(times, history.end_time, side="right"))
+        pushed = one[0, first:]
+        pushed[:until] = _force(history, times[:until])
         if n_points:
-            with np.errstate(all="ignore"):
-                pushed = history.force_at(times, 0)[0]
             one[1:, first:] = rigs.accelerations(history, bodies.target, bodies.rows, pushed, times).T
+        if tip_mass:
+            until = len(times) if moves else until
+            pushed[:until] = rigs.behind_tip(history, bodies.striker, tip_mass, pushed[:until], times[:until])
     return out
+
+
+def _force(history: History, times: np.ndarray) -> np.ndarray:
+    """Contact force [N] at ascending times (n_times,) from zero to the end of the run."""
+    begun, lengths = history.steps[:, 0], history.steps[:, 1]
+    if not len(begun):
+        return np.zeros(len(times))
+    rows = np.searchsorted(begun, times, side="right") - 1
+    part = np.minimum((times - begun[rows]) / lengths[rows], 1.0)
+    force, rate = np.empty((2, len(times)))
+    with np.errstate(all="ignore"):  # the rate of the force, not used here, is infinite at the onset of soft laws
+        record.forces(history.steps, history.now, history.law, history.n_coefficients, rows, 0, part, force, rate)
+    force[~history.pressed[rows, 0]] = 0.0
+    return force

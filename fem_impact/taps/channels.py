@@ -55,7 +55,7 @@ def force_channel(found: readers.Recording, force: Any, unit: list[str], name: s
     kinds = [units.known(text) for text in unit]
     hits = [i for i, kind in enumerate(kinds) if kind and kind[0] == "N"]
     hits = hits or [i for i, text in enumerate(found.names) if units.FORCE_NAMES.search(text)]
-    if len(hits) != 1 and len(found.names) == 1:
+    if len(hits) != 1 and len(found.names) == 1 and not units.RESPONSE_NAMES.search(found.names[0]):
         hits = [0]
     if len(hits) != 1:
         there = ", ".join(repr(text) for text in found.names[:20])

@@ -20,6 +20,7 @@ from .unknowns import TIME, Setting, Unknown, checked
 
 STARTS = 5  # [-] searches, from the best of `solver.SCREENED` points
 QUICK = 12  # [-] iterations of every search before the best two go on
+POORER = 4.0  # [-] ratio of sums of squares from which the second of them does not go on
 OUTLIER = 4.0  # [-] a tap that the others predict worse than this times the median of their own errors does not agree
 UNEQUAL = 1.5  # [-] ratio of noise over peak from which taps count differently: less is how well noise is known
 MOST_OUTLIERS = 0.34  # [-] of the taps may disagree
@@ -246,6 +247,7 @@ def _search(problem: Problem, taps: Taps, length: float, starts: int, rng: Any, 
         raise SimulationError("no search ended: blows in the ranges of unknown do not end; narrow the ranges")
     found.sort(key=lambda one: one.cost)
     apart = np.zeros(len(problem.own) * taps.n_taps)
-    finished = [solver.solve(problem, np.append(one.x, apart)) for one in found[:2]]
+    going = found[:1] + [one for one in found[1:2] if not one.ended and one.cost < POORER * found[0].cost]
+    finished = [solver.solve(problem, np.append(one.x, apart)) for one in going]
     best = min(finished, key=lambda one: one.cost)
-    return best, tuple(one.cost for one in [*finished, *found[2:]])
+    return best, tuple(one.cost for one in [*finished, *found[len(finished) :]])

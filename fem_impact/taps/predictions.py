@@ -64,7 +64,7 @@ def predicted(problem: Problem, values: Mapping[str, float], tap: Taps, rise_onl
     momentum = np.log(HALF_LOST * tap.impulse[0])
     x = seen.aligned(np.array([*own, momentum, tap.onset[0] * tap.rate - data.lead - 1.0]))
     x = solver.solve(seen, x, QUICK).x
-    made = single.sampled(single.fine(x), single.onsets(x))[0, 0] * data.scale[0, 0]
+    made = single.sampled(single.spectra(x), single.onsets(x))[0, 0] * data.scale[0, 0]
     onset = (data.lead + float(single.onsets(x)[0])) / tap.rate
     found = single.values(x)
     freed = {name: found[name] for name in (each.name.replace(TIME, "contact.stiffness") for each in free)}

@@ -1,7 +1,7 @@
 """Profiles of the likelihood: how far a value may move, with all others readjusted, before the data object."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,11 +10,13 @@ from scipy.stats import chi2, t
 
 from .._base import check
 from .._base.check import SimulationError
-from .solver import Problem, Solution, solve
+from .ridges import way
+from .solver import Problem, Solution, chord, solve
 from .unknowns import Unknown
 
 SURE = 0.95  # [-] the widest interval that a profile is followed to
 FIRST = 0.8  # [-] of the distance to that interval's end by curvature: the first step
+FARTHEST = 0.25  # [-] of its range: the first step at most
 GROWTH = (1.25, 3.0)  # [-] of the next step over the last
 TOO_STEEP, BACK = 1.6, 0.2  # [-] a rise beyond the target by the first is tried again with a step shorter by the second
 SHORTEST = 1e-9  # [-] step over the coordinate
@@ -146,37 +148,35 @@ def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int,
         low, high = low.copy(), high.copy()
         low[j], high[j] = named.bounds
     target = float(t.ppf(0.5 + 0.5 * SURE, freedom))
-    jacobian = problem.jacobian(best.x)
-    others = np.setdiff1d(np.arange(len(best.x)), [j])
-    lean = -np.linalg.lstsq(jacobian[:, others], jacobian[:, j], rcond=1e-8)[0]  # how the others follow
-    left = jacobian[:, j] + jacobian[:, others] @ lean
-    spread = np.sqrt(noise) / max(float(np.linalg.norm(left)), 1e-300)
+    farthest = FARTHEST * (high[j] - low[j])
+    first = way(problem, best.x, j, (low, high), noise, farthest / target)
     rows: list[tuple[float, float, np.ndarray]] = [(float(best.x[j]), 0.0, best.x)]
     opened, held, found = [False, False], ["", ""], best
     for side, (sign, bound) in enumerate(((-1.0, low[j]), (1.0, high[j]))):
-        x, step, at, root, steep = best.x.copy(), FIRST * target * spread, float(best.x[j]), 0.0, 0.0
-        ended = False
-        step, before = min(step, 0.25 * (high[j] - low[j])), best.x
+        trail, root, steep, ended = first, 0.0, 0.0, False
+        step = min(FIRST * target * trail.spread, farthest)
         for _ in range(MOST_POINTS):
+            reach, meets = trail.reach(sign)
+            if touches := reach < step:
+                step = reach
+            at = float(trail.x[j])
             last = at + sign * step
-            if abs(last - at) < SHORTEST * max(1.0, abs(at)):
-                break
+            if step < SHORTEST * max(1.0, abs(at)):
+                if not touches:
+                    break
+                trail = way(problem, trail.x, j, (low, high), noise, farthest / target, trail.stopped | meets)
+                step = min((1.02 * target - root) * trail.spread, farthest)
+                continue
             ended = sign * (last - bound) >= -1e-9 * abs(bound)
             last = float(bound) if ended else last
             step = abs(last - at)
-            guess = x.copy()
-            if before is best.x and x is not before:
-                guess[others] += lean * (last - at)
-            elif before is not x and abs(x[j] - before[j]) > 0.0:
-                guess[others] += (x - before)[others] / (x[j] - before[j]) * (last - at)
-            else:
-                guess[others] += lean * (last - at)
-            guess[j] = last
-            guess = np.clip(guess, low, high)
             try:
-                moved = solve(problem, guess, ITERATIONS, CLOSE, held=(j,))
+                moved, sure = chord(problem, trail.to(last), trail.jacobian, (j,), CLOSE)
+                if not sure:
+                    moved = solve(problem, moved.x, ITERATIONS, CLOSE, held=(j,))
+                    trail = replace(trail, jacobian=moved.jacobian)
                 if not moved.ended and moved.cost - best.cost > target**2 * noise:
-                    moved = solve(problem, moved.x, MORE, CLOSE, held=(j,), method="dogbox")  # quicker along a ridge
+                    moved = solve(problem, moved.x, MORE, CLOSE, held=(j,), method="dogbox")  # quicker trail a ridge
             except SimulationError:
                 held[side] = "the simulation"
                 break
@@ -188,12 +188,17 @@ def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int,
             if steep > TOO_STEEP * target:
                 step *= max(BACK, 1.02 * (target - root) / (steep - root))
                 continue
-            before, x, at = x, moved.x, last
             was, root = root, steep
+            trail = trail.on(moved.x)
             if root >= target or ended:
                 break
+            if touches:
+                trail = way(problem, moved.x, j, (low, high), noise, farthest / target, trail.stopped | meets)
+                step = min((1.02 * target - root) * trail.spread, farthest)
+                continue
             slope = max(root - was, 1e-3) / step
             step *= float(np.clip((1.02 * target - root) / slope / step, *GROWTH))
+        x = trail.x
         if root < target and steep <= TOO_STEEP * target:
             opened[side] = not (side == 0 and named.floor and ended)
         else:

@@ -1,6 +1,7 @@
 """Read the channels of a measurement from a file; `records` finds the taps in them."""
 
 import re
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,15 +13,21 @@ from .._base import check, isolated
 from . import units
 
 END_OF_HEADER = "***End_of_Header***"
+COMMENTS = ("#", "%", "//")  # begin lines that are no data
 HEADER_LINES = 200  # [-] of a text table at most, before its numbers begin
 UNEVEN = 0.02, 0.3  # [-] of the step: times may deviate from an even grid by the first, and by the second if rounded
 FEWEST = 8  # [-] samples of a channel
+FEW_TAPS = 16  # [-] a table with fewer rows than this is longer in time, without a doubt
+AGREE = 0.01  # [-] two statements of the rate may differ by this, as written with few digits
 MOST_CHANNELS = 256  # [-] of a file; an array with more rows holds something else
 RATE_NAMES = ("rate", "fs", "sampling_rate", "samplerate", "sample_rate", "sampling_frequency", "frequency")
 STEP_NAMES = ("dt", "delta_x", "delta_t", "tsample", "sampling_interval")
 TIME_NAMES = ("time", "t", "times", "x_value", "zeit", "time_s")
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 EXCITATION, ACCELERATION, VELOCITY, DISPLACEMENT = 13, 12, 11, 8  # codes of quantities in data set 58
 UFF_UNITS = {EXCITATION: "N", 9: "N", ACCELERATION: "m/s^2", VELOCITY: "m/s", DISPLACEMENT: "m"}
+UFF_HEAD = 13  # [-] lines of a data set 58 before its numbers
+UFF_END = re.compile(rb" {4}-1(?=\r|\n|\Z| {74})")  # begins and ends a data set, also right behind binary numbers
 TIME_RESPONSE = 1  # function type of data set 58
 
 
@@ -119,8 +126,18 @@ def labview(path: Path) -> Recording:
         )
     separator = "," if any(re.match(r"Separator[\t,]Comma", line) for line in lines[:30]) else "\t"
     common = _header(lines[: _end_of_header(lines, 0, path)], separator)
-    segments, first, rates = [], None, []
+    segments: list[np.ndarray] = []
+    rates: list[float] = []
+    notes: list[str] = []
+    first: tuple[tuple[str, ...], tuple[str, ...]] | None = None
     for head, names, rows in _labview_segments(lines, separator, path):
+        stated_count = _count(head)
+        if len(rows) < stated_count:
+            notes.append(
+                f"segment {len(segments) + 1} states {stated_count} samples and holds {len(rows)}: the file may be cut "
+                "off; its last row was left out"
+            )
+            rows = rows[:-1]
         columns = [name for name in names if name]
         columns = columns[:-1] if columns and columns[-1] == "Comment" else columns
         spread = common.get("X_Columns", ["One"])[0]
@@ -131,24 +148,51 @@ def labview(path: Path) -> Recording:
             use, titles = list(range(1, 2 * n_channels, 2)), columns[1::2]
         else:  # "No" and "One": the first column is the time, or empty
             use, titles = list(range(1, 1 + n_channels)), columns[1:]
-        decimal = common.get("Decimal_Separator", ["."])[0]
-        values = _numbers(rows, separator, use, decimal == ",", path)
+        comma = common.get("Decimal_Separator", ["."])[0] == ","
+        if not comma and separator != "," and any("," in row for row in rows[:3]):
+            comma = True
+            notes.append("its numbers have decimal commas, which its header does not say")
+        timed = spread != "Multi" and bool(rows) and _number(rows[0].split(separator)[0], comma)
+        values = _numbers(rows, separator, [0, *use] if timed else use, comma, path)
+        time, values = (values[:, 0], values[:, 1:]) if timed else (None, values)
         stated = head.get("Y_Unit_Label") or []
         channel = tuple((titles[i] if i < len(titles) else f"channel {i + 1}") for i in range(n_channels))
         unit = tuple(stated[i] if i < len(stated) else "" for i in range(n_channels))
-        if first is not None and channel != first[0]:
-            raise ValueError(f"{path.name} has other channels in segment {len(segments) + 1} than in segment 1")
+        for what, there, before in zip(("channels", "units"), (channel, unit), first or ()):
+            if there != before:
+                raise ValueError(f"{path.name} has other {what} in segment {len(segments) + 1} than in segment 1")
         first = first or (channel, unit)
         segments.append(values)
-        steps = head.get("Delta_X") or []
-        if steps and steps[0]:
-            step = float(steps[0].replace(",", "."))
-            rates.append(1.0 / step if step > 0.0 else np.nan)
+        rates += _labview_rates([cell for cell in head.get("Delta_X") or [] if cell], time, path)
     if first is None:
         raise ValueError(f"{path.name} holds a header but no samples")
     if rates and not np.allclose(rates, rates[0], rtol=1e-6):
-        raise ValueError(f"{path.name} has segments of different rates, {min(rates):g} and {max(rates):g} Hz")
-    return Recording(tuple(segments), *first, _round_rate(rates[0]) if rates else None)
+        raise ValueError(f"{path.name} has channels of different rates, {min(rates):g} and {max(rates):g} Hz")
+    return Recording(tuple(segments), *first, _round_rate(rates[0]) if rates else None, tuple(dict.fromkeys(notes)))
+
+
+def _count(head: dict[str, list[str]]) -> int:
+    """Largest number of samples that the header of a segment states; 0 if none."""
+    return max((int(cell) for cell in head.get("Samples") or [] if cell.isdigit()), default=0)
+
+
+def _labview_rates(steps: list[str], time: np.ndarray | None, path: Path) -> list[float]:
+    """Rates [Hz] by the steps stated, or by the times if none is; both have to agree."""
+    found = []
+    for cell in steps:
+        if not _number(cell, True) or not float(cell.replace(",", ".")) > 0.0:
+            raise ValueError(f"{path.name} states a step of {cell[:20]!r} s; it must be positive")
+        found.append(1.0 / float(cell.replace(",", ".")))
+    if time is None or len(time) < 2 or not np.ptp(time) > 0.0:
+        return found
+    if not found:
+        return [_rate(path, time)]
+    mean = (len(time) - 1) / (time[-1] - time[0])
+    if abs(mean / found[0] - 1.0) > AGREE:
+        raise ValueError(
+            f"{path.name} states a rate of {found[0]:g} Hz, but its times have {mean:g} Hz; export it again"
+        )
+    return found
 
 
 def _end_of_header(lines: list[str], start: int, path: Path) -> int:
@@ -189,6 +233,7 @@ def _labview_segments(lines: list[str], separator: str, path: Path) -> Iterator[
 def _numbers(rows: list[str], separator: str | None, use: list[int], comma: bool, path: Path) -> np.ndarray:
     """Columns ``use`` of rows of text as floats (n_samples, n_columns)."""
     rows = [row.replace(",", ".") for row in rows] if comma else rows
+    rows = [row.replace('"', "") for row in rows] if rows and '"' in rows[0] else rows
     try:
         return np.loadtxt(rows, delimiter=separator, usecols=use, ndmin=2, comments=None)
     except (ValueError, IndexError) as error:
@@ -209,7 +254,8 @@ def _round_rate(rate: float) -> float:
 
 def table(path: Path) -> Recording:
     """A text table: tabs, semicolons, commas or blanks between numbers, points or commas in them, headings or none."""
-    lines = [line for line in _text(path) if line.strip() and not line.lstrip().startswith(("#", "%", "//"))]
+    whole = [line for line in _text(path) if line.strip()]
+    lines = [line for line in whole if not line.lstrip().startswith(COMMENTS)]
     for separator, comma in (("\t", False), ("\t", True), (";", False), (";", True), (",", False), (None, False),
                              (None, True)):  # fmt: skip
         start = _first_row(lines, separator, comma)
@@ -217,19 +263,25 @@ def table(path: Path) -> Recording:
             break
     else:
         raise ValueError(f"{path.name} has no rows of numbers in its first {HEADER_LINES} lines")
-    width = len(_cells(lines[start], separator))
+    row = _cells(lines[start], separator)
+    width, use = len(row), [i for i, cell in enumerate(row) if cell]
     if width > MOST_CHANNELS:
         raise ValueError(f"{path.name} has {width} columns; at most {MOST_CHANNELS} can be read")
     heads = [_cells(line, separator) for line in lines[:start]]
     heads = [cells for cells in heads if len(cells) == width and any(cells)]
+    if not heads and whole[0] not in lines:  # a heading behind a sign of comment, as numpy.savetxt writes it
+        said = [line.lstrip(" #%/") for line in whole[: whole.index(lines[start])] if line not in lines]
+        heads = [cells for cells in (_cells(line, separator) for line in said) if len(cells) == width]
     names, unit = [f"column {i + 1}" for i in range(width)], [""] * width
     if heads:
+        names, unit = map(list, zip(*map(units.label, heads[-1])))
         if len(heads) > 1 and sum(units.known(cell.strip("[]() ")) is not None for cell in heads[-1]) > 0:
-            names, unit = heads[-2], [cell.strip("[]() ") for cell in heads[-1]]
-        else:
-            names, unit = map(list, zip(*map(units.label, heads[-1])))
-    values = _numbers(lines[start:], separator, list(range(width)), comma, path)
-    return _timed(path, values, names, unit, bool(heads))
+            (names, before), unit = map(list, zip(*map(units.label, heads[-2]))), [c.strip("[]() ") for c in heads[-1]]
+            for name, one, other in zip(names, before, unit):
+                if one and other and units.known(one) != units.known(other):
+                    raise ValueError(f"{path.name} states two units for {name!r}, {one!r} and {other!r}")
+    values = _numbers(lines[start:], separator, use, comma, path)
+    return _timed(path, values, [names[i] for i in use], [unit[i] for i in use], bool(heads))
 
 
 def _cells(line: str, separator: str | None) -> list[str]:
@@ -248,9 +300,14 @@ def _number(text: str, comma: bool) -> bool:
 def _first_row(lines: list[str], separator: str | None, comma: bool) -> int | None:
     """The first of three rows of numbers in a row; None if there is none."""
     good = 0
+    before: list[bool] = []
     for i, line in enumerate(lines[: HEADER_LINES + 3]):
         cells = _cells(line, separator)
-        good = good + 1 if all(_number(cell, comma) for cell in cells) and (separator is None or len(cells) > 1) else 0
+        empty = [not cell for cell in cells]  # a column may be empty, all along
+        fits = any(cells) and all(_number(cell, comma) for cell in cells if cell)
+        same = good == 0 or empty == before
+        good = (good + 1 if same else 1) if fits and (separator is None or len(cells) > 1) else 0
+        before = empty
         if good == 3:
             return i - 2
     return None
@@ -265,8 +322,11 @@ def _timed(path: Path, values: np.ndarray, names: list[str], unit: list[str], he
     if not time:
         return Recording((values,), tuple(names), tuple(unit), None, notes)
     i = time[0]
-    factor = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6}.get(unit[i], 1.0)
-    rate = _rate(path, factor * values[:, i])
+    if unit[i] and unit[i] not in TIME_UNITS:
+        raise ValueError(f"{path.name} has times in {unit[i]!r}; {', '.join(TIME_UNITS)} can be read")
+    rate = _rate(path, TIME_UNITS.get(unit[i], 1.0) * values[:, i])
+    if headed and not unit[i]:
+        notes = (f"{names[i]}: no unit stated, s assumed, so that the rate is {rate:g} Hz",)
     keep = [k for k in range(len(names)) if k != i]
     return Recording((values[:, keep],), tuple(names[k] for k in keep), tuple(unit[k] for k in keep), rate, notes)
 
@@ -288,29 +348,43 @@ def _rate(path: Path, time: np.ndarray) -> float:
 
 def _columns(path: Path, found: dict[str, np.ndarray]) -> Recording:
     """Named arrays as channels: (n_samples,), or (n_taps, n_samples) with the longer axis in time."""
-    rate, notes, channels = None, [], {}
+    rates, notes, channels, unit, n_times = [], [], {}, {}, None
     for name, value in found.items():
         low = name.rsplit(".", 1)[-1].lower()
-        if value.dtype.kind not in "iuf" or not value.size:
-            continue
-        if value.size == 1:
+        if value.dtype.kind == "c":
+            raise ValueError(f"{path.name} holds complex numbers in {name!r}; samples in time are real")
+        if value.dtype.kind not in "iuf":
+            notes += [f"{name} holds no numbers and was left out"] if value.size > 1 else []
+        elif value.size == 1:
+            size = float(value.ravel()[0])
             if low in RATE_NAMES:
-                rate = float(value.ravel()[0])
-            elif low in STEP_NAMES and value.ravel()[0] > 0.0:
-                rate = _round_rate(1.0 / float(value.ravel()[0]))
-        elif low in TIME_NAMES:
-            rate = _rate(path, np.asarray(value, float).reshape(-1, value.shape[-1])[0])
-        else:
+                rates.append(size)
+            elif low in STEP_NAMES and size > 0.0:
+                rates.append(_round_rate(1.0 / size))
+        elif value.size and low in TIME_NAMES:
+            times = np.asarray(value, float).reshape(-1, value.shape[-1])
+            times = times[0] if len(times) < times.shape[1] else times[:, 0]
+            rates.append(_rate(path, times))
+            n_times = len(times)
+        elif value.size:
             channels[name] = np.squeeze(np.asarray(value, float))
+            unit[name] = "counts" if value.dtype.kind in "iu" else ""
+    if len(rates) > 1 and not np.allclose(rates, rates[0], rtol=AGREE):
+        raise ValueError(f"{path.name} states different rates, {min(rates):g} and {max(rates):g} Hz; give one of them")
+    rate = rates[0] if rates else None
     if not channels:
-        raise ValueError(f"{path.name} holds no arrays of samples")
-    longest = max(max(value.shape) for value in channels.values())
+        raise ValueError(f"{path.name} holds no arrays of samples" + (f"; {notes[0]}" if notes else ""))
+    longest = n_times or max(max(value.shape) for value in channels.values())
     kept = {}
     for name, value in channels.items():
         if value.ndim > 2 or longest not in value.shape:
             notes.append(f"{name} has shape {value.shape} and was left out")
             continue
+        if value.ndim == 2 and n_times is None and min(value.shape) > FEW_TAPS:
+            notes.append(f"the longer side of {name}, {longest} of {value.shape}, was taken as time")
         kept[name] = np.atleast_2d(value if value.shape[-1] == longest else value.T)
+    if not kept:
+        raise ValueError(f"{path.name} holds {longest} times but no array of as many samples; {notes[-1]}")
     n_taps = max(len(value) for value in kept.values())
     single = len(kept) == 1 and n_taps > 1 and not units.FORCE_NAMES.search(next(iter(kept)))
     if single:  # one array of several channels
@@ -318,11 +392,12 @@ def _columns(path: Path, found: dict[str, np.ndarray]) -> Recording:
         if len(rows) > MOST_CHANNELS:
             raise ValueError(f"{path.name} holds an array of shape {rows.shape}; give channels by time")
         kept = {f"{name} {i + 1}": row[None] for i, row in enumerate(rows)}
+        unit = dict.fromkeys(kept, unit[name])
         notes.append(f"the rows of {name} were taken as {len(rows)} channels")
     for name in [name for name, value in kept.items() if len(value) != n_taps]:
         notes.append(f"{name} has {len(kept.pop(name))} rows instead of {n_taps} and was left out")
     segments = tuple(np.column_stack([value[i] for value in kept.values()]) for i in range(n_taps))
-    return Recording(segments, tuple(kept), ("",) * len(kept), rate, tuple(notes))
+    return Recording(segments, tuple(kept), tuple(unit[name] for name in kept), rate, tuple(notes))
 
 
 def numpy_file(path: Path) -> Recording:
@@ -334,18 +409,25 @@ def numpy_file(path: Path) -> Recording:
 
 
 def matlab(path: Path) -> Recording:
-    """A MATLAB file up to version 7; structures are opened one level deep."""
+    """A MATLAB file up to version 7; structures are opened, and cells of equally long records joined."""
     from scipy.io import loadmat
 
     with path.open("rb") as file:
         if file.read(16).startswith(b"MATLAB 7.3"):
             raise ValueError(f"{path.name} is a MATLAB 7.3 file; save it with '-v7' and try again")
     found: dict[str, np.ndarray] = {}
-    for name, value in loadmat(path, simplify_cells=True).items():
-        if name.startswith("__"):
+    opened = {name: value for name, value in loadmat(path, simplify_cells=True).items() if not name.startswith("__")}
+    while opened:
+        name, value = next(iter(opened.items()))
+        del opened[name]
+        if isinstance(value, dict):
+            opened = {f"{name}.{key}": each for key, each in value.items()} | opened
             continue
-        for key, each in value.items() if isinstance(value, dict) else [(None, value)]:
-            found[name if key is None else f"{name}.{key}"] = np.asarray(each)
+        rows = [np.ravel(each) for each in value] if isinstance(value, (list, np.ndarray)) and len(value) else []
+        whole = np.asarray(value) if not isinstance(value, list) else np.zeros(len(value), object)
+        if whole.dtype == object and rows and len({row.shape for row in rows}) == 1:
+            whole = np.array(rows) if all(row.dtype.kind in "iufc" for row in rows) else whole
+        found[name] = whole if whole.size > 1 or whole.dtype != object else np.zeros(2, object)
     return _columns(path, found)
 
 
@@ -353,13 +435,17 @@ def wav(path: Path) -> Recording:
     """A WAV file; integers become parts of full scale."""
     from scipy.io import wavfile
 
-    rate, values = wavfile.read(path)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        rate, values = wavfile.read(path)
+    cut = any("EOF" in str(each.message) for each in said)
+    notes = ("the file is cut off: it holds fewer samples than its header states",) if cut else ()
     if values.dtype.kind in "iu":
         low, high = np.iinfo(values.dtype).min, np.iinfo(values.dtype).max
         values = (values.astype(float) - 0.5 * (low + high + 1)) / (0.5 * (float(high) - low + 1))
     values = np.asarray(values, float).reshape(len(values), -1)
     names = tuple(f"channel {i + 1}" for i in range(values.shape[1]))
-    return Recording((values,), names, ("full scale",) * len(names), float(rate))
+    return Recording((values,), names, ("full scale",) * len(names), float(rate), notes)
 
 
 def _universal(head: bytes) -> bool:
@@ -371,26 +457,84 @@ def universal(path: Path) -> Recording:
     """Time records in data set 58 of a universal file; the second record of a channel begins a new segment."""
     import pyuff
 
+    raw = path.read_bytes()
+    if len(UFF_END.findall(raw)) % 2:
+        raise ValueError(f"{path.name} ends within a data set; it may be cut off")
     file = pyuff.UFF(str(path))
     kinds = [int(kind) for kind in file.get_set_types()]
     sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
-    sets = [one for one in sets if int(one.get("func_type", 0)) == TIME_RESPONSE]
-    if not sets:
+    if not any(int(one.get("func_type", 0)) == TIME_RESPONSE for one in sets):
         raise ValueError(f"{path.name} holds no time records (data set 58, function type 1); its data sets are {kinds}")
+    factors = _uff_factors([file.read_sets(i) for i, kind in enumerate(kinds) if kind == 164])
     channels: dict[tuple[Any, ...], list[np.ndarray]] = {}
-    rates, unit = [], {}
-    for one in sets:
-        key = (str(one.get("id1", "")).strip(), int(one.get("rsp_node", 0)), int(one.get("rsp_dir", 0)))
-        channels.setdefault(key, []).append(np.real(np.asarray(one["data"])).astype(float))
+    rates, unit, notes = [], {}, []
+    for one, block in zip(sets, (file._block_ind[i] for i, kind in enumerate(kinds) if kind == 58)):
+        if int(one.get("func_type", 0)) != TIME_RESPONSE:
+            continue
+        data = np.real(np.asarray(one["data"])).astype(float)
+        _check_uff(path, one, raw[block[0] : block[1] + 1])
         code = int(one.get("ordinate_spec_data_type", 0))
         stated = str(one.get("ordinate_axis_units_lab") or "").strip()
-        unit[key] = stated if units.known(stated) else UFF_UNITS.get(code, "" if stated == "NONE" else stated)
+        stated, kind = "" if stated == "NONE" else stated, UFF_UNITS.get(code)
+        key = (_uff_name(one), int(one.get("rsp_node", 0)), int(one.get("rsp_dir", 0)), code)
+        known = units.known(stated)
+        if known and kind and known[0] != kind:
+            raise ValueError(
+                f"{path.name} states the unit {stated!r} for {key[0]!r}, whose code {code} means {kind}; "
+                "export it again"
+            )
+        if stated and kind and not known:
+            notes.append(f"{key[0]}: the unit {stated!r} is not known, {kind} assumed by its code {code}")
+        if kind and not known and kind in factors:
+            data = data / factors[kind]
+            notes.append(f"{key[0]}: brought to {kind} by data set 164")
+        unit[key] = stated if known or not kind else kind
+        channels.setdefault(key, []).append(data)
         step = float(one.get("abscissa_inc") or 0.0)
         rates.append(1.0 / step if step > 0.0 else _rate(path, np.asarray(one["x"], float)))
     if not np.allclose(rates, rates[0], rtol=1e-6):
         raise ValueError(f"{path.name} has records of different rates, {min(rates):g} and {max(rates):g} Hz")
     count = min(len(records) for records in channels.values())
+    if any(len(records) > count for records in channels.values()):
+        notes.append(f"only {count} records of each channel were used, as many as all have")
     length = [min(len(records[i]) for records in channels.values()) for i in range(count)]
     segments = tuple(np.column_stack([records[i][: length[i]] for records in channels.values()]) for i in range(count))
-    names = tuple(name if name and name != "NONE" else f"node {node} direction {way}" for name, node, way in channels)
-    return Recording(segments, names, tuple(unit[key] for key in channels), _round_rate(rates[0]))
+    names = [name for name, *_ in channels]
+    names = [f"{name} ({unit[key]})" if names.count(name) > 1 else name for name, key in zip(names, channels)]
+    return Recording(
+        segments, tuple(names), tuple(unit[key] for key in channels), _round_rate(rates[0]), tuple(dict.fromkeys(notes))
+    )
+
+
+def _uff_name(one: dict) -> str:
+    name = str(one.get("id1", "")).strip()
+    return name if name not in ("", "NONE") else f"node {one.get('rsp_node', 0)} direction {one.get('rsp_dir', 0)}"
+
+
+def _uff_factors(sets: list[dict]) -> dict[str, float]:
+    """By what data of a unit's kind are divided to be in SI, from data sets 164."""
+    found: dict[str, float] = {}
+    for one in sets:
+        length, force = float(one["length"]), float(one["force"])
+        found |= {"N": force, "m/s^2": length, "m/s": length, "m": length}
+    return {kind: factor for kind, factor in found.items() if factor > 0.0 and factor != 1.0}
+
+
+def _check_uff(path: Path, one: dict, raw: bytes) -> None:
+    """ValueError if a data set 58 holds fewer samples than stated, or numbers that its reader would replace by zero."""
+    count, name = int(one["num_pts"]), _uff_name(one)
+    if len(one["data"]) != count:
+        raise ValueError(
+            f"{path.name} states {count} samples of {name!r} and holds {len(one['data'])}; export it again"
+        )
+    tail = b"\n".join(raw.split(b"\n")[UFF_HEAD:])
+    if one["binary"]:
+        kind = ("<" if one["byte_ordering"] == 1 else ">") + ("f4" if one["ord_data_type"] in (2, 5) else "f8")
+        size = int(kind[-1])
+        good = bool(np.isfinite(np.frombuffer(tail[: len(tail) // size * size], kind)).all())
+    else:
+        good = b"n" not in tail.lower()  # of NaN and infinity
+    if not good:
+        raise ValueError(
+            f"{path.name} has a value of {name!r} that is no finite number; export it again, or cut it out"
+        )

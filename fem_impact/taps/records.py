@@ -244,7 +244,7 @@ class Taps:
 
     def save(self, path: str | Path) -> None:
         """Write the taps to an .npz file that `read_taps` reads again."""
-        arrays = {"force": self.force, "rate": np.array(self.rate)}
+        arrays = {"force": self.force, "rate": np.array(self.rate), "time": self.time}
         for i, (name, unit) in enumerate(zip(self.table["channel"].values, self.units)):
             arrays[f"{name} [{unit}]"] = self.response[:, :, i]
         with check.path("path", path).open("wb") as file:

@@ -113,11 +113,15 @@ def accelerations(history: History, part: slice, rows: np.ndarray, force: np.nda
 
 
 def cell_force(history: History, part: slice, tip_mass: float, times: np.ndarray) -> np.ndarray:
-    """Force on a cell behind the striker's tip, (n_times,) [N]: contact force less tip mass times its deceleration.
+    """Force on a cell behind the striker's tip, (n_times,) [N], as `behind_tip` has it."""
+    return behind_tip(history, part, tip_mass, history.force_at(times, 0)[0], times)
+
+
+def behind_tip(history: History, part: slice, tip_mass: float, force: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Contact force (n_times,) [N] less the mass of the tip times its deceleration.
 
     A rigid striker decelerates by force over mass; its modes (``part`` of the history) add to that.
     """
-    force = history.force_at(times, 0)[0]
     if tip_mass == 0.0:
         return force
     return force + tip_mass * accelerations(history, part, history.shape[:, part], force, times)[:, 0]

@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -10,7 +11,7 @@ from scipy.stats import qmc
 
 from .._base import check
 from .._base.check import SimulationError
-from . import blows, rig
+from . import blows
 from .rig import FINE, MARGIN
 from .unknowns import TIME, Setting, Unknown
 
@@ -22,6 +23,11 @@ FELT = 0.1, 5.0  # [-] frequency times contact time of modes that shape a pulse:
 LOOKS = 3  # [-] Gauss-Newton steps in speed and onset while looking
 ENOUGH = 60  # [-] iterations of one search
 CLOSE = 1e-8  # [-] relative change of the sum of squares or of the values that ends a search
+CHORDS = 8  # [-] steps with derivatives of a point nearby
+KEPT = 0.3  # [-] of the promised gain, with which a step by such derivatives is good enough
+SMALL = 0.05  # [-] of the noise variance: a gain that is not sought
+LONG = 1e6  # [-] longest way along a ridge
+FLAT = 3e-5  # [-] of the largest singular value of scaled derivatives: a direction flatter than this may be a ridge
 MOMENTA = 5.0  # [-] the logarithm of the momentum is sought this far from that of the measured impulse
 SPEEDS = 25.0  # [-] the logarithm of a speed in m/s is sought this far from zero
 LATEST = 60.0  # [samples] the onset is sought this far from the trigger
@@ -157,35 +163,38 @@ class Problem:
         """Onsets (n_taps,) [samples] after `Data.lead`."""
         return x[self.n_shared + self.data.n_taps : self.n_shared + 2 * self.data.n_taps]
 
-    def fine(self, x: np.ndarray) -> np.ndarray:
-        """Unfiltered fine records, (n_taps, 1 + n_points, n_fine)."""
+    def spectra(self, x: np.ndarray) -> np.ndarray:
+        """Filtered spectra of the fine records, (n_taps, 1 + n_points, n_frequencies) of the band that passes."""
         speeds = self.speeds(x)
         groups = [(tap, speeds[tap : tap + 1]) for tap in range(self.data.n_taps)] if self.own else [(None, speeds)]
         made = []
         for tap, several in groups:
             values = self.values(x, tap)
-            bodies, tip_mass = self.setting.bodies(values)
-            duration = self.setting.duration(values)
+            bodies, tip_mass, duration = self.setting.blow(values)
             made.append(blows.records(
                 bodies, several, duration=duration, n_times=self.data.n_times, lead=self.data.lead,
                 rig=self.setting.rig, tip_mass=tip_mass,
             ))  # fmt: skip
-        return np.concatenate(made)
+        fine = np.concatenate(made)
+        frequencies, transfer, sensor = self._chain
+        spectra = np.fft.rfft(fine)[..., : len(frequencies)] * transfer
+        spectra[:, 0] *= sensor
+        return spectra
 
-    def sampled(self, fine: np.ndarray, onsets: np.ndarray, rate: bool = False) -> np.ndarray:
-        """Records as the rig samples them, (n_taps, 1 + n_points, n_times), over the scale; or their onset rates."""
-        n = fine.shape[-1]
+    @cached_property
+    def _chain(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Frequencies [Hz] of the fine records that the filter passes, and transfer functions of filter and sensor."""
         chain = self.setting.rig
-        frequencies = np.fft.rfftfreq(n, 1.0 / (FINE * chain.rate))
-        band = frequencies <= 1.25 * chain.rate if chain.anti_alias in rig.FILTERS else slice(None)
-        spectrum = np.fft.rfft(fine)
-        transfer = np.zeros(len(frequencies), complex)
-        transfer[band] = chain.passes(frequencies[band])
-        spectrum *= transfer * np.exp(-2j * np.pi * frequencies * onsets[:, None, None] / chain.rate)
-        spectrum[:, 0] *= chain.senses(frequencies)
-        if rate:
-            spectrum *= -2j * np.pi * frequencies / chain.rate
-        whole = np.fft.irfft(spectrum, n)[..., ::FINE]
+        frequencies = np.fft.rfftfreq(FINE * (self.data.n_times + 2 * MARGIN), 1.0 / (FINE * chain.rate))
+        transfer = chain.passes(frequencies)
+        band = slice(int(np.flatnonzero(transfer)[-1]) + 1)
+        return frequencies[band], transfer[band], chain.senses(frequencies[band])
+
+    def sampled(self, spectra: np.ndarray, onsets: np.ndarray, rate: bool = False) -> np.ndarray:
+        """Records as the rig samples them, (n_taps, 1 + n_points, n_times), over the scale; or their onset rates."""
+        turns = -2j * np.pi * self._chain[0] / self.setting.rig.rate  # of a delay of one sample
+        spectra = spectra * np.exp(turns * onsets[:, None, None])
+        whole = thinned(spectra * turns if rate else spectra, self.data.n_times + 2 * MARGIN)
         return whole[..., MARGIN : MARGIN + self.data.n_times] / self.data.scale[:, :, None]
 
     def _base(self, x: np.ndarray) -> np.ndarray:
@@ -193,7 +202,7 @@ class Problem:
         key = np.delete(x, slice(n + n_taps, n + 2 * n_taps)).tobytes()  # without the onsets
         if key not in self._last:
             self._last.clear()
-            self._last[key] = self.fine(x)
+            self._last[key] = self.spectra(x)
         return self._last[key]
 
     def residual(self, x: np.ndarray) -> np.ndarray:
@@ -214,7 +223,7 @@ class Problem:
             step = STEP if i == n or x[i] + STEP <= high[i] else -STEP
             moved = x.copy()
             moved[slice(n, n + n_taps) if i == n else i] += step
-            slope = (self.sampled(self.fine(moved), onsets) - here) / step
+            slope = (self.sampled(self.spectra(moved), onsets) - here) / step
             if i < n:
                 out[..., i] = slope
                 if i in places:  # the coordinate of a tap's own value acts as that of the unknown, on this tap alone
@@ -247,13 +256,26 @@ class Problem:
         return x
 
 
+def thinned(spectra: np.ndarray, n: int) -> np.ndarray:
+    """Every `FINE`-th sample, (..., n), of fine records of FINE n samples, from the begin of their spectra (..., m)."""
+    m = spectra.shape[-1]
+    if m > n:
+        return np.fft.irfft(spectra, FINE * n)[..., ::FINE]
+    half = n // 2 + 1
+    folded = np.zeros((*spectra.shape[:-1], half), complex)
+    folded[..., : min(m, half)] = spectra[..., :half]
+    above = np.arange((n + 1) // 2, m)  # what lies above half the rate folds back
+    folded[..., n - above] += spectra[..., above].conj()
+    return np.fft.irfft(folded, n) / FINE
+
+
 @dataclass(frozen=True, eq=False)
 class Solution:
     """The end of a search."""
 
     x: np.ndarray
     cost: float  # [-] sum of squares of the residuals
-    jacobian: np.ndarray | None = None
+    jacobian: np.ndarray  # (n_residuals, n_coordinates less those held)
     ended: bool = True  # False: the iterations were used up
 
     __repr__ = check.brief
@@ -282,6 +304,64 @@ def solve(
         method=method,
     )  # fmt: skip
     return Solution(whole(found.x), 2.0 * float(found.cost), found.jac, found.status > 0)
+
+
+def chord(
+    problem: Problem, x: np.ndarray, jacobian: np.ndarray, held: Sequence[int] = (), close: float = CLOSE
+) -> tuple[Solution, bool]:
+    """Least squares with the derivatives of a point nearby, (n_residuals, n_coordinates less those held).
+
+    Returns how far they lead, and whether that is the end: not if the sum of squares falls by less than `KEPT` of what
+    they promise, or a bound is in the way. The derivatives then have to be found anew, as by `solve`.
+    """
+    held = [*held, *problem.needless]
+    free = np.setdiff1d(np.arange(len(x)), held)
+    low, high = problem.bounds
+    basis = directions(jacobian)
+    steepest = np.abs(basis.flat).max(axis=1, initial=0.0) / (high - low)[free]
+    travel = 1.0 / max(float(steepest.max()), 1.0 / LONG)  # at most, along a ridge
+    residual = problem.residual(x)
+    cost = float(residual @ residual)
+    for _ in range(CHORDS):
+        along = basis.left.T @ residual
+        promised = float(np.square(along[basis.told]).sum())
+        if promised <= close * cost:  # the end, if there is nothing to gain along a ridge, up to its end
+            gains = 2.0 * np.abs(along[~basis.told]) * basis.sizes[~basis.told] * travel
+            ended = float(np.minimum(gains, np.square(along[~basis.told])).sum()) <= SMALL * cost / residual.size
+            return Solution(x, cost, jacobian, ended), ended
+        moved = x.copy()
+        moved[free] -= basis.inverse @ along[basis.told]
+        if ((moved <= low) | (moved >= high))[free].any():
+            break
+        try:
+            there = problem.residual(moved)
+        except SimulationError:
+            break
+        gained = cost - float(there @ there)
+        if not gained > 0.0:
+            break
+        x, residual, cost = moved, there, cost - gained
+        if gained < KEPT * promised:
+            break
+    return Solution(x, cost, jacobian, False), False
+
+
+class Basis(NamedTuple):
+    """Directions in which coordinates move the residuals, from derivatives."""
+
+    left: np.ndarray  # (n_residuals, n)
+    sizes: np.ndarray  # (n,) by how much a way of one does, the coordinates scaled by their columns
+    told: np.ndarray  # (n,) bool: differences of steps can tell it from a ridge
+    inverse: np.ndarray  # (n_coordinates, n_told) what moves the residuals by one
+    flat: np.ndarray  # (n_coordinates, n - n_told) ways of one along ridges
+
+
+def directions(jacobian: np.ndarray) -> Basis:
+    """The directions of derivatives (n_residuals, n_coordinates)."""
+    columns = np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)[:, None]
+    left, sizes, right = np.linalg.svd(jacobian / columns.T, full_matrices=False)
+    told = sizes > FLAT * sizes[0]
+    return Basis(left, sizes, told, (right[told] / sizes[told, None]).T / columns, right[~told].T / columns)
 
 
 def pulse_length(taps: Any) -> float:

@@ -17,7 +17,7 @@ FORCE_NAMES = re.compile(r"force|hammer|kraft|excit|\bexc\b|input|^f$", re.IGNOR
 RESPONSE_NAMES = re.compile(r"accel|resp|veloc|displ|vibro|^a\d*$|^acc", re.IGNORECASE)
 OTHERS = (  # not known by `known`: such a channel needs a scale
     "V", "mV", "uV", "µV", "kV", "pC", "A", "mA", "counts", "count", "LSB", "bits", "digits", "%", "dB", "Hz", "kHz",
-    "s", "ms", "us", "µs", "-", "a.u.",
+    "s", "ms", "us", "µs", "ns", "min", "h", "-", "a.u.",
 )  # fmt: skip
 LABEL = re.compile(r"^(.*?)\s*[\[(]([^\])]*)[\])]\s*$")  # "Force [N]", "Force (N)"
 

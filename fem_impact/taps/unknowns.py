@@ -158,12 +158,12 @@ class Setting:
 
     __repr__ = check.brief
 
-    def bodies(self, values: Mapping[str, float]) -> tuple[blows.Pair, float]:
-        """Both bodies and the contact that the values make, and the mass of the tip [kg]."""
-        striker = self.hammer(values)
-        target = self.structure(values)
+    def blow(self, values: Mapping[str, float]) -> tuple[blows.Pair, float, float]:
+        """Both bodies and the contact that the values make, the mass of the tip [kg], and `duration`."""
+        law = changed(self.contact, values)
         tip_mass = values.get("striker.tip_mass", self.rig.tip_mass)
-        return blows.pair(striker, target, changed(self.contact, values)), tip_mass
+        bodies = blows.pair(self.hammer(values), self.structure(values), law)
+        return bodies, tip_mass, self.duration(values, law)
 
     @cached_property
     def _hammer(self) -> blows.Body:
@@ -216,7 +216,8 @@ class Setting:
 
     def felt_mass(self, values: Mapping[str, float]) -> float:
         """Mass of the striker at its contact point [kg]."""
-        return self.hammer(values).felt_mass
+        mass = values.get("striker.mass")
+        return self._hammer.felt_mass * (1.0 if mass is None else mass / self._hammer.mass)
 
     def contact_time(self, values: Mapping[str, float]) -> float:
         """Time [s] on a wall of a blow with half the typical impulse, without loss: what stands for the stiffness."""
@@ -225,9 +226,9 @@ class Setting:
         a = values.get("contact.exponent", self.contact.exponent)
         return float(wall_time(k, a, 1.0 / mass, 0.5 * self.impulse / mass))
 
-    def duration(self, values: Mapping[str, float]) -> float:
+    def duration(self, values: Mapping[str, float], law: Contact | None = None) -> float:
         """The same time [s] with all that the contact does: layers, yielding, memory."""
-        law = changed(self.contact, values)
+        law = law or changed(self.contact, values)
         mass = self.felt_mass(values)
         speed = 0.5 * self.impulse / mass
         acting = acting_stiffness(np.array(law.numbers), 1.0 / mass, speed)

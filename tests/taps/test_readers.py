@@ -118,6 +118,21 @@ HOSTILE = {
 }  # fmt: skip
 
 
+def labview(first="", seg="", dec=".", unit="N\tg", n=20, times=False, rows=None):
+    """A LabVIEW file of two channels with ``n`` samples at 20 kHz; ``seg`` lines replace those of the same key."""
+    keys = {"Samples": f"Samples\t{n}\t{n}", "Y_Unit_Label": f"Y_Unit_Label\t{unit}", "Delta_X": "Delta_X\t5E-5\t5E-5"}
+    keys |= {line.split("\t")[0]: line for line in seg.splitlines()}
+    made = rows or "".join(f"{i / RATE if times else ''}\t{i % 7}.5\t{i % 5}.25\n" for i in range(n))
+    made = made.replace(".", ",") if dec == "," else made
+    head = f"LabVIEW Measurement\nDecimal_Separator\t.\n{first}***End_of_Header***\n\n"
+    parts = ["Channels\t2", *keys.values(), "***End_of_Header***", "X_Value\tforce\taccel\tComment"]
+    return (head + "\n".join(parts) + "\n" + made).encode()
+
+
+ONE = labview()
+NEXT = ONE[ONE.index(b"Channels") :]
+
+
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_bad_file_gives_one_sentence_that_names_it(tmp_path, name):
     content, said = HOSTILE[name]
@@ -125,6 +140,27 @@ def test_a_bad_file_gives_one_sentence_that_names_it(tmp_path, name):
     with pytest.raises(ValueError, match=said) as error:
         readers.read(tmp_path / name)
     assert name in str(error.value) and "\n" not in str(error.value)
+
+
+DAMAGED = {
+    "still.lvm": (labview(seg="Delta_X\t0\t0"), "step of '0' s"),
+    "step.lvm": (labview(seg="Delta_X\tabc\tabc"), "step of 'abc' s"),
+    "steps.lvm": (labview(seg="Delta_X\t5E-5\t1E-4"), "different rates"),
+    "lie.lvm": (labview(seg="Delta_X\t1E-4\t1E-4", times=True), "rate of 10000 Hz, but its times have 20000 Hz"),
+    "units.lvm": (ONE + b"\n" + NEXT.replace(b"N\tg", b"kN\tg"), "other units in segment 2"),
+    "swapped.lvm": (ONE + b"\n" + NEXT.replace(b"force\taccel", b"accel\tforce"), "other channels in segment 2"),
+    "twice.csv": (b"Force [N],a\nkN,g\n" + b"1,2\n" * 20, "two units for 'Force'"),
+    "weeks.csv": (b"Time [Hz],Force [N]\n" + b"".join(b"%d,1\n" % i for i in range(20)), "times in 'Hz'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DAMAGED)
+def test_a_file_that_contradicts_itself_says_where(tmp_path, name):
+    content, said = DAMAGED[name]
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ValueError, match=said) as error:
+        readers.arrays(tmp_path / name)
+    assert str(error.value).startswith(name)
 
 
 def test_pickled_arrays_are_refused(tmp_path):
@@ -157,3 +193,130 @@ def test_a_labview_file_with_times_for_each_channel(tmp_path):
     special = ["***Start_Special***", "anything", "***End_Special***"]
     (tmp_path / "t.lvm").write_text("\n".join([*head, *special, *segment, *rows]) + "\n")
     check(fi.read_taps(tmp_path / "t.lvm"))
+
+
+def recording(path):
+    """Units, rate, notes and the first segment of a file, without the separate process."""
+    found = readers.arrays(path)
+    return found["units"].tolist(), float(found["rate"]), " ".join(found["notes"]), found["segment0"]
+
+
+def test_a_labview_file_says_what_is_wrong_with_its_header(tmp_path):
+    path = tmp_path / "t.lvm"
+    path.write_bytes(labview(seg="Samples\t40\t40"))
+    _, rate, notes, values = recording(path)
+    assert "states 40 samples and holds 20" in notes and len(values) == 19 and rate == RATE
+    path.write_bytes(labview(dec=",").replace(b"Decimal_Separator\t,", b"Decimal_Separator\t."))
+    _, _, notes, values = recording(path)
+    assert "decimal commas" in notes and values[1].tolist() == [1.5, 1.25]
+    path.write_bytes(labview(seg="Delta_X\t\t", times=True))
+    assert recording(path)[1] == RATE  # from the times, as no step is stated
+
+
+def test_tables_as_numpy_and_spreadsheets_write_them(tmp_path):
+    values = np.column_stack([np.arange(20) / RATE, np.arange(20.0), np.arange(20.0) % 3])
+    np.savetxt(tmp_path / "a.csv", values, delimiter=",", header="t,Force [lbf],Accel [g]")
+    units, rate, notes, _ = recording(tmp_path / "a.csv")
+    assert (units, rate) == (["lbf", "g"], RATE) and "t: no unit stated, s assumed" in notes
+    text = "\n".join(["Time [ns];;Force [N]", *(f'"{1e9 * t:.0f}";;"{f}"' for t, f, _ in values)])
+    (tmp_path / "b.csv").write_text(text)  # quoted, and a column is empty
+    units, rate, _, got = recording(tmp_path / "b.csv")
+    assert (units, rate) == (["N"], RATE) and got[:, 0].tolist() == values[:, 1].tolist()
+
+
+def test_arrays_that_are_no_samples_are_not_taken_for_some(tmp_path):
+    _, force, acceleration = channels()
+    path = tmp_path / "t.npz"
+    np.savez(path, force=force + 0j, accel=acceleration, rate=RATE)
+    with pytest.raises(ValueError, match="complex numbers in 'force'"):
+        readers.arrays(path)
+    np.savez(path, force=force.astype(str), accel=acceleration, rate=RATE)
+    with pytest.raises(ValueError, match="does not say which channel is the force"):
+        fi.read_taps(path)
+    np.savez(path, force=(100 * force).astype(np.int16), rate=RATE)
+    with pytest.raises(ValueError, match=r"scale must be given for 'force'.*in 'counts'"):
+        fi.read_taps(path)
+    for rates in ({"rate": RATE, "dt": 1e-3}, {"time": np.arange(2600) / RATE, "fs": 2 * RATE}):
+        np.savez(path, force=force, **rates)
+        with pytest.raises(ValueError, match="different rates"):
+            readers.arrays(path)
+
+
+def test_more_taps_than_samples(tmp_path):
+    rows = np.tile(channels()[1][195:235], (60, 1))
+    fi.Taps.from_arrays(rows, rate=RATE).save(tmp_path / "t.npz")
+    assert fi.read_taps(tmp_path / "t.npz").n_taps == 60
+    np.savez(tmp_path / "u.npz", force=rows, rate=RATE)
+    assert "the longer side of force, 60 of (60, 40), was taken as time" in recording(tmp_path / "u.npz")[2]
+
+
+def test_structures_and_cells_of_matlab(tmp_path):
+    _, force, _ = channels()
+    cell = np.empty(2, object)
+    cell[:] = [force[:1000], force[1500:2500]]
+    savemat(tmp_path / "t.mat", {"run": {"data": {"force": cell}, "fs": RATE}, "who": "nobody"})
+    found = readers.arrays(tmp_path / "t.mat")
+    assert found["names"].tolist() == ["run.data.force"] and {"segment0", "segment1"} <= set(found)
+
+
+def test_a_wav_that_is_cut_off_says_so(tmp_path):
+    wavfile.write(tmp_path / "t.wav", int(RATE), np.zeros(2000, np.int16))
+    (tmp_path / "u.wav").write_bytes((tmp_path / "t.wav").read_bytes()[:1044])
+    *_, notes, values = recording(tmp_path / "u.wav")
+    assert "cut off" in notes and len(values) == 500
+
+
+RECORD = {
+    "type": 58, "binary": 0, "func_type": 1, "ver_num": 0, "load_case_id": 0, "rsp_node": 1, "rsp_dir": 3,
+    "ref_ent_name": "NONE", "ref_node": 0, "ref_dir": 0, "ord_data_type": 4, "abscissa_spacing": 1, "abscissa_min": 0.0,
+    "abscissa_inc": 1.0 / RATE, "z_axis_value": 0.0, "x": np.arange(40) / RATE, "id1": "NONE", "id2": "NONE",
+    "id3": "NONE", "id4": "NONE", "id5": "NONE", "num_pts": 40, "rsp_ent_name": "NONE", "abscissa_spec_data_type": 17,
+    "orddenom_spec_data_type": 0, "ordinate_spec_data_type": 13, "data": np.arange(40.0),
+}  # fmt: skip
+MOVES = {"ordinate_spec_data_type": 12, "data": 2.0 * np.arange(40)}
+POUNDS = {"type": 164, "units_code": 2, "units_description": "foot", "temp_mode": 1, "length": 3.2808, "force": 0.22481,
+          "temp": 1.8, "temp_offset": 459.67}  # fmt: skip
+
+
+def universal(path, *changes, before=()):
+    pyuff = pytest.importorskip("pyuff")
+    path.unlink(missing_ok=True)
+    pyuff.UFF(str(path)).write_sets([*before, *(RECORD | each for each in changes)], mode="add")
+    return path
+
+
+UNCLOSED = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # pyuff leaves files open
+
+
+@UNCLOSED
+@pytest.mark.parametrize("change", [{}, {"binary": 1, "byte_ordering": 1}, {"binary": 1, "byte_ordering": 2}])
+def test_force_and_acceleration_of_one_point_stay_apart_in_a_universal_file(tmp_path, change):
+    units, rate, _, values = recording(universal(tmp_path / "t.uff", change, MOVES | change))
+    assert (units, rate) == (["N", "m/s^2"], RATE) and values[10].tolist() == [10.0, 20.0]
+
+
+def test_universal_files_in_other_units_or_with_unknown_ones(tmp_path):
+    path = universal(tmp_path / "t.uff", {}, {"ordinate_axis_units_lab": "bananas"} | MOVES, before=[POUNDS])
+    *_, notes, values = recording(path)
+    assert values[10] == pytest.approx([10.0 / 0.22481, 20.0 / 3.2808]) and "brought to N by data set 164" in notes
+    assert "'bananas' is not known" in notes
+    with pytest.raises(ValueError, match="states the unit 'g' for 'node 1 direction 3', whose code 13 means N"):
+        readers.arrays(universal(path, {"ordinate_axis_units_lab": "g"}))
+
+
+@UNCLOSED
+def test_universal_files_that_are_damaged(tmp_path):
+    path = universal(tmp_path / "t.uff", {}, MOVES)
+    whole = path.read_bytes()
+    for said, raw in (
+        ("ends within a data set", whole[: 2 * len(whole) // 3]),
+        ("states 2147483647 samples .* holds 40", whole.replace(b"        40", b"2147483647", 1)),
+        ("no finite number", whole.replace(b"   1.00000000000e+01", b"                 nan", 1)),
+    ):
+        path.write_bytes(raw)
+        with pytest.raises(ValueError, match=said):
+            readers.arrays(path)
+    nothing = RECORD["data"].copy()
+    nothing[3] = np.inf
+    with pytest.raises(ValueError, match="no finite number"):
+        readers.arrays(universal(path, {"binary": 1, "data": nothing}))
