@@ -44,7 +44,7 @@ LONGEST = 700  # [-] characters of a message
 # Called by the package with what it has checked or made, not by users: plumbing, and results.
 INNER = {
     "Response", "Impact", "Scene", "Plan", "SimulationError",  # made by strike, load_scene and plan
-    "Scene.blame", "Scene.heard_from", "Scene.kept", "Modes.point", "sound.beside", "mesh.aligned",
+    "Scene.blame", "Scene.heard_from", "Scene.kept", "Modes.point", "sound.beside", "mesh.aligned", "mesh.pierced",
      "Scene.body", "Scene.closed_form", "Scene.fault", "Scene.finder", "Scene.make_contact",
     "Scene.make_section", "Scene.make_striker", "Scene.data",
     "Response.to_xarray", "Modes.to_pyvista",  # no arguments

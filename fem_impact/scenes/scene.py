@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
-from ..fe.assembly import THICK, System, support_of_facets, support_words
+from ..fe.assembly import THICK, System, clamped, support_of_facets, support_words
 from ..fe.section import Beam, Material, Plate
+from ..fe.springs import check_posts
 from ..impact import collision, promise
 from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..mesh import sketch
-from ..mesh.meshes import Mesh
+from ..mesh.meshes import Mesh, pierced
 from ..model import planner
 from ..model.planner import Blow, Plan, Run
 from ..model.target import FIRST_LOOK, Stages, Target, Watch
@@ -188,7 +189,7 @@ class Scene:
         points = [np.atleast_1d(np.asarray(point, float)) for point in self.watched]
         title = f"Outline of the struck body, struck at ({', '.join(f'{x:.4g}' for x in at)}) m"
         title += f", observed at {len(points)} point{'s' * (len(points) > 1)}" if points else ""
-        return sketch.body(self.body(), supports=self.supports.values, at=at, points=points, title=title)
+        return sketch.body(self.body(), supports=self.held, at=at, points=points, title=title)
 
     def _repr_html_(self) -> str:
         """For notebooks: the picture and the contents of each table."""
@@ -231,12 +232,13 @@ class Scene:
         """The scene as objects."""
         mesh = self.body()
         section = self.make_section("beam" if mesh.dimension == 1 else "plate")
-        supports = supports_of(self.supports.values)
+        supports = supports_of(self.held)
         with self.blame("supports"):
             support_of_facets(mesh, supports, support_words(self.target.values.get("theory")))
         with self.blame("target"):
             told = target_values(**self.target.values)
             told.pop("nu")
+            told["point_supports"] = tuple(entry for entry in told["point_supports"] if entry[1] != "clamped")
             target = Target(mesh, section, supports, **told, blame=self.blame)
         points = tuple(self.points)
         moving = self.observe is not None
@@ -248,7 +250,19 @@ class Scene:
 
     @cached_property
     def _body(self) -> Mesh:
-        return self._make("mesh", self.mesh)
+        mesh = self._make("mesh", self.mesh)
+        with self.blame("target"):
+            clamps = check_posts(self._posts, mesh.dimension)[1]
+            return pierced(mesh, clamps) if clamps else mesh
+
+    @cached_property
+    def _posts(self) -> tuple:
+        return target_values(**self.target.values)["point_supports"]
+
+    @property
+    def held(self) -> dict[str, Any]:
+        """The supports of the edges as written, with those around clamped points."""
+        return clamped(dict(self.supports.values), sum(entry[1] == "clamped" for entry in self._posts))
 
     def make_section(self, kind: str) -> Plate | Beam:
         """The section; without a material, any of the right kind, as mass and first frequency set the scale."""

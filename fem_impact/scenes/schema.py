@@ -130,9 +130,13 @@ def _weight(i: int, entry: Any) -> tuple[Any, float]:
     return entry["at"], check.positive(f"point_masses[{i}].mass", entry["mass"], "kg")
 
 
-def _post(i: int, entry: Any) -> tuple[Any, Any]:
-    if not isinstance(entry, dict) or not {"at"} <= set(entry) <= {"at", "stiffness"}:
-        raise ValueError(f"point_supports[{i}] must have at and perhaps stiffness, got {check.shown(entry)}")
+def _post(i: int, entry: Any) -> tuple:
+    if not isinstance(entry, dict) or set(entry) not in ({"at"}, {"at", "stiffness"}, {"at", "clamped"}):
+        raise ValueError(
+            f"point_supports[{i}] must have at and perhaps stiffness, or clamped, a radius; got {check.shown(entry)}"
+        )
+    if "clamped" in entry:
+        return entry["at"], "clamped", check.positive(f"point_supports[{i}].clamped", entry["clamped"], "m")
     if "stiffness" not in entry:
         return entry["at"], "hinged"
     return entry["at"], check.positive(f"point_supports[{i}].stiffness", entry["stiffness"], "N/m")
