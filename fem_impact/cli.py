@@ -6,6 +6,7 @@ import difflib
 import io
 import json
 import logging
+import math
 import os
 import re
 import shutil
@@ -15,6 +16,7 @@ import tempfile
 import textwrap
 import threading
 import time
+import warnings
 import webbrowser
 from collections.abc import Iterator, MutableMapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
@@ -218,8 +220,9 @@ def _parser() -> argparse.ArgumentParser:
     add("--pictures", action="store_true", help="write 3-D pictures of the mode shapes and the wave, as PNG and GIF")
     add("--vtk", action="store_true", help="write motion.pvd, the motion for ParaView and pyvista")
     add(
-        "--listener", metavar=("X", "Y", "Z"), nargs=3, type=float,
-        help="write radiated.wav, the sound the plate radiates to this point [m]; Z is the height above the plate",
+        "--listener", metavar=("X", "Y", "Z"), nargs=3, type=float, action="append",
+        help="write radiated.wav, the sound the plate radiates to this point [m]; Z is the height above the plate; "
+        "repeatable; of two also stereo.wav",
     )  # fmt: skip
     add("--duration", metavar="S", type=float, help="length of the sounds [s] (default: by their decay)")
     add("--normalise", action="store_true", help="scale each sound to a peak of 1.0")
@@ -351,7 +354,9 @@ def _strike(options: argparse.Namespace) -> bool:
     began = time.perf_counter()
     scene = fi.load_scene(options.scene)
     if options.listener is not None:
-        scene = scene.heard_from(options.listener)
+        scene = scene.heard_from(*options.listener)
+    if scene.stroke:
+        return _play(options, scene)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     display = Display()
     with fi.export.staged(folder) as staging, Painter() if options.pictures else nullcontext() as painter:
@@ -378,11 +383,7 @@ def _strike(options: argparse.Namespace) -> bool:
         tested = f" (which also treats the body as {run.finer.target}: it has too many modes)" if coarse else ""
         differences = ", ".join(f"{name} {value:.1e}" for name, value in run.verified.items())
         _say(f"Verified by a finer run{tested}: {differences}")
-    for key, name, where in (("sound", "strike.wav", "Point"), ("radiated", "radiated.wav", "Listener")):
-        if key in data:
-            heard = data[key]
-            level = "silence" if heard["level"] is None else f"peak {heard['stated']}"
-            _say(f"{where}: {level}; 1.0 in {name} is {heard['full_scale']:.4g} {heard['unit']}")
+    _say_sounds(data.get("sounds", ()))
     _say("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items()))
     _say(f"Files in {folder}{os.sep}: {', '.join(data['files'])}")
     return missed
@@ -400,7 +401,8 @@ def _write(
     folder: Path, scene: Any, run: Any, options: argparse.Namespace, stages: Any, painter: Any
 ) -> dict[str, Any]:
     """Write every file of a strike; return the contents of response.json."""
-    from .show import sampling  # imported only when needed
+    from .scenes import hearing  # imported only when needed
+    from .show import sampling
     from .show.canvas import NAMES
 
     response, files = run.response, ["response.json", "force.csv", "force.png"]
@@ -418,7 +420,12 @@ def _write(
         with stages("files"):
             fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=SHAPES_WRITTEN))
         with stages("sound"):
-            files += ["modes.pvd", *_write_sounds(folder, scene, response, extra, options)]
+            sounds = hearing.write(folder, scene, response, duration=options.duration, normalise=options.normalise)
+        first = {"at": "sound", "listener": "radiated"}  # the keys of the first point and listener
+        for heard in reversed(sounds):
+            extra.update({first[name]: heard for name in first if name in heard})
+        extra["sounds"] = sounds
+        files += ["modes.pvd", *(heard["file"] for heard in sounds)]
         if options.vtk:
             end = sampling.end_of(response)
             times = [end * i / (MOTION_TIMES - 1) for i in range(MOTION_TIMES)]
@@ -441,21 +448,47 @@ def _write(
     return data
 
 
-def _write_sounds(
-    folder: Path, scene: Any, response: Any, extra: dict[str, Any], options: argparse.Namespace
-) -> list[str]:
-    """Write the motion of a point and the pressure at the listener as sound; record places and levels."""
-    heard = {"sound": ("strike.wav", {"at": scene.points[0]})}
-    if scene.listener is not None:
-        heard["radiated"] = ("radiated.wav", {"listener": scene.listener})
-    for key, (name, where) in heard.items():
-        wav = fi.export.write_wav(
-            folder / name, response, duration=options.duration, normalise=options.normalise, **where
-        )
-        levels = {"full_scale": wav.full_scale, "unit": wav.unit, "peak_level": wav.peak_level, "level": wav.level}
-        levels["stated"] = wav.said
-        extra[key] = {**where, **levels, "reference": fi.sound.REFERENCE[wav.unit][0]}
-    return [name for name, _ in heard.values()]
+def _play(options: argparse.Namespace, scene: Any) -> bool:
+    """Play the strokes of a scene and write what they did; returns whether the tolerance was missed."""
+    from .model.target import Stages  # imported only when needed
+    from .scenes import hearing, sequence
+
+    given = {"verify": options.verify, "pictures": options.pictures, "vtk": options.vtk, "target": options.target}
+    wrong = next((name for name, value in given.items() if value), None)
+    if wrong:
+        raise ValueError(f"--{wrong} must be left out for a scene with strokes")
+    began = time.perf_counter()
+    folder = options.out if options.out is not None else Path("out") / options.scene.stem
+    display = Display()
+    with fi.export.staged(folder) as staging, warnings.catch_warnings():
+        warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
+        stages = Stages(display)
+        found = scene.play(watch=display, strict=options.strict, **_choices(options))
+        with stages("files"):
+            fi.export.write_force(staging / "force.csv", found)
+            fi.figures.save(staging / "force.png", fi.figures.force(found))
+            fi.export.write_vtk(staging / "modes.pvd", found.target.truncated(n_modes=SHAPES_WRITTEN))
+        with stages("sound"):
+            sounds = hearing.write(staging, scene, found, duration=options.duration, normalise=options.normalise)
+        tables, copies = scene.kept(staging, tolerance=found.tolerance)
+        names = ["response.json", "force.csv", "force.png", "modes.pvd", *(each["file"] for each in sounds), *copies]
+        seconds = {**stages.seconds, "total": time.perf_counter() - began}
+        data = {**sequence.numbers(found, tables, seconds), "sounds": sounds, "files": names}
+        fi.export.write_json(staging / "response.json", data)
+    if options.json:
+        _print_json(data)
+    else:
+        _say(_title(scene), found.summary())
+        _say_sounds(sounds)
+        _say(f"Time: {seconds['total']:.2f} s", f"Files in {folder}{os.sep}: {', '.join(names)}")
+    return not found.tolerance_met
+
+
+def _say_sounds(sounds: Sequence[dict[str, Any]]) -> None:
+    for heard in sounds:
+        where = "Point" if "at" in heard else "Listener" if "listener" in heard else "Both listeners"
+        level = "silence" if heard["level"] is None or heard["level"] == -math.inf else f"peak {heard['stated']}"
+        _say(f"{where}: {level}; 1.0 in {heard['file']} is {heard['full_scale']:.4g} {heard['unit']}")
 
 
 def _plan(options: argparse.Namespace) -> None:

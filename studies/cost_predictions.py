@@ -49,7 +49,8 @@ def scenes(whole: bool = False, only: Sequence[str] = ()) -> list[Path]:
     """Paths of the scenes to run."""
     everyday = sorted((HERE / "scenes" / "everyday").glob("*.toml"))
     found = [*sorted((HERE / "scenes").glob("*.toml")), *everyday[:: 1 if whole else 2]]
-    return [path for path in found if not only or any(part in path.stem for part in only)]
+    single = [path for path in found if "[[stroke]]" not in path.read_text(encoding="utf-8")]
+    return [path for path in single if not only or any(part in path.stem for part in only)]
 
 
 def tight(folder: Path, only: Sequence[str] = ()) -> list[tuple[Path, float]]:

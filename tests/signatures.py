@@ -44,9 +44,9 @@ LONGEST = 700  # [-] characters of a message
 # Called by the package with what it has checked or made, not by users: plumbing, and results.
 INNER = {
     "Response", "Impact", "Scene", "Plan", "SimulationError",  # made by strike, load_scene and plan
-    "Scene.blame", "Scene.heard_from", "Scene.kept", "Modes.point", "sound.beside", "mesh.aligned",
+    "Scene.blame", "Scene.heard_from", "Scene.kept", "Modes.point", "sound.beside", "mesh.aligned", "mesh.pierced",
      "Scene.body", "Scene.closed_form", "Scene.fault", "Scene.finder", "Scene.make_contact",
-    "Scene.make_section", "Scene.make_striker", "Scene.data",
+    "Scene.make_section", "Scene.make_striker", "Scene.data", "Scene.alone", "Scene.check_single",
     "Response.to_xarray", "Modes.to_pyvista",  # no arguments
     "Gradient", "Gradient.change", "Response.band_spectrum",  # made by Response.gradient; its arguments are any words
     "Plan.data", "Plan.run", "Plan.strike", "Response.body_slice", "Response.summary", "Scene.picture",
@@ -60,7 +60,8 @@ INNER = {
     "ToleranceWarning", "analytic.closed_form", "Striker.let_go",
     "Taps", "Taps.summary",  # made by read_taps and Taps.from_arrays
     "pictures.gallery", "pictures.film", "hammers.choose_on",
-    "Modes", "sound.Sound.audible", "sound.Sound.faded", "sound.Sound.wav", "hammers.Hammer.data",
+    "Modes", "sound.Sound.audible", "sound.Sound.normalised", "sound.Sound.faded", "sound.Sound.wav",
+    "hammers.Hammer.data",
 }  # fmt: skip
 
 
@@ -108,6 +109,8 @@ def things() -> dict[str, Any]:
     path = folder / "scene.toml"
     path.write_text(QUICK)
     scene = fi.load_scene(path)
+    several = folder / "sequence.toml"
+    several.write_text(f"{QUICK}[[stroke]]\nwhen = 0.0\n")
     uff = folder / "modes.uff"
     fi.export.write_uff(uff, modes)
     mesh = folder / "plate.msh"
@@ -121,6 +124,7 @@ def things() -> dict[str, Any]:
         "metal": metal, "plate": plate, "beam": beam, "square": square, "modes": modes, "striker": striker, "law": law,
         "sphere": fi.Striker.sphere(metal, 0.01), "free": fi.Modes.rigid(1.0), "folder": folder, "path": path,
         "system": fi.assemble(square, plate, {"boundary": "hinged"}), "scene": scene, "uff": uff, "mesh": mesh,
+        "sequence": fi.load_scene(several), "tone": fi.sound.Sound(np.ones(100), 8000, 1.0),
         "hit": fi.strike(modes, striker, law, at=(0.13, 0.1), speed=1.0, tolerance=1e-2),
         "outline": Outline.around(circle((0.0, 0.0), 1.0, "rim")),
         "plan": scene.plan(), "run": scene.run(target="modal"),
@@ -274,6 +278,7 @@ def table() -> dict[str, dict[str, Any]]:
         },
         "Scene.changed": {"self": t["scene"], "values": {"contact.stiffness": 2e6}},
         "Scene.modes": {"self": t["scene"], "count": 5},
+        "Scene.play": {"self": t["sequence"], "watch": None, "strict": False, "tolerance": 1e-1},
         "Scene.plan": {"self": t["scene"], "watch": None, "tolerance": 1e-1},
         "Scene.run": {"self": t["scene"], "watch": None, "plan": None, "before": None, "verify": False,
                       "tolerance": 0.1},
@@ -319,6 +324,7 @@ def table() -> dict[str, dict[str, Any]]:
         "export.write_animation": {"path": folder / "mode.pvd", "modes": t["modes"], "mode": 1, "frames": 3},
         "export.write_uff": {"path": folder / "shapes.uff", "modes": t["modes"]},
         "export.write_wav": {"path": folder / "hit.wav", **hit, "at": at, "listener": None, "duration": 0.01},
+        "export.write_sound": {"path": folder / "tone.wav", "heard": t["tone"]},
         "export.write_force": {"path": folder / "force.csv", **hit},
         "export.write_json": {"path": folder / "data.json", "data": {"a": 1.0}},
         "export.numbers": hit,
@@ -329,6 +335,7 @@ def table() -> dict[str, dict[str, Any]]:
         "figures.mobility": {"modes": t["modes"], "at": at, "to": at, "band": (10.0, 1e3)},
         "figures.mode_shapes": {"modes": t["modes"], "count": 2, "columns": 2},
         "sound.synthesise": {**hit, "at": at, "duration": 0.01, "rate": 8000, "normalise": False},
+        "sound.together": {"sounds": [t["tone"], t["tone"]]},
         "sound.radiate": {
             **hit, "listener": (0.1, 0.1, 1.0), "duration": 0.01, "rate": 8000, "normalise": False,
             "air": (1.2, 343.0),

@@ -10,7 +10,7 @@ from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, eye_array, v
 
 from .._base import check
 from ..mesh.facets import Curves
-from ..mesh.meshes import Mesh, aligned
+from ..mesh.meshes import Mesh, aligned, pierced
 from . import beam_elements, plausible, shear_beam, thick
 from .beam_elements import HermiteSpace
 from .corners import around_corners
@@ -201,9 +201,10 @@ def assemble(
         a disk of radius 0.325 times the thickness, because under a point it would give way without limit.
     point_masses : sequence of (point [m], mass [kg])
         Masses without extent that move with the plate or beam.
-    point_supports : sequence of (point [m], "hinged" or stiffness [N/m])
-        Points held at rest, free to turn, or by a spring: cords at the nodes of a marimba bar, a post, the feet of a
-        panel. For a clamp of a small radius, give the mesh a hole and clamp its edge.
+    point_supports : sequence of (point [m], "hinged" or stiffness [N/m]) or (point [m], "clamped", radius [m])
+        Points held at rest, free to turn, or by a spring: cords at the nodes of a marimba bar, the feet of a panel. A
+        disk of a plate that is clamped, such as between the nuts of a post, becomes a hole with a clamped edge
+        "clamp0" ... of the mesh.
     near : array_like, shape (n_points, dimension) [m], optional
         Points where forces act, such as the strike point; triangles shrink towards them, and a beam gets a node there.
     graded : bool
@@ -232,7 +233,10 @@ def assemble(
     supports = {} if supports is None else supports
     if callable(getattr(section, "thickness", None)):
         mesh = aligned(mesh)
-    masses = Attached(check_masses(point_masses, mesh.dimension), check_posts(point_supports, mesh.dimension))
+    posts, clamps = check_posts(point_supports, mesh.dimension)
+    if clamps:
+        mesh, supports = pierced(mesh, clamps), clamped(supports, len(clamps))
+    masses = Attached(check_masses(point_masses, mesh.dimension), posts)
     near = None if near is None else check.array("near", near, (None, mesh.dimension), "m", lift=True)
     return _made(mesh, section, supports, element, masses, None if near is None or not len(near) else near, graded)
 
@@ -312,6 +316,13 @@ def reassemble(
     attached = Attached(list(system.point_masses), list(system.point_supports))
     rest = attached, near, system.graded, layer
     return _made(mesh, system.section, system.supports, element or system.element, *rest)
+
+
+def clamped(supports: Any, n_clamps: int) -> dict:
+    """Supports of the edges, with those of clamps by `pierced`."""
+    if not isinstance(supports, dict):
+        raise ValueError(f"supports must be a dict of edge name -> support, got {check.shown(supports)}")
+    return {**supports, **{f"clamp{i}": "clamped" for i in range(n_clamps)}}
 
 
 def notes_on(mesh: Mesh, section: Plate | Beam) -> tuple[str, ...]:

@@ -52,24 +52,38 @@ def beam_springs(dofs: list[tuple[int, int]], held: list[Elastic], frame: Any, n
     return coo_matrix((values, (numbers, numbers)), shape=(n_all, n_all)).tocsr()
 
 
-def check_posts(point_supports: Any, dimension: int) -> list[tuple[np.ndarray, float]]:
-    """Check (point, support) pairs; return points (dimension,) [m] and stiffnesses [N/m], infinite if hinged."""
+def check_posts(
+    point_supports: Any, dimension: int
+) -> tuple[list[tuple[np.ndarray, float]], list[tuple[np.ndarray, float]]]:
+    """Check point supports; return what holds points and what clamps disks.
+
+    Points (dimension,) [m] with stiffnesses [N/m], infinite if hinged; centres (2,) [m] with radii [m].
+    """
     if isinstance(point_supports, (str, dict)) or not isinstance(point_supports, Sequence):
         raise ValueError(f"point_supports must be a list of (point, support) pairs, got {check.shown(point_supports)}")
-    result: list[tuple[np.ndarray, float]] = []
+    posts: list[tuple[np.ndarray, float]] = []
+    clamps: list[tuple[np.ndarray, float]] = []
     for i, entry in enumerate(point_supports):
-        if not isinstance(entry, Sequence) or isinstance(entry, str) or len(entry) != 2:
+        clamped = isinstance(entry, Sequence) and len(entry) == 3 and entry[1] == "clamped"
+        if not clamped and (not isinstance(entry, Sequence) or isinstance(entry, str) or len(entry) != 2):
             raise ValueError(
-                f"point_supports[{i}] must be a pair (point in m, 'hinged' or a stiffness in N/m), got "
-                f"{check.shown(entry)}"
+                f"point_supports[{i}] must be a pair (point in m, 'hinged' or a stiffness in N/m) or (point, "
+                f"'clamped', radius in m), got {check.shown(entry)}"
             )
         point = check.array(f"point of point_supports[{i}]", entry[0], (dimension,), "m", lift=True)
-        if isinstance(entry[1], str):
+        if clamped:
+            if dimension != 2:
+                raise ValueError(
+                    f"point_supports[{i}] must not clamp a point of a beam, whose sides then know nothing of each "
+                    "other; make two beams, or hold it by 'hinged' at two points"
+                )
+            clamps.append((point, check.positive(f"radius of point_supports[{i}]", entry[2], "m")))
+        elif isinstance(entry[1], str):
             check.one_of(f"support of point_supports[{i}]", entry[1], ("hinged",))
-            result.append((point, np.inf))
+            posts.append((point, np.inf))
         else:
-            result.append((point, check.positive(f"stiffness of point_supports[{i}]", entry[1], "N/m")))
-    return result
+            posts.append((point, check.positive(f"stiffness of point_supports[{i}]", entry[1], "N/m")))
+    return posts, clamps
 
 
 def check_masses(point_masses: Any, dimension: int) -> list[tuple[np.ndarray, float]]:

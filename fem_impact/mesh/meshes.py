@@ -11,7 +11,7 @@ import numpy as np
 from .._base import check, markup
 from . import drawings, mesh_files, sketch, smooth_edges
 from .facets import Curves, divided
-from .loops import Bezier, Outline, circle, crossed, extent, polyline, signed_area, straight_loop
+from .loops import Bezier, Outline, circle, crossed, extent, polyline, segment, signed_area, straight_loop
 from .triangulation import triangulate
 
 LONG_DIVISIONS = 64  # [-] at most this many along a rectangle, however slender it is
@@ -355,18 +355,71 @@ def save(path: Any, mesh: Mesh) -> None:
     mesh_files.write(path, mesh.points, mesh.cells, mesh.facets, mesh.middles, mesh.curved, mesh.edges)
 
 
+def pierced(mesh: Mesh, holes: Sequence[tuple[np.ndarray, float]], *, size: float | None = None) -> Mesh:
+    """The mesh of a plate with round holes, each a centre (2,) [m] and a radius [m]; their edges are "clamp0" ...
+
+    Edges keep their names and curves; a mesh from a file keeps its own vertices on the rim, not inside.
+    """
+    least = SMALLEST_HOLE * float(np.ptp(mesh.points, axis=0).max())
+    for _, radius in holes:
+        if radius < least:
+            raise ValueError(
+                f"radius of point_supports must be at least {SMALLEST_HOLE:g} of the body, {least:g} m, got "
+                f"{radius:g} m"
+            )
+    inner = tuple(circle(centre, radius, f"clamp{i}") for i, (centre, radius) in enumerate(holes))
+    known = _outline(mesh)
+    around = _facets_outline(mesh) if known is None else known
+    whole = Outline.around(around.outer, (*around.holes, *inner))
+    problem = crossed(whole)
+    if problem:
+        raise ValueError(f"point_supports must leave room for each clamp, inside the body and apart: {problem}")
+    size, stated = (mesh.size, mesh.size_stated) if size is None else (size, True)
+    _check_affordable(2.0 * mesh.area / size / size, size)
+    arrays = triangulate(whole, size)
+    parts = arrays["edges"]
+    if known is None:
+        arrays["edges"] = {
+            name: np.concatenate([parts[str(i)] for i in numbers]) for name, numbers in mesh.edges.items()
+        }
+    arrays["edges"] |= {f"clamp{i}": parts[f"clamp{i}"] for i in range(len(holes))}
+    arrays["edges"]["boundary"] = np.arange(len(arrays["facets"]))
+    recipe = partial(pierced, mesh, holes)
+    return Mesh(**arrays, recipe=recipe, size=size, size_stated=stated, notes=mesh.notes)
+
+
+def _outline(mesh: Mesh) -> Outline | None:
+    """The outline that a mesh was made from; None if it comes from a file."""
+    recipe = mesh.recipe
+    if mesh.form[:1] == ("rectangle",):
+        length, width = mesh.form[1:]
+        corners = [(0.0, 0.0), (length, 0.0), (length, width), (0.0, width)]
+        names = "bottom", "right", "top", "left"
+        after = [*corners[1:], corners[0]]
+        return Outline.around(tuple(segment(a, b, name) for a, b, name in zip(corners, after, names)))
+    if mesh.form[:1] == ("disk",):
+        return Outline.around(circle((0.0, 0.0), mesh.form[1], "outer"))
+    return recipe.args[0] if isinstance(recipe, partial) and recipe.func is fill else None
+
+
+def _facets_outline(mesh: Mesh) -> Outline:
+    """The rim of a mesh, each facet a piece that is called by its number."""
+    ends = mesh.points[mesh.facets]
+    control = Curves(ends, mesh.middles, mesh.tangents, mesh.curvatures).controls()
+    pieces = [
+        Bezier(curve if bent else end, str(i)) for i, (curve, bent, end) in enumerate(zip(control, mesh.curved, ends))
+    ]
+    start = {int(facet[0]): piece for facet, piece in zip(mesh.facets, pieces)}
+    loops = [tuple(start[vertex] for vertex in loop) for loop in mesh_files.loops_of(mesh.facets)]
+    return Outline(loops[0], tuple(loops[1:]))
+
+
 def _resized(mesh: Mesh, *, size: float) -> Mesh:
     """A mesh from a file with triangles of about ``size`` [m]: split in four, or new ones inside the same rim."""
     ratio = mesh.size / size
     if ratio >= 1.0 - 1e-9 and 2.0 ** np.ceil(np.log2(ratio) - 1e-9) < OVERSHOOT * ratio:
         return replace(_divided(mesh, size=size), recipe=partial(_resized, mesh))
-    names = [str(i) for i in range(len(mesh.facets))]
-    ends = mesh.points[mesh.facets]
-    control = list(Curves(ends, mesh.middles, mesh.tangents, mesh.curvatures).controls())
-    pieces = [Bezier(curve if bent else end, name) for curve, bent, end, name in zip(control, mesh.curved, ends, names)]
-    start = {int(facet[0]): piece for facet, piece in zip(mesh.facets, pieces)}
-    loops = [tuple(start[vertex] for vertex in loop) for loop in mesh_files.loops_of(mesh.facets)]
-    around = Outline(loops[0], tuple(loops[1:]))
+    around = _facets_outline(mesh)
     _check_affordable(2.0 * mesh.area / size / size, size)
     try:
         arrays = None if crossed(around) else triangulate(around, size)
@@ -375,7 +428,7 @@ def _resized(mesh: Mesh, *, size: float) -> Mesh:
     if arrays is None:  # fall back on splitting the file's own triangles, which only costs more
         return replace(_divided(mesh, size=size), recipe=partial(_divided, mesh))
     parts = arrays["edges"]
-    edges = {name: np.concatenate([parts[names[i]] for i in numbers]) for name, numbers in mesh.edges.items()}
+    edges = {name: np.concatenate([parts[str(i)] for i in numbers]) for name, numbers in mesh.edges.items()}
     recipe = partial(_resized, mesh)
     return Mesh(**{**arrays, "edges": edges}, recipe=recipe, size=size)
 

@@ -224,16 +224,16 @@ class Player:
 
 
 def _sounds(scene: Scene, response: Response) -> list[Player]:
-    """The sound at each observation point and, for a plate, at the listener (default: `DISTANCE` from the plate)."""
+    """The sound at each observation point and, for a plate, at each listener (default: `DISTANCE` from the plate)."""
     heard = [
         (f"Motion at {place(point)}", sound.synthesise(response, point, duration=_duration(response)))
         for point in scene.points[:MOST_POINTS]
     ]
     if response.target.dimension == 2:
-        listener = scene.listener or [*np.asarray(response.at).tolist(), DISTANCE]
-        where = f" to {place(listener)}" if scene.listener else f", {DISTANCE:g} m in front of the strike point"
-        pressure = sound.radiate(response, listener, duration=_duration(response))
-        heard.append((f"Sound radiated{where}", pressure))
+        for listener in scene.listeners[:MOST_POINTS] or [[*np.asarray(response.at).tolist(), DISTANCE]]:
+            where = f" to {place(listener)}" if scene.listeners else f", {DISTANCE:g} m in front of the strike point"
+            pressure = sound.radiate(response, listener, duration=_duration(response))
+            heard.append((f"Sound radiated{where}", pressure))
     players = []
     for name, samples in heard:
         level = samples.peak_level

@@ -6,7 +6,7 @@ from types import UnionType
 from typing import Any, get_args
 
 from ..fe.section import KINDS, SOFT, Elastic
-from .schema import MAKERS, PATHS, REQUIRED, SUPPLIED
+from .schema import MAKERS, NESTED, PATHS, REPEATED, REQUIRED, SUPPLIED
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # what taplo and VS Code read
 TYPES = {float: "number", int: "integer", str: "string", bool: "boolean"}  # all others may be anything
@@ -18,6 +18,8 @@ def schema() -> dict[str, Any]:
     Every scene that loads satisfies it; it leaves ranges of numbers and everything between tables to `load_scene`.
     """
     tables = {name: _table(selector, makers) for name, (selector, makers) in MAKERS.items()}
+    tables[REPEATED]["properties"] |= {name: tables[name] for name in NESTED}
+    tables[REPEATED] = {"type": "array", "items": tables[REPEATED]}
     spring = _keys(Elastic)
     tables["supports"] = {
         "type": "object",

@@ -69,6 +69,7 @@ def map_scene(
         striker on a rigid wall; and ``threshold`` [Hz], the contact resonance above which the body stops the striker
         by the kinetic-energy criterion (NaN if the striker never rebounds or is never stopped).
     """
+    scene.check_single()
     table = {} if scene.map is None else scene._make("map", scene.map)
     over = table.get("over", {}) if over is None else over
     if not isinstance(over, Mapping) or not all(isinstance(name, str) for name in over):

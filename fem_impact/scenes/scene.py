@@ -11,19 +11,36 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
-from ..fe.assembly import THICK, System, support_of_facets, support_words
+from ..fe.assembly import THICK, System, clamped, support_of_facets, support_words
 from ..fe.section import Beam, Material, Plate
+from ..fe.springs import check_posts
 from ..impact import collision, promise
 from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..mesh import sketch
-from ..mesh.meshes import Mesh
+from ..mesh.meshes import Mesh, pierced
 from ..model import planner
 from ..model.planner import Blow, Plan, Run
+from ..model.playing import Strokes
 from ..model.target import FIRST_LOOK, Stages, Target, Watch
 from ..modes.modal import Modes
-from .schema import MAKERS, PATHS, REQUIRED, TABLES, Part, fault, read_part, read_tables, supports_of, target_values
+from . import sequence
+from .schema import (
+    MAKERS,
+    NESTED,
+    PATHS,
+    REPEATED,
+    REQUIRED,
+    TABLES,
+    Part,
+    fault,
+    read_part,
+    read_strokes,
+    read_tables,
+    supports_of,
+    target_values,
+)  # fmt: skip
 
 NOTHING = Part()  # stands for a missing table
 
@@ -44,6 +61,7 @@ class Scene:
     supports: Part = NOTHING
     observe: Part | None = None
     map: Part | None = None
+    stroke: tuple[Part, ...] = ()  # blows one after another, for `sequence.play`; [strike] says what they share
 
     __repr__ = check.brief
 
@@ -53,6 +71,27 @@ class Scene:
         ``strict`` as in `fi.strike`, ``changes`` as in `plan`. A ValueError names the wrong file, table and key.
         """
         return promise.kept(self.run(**changes).response, strict)
+
+    @check.typed
+    def play(self, *, watch: Watch | None = None, strict: bool = False, **changes: Any) -> Strokes:
+        """Play the strokes of the scene, its tables [[stroke]], with the modes that the most demanding of them needs.
+
+        Parameters
+        ----------
+        watch : callable, optional
+            As in `plan`.
+        strict : bool
+            As in `fi.strike`.
+        **changes
+            ``tolerance``, ``quantity``, ``residual`` and ``duration``, which replace those of the scene, and
+            ``n_modes``, ``max_frequency`` or ``size``, as in `plan`.
+
+        Returns
+        -------
+        Strokes
+            As from `fi.strokes`.
+        """
+        return sequence.play(self, watch, strict, **changes)
 
     def modes(self, count: int | None = None, *, keep: Path | None = None) -> Modes:
         """Modes of the struck body: the first ``count``, or as many as the blow needs to meet its tolerance.
@@ -142,18 +181,22 @@ class Scene:
         return list(self.watched or [self.blow.values["at"]])
 
     @property
-    def listener(self) -> list[float] | None:
-        """Position of the listener to the sound of the plate, (3,) [m]; None if [observe] has none."""
-        return None if self.observe is None else self.observe.values.get("listener")
+    def listeners(self) -> list[Any]:
+        """Positions of the listeners to the sound of the plate, (n_listeners, 3) [m]; empty if [observe] has none."""
+        told = {} if self.observe is None else self.observe.values
+        return [told["listener"]] if "listener" in told else list(told.get("listeners", []))
 
     @property
     def watched(self) -> list[Any]:
         """The points of [observe], (n_points, dimension) [m]; empty if it has none."""
         return [] if self.observe is None else self.observe.values.get("points", [])
 
-    def heard_from(self, listener: Any) -> "Scene":
-        """The same scene with a listener at (3,) [m]; the third coordinate is the distance from the plate's plane."""
-        part = Part("", {**(NOTHING if self.observe is None else self.observe).values, "listener": listener})
+    def heard_from(self, *listeners: Any) -> "Scene":
+        """The same scene with listeners at (3,) [m]; the third coordinate is the distance from the plate's plane."""
+        told = dict((NOTHING if self.observe is None else self.observe).values)
+        told = {key: value for key, value in told.items() if key not in ("listener", "listeners")}
+        heard = {"listener": listeners[0]} if len(listeners) == 1 else {"listeners": list(listeners)}
+        part = Part("", {**told, **heard})
         scene = replace(self, observe=part)
         _check_whole(scene)
         return scene
@@ -188,7 +231,7 @@ class Scene:
         points = [np.atleast_1d(np.asarray(point, float)) for point in self.watched]
         title = f"Outline of the struck body, struck at ({', '.join(f'{x:.4g}' for x in at)}) m"
         title += f", observed at {len(points)} point{'s' * (len(points) > 1)}" if points else ""
-        return sketch.body(self.body(), supports=self.supports.values, at=at, points=points, title=title)
+        return sketch.body(self.body(), supports=self.held, at=at, points=points, title=title)
 
     def _repr_html_(self) -> str:
         """For notebooks: the picture and the contents of each table."""
@@ -204,7 +247,9 @@ class Scene:
         tables: dict[str, Any] = {"title": self.title} if self.title else {}
         for table in TABLES:
             part = self.blow if table == "strike" else getattr(self, table)
-            if part is not None and (part.kind or part.values):
+            if isinstance(part, tuple):
+                tables |= {table: [dict(each.values) for each in part]} if part else {}
+            elif part is not None and (part.kind or part.values):
                 selector = MAKERS[table][0] if table in MAKERS else ""
                 tables[table] = {**({selector: part.kind} if selector else {}), **part.values}
         tables["strike"] |= changes
@@ -221,8 +266,29 @@ class Scene:
                 names.append(source.name)
         return tables, names
 
+    def alone(self, number: int) -> "Scene":
+        """The scene of one stroke as a single blow."""
+        values = self.stroke[number].values
+        called = f"[[{REPEATED}]] {number}"
+        own: dict[str, Any] = {
+            name: read_part(self.path, name, values[name], Path(), f"{called} {name}:")
+            for name in NESTED
+            if name in values
+        }
+        blow = {**self.blow.values, **{name: values[name] for name in ("at", "speed") if name in values}}
+        own |= {"stroke": (), "blow": Part("", blow)}
+        return replace(self, **own)
+
+    def check_single(self) -> None:
+        """Raise ValueError if this is a sequence, whose strokes are played together."""
+        if self.stroke:
+            raise self.fault(
+                f"[[{REPEATED}]] must be left out here: this needs a single blow; play strokes with strike"
+            )
+
     def _staged(self, stages: Stages) -> Blow:
         """`built`, with its time."""
+        self.check_single()
         with stages("mesh"):
             return self.built
 
@@ -231,12 +297,13 @@ class Scene:
         """The scene as objects."""
         mesh = self.body()
         section = self.make_section("beam" if mesh.dimension == 1 else "plate")
-        supports = supports_of(self.supports.values)
+        supports = supports_of(self.held)
         with self.blame("supports"):
             support_of_facets(mesh, supports, support_words(self.target.values.get("theory")))
         with self.blame("target"):
             told = target_values(**self.target.values)
             told.pop("nu")
+            told["point_supports"] = tuple(entry for entry in told["point_supports"] if entry[1] != "clamped")
             target = Target(mesh, section, supports, **told, blame=self.blame)
         points = tuple(self.points)
         moving = self.observe is not None
@@ -248,7 +315,19 @@ class Scene:
 
     @cached_property
     def _body(self) -> Mesh:
-        return self._make("mesh", self.mesh)
+        mesh = self._make("mesh", self.mesh)
+        with self.blame("target"):
+            clamps = check_posts(self._posts, mesh.dimension)[1]
+            return pierced(mesh, clamps) if clamps else mesh
+
+    @cached_property
+    def _posts(self) -> tuple:
+        return target_values(**self.target.values)["point_supports"]
+
+    @property
+    def held(self) -> dict[str, Any]:
+        """The supports of the edges as written, with those around clamped points."""
+        return clamped(dict(self.supports.values), sum(entry[1] == "clamped" for entry in self._posts))
 
     def make_section(self, kind: str) -> Plate | Beam:
         """The section; without a material, any of the right kind, as mass and first frequency set the scale."""
@@ -342,13 +421,14 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
     for name, table in tables.items():
         if name not in TABLES:
             raise fault(path, f"[{name}] is not a table of a scene{check.nearest(name, TABLES)}")
-        if not isinstance(table, dict):
+        if not isinstance(table, dict) and name != REPEATED:
             raise fault(path, f"{name} must be a table, written [{name}]")
     for name in REQUIRED:
         if name not in tables:
             raise fault(path, f"[{name}] is missing")
+    strokes = read_strokes(path, tables.pop(REPEATED, []), folder)
     parts = {name: read_part(path, name, table, folder) for name, table in tables.items()}
-    scene = Scene(path, title, blow=parts.pop("strike"), **parts)
+    scene = Scene(path, title, blow=parts.pop("strike"), stroke=strokes, **parts)
     _check_whole(scene)
     return scene
 
@@ -410,7 +490,7 @@ def _check_whole(scene: Scene) -> None:
         part = getattr(scene, table)
         if part is not None:
             scene._make(table, part)
-    if scene.listener is not None and scene.mesh.kind == "line":
+    if scene.listeners and scene.mesh.kind == "line":
         raise fault(scene.path, "[observe] listener must be left out for a beam: only plates radiate sound here")
     if scene.section is not None:
         scene.make_section(scene.section.kind)
@@ -418,3 +498,10 @@ def _check_whole(scene: Scene) -> None:
         raise fault(scene.path, "[contact] kind 'between' needs a striker of kind 'sphere' and a [section]")
     scene.make_striker()
     scene.make_contact()
+    if scene.stroke and "max_impacts" in scene.blow.values:
+        raise fault(
+            scene.path, f"[strike] max_impacts must be left out with [[{REPEATED}]]; give a stroke lasts instead"
+        )
+    for i, part in enumerate(scene.stroke):
+        if any(name in part.values for name in NESTED):
+            _check_whole(scene.alone(i))

@@ -130,9 +130,13 @@ def _weight(i: int, entry: Any) -> tuple[Any, float]:
     return entry["at"], check.positive(f"point_masses[{i}].mass", entry["mass"], "kg")
 
 
-def _post(i: int, entry: Any) -> tuple[Any, Any]:
-    if not isinstance(entry, dict) or not {"at"} <= set(entry) <= {"at", "stiffness"}:
-        raise ValueError(f"point_supports[{i}] must have at and perhaps stiffness, got {check.shown(entry)}")
+def _post(i: int, entry: Any) -> tuple:
+    if not isinstance(entry, dict) or set(entry) not in ({"at"}, {"at", "stiffness"}, {"at", "clamped"}):
+        raise ValueError(
+            f"point_supports[{i}] must have at and perhaps stiffness, or clamped, a radius; got {check.shown(entry)}"
+        )
+    if "clamped" in entry:
+        return entry["at"], "clamped", check.positive(f"point_supports[{i}].clamped", entry["clamped"], "m")
     if "stiffness" not in entry:
         return entry["at"], "hinged"
     return entry["at"], check.positive(f"point_supports[{i}].stiffness", entry["stiffness"], "N/m")
@@ -143,13 +147,34 @@ def supports_of(values: Mapping[str, Any]) -> dict[str, Any]:
     return {edge: Elastic(**kind) if isinstance(kind, dict) else kind for edge, kind in values.items()}
 
 
-def _observe(*, points: Any = None, listener: Any = None) -> None:
-    if points is None and listener is None:
+def _observe(*, points: Any = None, listener: Any = None, listeners: Any = None) -> None:
+    if points is None and listener is None and listeners is None:
         raise ValueError("points or listener must be given; add one or leave out the table")
     if points is not None and (not isinstance(points, list) or not points):
         raise ValueError(f"points must be a list of points such as [[0.1, 0.2]], got {check.shown(points)}")
-    if listener is not None:
-        sound.beside(listener)
+    if listener is not None and listeners is not None:
+        raise ValueError("listener must be left out beside listeners; add it to their list")
+    if listeners is not None and (not isinstance(listeners, list) or not 0 < len(listeners) <= MOST_LISTENERS):
+        raise ValueError(
+            f"listeners must be a list of 1 to {MOST_LISTENERS} places such as [[0.1, 0.2, 1.0]], got "
+            f"{check.shown(listeners)}"
+        )
+    for place in [listener] if listener is not None else listeners or []:
+        sound.beside(place)
+
+
+def stroke_values(
+    *, when: float, at: Any = None, speed: float | None = None, lasts: float | None = None, striker: Any = None,
+    contact: Any = None,
+) -> None:  # fmt: skip
+    """Check one table [[stroke]]: when [s] the striker is at the surface, and what differs from the other tables."""
+    check.number("when", when, "s")
+    for name, value, unit in (("speed", speed, "m/s"), ("lasts", lasts, "s")):
+        if value is not None:
+            check.positive(name, value, unit)
+    for name, value in (("striker", striker), ("contact", contact)):
+        if value is not None and not isinstance(value, Mapping):
+            raise ValueError(f"{name} must be a table with the keys of [{name}], got {check.shown(value)}")
 
 
 def map_values(*, over: Any, max_frequency: Any = None) -> dict[str, Any]:
@@ -175,6 +200,7 @@ def _along(name: str, values: Any) -> np.ndarray:
     return np.geomspace(check.positive(f"{name}.from", low), check.positive(f"{name}.to", high), count)
 
 
+MOST_LISTENERS = 100  # [-] each costs a sound
 BAR_MODES = 96  # [-] modes of a bar that strikes; each blow keeps as many of them as it needs
 LOWEST_NU = -0.99  # [-] closer to -1, the rigidity of a plate is beyond all numbers
 MOST_VALUES = 10**6  # [-] most values along one axis of a map
@@ -200,6 +226,7 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
         "felt": Contact.felt, "between": Contact.between,
     }),
     "strike": ("", {"": collision.strike}),
+    "stroke": ("", {"": stroke_values}),
     "observe": ("", {"": _observe}),
     "map": ("", {"": map_values}),
 }  # fmt: skip
@@ -207,6 +234,8 @@ TABLES = [*MAKERS, "supports"]
 REQUIRED = ("mesh", "striker", "contact", "strike")
 # arguments that come from other tables
 SUPPLIED = {"material", "modes", "striker", "contact", "sphere", "plate", "start"}
+REPEATED = "stroke"  # the table that may stand several times, written [[stroke]]
+NESTED = ("striker", "contact")  # tables that may stand within a stroke too
 OF_TARGET = {"stretching"}  # arguments of the strike that are keys of the table [target]
 PATHS = ("source", "path")  # keys that name a file, relative to the scene file
 
@@ -258,14 +287,33 @@ def read_bytes(path: Path) -> bytes:
     return raw
 
 
-def read_part(path: Path, table: str, values: dict[str, Any], folder: Path) -> Part:
+def read_strokes(path: Path, tables: Any, folder: Path) -> tuple[Part, ...]:
+    """Read the tables [[stroke]]; what they say of striker and contact stays as it is written."""
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise fault(path, f"{REPEATED} must be tables, each written [[{REPEATED}]]")
+    parts = []
+    for i, table in enumerate(tables):
+        called = f"[[{REPEATED}]] {i}"
+        part = read_part(path, REPEATED, table, folder, called)
+        try:
+            stroke_values(**part.values)
+        except ValueError as error:
+            raise fault(path, f"{called} {error}") from None
+        for name in NESTED:
+            if name in table:
+                read_part(path, name, table[name], folder, f"{called} {name}:")
+        parts.append(part)
+    return tuple(parts)
+
+
+def read_part(path: Path, table: str, values: dict[str, Any], folder: Path, called: str = "") -> Part:
     """Read one table and check its keys against the arguments of its function; ValueError names file, table and key.
 
-    File names in the table are relative to ``folder``.
+    File names in the table are relative to ``folder``. Errors call the table ``called``, by default [table].
     """
 
     def wrong(text: str) -> ValueError:
-        return fault(path, f"[{table}] {text}")
+        return fault(path, f"{called or f'[{table}]'} {text}")
 
     try:
         bad = _not_finite(values)
@@ -302,6 +350,7 @@ def read_part(path: Path, table: str, values: dict[str, Any], folder: Path) -> P
 
 def _check_keys(selector: str, kind: str, values: dict[str, Any], maker: Callable[..., Any]) -> None:
     supplied = SUPPLIED | OF_TARGET if maker is collision.strike else SUPPLIED
+    supplied = supplied - set(NESTED) if maker is stroke_values else supplied
     arguments = {n: p for n, p in inspect.signature(maker).parameters.items() if n not in supplied}
     known = [selector, *arguments] if selector else list(arguments)
     for key in values:

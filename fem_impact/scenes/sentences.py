@@ -67,7 +67,7 @@ def words(scene: Scene, response: Response) -> list[str]:
     if scene.mesh.kind == "disk":
         kind, extent = "disk", f"{si(2.0 * scene.mesh.values['radius'], 'm')} diameter"
     flexible = modes.frequencies[modes.omega > 0.0]
-    told = scene.supports.values or {"boundary": "free"}
+    told = scene.held or {"boundary": "free"}
     held = {edge: how if isinstance(how, str) else "held by springs" for edge, how in told.items()}
     if len(set(held.values())) == 1 and ("boundary" in held or len(held) == len(scene.body().edges) - 1):
         edges = next(iter(held.values())) + (" all round" if modes.dimension == 2 else " at both ends")

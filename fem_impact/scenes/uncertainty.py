@@ -163,6 +163,7 @@ def _told(scene: Any, striker: Any, contact: Any, at: Any, speed: Any, damping_r
         if given is not None:
             raise ValueError(f"{name} must be left out for a scene, which has its own")
     told = scene if isinstance(scene, Scene) else load_scene(scene)
+    told.check_single()
     return told, told.built
 
 

@@ -25,7 +25,7 @@ from . import sampling, sound
 
 __all__ = [
     "csv_text", "numbers", "plain", "run_data", "staged", "versions", "vtk_ending", "write_animation", "write_force",
-    "write_json", "write_uff", "write_vtk", "write_wav",
+    "write_json", "write_sound", "write_uff", "write_vtk", "write_wav",
 ]  # fmt: skip
 
 CENTROID_BAND = 20e3  # [Hz] upper end of the spectral centroid's band: about the limit of hearing
@@ -165,12 +165,26 @@ def write_wav(
     >>> sound.rate, sound.full_scale, sound.unit
     (48000, 1.0, 'm/s')
     """
-    check.one_of("path ending", check.path("path", path).suffix.lower(), (".wav",))
     if listener is None:
         heard = sound.synthesise(response, at, **options)
     else:
         heard = sound.radiate(response, listener, **options)
-    heard = (heard if options.get("normalise") else heard.audible()).faded()
+    return write_sound(path, heard if options.get("normalise") else heard.audible())
+
+
+@check.typed
+def write_sound(path: str | Path, heard: sound.Sound) -> sound.Sound:
+    """Write samples as 32-bit float WAV, one channel or several, with a fade at the end; return what was written.
+
+    Examples
+    --------
+    >>> tone = fi.sound.Sound(np.sin(np.arange(4800.0)), 48000, 1.0, "Pa")
+    >>> fi.export.write_sound("both.wav", fi.sound.together([tone, tone])).samples.shape
+    (4800, 2)
+    """
+    check.one_of("path ending", check.path("path", path).suffix.lower(), (".wav",))
+    check.instance("heard", heard, sound.Sound)
+    heard = heard.faded()
     with replacing(path) as temporary:
         temporary.write_bytes(heard.wav())
     return heard

@@ -1,6 +1,7 @@
 """The sound of a blow, as samples: the velocity of a point on the struck body, or the pressure a plate radiates."""
 
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -33,7 +34,7 @@ CRITICAL = 1e-6  # [-] damping ratios closer to 1 become 1 plus this: at 1 the t
 class Sound:
     """Samples, ready to write or play."""
 
-    samples: np.ndarray  # (n_times,) [-] velocity or pressure, divided by full_scale
+    samples: np.ndarray  # (n_times,) or, for several channels, (n_times, n_channels) [-] value over full_scale
     rate: int  # [Hz]
     full_scale: float  # [m/s] or [Pa], value of a sample of 1.0
     unit: str = "m/s"
@@ -60,11 +61,17 @@ class Sound:
         factor = 10.0 ** np.ceil(np.log10(peak) - 1e-12) if peak else 1.0
         return replace(self, samples=self.samples / factor, full_scale=self.full_scale * float(factor))
 
+    def normalised(self) -> "Sound":
+        """The same sound with its peak as full scale."""
+        peak = float(np.abs(self.samples).max(initial=0.0)) or 1.0
+        return replace(self, samples=self.samples / peak, full_scale=self.full_scale * peak)
+
     def faded(self) -> "Sound":
         """The same sound, ending in a fade of FADE seconds or of a quarter of its length, so that it does not click."""
         count = min(round(FADE * self.rate), len(self.samples) // 4)
         samples = self.samples.copy()
-        samples[len(samples) - count :] *= np.cos(0.5 * np.pi * np.arange(1, count + 1) / max(count, 1)) ** 2
+        fall = np.cos(0.5 * np.pi * np.arange(1, count + 1) / max(count, 1)) ** 2
+        samples[len(samples) - count :] *= fall if samples.ndim == 1 else fall[:, None]
         return replace(self, samples=samples)
 
     @property
@@ -93,6 +100,34 @@ class Sound:
     def said(self) -> str:
         """The level in words, with its reference."""
         return f"{self.level:.1f} dB re {REFERENCE[self.unit][1]}".replace("-", "−")
+
+
+@check.typed
+def together(sounds: Sequence[Sound]) -> Sound:
+    """Sounds of one blow as the channels of one: stereo of two listeners, left and right.
+
+    They keep their levels and delays relative to each other, on the largest of their full scales; shorter ones are
+    continued by silence.
+
+    Examples
+    --------
+    >>> modes = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=20, damping_ratio=0.01)
+    >>> hit = fi.strike(modes, fi.Striker.rigid(0.03), fi.Contact.linear(1e5), at=(0.13, 0.1), speed=1.0)
+    >>> ears = [fi.sound.radiate(hit, (x, 0.15, 0.5), duration=0.1) for x in (0.1, 0.3)]
+    >>> fi.sound.together(ears).samples.shape
+    (4800, 2)
+    """
+    if not isinstance(sounds, Sequence) or not sounds or not all(isinstance(each, Sound) for each in sounds):
+        raise ValueError(f"sounds must be a list of sounds, got {check.shown(sounds)}")
+    first = sounds[0]
+    for each in sounds:
+        if each.samples.ndim != 1 or (each.rate, each.unit) != (first.rate, first.unit):
+            raise ValueError("sounds must have one channel each, and the same rate and unit")
+    scale = max(each.full_scale for each in sounds)
+    samples = np.zeros((max(len(each.samples) for each in sounds), len(sounds)))
+    for channel, each in zip(samples.T, sounds):
+        channel[: len(each.samples)] = each.samples * (each.full_scale / scale)
+    return Sound(samples, first.rate, scale, first.unit)
 
 
 @check.typed

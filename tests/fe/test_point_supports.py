@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import shapely
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh, null_space
 from scipy.optimize import brentq
@@ -158,6 +159,27 @@ def test_a_free_plate_on_its_four_corners_meets_ritz():
     assert_allclose(bounce.frequencies[0], np.sqrt(4e-3 / soft.mass) / (2.0 * np.pi), rtol=1e-5)
 
 
+@pytest.mark.parametrize("source", ["outline", pytest.param("file", marks=pytest.mark.slow)])
+def test_a_clamped_disk_of_a_plate_is_a_clamped_hole(tmp_path, source):
+    """The mesh of the hole is drawn through points of the circle, or has the plate's own rim from a file."""
+    at, radius = np.array([0.4, 0.3]), 0.05
+    turn = np.linspace(0.0, 2.0 * np.pi, 65)[:-1, None]
+    hole = at + radius * np.hstack([np.cos(turn), np.sin(turn)])
+    drawn = fi.mesh.outline(shapely.Polygon([(0, 0), (1, 0), (1, WIDTH), (0, WIDTH)], [hole]))
+    wanted = fi.find_modes(fi.assemble(drawn, SHEET, {"outer": "hinged", "hole0": "clamped"}), n_modes=3)
+    whole = fi.mesh.rectangle(1.0, WIDTH)
+    if source == "file":
+        fi.mesh.save(tmp_path / "plate.msh", whole)
+        whole = fi.mesh.load(tmp_path / "plate.msh")
+    edges = dict.fromkeys(("left", "right", "bottom", "top"), "hinged")
+    system = fi.assemble(whole, SHEET, edges, point_supports=[(at, "clamped", radius)])
+    assert set(system.mesh.edges) == {*edges, "outer", "clamp0", "boundary"} and system.point_supports == ()
+    modes = fi.find_modes(system, n_modes=3)
+    assert_allclose(modes.frequencies, wanted.frequencies, rtol=2e-5)  # what is promised of either
+    post = post_in_a_hinged_plate(at, 3) * RATE / (2.0 * np.pi)
+    assert (modes.frequencies > 1.02 * post).all()  # stiffer than the point alone
+
+
 ON_CORDS = fi.assemble(fi.mesh.line(1.0), BAR, {}, point_supports=[((0.224,), "hinged"), ((0.776,), "hinged")])
 ON_FEET = fi.assemble(
     fi.mesh.rectangle(0.4, 0.3), SHEET, {}, point_supports=[((x, y), 1e6) for x in (0.05, 0.35) for y in (0.05, 0.25)]
@@ -184,6 +206,11 @@ def test_what_is_no_point_support_says_so():
         (line, BAR, 3, "point_supports must be a list"),
         (line, BAR, [(0.5,)], r"point_supports\[0\] must be a pair"),
         (line, BAR, [((0.5,), "clamped")], r"support of point_supports\[0\] must be one of hinged"),
+        (line, BAR, [((0.5,), "clamped", 0.01)], r"point_supports\[0\] must not clamp a point of a beam"),
+        (square, SHEET, [((0.5, 0.5), "clamped", 0.0)], r"radius of point_supports\[0\] must be positive"),
+        (square, SHEET, [((0.5, 0.5), "clamped", 1e-9)], "radius of point_supports must be at least 1e-06 of the body"),
+        (square, SHEET, [((0.5, 0.5), "clamped", 0.6)], "point_supports must leave room for each clamp"),
+        (square, SHEET, [((0.5, x), "clamped", 0.1) for x in (0.5, 0.6)], "point_supports must leave room"),
         (line, BAR, [((0.5,), -1.0)], r"stiffness of point_supports\[0\] must be positive"),
         (square, SHEET, [((2.0, 0.5), "hinged")], r"point of point_supports\[0\] must lie on the body"),
     ):

@@ -13,13 +13,13 @@ from fem_impact.scenes.schema import MAKERS, TABLES
 ROOT = Path(__file__).parents[2]
 SHIPPED = sorted((ROOT / "studies" / "scenes").rglob("*.toml"))
 SCHEMA = editor_schema.schema()
-PLAIN = {"object": dict, "string": str, "boolean": bool, "integer": int, "number": (int, float)}
+PLAIN = {"object": dict, "array": list, "string": str, "boolean": bool, "integer": int, "number": (int, float)}
 
 
 def faults(value, schema, where="scene"):
     """What violates the few keywords that the schema uses; a keyword it does not know is an error."""
     known = {"$schema", "title", "description", "default", "type", "properties", "required", "additionalProperties",
-             "enum", "const", "oneOf", "anyOf"}  # fmt: skip
+             "enum", "const", "oneOf", "anyOf", "items"}  # fmt: skip
     assert set(schema) <= known, set(schema) - known
     found = []
     kind = PLAIN.get(schema.get("type", ""), object)
@@ -35,6 +35,8 @@ def faults(value, schema, where="scene"):
         for name, item in value.items():
             rule = inner.get(name, schema.get("additionalProperties", {}))
             found += [f"{where} has {name}"] if rule is False else faults(item, rule, f"{where}.{name}")
+    for i, item in enumerate(value if isinstance(value, list) else ()):
+        found += faults(item, schema.get("items", {}), f"{where}[{i}]")
     for word, most in (("oneOf", 1), ("anyOf", 99)):
         if word in schema:
             each = [faults(value, choice, where) for choice in schema[word]]
@@ -81,6 +83,18 @@ def test_the_schema_knows_every_table_and_kind():
     for name, (selector, makers) in MAKERS.items():
         if selector:
             assert SCHEMA["properties"][name]["properties"][selector]["enum"] == list(makers)
+
+
+def test_strokes_have_strikers_and_contacts_of_their_own_in_the_schema():
+    text = templates.text("plate") + '\n[[stroke]]\nwhen = 0.0\nstriker = { kind = "rigid", mass = 0.01 }\n'
+    assert faults(tomllib.loads(text), SCHEMA) == []
+    for old, new, fault in (
+        ("when = 0.0", "wen = 0.0", "scene.stroke[0] lacks when"),
+        ("mass = 0.01", "mas = 0.01", "scene.stroke[0].striker has mas"),
+        ("when = 0.0", "when = 0.0\nlasts = true", "scene.stroke[0].lasts is no number"),
+    ):
+        found = faults(tomllib.loads(text.replace(old, new)), SCHEMA)
+        assert any(said.startswith(fault) for said in found), found
 
 
 def test_the_prompt_prints_the_schema(capsys):

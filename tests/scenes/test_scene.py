@@ -133,9 +133,22 @@ def test_a_panel_on_posts_in_a_scene(tmp_path):
     for wrong, text in (
         ("[{ stiffness = 1e4 }]", "must have at"),
         ("[{ at = [0.1, 0.1], stiffness = 0 }]", "positive"),
+        ("[{ at = [0.1, 0.1], stiffness = 1.0, clamped = 0.01 }]", "must have at and perhaps stiffness, or clamped"),
     ):
         with pytest.raises(ValueError, match=text):
             scene.load_scene(write(tmp_path, told.replace(posts, f"point_supports = {wrong}")))
+
+
+def test_a_plate_clamped_at_a_post_in_a_scene(tmp_path):
+    posts = "point_supports = [{ at = [0.1, 0.1], clamped = 0.01 }, { at = [0.3, 0.2] }]"
+    loaded = scene.load_scene(write(tmp_path, TEXT.replace('source = "analytic"', posts)))
+    assert "clamp0" in loaded.body().edges and loaded.held["clamp0"] == "clamped"
+    assert [entry[1] for entry in loaded.built.target.point_supports] == ["hinged"]
+    shape = loaded.modes(3).shape_at([(0.1101, 0.1), (0.3, 0.2), (0.25, 0.1)])
+    assert np.abs(shape[:2]).max() < 1e-3 * np.abs(shape[2]).max()  # at the edge of the clamp and on the other post
+    off = TEXT.replace('source = "analytic"', "point_supports = [{ at = [9.0, 0.1], clamped = 0.01 }]")
+    with pytest.raises(ValueError, match=r"\[target\] point_supports must leave room for each clamp"):
+        scene.load_scene(write(tmp_path, off)).strike()
 
 
 def test_a_held_striker_in_a_scene_comes_back(tmp_path):
