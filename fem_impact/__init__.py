@@ -31,6 +31,7 @@ _NAMES = {
     "taps.fit": "fit",
     "taps.transfer": "frf mac matched",
     "taps.update": "update",
+    "designs.search": "design",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 _MODULES = {

@@ -303,6 +303,10 @@ def table() -> dict[str, dict[str, Any]]:
             "striker": t["striker"], "contact": t["law"], "at": at, "speed": 1.0, "damping_ratio": 0.01,
             "correlation": {("mass", "speed"): 0.5}, "tolerance": 1e-1, "max_blows": 100.0,
         },
+        "design": {
+            "objects": t["path"], "wanted": {"contact_time": (1e-6, 1.0)}, "free": {"striker.mass": (0.02, 0.05)},
+            "least": "striker.mass", "start": {"striker.mass": 0.03}, "tolerance": 1e-2, "tries": 1, "n_modes": 5,
+        },
         "figures.edges": {"mesh": t["square"]},
         "figures.spread": {"found": t["spread"]},
         "mesh.Mesh.refined": {"self": t["square"], "factor": 2.0},

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from test_advice import ADVICE
 from test_advice_of_assumptions import REMEDIES
+from test_advice_of_design import DESIGNS
 from test_advice_of_files import FILES
 from test_advice_of_gradients import GRADIENTS
 from test_advice_of_stretching import STRETCHING
@@ -63,6 +64,7 @@ ELSEWHERE = {  # advice followed in a test of its own: the test, and patterns of
         "modes lie between eigenvalues",
     ),
     "fe/test_eigenvalues.py::test_modes_that_stay_missing_are_found_by_asking_for_more": ("ask for a few more modes",),
+    "fe/test_variation.py::test_morley_elements_have_none": ("unknown for element 'morley'; take 'argyris'",),
     "fe/test_point_load.py::test_modes_softer_than_the_body_are_an_error": ("find the modes on a finer mesh",),
     "impact/test_promise.py::test_the_modes_advised_meet_the_tolerance": ("^keep .* modes of .* instead of",),
     "impact/test_promise.py::test_a_contact_that_needs_too_many_modes_gets_what_needs_fewer": (
@@ -114,7 +116,7 @@ def messages(path):
 
 def covering():
     """Patterns of the messages that a test provokes and whose advice it follows."""
-    tables = ADVICE, FILES, REMEDIES, GRADIENTS, STRETCHING
+    tables = ADVICE, FILES, REMEDIES, GRADIENTS, STRETCHING, DESIGNS
     yield from (words for table in tables for _, words, _ in table.values())
     for name, patterns in ELSEWHERE.items():
         file, test = name.split("::")

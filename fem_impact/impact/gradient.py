@@ -1,7 +1,7 @@
 """`hit.gradient`: derivatives of what a blow does in the numbers that make it, each with its error."""
 
 import html
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -10,6 +10,7 @@ import numpy as np
 
 from .._base import check, markup
 from .._base.check import SimulationError
+from ..fe.variation import SectionChange
 from .compiled import record
 from .compiled.law import KIND
 from .parameters import POSSIBLE, UNITS, Parameters
@@ -106,8 +107,14 @@ class Gradient:
         return markup.table(rows, head)
 
 
-def gradients(hit: "Response", quantity: Any, wrt: Any) -> dict[str, Gradient]:
-    """The gradient of each quantity, see `Response.gradient`."""
+def gradients(
+    hit: "Response", quantity: Any, wrt: Any, sections: Mapping[str, tuple[float, SectionChange]] | None = None
+) -> dict[str, Gradient]:
+    """The gradient of each quantity, see `Response.gradient`.
+
+    ``sections`` are further numbers, each with its value and with how the target's section changes with it.
+    """
+    sections = sections or {}
     several = (quantity,) if isinstance(quantity, str) else check.several("quantity", quantity, str)
     wanted = [_asked(item) for item in several]
     if hit.striker is None or len(hit.bodies) != 2:
@@ -119,7 +126,7 @@ def gradients(hit: "Response", quantity: Any, wrt: Any) -> dict[str, Gradient]:
         raise SimulationError(f"no gradient: {why}, and what that changes is not followed yet")
     if not hit.n_impacts:
         raise SimulationError("no gradient: the bodies never touched; check gap and speed")
-    parameters = Parameters(hit)
+    parameters = Parameters(hit, {name: change for name, (_, change) in sections.items()})
     names = parameters.checked(wrt)
     change = parameters.change(names)
     coarse = hit.coarse
@@ -131,7 +138,7 @@ def gradients(hit: "Response", quantity: Any, wrt: Any) -> dict[str, Gradient]:
     fine = Sensitivity.of(hit.history, change)
     _check_grazing(fine)
     rough = None if coarse is None else Sensitivity.of(coarse, change)
-    numbers = np.array([parameters.values[name] for name in names])
+    numbers = np.array([sections[name][0] if name in sections else parameters.values[name] for name in names])
     found = {}
     for name, band in wanted:
         if name.startswith("peak"):

@@ -1,6 +1,7 @@
 """The numbers of a blow that a gradient can be taken in, and what each changes in the modes and contact of the run."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -8,6 +9,8 @@ import numpy as np
 
 from .._base import check
 from ..fe.section import Beam, Elastic, Plate
+from ..fe.variation import DIFFERENCES, SectionChange
+from ..modes import varied
 from ..modes.modal import Modes, left_out
 from .compiled.law import LAYERS, POWER
 from .compiled.tangents import Change
@@ -32,12 +35,6 @@ ROD = {"section.diameter": (1.0, 2.0), **BEAM}
 SCALE = {Plate: (-2.0, 2.0), Beam: (-2.0, 1.0)}  # all lengths along the body, at the same thickness
 SHIFT = 1e-3  # [rad] of the shortest wave kept: distance of the points whose shapes give the slope of each shape
 STATIC_SHIFT = 1e-3  # [-] of the body: the same for the static compliance, which has no short waves
-# fourth-order differences over points at these multiples of the distance: about the point, and to one side of it
-DIFFERENCES = (
-    ((-2, -1, 1, 2), (1 / 12, -2 / 3, 2 / 3, -1 / 12)),
-    ((0, 1, 2, 3, 4), (-25 / 12, 4.0, -3.0, 4 / 3, -1 / 4)),
-    ((0, -1, -2, -3, -4), (25 / 12, -4.0, 3.0, -4 / 3, 1 / 4)),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +42,7 @@ class Parameters:
     """The numbers of one blow of `strike`, by the names that scene files give them."""
 
     hit: "Response"
+    sections: Mapping[str, SectionChange] = field(default_factory=dict)  # how numbers of the user's change the section
 
     __repr__ = check.brief
 
@@ -142,6 +140,8 @@ class Parameters:
             return tuple(self.values)
         names = (wrt,) if isinstance(wrt, str) else check.several("wrt", wrt, str)
         for name in names:
+            if name in self.sections:
+                continue
             if name in self._barred:
                 raise check.SimulationError(f"no gradient in {name}: {self._barred[name]}")
             if name in self.values:
@@ -167,7 +167,10 @@ class Parameters:
         """What a unit of each number changes in the run."""
         found = no_change(self.hit.history, len(names))
         for i, name in enumerate(names):
-            self._enter(found, i, name)
+            if name in self.sections:
+                self._vary(found, i, self.sections[name])
+            else:
+                self._enter(found, i, name)
         return found
 
     def _enter(self, found: Change, i: int, name: str) -> None:
@@ -245,6 +248,27 @@ class Parameters:
             found.omega[i, extra] = faster / value * h.omega[extra]
             found.shape[i, extra] = faster / value * h.shape[0, extra]
         self._soften(found, i, body, -(heavier + 2.0 * faster) / value * self._rest[body])
+
+    def _vary(self, found: Change, i: int, change: SectionChange) -> None:
+        """A target whose section changes along its length or over its area."""
+        hit, target, part, h = self.hit, self.hit.bodies[1], self._bodies[1], self.hit.history
+        if self.why_no_target or hit.at is None or h.start_q[part].any() or h.start_p[part].any():
+            raise check.SimulationError(
+                f"no gradient in the section: {self.why_no_target or 'the target moved before the blow'}"
+            )
+        seen = varied.changed(target, change, hit.at)
+        found.omega[i, part] = seen.omega
+        found.shape[i, part] = -seen.shape
+        found.bias[i, part] = hit._push * seen.shape
+        extra, flexible = self._extra(1), target.omega > 0.0
+        if extra is not None:  # it follows the last mode
+            faster = seen.omega[-1] / target.omega[-1]
+            found.omega[i, extra] = faster * h.omega[extra]
+            found.shape[i, extra] = faster * h.shape[0, extra]
+        if self._rest[1]:
+            row, omega = target.shapes.at(hit.at[None])[0, flexible], target.omega[flexible]
+            carried = 2.0 * row / omega**2 @ (seen.shape[flexible] - row * seen.omega[flexible] / omega)
+            self._soften(found, i, 1, seen.compliance - float(carried))
 
     def _shift(self, found: Change, i: int, axis: int) -> None:
         """The target struck further along an axis."""

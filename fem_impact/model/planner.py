@@ -442,7 +442,12 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
         if plan.target == target:
             raise
         other = plan.blow.run(watch, **{**plan.changes, **finer, "target": plan.target})
-    one, two = run.response, other.response
+    true = differences(run.response, other.response, plan.quantities)
+    return replace(run, verified=MappingProxyType(true), finer=other.plan)
+
+
+def differences(one: Response, two: Response, quantities: Mapping[str, float | None]) -> dict[str, float]:
+    """Differences [-] of two runs of one blow: absolute in the restitution and the count, relative in the others."""
     true = {
         "restitution": abs(one.restitution - two.restitution),
         "n_impacts": float(abs(one.n_impacts - two.n_impacts)),
@@ -450,11 +455,11 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
     for name in ("impulse", "contact_time", "peak_force"):
         size = getattr(two, name)
         true[name] = abs(getattr(one, name) - size) / size if size else 0.0
-    for name, band in plan.quantities.items():
+    for name, band in quantities.items():
         if band is not None:
             spectra = [response.spectrum(np.linspace(0.0, band, BAND_POINTS)) for response in (one, two)]
             true[name] = float(np.abs(spectra[0] - spectra[1]).max() / (np.abs(spectra[1]).max() or 1.0))
-    return replace(run, verified=MappingProxyType(true), finer=other.plan)
+    return true
 
 
 def _idealised(asked: _Asked, target: str | None, stages: Stages) -> Plan | None:

@@ -1,0 +1,118 @@
+"""What can be wanted of a design: frequencies of the body, quantities of a blow, one impact only."""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .._base import check
+from ..impact.gradient import UNIT_OF
+
+MODE = re.compile(r"mode([1-9]\d*)\.(frequency|ratio)")
+BLOW = "restitution", "impulse", "contact_time", "peak_force", "peak_time", "spectral_centroid"
+KNOWN = (*BLOW, "mode1.frequency", "mode2.ratio")
+EXAMPLE = '{"mode1.frequency": 262.0, "contact_time": (1e-3, 2e-3)}'
+
+
+@dataclass(frozen=True)
+class Goal:
+    """One quantity of the body, or of one blow, and the range it is wanted in; both ends are one for a value."""
+
+    name: str
+    low: float
+    high: float
+    blow: str = ""
+
+    @property
+    def label(self) -> str:
+        """The name, with that of its blow."""
+        return f"{self.blow}: {self.name}" if self.blow else self.name
+
+    @property
+    def mode(self) -> int:
+        """Number of the flexible mode whose frequency is meant, from 1; 0 for a quantity of a blow."""
+        found = MODE.fullmatch(self.name)
+        return int(found[1]) if found else 0
+
+    @property
+    def ratio(self) -> bool:
+        """Whether the frequency over that of the first mode is meant."""
+        return self.name.endswith(".ratio")
+
+    @property
+    def unit(self) -> str:
+        """Unit of the quantity, empty for a ratio."""
+        return ("" if self.ratio else "Hz") if self.mode else UNIT_OF.get(self.name.partition("=")[0], "")
+
+    @property
+    def scale(self) -> float:
+        """What a miss is told relative to: the wanted value, 1 for a restitution."""
+        if self.name == "restitution":
+            return 1.0
+        return max(abs(end) for end in (self.low, self.high) if math.isfinite(end)) or 1.0
+
+    @property
+    def exact(self) -> bool:
+        """Whether one value is wanted."""
+        return self.low == self.high
+
+    def miss(self, value: float) -> float:
+        """How far a value is above the range (below, if negative), over the scale."""
+        return (max(0.0, value - self.high) + min(0.0, value - self.low)) / self.scale
+
+    @property
+    def words(self) -> str:
+        """The range, in words."""
+        unit = f" {self.unit}".rstrip()
+        if self.exact:
+            return f"{self.low:.6g}{unit}"
+        ends = f"at least {self.low:.6g}", f"at most {self.high:.6g}"
+        return " and ".join(words for words, end in zip(ends, (self.low, self.high)) if math.isfinite(end)) + unit
+
+
+def read(wanted: Any, blows: tuple[str, ...]) -> tuple[Goal, ...]:
+    """All goals from what a user wants; those not told for one blow hold for each. ValueError says what is wrong."""
+    table = _table("wanted", wanted)
+    if not table:
+        raise ValueError(f"wanted must name at least one quantity, as in {EXAMPLE}")
+    found: list[Goal] = []
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            check.one_of("the blow in wanted", name, [blow for blow in blows if blow])
+            found += [_goal(f"wanted[{name!r}]", own, what, name) for own, what in _table("wanted", value).items()]
+        elif MODE.fullmatch(name):
+            found.append(_goal("wanted", name, value, ""))
+        else:
+            found += [_goal("wanted", name, value, blow) for blow in blows]
+    return tuple(found)
+
+
+def _table(name: str, value: Any) -> dict[str, Any]:
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+        raise ValueError(f"{name} must be a dict of names, as in {EXAMPLE}; got {check.shown(value)}")
+    return dict(value)
+
+
+def _goal(where: str, name: str, value: Any, blow: str) -> Goal:
+    label = f"{where}[{name!r}]"
+    plain, equals, _ = name.partition("=")
+    if not MODE.fullmatch(name):
+        check.one_of(where, plain, KNOWN)
+        if (plain == "spectral_centroid") != bool(equals):
+            rule = (
+                "needs a band in Hz, such as 'spectral_centroid=5000'"
+                if not equals
+                else f"has no band, write {plain!r}"
+            )
+            raise ValueError(f"{where}: {plain} {rule}")
+    ends = value if isinstance(value, (tuple, list)) else (value, value)
+    if len(ends) != 2 or (ends[0] is None and ends[1] is None):
+        raise ValueError(
+            f"{label} must be a number or a range (low, high), got {check.shown(value)}; None leaves an end open"
+        )
+    low = -math.inf if ends[0] is None else check.number(label, ends[0])
+    high = math.inf if ends[1] is None else check.number(label, ends[1])
+    if low > high:
+        raise ValueError(f"{label} must be a range (low, high), got ({low:g}, {high:g})")
+    return Goal(name, low, high, blow)

@@ -1,0 +1,493 @@
+"""`design`: the numbers of a body and a blow that make both come out as wanted, by optimisers with exact gradients."""
+
+import math
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares, minimize
+from scipy.stats import qmc
+
+from .._base import check, markup
+from .._base.check import SimulationError, ToleranceWarning
+from ..fe.variation import SectionChange
+from ..impact import gradient, promise
+from ..impact.response import Response
+from ..model import planner
+from ..modes import varied
+from ..modes.modal import Modes
+from ..taps import arguments
+from ..taps.unknowns import Unknown
+from . import goals
+from .goals import Goal
+from .objects import Maker, Piece, Rate
+
+TOLERANCE = 1e-3  # [-] default miss of what is wanted: 1.7 cents of a frequency
+STRIKE = 1e-5  # [-] tolerance of the blows of a search, if they state none: small beside what is wanted
+FREQUENCY = 1e-6  # [-] largest error of the frequencies of a search
+RIGID = 3  # [-] rigid motions that a free body may have before its first flexible mode
+ENOUGH = 60  # [-] steps of one search
+CLOSE = 1e-10  # [-] relative change that ends a search
+LOST = 1e3  # [-] miss of numbers that make no blow: the search turns back
+MOST_MODES = 10_000  # [-] of a body in a blow
+MOST_TRIES = 1024  # [-] points where a search begins
+AT_END = 1e-6  # [-] of a range: nearer to its end counts as there
+FINER = 8.0  # [-] frequencies are found that much better to check a design, as blows are by `verify`
+
+
+@dataclass(frozen=True)
+class Reached:
+    """What became of one goal."""
+
+    goal: Goal
+    value: float
+    slopes: Mapping[str, float]  # by free number, unit of the quantity over unit of the number
+
+    @property
+    def miss(self) -> float:
+        """How far the value lies outside its range, over the wanted value [-]; of a restitution absolute."""
+        return self.goal.miss(self.value)
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """A design struck again as a blow of its own, with a finer model."""
+
+    values: Mapping[str, float]  # by the label of each goal
+    hits: Mapping[str, Response]  # by name of the blow
+    differences: Mapping[str, Mapping[str, float]]  # of each from the finer blow, see `planner.differences`
+
+    __repr__ = check.brief
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """What `design` found."""
+
+    values: Mapping[str, float]  # of the free numbers
+    reached: tuple[Reached, ...]
+    tolerance: float  # [-]
+    at_end: tuple[str, ...]  # free numbers at an end of their range
+    n_evaluations: int
+    maker: Maker = field(repr=False)
+    hits: Mapping[str, Response] = field(default_factory=dict, repr=False)  # by name of the blow
+
+    __repr__ = check.brief
+
+    @property
+    def met(self) -> bool:
+        """Whether every goal is reached within the tolerance."""
+        return all(abs(each.miss) <= self.tolerance for each in self.reached)
+
+    def __getitem__(self, label: str) -> float:
+        """The value reached of a quantity, by its name, for one of several blows by "blow: name"."""
+        labels = [each.goal.label for each in self.reached]
+        return self.reached[labels.index(check.one_of("label", label, labels))].value
+
+    @property
+    def objects(self) -> Any:
+        """The scene, or what the function made, with the numbers found."""
+        return self.maker.build(dict(self.values))
+
+    @property
+    def verdict(self) -> str:
+        """One sentence: whether the goals are reached and, if not, which is missed most and what holds the search."""
+        if self.met:
+            return f"design found: every goal within {self.tolerance:g}"
+        worst = max(self.reached, key=lambda each: abs(each.miss))
+        held = f"; {', '.join(self.at_end)} stopped at the end of the range: widen that" if self.at_end else ""
+        return (
+            f"design MISSED: {worst.goal.label} is {worst.value:.6g}, wanted {worst.goal.words}"
+            f"{held or '; free more numbers, or begin elsewhere, with start or tries'}"
+        )
+
+    def summary(self) -> str:
+        """The design in a few lines."""
+        rows = [(each.goal.label, f"{each.value:.6g} {each.goal.unit}".strip(), f"wanted {each.goal.words}")
+                for each in self.reached]  # fmt: skip
+        found = [(name, f"{value:.6g}" + (", at the end of its range" if name in self.at_end else ""))
+                 for name, value in self.values.items()]  # fmt: skip
+        lines = [self.verdict, *(f"  {line}" for line in markup.columns(found))]
+        lines += ["with", *(f"  {line}" for line in markup.columns(rows)), f"{self.n_evaluations} evaluations"]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """For notebooks: tables of the numbers found and of the goals."""
+        rows = [(each.goal.label, f"{each.value:.6g} {each.goal.unit}", each.goal.words) for each in self.reached]
+        numbers = [(name, f"{value:.6g}") for name, value in self.values.items()]
+        return markup.side_by_side(
+            markup.table(numbers, ["free", "found"]), markup.table(rows, ["quantity", "reached", "wanted"])
+        )
+
+    def verify(self) -> Checked:
+        """Strike the design as a blow of its own and again with a finer model, as ``strike --verify`` does.
+
+        Frequencies are found again, too, to an eighth of the error.
+        """
+        found: dict[str, float] = {}
+        hits: dict[str, Response] = {}
+        apart: dict[str, Mapping[str, float]] = {}
+        for name, piece in self.maker.pieces(self.values).items():
+            own = [each.goal for each in self.reached if each.goal.blow == name and not each.goal.mode]
+            if own:
+                hits[name], apart[name] = _twice(piece, self.tolerance)
+                found |= {goal.label: _of_hit(hits[name], goal) for goal in own}
+        some = [each.goal for each in self.reached if each.goal.mode]
+        if some:
+            piece = next(iter(self.maker.pieces(self.values).values()))
+            modes = _modes_of(piece, max(goal.mode for goal in some) + RIGID, FREQUENCY / FINER)
+            found |= {goal.label: _of_modes(modes, goal) for goal in some}
+        return Checked(MappingProxyType(found), MappingProxyType(hits), MappingProxyType(apart))
+
+
+@check.typed
+def design(
+    objects: Any,
+    wanted: Mapping[str, Any],
+    free: Mapping[str, Any],
+    *,
+    least: str | None = None,
+    start: Mapping[str, float] | None = None,
+    tolerance: float = TOLERANCE,
+    tries: int = 1,
+    n_modes: int | None = None,
+) -> Design:
+    """Find numbers of a body and a blow that make both come out as wanted.
+
+    Parameters
+    ----------
+    objects : Scene, path of a scene file, or function
+        What is designed. Of a scene, free numbers are those of its tables. A function takes a dict of values and
+        returns arguments of `strike` by name: the body as ``target`` (a System or Modes), or quicker as ``mesh``,
+        ``section`` and ``supports``, then ``striker``, ``contact``, ``at``, ``speed`` and others; for several blows a
+        dict of such dicts by name; if only frequencies are wanted, the body alone will do.
+    wanted : mapping of quantity to a value, or to a range (low, high) with None for an open end
+        Of the body "mode1.frequency" [Hz] (flexible modes from 1) and "mode2.ratio" (over the first frequency); of each
+        blow "contact_time", "restitution", "impulse", "peak_force", "peak_time" and "spectral_centroid=5000" (its band
+        in Hz). With the name of one of several blows as key, a mapping of what is wanted of that one.
+    free : mapping of number to (low, high)
+        What may change, and how far; by its logarithm where both ends are positive.
+    least : str, optional
+        The free number that shall be as small as the goals allow, such as the mass of a hammer.
+    start : mapping of number to value, optional
+        Where the search begins; by default the middle of each range.
+    tolerance : float [-]
+        Largest miss of a goal, relative to the wanted value (of a restitution absolute).
+    tries : int
+        Searches from further points, spread over the ranges, until one finds a design.
+    n_modes : int, optional
+        Modes of the body in each blow; by default as many as the plan of the first takes.
+
+    Returns
+    -------
+    Design
+        A design that misses a goal warns (`ToleranceWarning`) and says what holds it.
+
+    Raises
+    ------
+    ValueError
+        If something wanted or free is unknown, or the start makes no body or blow.
+    SimulationError
+        Where no derivative exists: a number that changes the mesh, a frequency that several modes share.
+
+    Notes
+    -----
+    Goals without ``least`` are met by least squares within bounds (``scipy.optimize.least_squares``), with it by
+    sequential quadratic programming (SLSQP). All derivatives are exact but for the finite elements: those of a blow
+    from its recorded steps (`Response.gradient`), those of frequencies and shapes from the derivatives of stiffness and
+    mass along the modes. Modes that share a frequency answer a blow smoothly, but their single frequencies split, which
+    is refused.
+
+    Examples
+    --------
+    >>> def bar(values):
+    ...     section = fi.Beam.rectangular(fi.Material(E=16e9, nu=0.35, rho=900.0), width=0.05, height=values["height"])
+    ...     return {"mesh": fi.mesh.line(0.35), "section": section}
+    >>> found = fi.design(bar, wanted={"mode1.frequency": 440.0}, free={"height": (5e-3, 40e-3)})
+    >>> found.met, round(1e3 * found.values["height"], 2)  # mm
+    (True, 12.43)
+    """
+    ranges = tuple(Unknown(name, *limits) for name, limits in arguments.ranges("free", free).items())
+    names = tuple(each.name for each in ranges)
+    begin = arguments.table("start", start)
+    for name in begin:
+        check.one_of("start", name, names)
+    if least is not None:
+        check.one_of("least", least, names)
+    tolerance = check.between("tolerance", tolerance, 1e-9, 0.5)
+    maker = Maker.of(objects, names)
+    middle = {each.name: float(each.outside(np.mean(each.bounds))) for each in ranges} | begin
+    for each in ranges:
+        check.between(f"start[{each.name!r}]", middle[each.name], each.low, each.high)
+    wishes = goals.read(wanted, tuple(maker.pieces(middle)))
+    search = _Search(
+        maker, ranges, wishes, least, None if n_modes is None else check.count("n_modes", n_modes, high=MOST_MODES)
+    )
+    first = np.array([float(each.inside(middle[each.name])) for each in ranges])
+    found = search.run(first, tolerance)
+    tries = check.count("tries", tries, high=MOST_TRIES)
+    points = qmc.Sobol(len(ranges), seed=0).random_base2(max(1, math.ceil(math.log2(tries))))
+    low, high = search.bounds
+    for point in points[: tries - 1]:
+        if found.met:
+            break
+        try:
+            other = search.run(low + point * (high - low), tolerance)
+        except (SimulationError, ValueError):
+            continue
+        found = min(found, other, key=lambda each: max(abs(one.miss) for one in each.reached))
+    found = replace(found, n_evaluations=len(search.seen))
+    if not found.met:
+        warnings.warn(found.verdict, ToleranceWarning, stacklevel=promise._callers_level())
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """What the numbers of one point make."""
+
+    values: dict[str, float]
+    pieces: dict[str, Piece]
+    modes: dict[str, Modes]  # of the body, by name of the blow
+    hits: dict[str, Response]
+    found: np.ndarray  # (n_goals,)
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Goals over coordinates of the free numbers, remembered by point."""
+
+    maker: Maker
+    ranges: tuple[Unknown, ...]
+    goals: tuple[Goal, ...]
+    least: str | None
+    n_modes: int | None
+    seen: dict[bytes, Any] = field(default_factory=dict)  # point -> _State, or the error that it met
+    slopes: dict[bytes, np.ndarray] = field(default_factory=dict)
+    bodies: dict[Any, Modes] = field(default_factory=dict)  # by key of the piece and number of modes
+    counts: dict[str, int] = field(default_factory=dict)  # modes of each blow
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        low, high = np.array([each.bounds for each in self.ranges]).T
+        return low, high
+
+    def values(self, x: np.ndarray) -> dict[str, float]:
+        return {each.name: float(np.clip(each.outside(z), each.low, each.high)) for each, z in zip(self.ranges, x)}
+
+    def state(self, x: np.ndarray) -> _State:
+        """What a point makes; raises again the error that it met before."""
+        key = x.tobytes()
+        if key not in self.seen:
+            try:
+                self.seen[key] = self._made(self.values(x))
+            except (SimulationError, ValueError) as error:
+                self.seen[key] = error
+        if isinstance(self.seen[key], Exception):
+            raise self.seen[key]
+        found: _State = self.seen[key]
+        return found
+
+    def _made(self, values: dict[str, float]) -> _State:
+        pieces = self.maker.pieces(values)
+        highest = max((goal.mode for goal in self.goals), default=0)
+        modes: dict[str, Modes] = {}
+        hits: dict[str, Response] = {}
+        for name, piece in pieces.items():
+            struck = any(goal.blow == name and not goal.mode for goal in self.goals)
+            if struck and piece.striker is None:
+                raise ValueError("wanted: a quantity of a blow needs striker, contact, at and speed; objects has none")
+            if struck or name == next(iter(pieces)):
+                count = max(self._count(name, piece) if struck else 0, highest + RIGID if highest else 0)
+                modes[name] = self._body(piece, count)
+            if struck:
+                hits[name] = piece.strike(modes[name], STRIKE)
+        first = next(iter(pieces))
+        found = [_of_modes(modes[first], goal) if goal.mode else _of_hit(hits[goal.blow], goal) for goal in self.goals]
+        return _State(values, pieces, modes, hits, np.array(found))
+
+    def _count(self, name: str, piece: Piece) -> int:
+        """Modes of the body in a blow; the same in all evaluations, so that nothing jumps."""
+        if piece.target.modes is not None:
+            return piece.target.modes.n_modes
+        if self.n_modes is not None:
+            return self.n_modes
+        if name not in self.counts:
+            self.counts[name] = piece.blow.plan(target="modal").n_modes
+        return self.counts[name]
+
+    def _body(self, piece: Piece, count: int) -> Modes:
+        key = (piece.key, count)
+        if piece.key is None or key not in self.bodies:
+            modes = _modes_of(piece, count, FREQUENCY)
+            if piece.key is None:
+                return modes
+            self.bodies[key] = modes
+        return self.bodies[key]
+
+    def slope(self, x: np.ndarray) -> np.ndarray:
+        """Derivatives (n_goals, n_free) of all goals in the values of the free numbers."""
+        key = x.tobytes()
+        if key not in self.slopes:
+            self.slopes[key] = self._slopes(self.state(x))
+        return self.slopes[key]
+
+    def _slopes(self, state: _State) -> np.ndarray:
+        found = np.zeros((len(self.goals), len(self.ranges)))
+        scales = [state.values[each.name] if each.log else each.high - each.low for each in self.ranges]
+        rates = {name: self.maker.rates(state.values, name, scale) for name, scale in zip(self.maker.names, scales)}
+        first = next(iter(state.pieces))
+        tuned = [i for i, goal in enumerate(self.goals) if goal.mode]
+        for j, name in enumerate(self.maker.names if tuned else ()):
+            found[tuned, j] = _mode_slopes(state.modes[first], [self.goals[i] for i in tuned], rates[name][first])
+        for blow, hit in state.hits.items():
+            some = [i for i, goal in enumerate(self.goals) if goal.blow == blow and not goal.mode]
+            labels = [self.goals[i].name for i in some]
+            found[some] = _hit_slopes(hit, labels, state.values, {name: rate[blow] for name, rate in rates.items()})
+        return found
+
+    def run(self, first: np.ndarray, tolerance: float) -> Design:
+        """One search from one point."""
+        low, high = self.bounds
+        inside = np.clip(first, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
+        self.state(inside)  # an error at the start is the user's
+        x = self._least(inside) if self.least is not None else self._squares(inside)
+        state, slopes = self.state(x), self.slope(x)
+        reached = tuple(
+            Reached(goal, float(value), dict(zip(self.maker.names, row.tolist())))
+            for goal, value, row in zip(self.goals, state.found, slopes)
+        )
+        part = (x - low) / (high - low)
+        ends = tuple(each.name for each, p in zip(self.ranges, part) if min(p, 1.0 - p) < AT_END)
+        return Design(
+            MappingProxyType(state.values), reached, tolerance, ends, len(self.seen), self.maker,
+            MappingProxyType(state.hits),
+        )  # fmt: skip
+
+    def _misses(self, x: np.ndarray) -> np.ndarray:
+        try:
+            found = self.state(x).found
+        except (SimulationError, ValueError):
+            return np.full(len(self.goals), LOST)
+        return np.array([goal.miss(value) for goal, value in zip(self.goals, found)])
+
+    def _turned(self, x: np.ndarray) -> np.ndarray:
+        """Derivatives (n_goals, n_free) of the goals over their scale, in the coordinates."""
+        per_value = [1.0 / each.outside(z) if each.log else 1.0 / (each.high - each.low)
+                     for each, z in zip(self.ranges, x)]  # fmt: skip
+        scale = np.array([goal.scale for goal in self.goals])
+        return self.slope(x) / scale[:, None] / np.array(per_value)
+
+    def _squares(self, first: np.ndarray) -> np.ndarray:
+        low, high = self.bounds
+
+        def slopes(x: np.ndarray) -> np.ndarray:
+            return self._turned(x) * (self._misses(x) != 0.0)[:, None]
+
+        found = least_squares(
+            self._misses, first, slopes, (low, high), method="dogbox", x_scale=high - low, xtol=CLOSE, ftol=CLOSE,
+            gtol=CLOSE, max_nfev=ENOUGH,
+        )  # fmt: skip
+        return np.asarray(found.x)
+
+    def _least(self, first: np.ndarray) -> np.ndarray:
+        """The smallest value of one number that meets all goals."""
+        which = self.maker.names.index(self.least or "")
+        unit = np.eye(len(first))[which]
+        low, high = self.bounds
+        sides = []  # a row each: goal, sign and limit over its scale
+        for i, goal in enumerate(self.goals):
+            if goal.exact:
+                sides.append((i, 0.0, goal.low))
+            else:
+                sides += [(i, s, end) for s, end in ((1.0, goal.low), (-1.0, goal.high)) if math.isfinite(end)]
+        constraints = [self._constraint(*side) for side in sides]
+        found = minimize(
+            lambda x: (x[which] - first[which]) / (high[which] - low[which]), first,
+            jac=lambda x: unit / (high[which] - low[which]), bounds=list(zip(low, high)), constraints=constraints,
+            method="SLSQP", options={"maxiter": ENOUGH, "ftol": CLOSE},
+        )  # fmt: skip
+        return np.clip(found.x, low, high)
+
+    def _constraint(self, i: int, sign: float, limit: float) -> dict[str, Any]:
+        goal, factor = self.goals[i], sign or 1.0
+
+        def value(x: np.ndarray) -> float:
+            try:
+                return float(factor * (self.state(x).found[i] - limit) / goal.scale)
+            except (SimulationError, ValueError):
+                return -LOST
+
+        return {
+            "type": "ineq" if sign else "eq", "fun": value, "jac": lambda x: factor * self._turned(x)[i]
+        }  # fmt: skip
+
+
+def _twice(piece: Piece, tolerance: float) -> tuple[Response, Mapping[str, float]]:
+    """A blow by a plan of its own, and its differences from a finer one; modes that were given stay."""
+    if piece.target.modes is None:
+        run = planner.verify(piece.blow.run(tolerance=min(tolerance, piece.arguments.get("tolerance", tolerance))))
+        assert run.verified is not None
+        return run.response, run.verified
+    modes = piece.target.surrounded(piece.target.modes)
+    hit = piece.strike(modes, tolerance)
+    return hit, planner.differences(hit, piece.strike(modes, hit.tolerance / FINER), hit.quantities)
+
+
+def _modes_of(piece: Piece, count: int, tolerance: float) -> Modes:
+    """The first modes of the body as struck."""
+    target = piece.target
+    if target.modes is None and target.source == "auto" and target.section is not None:
+        target = replace(target, source="fe")
+    return target.surrounded(target.find(count, tolerance=tolerance))
+
+
+def _of_modes(modes: Modes, goal: Goal) -> float:
+    """Frequency [Hz] or ratio of frequencies of a goal."""
+    flexible = modes.frequencies[modes.omega > 0.0]
+    if len(flexible) < goal.mode:
+        raise ValueError(f"wanted: mode {goal.mode} needs more modes, the body has {len(flexible)} flexible ones")
+    return float(flexible[goal.mode - 1] / (flexible[0] if goal.ratio else 1.0))
+
+
+def _of_hit(hit: Response, goal: Goal) -> float:
+    """The quantity of a blow."""
+    name, _, band = goal.name.partition("=")
+    if name == "peak_time":
+        return float(hit.time[int(np.argmax(hit.force))])
+    return float(hit.spectral_centroid(float(band)) if band else getattr(hit, name))
+
+
+def _mode_slopes(modes: Modes, some: list[Goal], rate: Rate) -> np.ndarray:
+    """Derivatives (n_goals,) of `_of_modes` in a free number."""
+    asked = np.unique([1, *(goal.mode for goal in some)]) - 1 + modes.n_rigid
+    frequencies = modes.frequencies[asked]
+    slopes = frequencies * rate.numbers.get("target.first_frequency", 0.0) / frequencies[0]
+    if rate.section is not None:
+        slopes = slopes + varied.frequency_slopes(modes, rate.section, asked)
+    which = np.searchsorted(asked, [goal.mode - 1 + modes.n_rigid for goal in some])
+    ratios = np.array([goal.ratio for goal in some])
+    own = frequencies[which] / frequencies[0]
+    return np.where(ratios, (slopes[which] - slopes[0] * own) / frequencies[0], slopes[which])
+
+
+def _hit_slopes(hit: Response, labels: list[str], values: Mapping[str, float], rates: Mapping[str, Rate]) -> np.ndarray:
+    """Derivatives (n_goals, n_free) of quantities of one blow, by the chain rule over its numbers."""
+    numbers = sorted({name for rate in rates.values() for name in rate.numbers})
+    sections: dict[str, tuple[float, SectionChange]] = {
+        name: (values[name], rate.section) for name, rate in rates.items() if rate.section is not None
+    }
+    if not numbers and not sections:
+        return np.zeros((len(labels), len(rates)))
+    marked = {f"free {name}": each for name, each in sections.items()}  # apart from numbers of the blow
+    found = gradient.gradients(hit, labels, (*numbers, *marked), marked)
+    result = np.zeros((len(labels), len(rates)))
+    for i, each in enumerate(found.values()):
+        for j, (name, rate) in enumerate(rates.items()):
+            result[i, j] = sum(each[number] * slope for number, slope in rate.numbers.items())
+            if name in sections:
+                result[i, j] += each[f"free {name}"]
+    return result

@@ -1,0 +1,135 @@
+"""What a small change of a body's section changes in its modes: frequencies, shapes at a point, and its compliance."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._base import check
+from .._base.check import SimulationError
+from ..fe.variation import SectionChange, energies
+from .modal import FieldShapes, Modes
+
+SAME = 1e-6  # [-] modes whose frequencies are nearer than this and their errors count as one frequency
+TERMS = 10  # [-] static solutions that stand for the modes left out; the error falls as (f / f_left_out)**(2 TERMS)
+
+
+@dataclass(frozen=True, eq=False)
+class ModesChange:
+    """Changes per unit of a number, of modes as seen from one point."""
+
+    omega: np.ndarray  # (n_modes,) [rad/s]
+    shape: np.ndarray  # (n_modes,) [kg**-0.5] at the point
+    compliance: float  # [m/N] of the whole body at the point
+
+    __repr__ = check.brief
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+
+
+def solution(modes: Modes) -> FieldShapes:
+    """The finite elements behind modes; SimulationError for modes of other kinds."""
+    if not isinstance(modes.shapes, FieldShapes):
+        raise SimulationError("no derivative in the section: it needs modes of finite elements, of find_modes")
+    if modes.thick and modes.dimension == 2:
+        raise SimulationError("no derivative in the section: that of a thick plate is not known; take a thin one")
+    return modes.shapes
+
+
+def frequency_slopes(modes: Modes, change: SectionChange, which: np.ndarray) -> np.ndarray:
+    """Changes (n,) [Hz] of the frequencies of some modes per unit of a number.
+
+    A frequency that several modes share splits at any change unless all its modes change alike; then it has a
+    derivative, otherwise SimulationError says so.
+    """
+    shapes, omega = solution(modes), modes.omega
+    rate = shapes.system.frame.rate
+    groups = [np.flatnonzero(_alike(modes)[i]) for i in which]
+    used = np.unique(np.concatenate(groups)) if len(groups) else np.zeros(0, int)
+    stiffer, heavier = energies(shapes.system, change, shapes.vectors[:, used])
+    found = np.zeros(len(which))
+    for k, (i, group) in enumerate(zip(which, groups)):
+        own = np.searchsorted(used, group)
+        split = stiffer[np.ix_(own, own)] - (omega[i] / rate) ** 2 * heavier[np.ix_(own, own)]
+        mean = float(np.trace(split)) / len(own)
+        scale = np.abs(np.diag(stiffer)[own]).max() + (omega[i] / rate) ** 2 * np.abs(np.diag(heavier)[own]).max()
+        if np.abs(split - mean * np.eye(len(own))).max() > np.sqrt(SAME) * scale:
+            raise SimulationError(
+                f"no derivative of the frequency {omega[i] / (2.0 * np.pi):.6g} Hz: {len(own)} modes share it, and a "
+                "change splits it; want another frequency, or start from a body without this symmetry"
+            )
+        found[k] = mean * rate**2 / (2.0 * omega[i]) / (2.0 * np.pi) if omega[i] else 0.0
+    return found
+
+
+def _alike(modes: Modes) -> np.ndarray:
+    """Whether each two modes share one frequency, as far as the elements tell, (n_modes, n_modes)."""
+    omega, doubt = modes.omega, SAME if modes.frequency_error is None else SAME + modes.frequency_error
+    unsure = doubt * omega
+    return np.abs(omega - omega[:, None]) <= np.maximum(unsure, np.reshape(unsure, (-1, 1)))
+
+
+def changed(modes: Modes, change: SectionChange, at: np.ndarray) -> ModesChange:
+    """Changes of modes as seen from a point ``at`` (dimension,) [m], exact but for the elements.
+
+    Modes that share a frequency are changed together: only what the point sees of them counts, and that is smooth.
+    """
+    shapes = solution(modes)
+    system, n = shapes.system, modes.n_modes
+    frame, n_rigid = system.frame, modes.n_rigid
+    load = np.asarray(system.interpolate(at[None]).todense()).T  # (n_dofs, 1)
+    seen = (load.T @ shapes.vectors)[0]  # (n_modes,) in the frame
+    square = (modes.omega / frame.rate) ** 2
+    rest = _left_out(shapes, seen, square, load)
+    stiffer, heavier = energies(system, change, np.column_stack([shapes.vectors, *rest]))
+    force = stiffer[:, :n] - heavier[:, :n] * square  # (n + TERMS, n) what a change of each mode is pushed with
+    slope = np.diag(force[:n]).copy()  # of the eigenvalues
+    apart, alike = square - square[:, None], _alike(modes)
+    mix = np.where(alike, -0.5 * heavier[:n, :n], force[:n] / np.where(alike, 1.0, apart))
+    shape = seen @ mix
+    growth = np.array([square**k for k in range(len(rest))])
+    growth[-1] *= _tail(shapes, rest, square)
+    shape -= np.einsum("ki,ki->i", growth, force[n:])
+    for i in np.flatnonzero(alike.sum(axis=0) > 1):
+        group = alike[i]
+        size = float(seen[group] @ seen[group])
+        if i >= n_rigid and size:
+            slope[i] = float(seen[group] @ force[:n][np.ix_(group, group)] @ seen[group]) / size
+    omega = np.zeros(n)
+    omega[n_rigid:] = slope[n_rigid:] * frame.rate**2 / (2.0 * modes.omega[n_rigid:])
+    return ModesChange(omega, shape * frame.mass**-0.5, _softer(shapes, change, at))
+
+
+def _left_out(shapes: FieldShapes, seen: np.ndarray, square: np.ndarray, load: np.ndarray) -> list[np.ndarray]:
+    """Vectors r_k (n_dofs,): the sum over all modes left out of their shape at the load over square**(k+1), times them.
+
+    Their series in powers of a square frequency is how the modes left out answer at that frequency.
+    """
+    flexible = square > 0.0
+    M = shapes.system.M
+    kept = shapes.vectors
+    found = [shapes.flexibility.solve(load)[:, 0] - kept[:, flexible] @ (seen[flexible] / square[flexible])]
+    for _ in range(TERMS - 1):
+        heavy = M @ found[-1]
+        heavy -= M @ (kept @ (kept.T @ heavy))  # rounding of the kept modes would grow
+        found.append(shapes.flexibility.solve(heavy[:, None])[:, 0])
+    return found
+
+
+def _tail(shapes: FieldShapes, rest: list[np.ndarray], square: np.ndarray) -> np.ndarray:
+    """Factor of the last term for all those after it, of which each is about the same fraction of the one before."""
+    heavy = shapes.system.M @ rest[-2]
+    size = float(rest[-2] @ heavy)
+    ratio = float(rest[-1] @ heavy) / size if size > 0.0 else 0.0
+    return 1.0 / np.maximum(1.0 - ratio * square, SAME)
+
+
+def _softer(shapes: FieldShapes, change: SectionChange, at: np.ndarray) -> float:
+    """Change of the static compliance [m/N] of the whole body at a point, per unit of a number."""
+    found = shapes._deflection(at[None])
+    system, dip = found.system, found.vectors[:, 0]
+    load = np.asarray(system.interpolate(at[None]).todense())[0]
+    drift = system.rigid @ (system.rigid.T @ load)  # acceleration of a body that can move rigidly
+    stiffer, heavier = energies(system, change, np.column_stack([dip, drift]))
+    unit = system.frame.mass * system.frame.rate**2
+    return -float(stiffer[0, 0] + 2.0 * heavier[0, 1]) / unit

@@ -1,0 +1,47 @@
+"""What can be wanted, and what is refused with the rule and the value."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from fem_impact.designs import goals
+
+
+def test_values_and_ranges_miss_by_what_lies_outside():
+    value, below, between = goals.read(
+        {"mode1.frequency": 440.0, "contact_time": (None, 2e-3), "restitution": (0.2, 0.4)}, ("",)
+    )
+    assert value.exact and not below.exact
+    assert_allclose([value.miss(444.4), value.miss(435.6)], [0.01, -0.01])
+    assert_allclose([below.miss(1e-3), below.miss(3e-3)], [0.0, 0.5])
+    assert_allclose([between.miss(0.1), between.miss(0.3), between.miss(0.5)], [-0.1, 0.0, 0.1])  # absolute
+    assert (value.unit, below.unit, between.unit) == ("Hz", "s", "")
+    assert below.words == "at most 0.002 s" and between.words == "at least 0.2 and at most 0.4"
+
+
+def test_goals_hold_for_each_blow_or_for_one():
+    found = goals.read(
+        {"mode2.ratio": 4.0, "impulse": 1.0, "loud": {"spectral_centroid=5000": 900.0}}, ("soft", "loud")
+    )
+    labels = [goal.label for goal in found]
+    assert labels == ["mode2.ratio", "soft: impulse", "loud: impulse", "loud: spectral_centroid=5000"]
+    assert found[0].ratio and found[0].mode == 2 and found[3].mode == 0
+
+
+@pytest.mark.parametrize(
+    "wanted, words",
+    [
+        ({}, "wanted must name at least one quantity"),
+        ([("impulse", 1.0)], "wanted must be a dict of names"),
+        ({"impuls": 1.0}, "wanted must be one of .*'impuls'"),
+        ({"impulse": (2.0, 1.0)}, r"wanted\['impulse'\] must be a range \(low, high\), got \(2, 1\)"),
+        ({"impulse": (None, None)}, "must be a number or a range .* None leaves an end open"),
+        ({"impulse": np.nan}, r"wanted\['impulse'\]"),
+        ({"impulse=5": 1.0}, "impulse has no band, write 'impulse'"),
+        ({"spectral_centroid": 1.0}, "needs a band in Hz, such as 'spectral_centroid=5000'"),
+        ({"loud": {"impulse": 1.0}}, "the blow in wanted must be one of"),
+    ],
+)
+def test_what_cannot_be_wanted_is_said(wanted, words):
+    with pytest.raises(ValueError, match=words):
+        goals.read(wanted, ("",))

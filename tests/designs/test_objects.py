@@ -1,0 +1,63 @@
+"""Bodies and blows made from numbers: their numbers, and how these change with the free ones."""
+
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.designs.objects import Maker
+
+WOOD = fi.Material(E=16e9, nu=0.35, rho=900.0)
+
+
+def blow(values):
+    """A bar whose height, mallet and speed follow from two numbers."""
+    section = fi.Beam.rectangular(WOOD, width=0.05, height=lambda x: values["height"] * (1.0 + x[:, 0]))
+    return {
+        "mesh": fi.mesh.line(0.35), "section": section, "striker": fi.Striker.stick(values["mass"], 3e3, n_modes=3),
+        "contact": fi.Contact.hertz(1e6 * values["mass"] ** 2), "at": 0.1, "speed": 2.0 - values["mass"],
+    }  # fmt: skip
+
+
+def test_numbers_change_by_the_chain_rule():
+    maker = Maker.of(blow, ("height", "mass"))
+    values = {"height": 0.02, "mass": 0.05}
+    mass = maker.rates(values, "mass", 0.05)[""]
+    assert mass.section is None
+    assert set(mass.numbers) == {"striker.mass", "contact.stiffness", "strike.speed"}
+    # differences of fourth order with a step of 1e-5: rounding alone
+    assert_allclose([mass.numbers[name] for name in ("striker.mass", "contact.stiffness", "strike.speed")],
+                    [1.0, 1e5, -1.0], rtol=1e-9)  # fmt: skip
+    height = maker.rates(values, "height", 0.02)[""]
+    assert height.section is not None and not height.numbers
+
+
+def test_one_sided_where_the_other_side_makes_nothing():
+    maker = Maker.of(lambda values: fi.Modes.rigid(values["mass"] ** 2 if values["mass"] <= 2.0 else -1.0), ("mass",))
+    found = maker.rates({"mass": 2.0}, "mass", 1.0)[""]
+    assert_allclose(found.numbers["target.mass"], 4.0, rtol=1e-9)
+
+
+def test_a_scene_and_a_function_make_the_same_pieces():
+    path = "studies/scenes/marimba_bar.toml"
+    one = Maker.of(path, ("striker.mass",)).pieces({"striker.mass": 0.02})[""]
+    two = Maker.of(fi.load_scene(path), ("striker.mass",)).pieces({"striker.mass": 0.02})[""]
+    assert one.numbers == two.numbers and one.numbers["striker.mass"] == 0.02
+    assert one.key == two.key  # the body is the same, and found once
+
+
+@pytest.mark.parametrize(
+    "objects, words",
+    [
+        (3, "objects must be a scene, the path of one, or a function"),
+        (lambda values: 3, "must return a System, Modes, a dict of arguments"),
+        (lambda values: {"target": fi.Modes.rigid(1.0), "striker": fi.Striker.rigid(1.0)}, "contact must be"),
+        (
+            lambda values: {"target": fi.Modes.rigid(1.0), "striker": fi.Striker.rigid(1.0),
+                            "contact": fi.Contact.hertz(1e6), "at": None},
+            "needs speed, an argument of strike",
+        ),
+    ],
+)  # fmt: skip
+def test_what_makes_no_blow_is_said(objects, words):
+    with pytest.raises(ValueError, match=words):
+        Maker.of(objects, ()).pieces({})

@@ -1,0 +1,116 @@
+"""What a changed section changes in modes: powers of uniform bodies, and differences of modes found again."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.fe.variation import DIFFERENCES, SectionChange
+from fem_impact.modes import varied
+
+WOOD = fi.Material(E=16e9, nu=0.35, rho=900.0)
+AT = np.array([0.15])
+
+
+def along(made, value, step):
+    multiples, weights = DIFFERENCES[0]
+    return SectionChange(tuple(made(value + step * k) for k in multiples), tuple(w / step for w in weights))
+
+
+def uniform(height):
+    return fi.Beam.rectangular(WOOD, width=0.055, height=height)
+
+
+def undercut(middle):
+    return fi.Beam.rectangular(
+        WOOD, width=0.055, height=lambda x: 0.022 - (0.022 - middle) * np.sin(np.pi * x[:, 0] / 0.35) ** 2
+    )
+
+
+def modes_of(section, theory=None, ends=None, count=10):
+    return fi.find_modes(fi.assemble(fi.mesh.line(0.35), section, ends, theory=theory), n_modes=count)
+
+
+@pytest.mark.parametrize("ends", [None, {"left": "clamped"}])
+def test_a_uniform_bar_changes_by_powers(ends):
+    height = 0.02
+    modes = modes_of(uniform(height), ends=ends)
+    found = varied.changed(modes, along(uniform, height, 1e-4), AT)
+    assert_allclose(found.omega, modes.omega / height, rtol=1e-8)
+    row = modes.shapes.at(AT[None])[0]
+    assert_allclose(found.shape, -0.5 * row / height, rtol=1e-8, atol=1e-8 * np.abs(row).max() / height)
+    compliance = modes.shapes.compliance(AT[None])[0, 0]
+    assert_allclose(found.compliance, -3.0 * compliance / height, rtol=1e-8)
+    slopes = varied.frequency_slopes(modes, along(uniform, height, 1e-4), np.array([5, 6]))
+    assert_allclose(slopes, modes.frequencies[5:7] / height, rtol=1e-8)
+
+
+@pytest.mark.parametrize("theory", ["euler", pytest.param("timoshenko", marks=pytest.mark.slow)])
+def test_an_undercut_changes_modes_by_differences(theory):
+    value, step = 9e-3, 2e-5
+    change = varied.changed(modes_of(undercut(value), theory), along(undercut, value, 1e-5), AT)
+    sides = [modes_of(undercut(value + k * step), theory) for k in DIFFERENCES[0][0]]
+    weights = np.array(DIFFERENCES[0][1]) / step
+
+    def difference(of):
+        return sum(weight * of(side) for weight, side in zip(weights, sides))
+
+    now = modes_of(undercut(value), theory)
+    assert_allclose(change.omega, difference(lambda each: each.omega), rtol=1e-6, atol=1e-6)  # fourth order
+    squares = difference(lambda each: each.shapes.at(AT[None])[0] ** 2)
+    found = 2.0 * now.shapes.at(AT[None])[0] * change.shape
+    assert_allclose(found[:2].sum(), squares[:2].sum(), rtol=1e-7)  # rigid motions may turn into one another
+    # the last mode is next to those left out, of which ten static solutions tell
+    assert_allclose(found[2:-1], squares[2:-1], rtol=1e-4, atol=1e-5 * np.abs(squares).max())
+    assert_allclose(found[-1], squares[-1], atol=1e-3 * np.abs(squares).max())
+    exact = difference(lambda each: each.shapes.compliance(AT[None])[0, 0])
+    assert_allclose(change.compliance, exact, rtol=1e-6)
+
+
+def square_plate(values):
+    return fi.Plate(WOOD, thickness=lambda x: 3e-3 * (1.0 + values * x[:, 0]))
+
+
+@pytest.mark.slow
+def test_modes_that_share_a_frequency_answer_a_blow_smoothly_and_have_no_single_derivatives():
+    """Of a pair, any turned basis is as good: what the point feels of it must not depend on which was found."""
+    square = fi.mesh.rectangle(0.3, 0.3, size=0.06)
+    modes = fi.find_modes(fi.assemble(square, square_plate(0.0), {"boundary": "hinged"}), n_modes=6)
+    change, at = along(square_plate, 0.0, 1e-3), np.array([0.07, 0.11])
+    found = varied.changed(modes, change, at)
+    angle = 0.4
+    turn = np.eye(6)
+    turn[1:3, 1:3] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    shapes = modes.shapes
+    other = type(shapes)(shapes.system, shapes.vectors @ turn, shapes.flexibility)
+    turned = varied.changed(fi.Modes(modes.omega, modes.damping_ratio, other, modes.mass), change, at)
+    rows = modes.shapes.at(at[None])[0], turned_row(shapes, turn, at)
+    for one, row in zip((found, turned), rows):
+        felt = float((row[1:3] ** 2) @ one.omega[1:3]), float(row[1:3] @ one.shape[1:3])
+        assert_allclose(
+            felt, (float((rows[0][1:3] ** 2) @ found.omega[1:3]), float(rows[0][1:3] @ found.shape[1:3])), rtol=1e-9
+        )
+    with pytest.raises(fi.SimulationError, match="2 modes share it, and a change splits it"):
+        varied.frequency_slopes(modes, along(wedge, 0.0, 1e-3), np.array([1]))
+    whole = varied.frequency_slopes(modes, along(lambda h: fi.Plate(WOOD, h), 3e-3, 1e-5), np.array([0, 1, 2]))
+    assert_allclose(whole, modes.frequencies[:3] / 3e-3, rtol=1e-8)  # alike for both of a pair
+
+
+def turned_row(shapes, turn, at):
+    return shapes.at(at[None])[0] @ turn
+
+
+def wedge(values):
+    """A groove across: stiffer for one mode of the pair (2, 1), (1, 2) than for the other."""
+    return fi.Plate(WOOD, thickness=lambda x: 3e-3 * (1.0 + values * np.sin(np.pi * x[:, 0] / 0.3) ** 2))
+
+
+def test_other_modes_say_why_they_have_none():
+    closed = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=5)
+    with pytest.raises(fi.SimulationError, match="needs modes of finite elements, of find_modes"):
+        varied.solution(closed)
+    thick = fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.2), fi.Plate(WOOD, 0.02), theory="mindlin")
+    with pytest.raises(fi.SimulationError, match="that of a thick plate is not known; take a thin one"):
+        varied.solution(fi.find_modes(thick, n_modes=4))
+    thin = fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.2), fi.Plate(WOOD, 0.02))
+    assert varied.solution(fi.find_modes(thin, n_modes=4)).vectors.shape[1] == 4
