@@ -343,12 +343,14 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
     inherited = sum(differ(_run(_joined(other, contacts), ran, size, pace, *last), coarse) for other in others)
     parted = {"truncation": truncation, "mesh": mesh_error, "inherited": inherited}
     for i, body in enumerate(bodies):
+        before = history
         for cause, other in body.poorer.items():
             poorer = [*parts[:i], _poorer(parts[i], other), *parts[i + 1 :]]
             try:
                 # in fine steps, because the fastest modes of two descriptions differ, and so do their step errors
                 less = _run(_joined(poorer, contacts), ran, step, pace, *last)
-                parted[cause] += max(differ(less, history), float(_may_touch(history, less, pace[0])))
+                parted[cause] += max(differ(less, before), float(_may_touch(before, less, pace[0])))
+                before = less
             except SimulationError:  # the poorer body cannot be followed, so it tells nothing
                 parted[cause] += 1.0
     error = Error(step_error, **parted, resolvable=resolvable, sensitivity=_sensitivity(coarse, history))

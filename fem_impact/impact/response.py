@@ -4,6 +4,7 @@ import html
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -696,9 +697,9 @@ class Response(Totals):
             return float("inf")
         if len(times) > LOOKED_AT:
             times = times[np.linspace(0, len(times) - 1, LOOKED_AT).astype(int)]
-        one, *others = (getattr(blow, name)(points, times) for blow in self._seen)
-        largest = float(np.abs(one).max(initial=0.0))
-        apart = sum(float(np.abs(one - other).max(initial=0.0)) for other in others)
+        told = [getattr(blow, name)(points, times) for blow in self._seen]
+        largest = float(np.abs(told[0]).max(initial=0.0))
+        apart = sum(float(np.abs(one - other).max(initial=0.0)) for one, other in pairwise(told))
         return apart / largest if largest else 0.0
 
     def _told(self, points: Any, times: Any, body: int, name: str) -> bool:

@@ -163,7 +163,8 @@ class Seen:
         with self.stages("vectors"):
             found = fine.modes(self.count)
             if coarse is not None:
-                other = replace(coarse.modes(self.count), poorer={})
+                few = found.poorer.get("truncation", found)  # as many vectors on either mesh
+                other = coarse.pairs(few.n_modes - coarse.system.rigid.shape[1])
                 found = replace(found, poorer={**found.poorer, "mesh": other})
         found = self.target.finished_vectors(found)
         return found, folded(found, cutoff, self.margin)
@@ -171,12 +172,14 @@ class Seen:
     def improved(self, error: Error, allowed: float) -> bool:
         """Take more vectors or a finer mesh, whichever the error of a blow calls for; False if neither is possible."""
         first = self.coarse is None  # the mesh is compared only when there are vectors enough
-        few = error.truncation > SHARE * allowed if first else error.truncation > error.mesh
         if not first and error.truncation + error.mesh <= allowed:
             return False
+        share = SHARE * allowed if first else allowed - error.mesh
+        much = error.truncation / share if share > 0.0 else np.inf
+        few = much > 1.0 and (first or error.truncation > error.mesh or much < MORE[1] ** FALLING)
         self.spent = self.spent or (few and (self.count >= MOST_VECTORS or self._stuck(error.truncation)))
         if few and not self.spent:
-            more = np.clip((error.truncation / (SHARE * allowed)) ** (1.0 / FALLING), *MORE) if first else MORE[1]
+            more = np.clip(much ** (1.0 / FALLING), *MORE)
             self.count, self.margin = min(MOST_VECTORS, round(more * self.count)), NOTCH * self.margin
             return True
         if first:

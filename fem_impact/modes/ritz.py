@@ -27,6 +27,7 @@ from .modal import Damping, Modes, Shapes, damping_notes, damping_ratios
 PIECE = 2**20  # [byte] of earlier vectors taken at a time: fits into the cache of a core
 DRIFT = 1e-12  # [-] overlap with earlier vectors above which they are removed more often
 DEPENDENT = 1e-10  # [-] a new vector shorter than this fraction of its length before orthogonalisation adds nothing
+ROOM = 2.0  # [-] vectors that there is room for, over those wanted: taking more later copies all
 FEWER = 0.7  # [-] fraction of the vectors with which a second blow tells the error of having no more
 
 
@@ -124,14 +125,16 @@ class Krylov:
             overlap = self._carried.T @ self._next  # in exact arithmetic only the two latest blocks overlap
             self.projected[before:end, start:end] = overlap[:, : end - start]
             new = self._next - self.vectors[before:end].T @ overlap
-            new = new - self.system.rigid @ (self._moving.T @ new)
+            if self._moving.shape[1]:
+                new = new - self.system.rigid @ (self._moving.T @ new)
             self._due -= 1
             if end and self._due <= 0:
                 new = self._cleared(new)
             heavy = M @ new
             gram = new.T @ heavy
             length = np.sqrt((overlap**2).sum(axis=0) + gram.diagonal())  # before `overlap` was removed
-            value, turn = np.linalg.eigh(gram / np.outer(length, length))
+            scaled = gram / np.outer(length, length)
+            value, turn = np.linalg.eigh(scaled) if self.width > 1 else (scaled[0], np.ones((1, 1)))
             kept = value > DEPENDENT**2
             if not kept.any():
                 self.full = True
@@ -147,9 +150,9 @@ class Krylov:
             self._next = self._solve(latest)
 
     def _make_room(self, count: int) -> None:
-        """Take memory for so many vectors."""
-        more = count - len(self.vectors)
-        if more > 0:
+        """Take memory for so many vectors, and for more to come: it is not used until they do."""
+        if count > len(self.vectors):
+            more = int(ROOM * count) - len(self.vectors)
             self.vectors = np.concatenate([self.vectors, np.empty((more, self.system.n_dofs))])
             self.projected = np.pad(self.projected, (0, more))
 
@@ -207,18 +210,20 @@ class Krylov:
         return inverse
 
     def modes(self, count: int, damping_ratio: Damping = 0.0) -> Modes:
-        """Ritz pairs of the first ``count`` vectors, after the rigid motions, which are exact.
+        """`pairs` of the first ``count`` vectors.
 
         `Modes.poorer` holds those of fewer vectors, so that a blow states the error of having no more.
         """
+        found = self.pairs(count, damping_ratio)
+        if count >= self.count and self.full:
+            return found
+        fewer = max(self.width, int(FEWER * min(count, self.count)))
+        return replace(found, poorer={"truncation": self.pairs(fewer, damping_ratio)})
+
+    def pairs(self, count: int, damping_ratio: Damping = 0.0) -> Modes:
+        """Ritz pairs of the first ``count`` vectors, after the rigid motions, which are exact."""
         self.grow(count)
         count = min(count, self.count)
-        found = self._pairs(count, damping_ratio)
-        if count == self.count and self.full:
-            return found
-        return replace(found, poorer={"truncation": self._pairs(max(self.width, int(FEWER * count)), damping_ratio)})
-
-    def _pairs(self, count: int, damping_ratio: Damping) -> Modes:
         frame, rigid = self.system.frame, self.system.rigid
         value, turn = self._eigenpairs(count)
         omega = np.concatenate([np.zeros(rigid.shape[1]), np.sqrt(np.maximum(value, 0.0)) * frame.rate])

@@ -353,7 +353,7 @@ def described(grid: Grid, numbers: np.ndarray, workers: int | None = None) -> np
     cell has the error of the nearest of them. Too few vectors may agree on a final separation that is none; therefore
     cells with several impacts are also struck alone, because `strike` looks for that.
     """
-    causes = {cause for modes in grid.base.views.values() for cause in modes.poorer}
+    causes = list(dict.fromkeys(cause for modes in grid.base.views.values() for cause in modes.poorer))
     if not causes:
         return np.zeros(grid.shape)
     most = DOUBTED[grid.quick]
@@ -364,9 +364,11 @@ def described(grid: Grid, numbers: np.ndarray, workers: int | None = None) -> np
     names = [grid.layers.index(name) for name in few.layers]
     mine = numbers.reshape(-1, *grid.shape)[np.ix_(np.array(names), *chosen)]
     total = np.zeros(few.shape)
-    for cause in sorted(causes):
+    before = mine
+    for cause in causes:
         other, _ = solve(replace(few, base=grid.base.poorer(cause), kernels={}), 0, few.n_cases, workers=workers)
-        total += _apart(few.layers, mine, other.reshape(mine.shape))
+        before, better = other.reshape(mine.shape), before
+        total += _apart(few.layers, better, before)
     several = np.flatnonzero(mine[few.layers.index("n_impacts")] > 1)
     several = several[:: max(1, -(-len(several) // DOUBTED[False]))]
     with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
