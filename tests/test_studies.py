@@ -1,12 +1,15 @@
 """The studies still reproduce what they were made to show."""
 
 import importlib.util
+import re
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 STUDIES = Path(__file__).parents[1] / "studies"
+sys.path.append(str(STUDIES))  # for what they share
 
 
 def study(name):
@@ -166,3 +169,20 @@ def test_a_stiffer_hand_buzzes_faster_and_a_damped_one_stops_sooner(monkeypatch)
     omega = np.sqrt(1000.0 / (roll.STICK / 3.0))
     assert roll.alone(1e-6) == pytest.approx(roll.FORCE / (2.0 * roll.SPEED * roll.STICK / 3.0))  # F / 2 m v
     assert roll.alone(1000.0) > 0.5 * omega / (0.5 * np.pi)  # half a swing at most
+
+
+def test_studies_save_pictures_in_the_format_of_the_command(tmp_path):
+    drawing = study("drawing")
+    arguments = ["fig05.py", "--format", "svg", "out"]
+    assert drawing.taken(arguments) == ".svg" and arguments == ["fig05.py", "out"]
+    arguments = ["fig05.py", "out", "--format=pdf"]
+    assert drawing.taken(arguments) == ".pdf" and arguments == ["fig05.py", "out"]
+    assert drawing.taken(["fig05.py"]) == ".png"
+    with pytest.raises(SystemExit, match="--format must be one of png, pdf, svg, got 'bmp'"):
+        drawing.taken(["fig05.py", "--format", "bmp"])
+
+
+def test_every_picture_of_a_study_is_saved_in_one_place():
+    for path in STUDIES.glob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        assert path.name == "drawing.py" or not re.search(r"savefig\(|figures\.save\(", text), path.name
