@@ -31,6 +31,7 @@ from .display import Display
 
 BAD_INPUT, FAILED, MISSED, INTERRUPTED = 2, 1, 3, 130  # exit statuses, as Unix tools use them; 130 is 128 + SIGINT
 WIDEST = 88  # [-] columns: printed text is never wider, and narrower on a narrow terminal
+FORMATS = ("png", "pdf", "svg")  # of pictures
 MOTION_TIMES = 100  # [-] instants in motion.pvd: four seconds at 25 per second
 SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` writes any number
 
@@ -224,6 +225,7 @@ def _parser() -> argparse.ArgumentParser:
         help="write radiated.wav, the sound the plate radiates to this point [m]; Z is the height above the plate; "
         "repeatable; of two also stereo.wav",
     )  # fmt: skip
+    _add_format(add)
     add("--duration", metavar="S", type=float, help="length of the sounds [s] (default: by their decay)")
     add("--normalise", action="store_true", help="scale each sound to a peak of 1.0")
     add("--json", action="store_true", help="print the contents of response.json instead of the summary")
@@ -247,8 +249,9 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     add("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
     add(
-        "--format", choices=("nc", "zarr"), default="nc", help="format of the numbers: map.nc or map.zarr (default: nc)"
-    )
+        "--format", choices=("nc", "zarr", *FORMATS), action="append", default=[],
+        help="format of the numbers, nc or zarr, or of the pictures, png, pdf or svg; repeatable (default: nc and png)",
+    )  # fmt: skip
     add("--workers", metavar="N", type=int, help="number of threads (default: one per core)")
     add("--cluster", metavar="ADDRESS", help="run on the Dask cluster whose scheduler has this address")
     add("--store", metavar="DIR", type=_place, help="keep finished cells there; an interrupted run continues from them")
@@ -268,6 +271,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--cluster", metavar="ADDRESS", help="run on the Dask cluster whose scheduler has this address")
     add("--store", metavar="DIR", type=_place, help="keep finished blows there; an interrupted run continues from them")
     add("--out", metavar="DIR", type=_place, help="folder for spread.json, .nc, .csv and .png (default: out/NAME)")
+    _add_format(add)
     add("--json", action="store_true", help="print the contents of spread.json instead of the summary")
 
     add = verb(
@@ -281,6 +285,7 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     add("--masses", metavar="KG", type=float, nargs="+", help="masses of the hammers [kg] (default: 1 g to 1 kg)")
     add("--out", metavar="FILE", type=_place, help="write a picture to this file: .png, .pdf or .svg")
+    _add_format(add, None)
     add("--json", action="store_true", help="print the numbers as JSON")
 
     add = verb(
@@ -304,6 +309,7 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     add("--unit", metavar="U", help="unit of the numbers in the file: m, cm, mm, um, in or km (default: the file's)")
     add("--out", metavar="FILE", type=_place, help="draw elements and named edges to this file: .png, .pdf or .svg")
+    _add_format(add, None)
 
     verb(_schema, "schema", "print a JSON schema of scenes, by which editors complete and check them", scene="")
 
@@ -316,6 +322,18 @@ def _parser() -> argparse.ArgumentParser:
     add("shell", choices=("bash", "zsh", "tcsh"), nargs="?", default="bash", help="default: bash")
     _add_taps(verb)
     return parser
+
+
+def _add_format(add: Any, default: str | None = FORMATS[0]) -> None:
+    """Add the option that sets the format of all pictures; without a default, the ending of --out sets it."""
+    said = "by the ending of --out" if default is None else default
+    add("--format", choices=FORMATS, default=default, help=f"format of the pictures (default: {said})")
+
+
+def _drawn(options: argparse.Namespace) -> Path | None:
+    """The picture to write, with the ending of the format asked for."""
+    named = options.out is not None and options.format is not None
+    return options.out.with_suffix(f".{options.format}") if named else options.out
 
 
 def _add_choices(add: Any) -> None:
@@ -405,17 +423,17 @@ def _write(
     from .show import sampling
     from .show.canvas import NAMES
 
-    response, files = run.response, ["response.json", "force.csv", "force.png"]
+    response, files = run.response, ["response.json", "force.csv", f"force.{options.format}"]
     extra: dict[str, Any] = {}
     if run.plan.target == "vectors" and response.ringing is None:
         with stages("modes"):
             response = response.on(response.target)
     drawn = painter is not None and run.rings
     if drawn:
-        painter.begin(folder, response)
+        painter.begin(folder, response, options.format)
     with stages("files"):
         fi.export.write_force(folder / "force.csv", response)
-        fi.figures.save(folder / "force.png", fi.figures.force(response))
+        fi.figures.save(folder / f"force.{options.format}", fi.figures.force(response))
     if run.rings:
         with stages("files"):
             fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=SHAPES_WRITTEN))
@@ -437,7 +455,7 @@ def _write(
                 missing = painter.finish()
             if missing:
                 _tell(f"pictures are drawn in two dimensions; {missing}")
-            files += NAMES
+            files += [*(f"{name}.{options.format}" for name in NAMES), "wave.gif"]
     if run.verified is not None:
         extra["verified"] = run.verified
     changes = {name: value for name, value in run.plan.changes.items() if name in ("tolerance", "quantity")}
@@ -466,12 +484,13 @@ def _play(options: argparse.Namespace, scene: Any) -> bool:
         found = scene.play(watch=display, strict=options.strict, **_choices(options))
         with stages("files"):
             fi.export.write_force(staging / "force.csv", found)
-            fi.figures.save(staging / "force.png", fi.figures.force(found))
+            fi.figures.save(staging / f"force.{options.format}", fi.figures.force(found))
             fi.export.write_vtk(staging / "modes.pvd", found.target.truncated(n_modes=SHAPES_WRITTEN))
         with stages("sound"):
             sounds = hearing.write(staging, scene, found, duration=options.duration, normalise=options.normalise)
         tables, copies = scene.kept(staging, tolerance=found.tolerance)
-        names = ["response.json", "force.csv", "force.png", "modes.pvd", *(each["file"] for each in sounds), *copies]
+        pictures = [f"force.{options.format}"]
+        names = ["response.json", "force.csv", *pictures, "modes.pvd", *(each["file"] for each in sounds), *copies]
         seconds = {**stages.seconds, "total": time.perf_counter() - began}
         data = {**sequence.numbers(found, tables, seconds), "sounds": sounds, "files": names}
         fi.export.write_json(staging / "response.json", data)
@@ -504,7 +523,8 @@ def _map(options: argparse.Namespace) -> None:
     from .scenes import maps  # imported only when needed
 
     began = time.perf_counter()
-    maps.can_write(options.format, options.out)
+    chosen = {word in FORMATS: word for word in options.format}  # of pictures and of numbers
+    form, picture = maps.can_write(chosen.get(False, "nc"), options.out), chosen.get(True, FORMATS[0])
     scene = fi.load_scene(options.scene)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     with fi.export.staged(folder) as staging:
@@ -516,7 +536,7 @@ def _map(options: argparse.Namespace) -> None:
                 stage=display,
             )  # fmt: skip
         with display("files"):
-            names = maps.write(staging, table, options.format)
+            names = maps.write(staging, table, form, picture)
     axes = ", ".join(f"{name} ({size})" for name, size in table.sizes.items())
     single, failed = int((table.n_impacts == 1).sum()), int((table.n_impacts < 0).sum())
     _say(_title(scene), f"{table.n_impacts.size} blows over {axes}: {single} hit once, {failed} failed")
@@ -550,7 +570,7 @@ def _spread(options: argparse.Namespace) -> None:
                 store=options.store, watch=partial(display.report, "blows"),
             )  # fmt: skip
         with display("files"):
-            names = uncertainty.write(staging, found)
+            names = uncertainty.write(staging, found, options.format)
     if options.json:
         _print_json({**found.data(), "versions": fi.export.versions()})
         return
@@ -572,12 +592,13 @@ def _hammer(options: argparse.Namespace) -> None:
     from .show import plots  # imported only when needed
 
     scene = fi.load_scene(options.scene)
+    drawn = _drawn(options)
     masses = options.masses or [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]
     with Display(_tell)("hammers"):
         hammers = maps.hammers_for(scene, options.bandwidth, masses, drop=options.drop)
-        if options.out is not None:
-            options.out.parent.mkdir(parents=True, exist_ok=True)
-            fi.figures.save(options.out, plots.hammers(hammers, options.bandwidth, options.drop))
+        if drawn is not None:
+            drawn.parent.mkdir(parents=True, exist_ok=True)
+            fi.figures.save(drawn, plots.hammers(hammers, options.bandwidth, options.drop))
     if options.json:
         data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [hammer.data() for hammer in hammers]}
         _print_json({**data, "versions": fi.export.versions()})
@@ -604,8 +625,8 @@ def _hammer(options: argparse.Namespace) -> None:
     idle = ", ".join(f"{1e3 * hammer.mass:.4g} g" for hammer in hammers if not hammer.works)
     if idle:
         _say(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; try lighter hammers")
-    if options.out is not None:
-        _say(f"Files: {options.out}")
+    if drawn is not None:
+        _say(f"Files: {drawn}")
 
 
 def _report(options: argparse.Namespace) -> bool:
@@ -671,6 +692,7 @@ def _new(options: argparse.Namespace) -> None:
 def _mesh(options: argparse.Namespace) -> None:
     from .mesh import edge_table  # imported only when needed
 
+    drawn = _drawn(options)
     ending = options.scene.suffix.lower()
     with Display()("mesh"):
         if ending == ".toml":
@@ -680,9 +702,9 @@ def _mesh(options: argparse.Namespace) -> None:
         else:
             read = fi.mesh.outline if ending in (".svg", ".dxf") else fi.mesh.load
             mesh = read(options.scene, unit=options.unit)
-        if options.out is not None:
-            options.out.parent.mkdir(parents=True, exist_ok=True)
-            fi.figures.save(options.out, fi.figures.edges(mesh))
+        if drawn is not None:
+            drawn.parent.mkdir(parents=True, exist_ok=True)
+            fi.figures.save(drawn, fi.figures.edges(mesh))
     _say(str(options.scene))
     _print_notes(mesh.notes)
     _print_table(edge_table.rows(mesh))
@@ -693,8 +715,8 @@ def _mesh(options: argparse.Namespace) -> None:
         for edge in edge_table.edges(mesh)
     ]  # fmt: skip
     _print_table(rows, ("edge", "length", "facets", "form", "half way at", "the same as"))
-    if options.out is not None:
-        _say(f"Files: {options.out}")
+    if drawn is not None:
+        _say(f"Files: {drawn}")
 
 
 def _schema(options: argparse.Namespace) -> None:

@@ -29,6 +29,7 @@ from pathlib import Path
 import matplotlib
 
 matplotlib.use("Agg")
+import drawing
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -248,8 +249,7 @@ def draw(cases: list[Case], path: Path) -> None:
     right.set(xlabel="tolerance", ylabel="true error", xlim=(5e-7, 2e-1))
     for axes in (left, right):
         axes.legend(frameon=False)
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
+    drawing.save(path, figure, dpi=120)
 
 
 def main() -> None:

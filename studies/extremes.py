@@ -24,6 +24,7 @@ from pathlib import Path
 import matplotlib
 
 matplotlib.use("Agg")
+import drawing
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -158,8 +159,7 @@ def draw(found: list[Outcome], path: Path) -> None:
     labels = [f"{row}  {min(values):.0e} ... {max(values):.0e}" for row, values in zip(rows, ends)]
     axis.set(yticks=range(len(rows)), yticklabels=labels, xticks=[], xlabel="from the smallest to the largest value")
     axis.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=4)
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
+    drawing.save(path, figure, dpi=120)
 
 
 def main() -> None:

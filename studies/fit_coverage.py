@@ -21,6 +21,7 @@ from pathlib import Path
 import matplotlib
 
 matplotlib.use("Agg")
+import drawing
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.stats import beta
@@ -238,8 +239,7 @@ def draw(rows: list[dict], path: Path) -> None:
     right.set_yticks(range(3), ["intervals hold\nthe truth", "unidentifiable,\ncalled so", "false\nalarms"])
     right.set(xlabel="share [%], with its 95 % range; green: the aim", xlim=(-2, 102))
     right.invert_yaxis()
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
+    drawing.save(path, figure, dpi=150)
 
 
 def main(arguments: list[str] | None = None) -> list[dict]:

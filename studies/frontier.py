@@ -25,6 +25,7 @@ from pathlib import Path
 import matplotlib
 
 matplotlib.use("Agg")
+import drawing
 import matplotlib.pyplot as plt
 import numpy as np
 import scene_speed
@@ -225,8 +226,7 @@ def draw(panels: dict[str, list[Point]], found: list[Dial], path: Path) -> None:
     for axis in axes.flat:
         axis.legend(frameon=False, fontsize=8)
         axis.grid(alpha=0.3)
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
+    drawing.save(path, figure, dpi=120)
 
 
 def main() -> None:

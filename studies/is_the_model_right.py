@@ -20,6 +20,7 @@ from pathlib import Path
 import matplotlib
 
 matplotlib.use("Agg")
+import drawing
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import ListedColormap
@@ -146,8 +147,7 @@ def draw(results: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]], path: Pa
     patches.append(plt.Rectangle((0, 0), 1, 1, color="#e6e6e6"))
     names = [*(ALL[i] for i in sorted(drawn)), "below 0.01 %, or not computed"]
     figure.legend(patches, names, loc="outside lower center", ncols=len(names), frameon=False, fontsize=9)
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    drawing.save(path, figure, dpi=130)
 
 
 def stretched(path: Path) -> None:
@@ -181,8 +181,7 @@ def stretched(path: Path) -> None:
     two.set(xlabel="speed [m/s]", ylabel="change of the restitution [-]", ylim=(0.1 * true.min(), 2.0))
     for axes in (one, two):
         axes.legend(frameon=False, fontsize=9)
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    drawing.save(path, figure, dpi=130)
 
 
 def everyday() -> list[dict[str, str]]:

@@ -19,6 +19,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import matplotlib
 
 matplotlib.use("agg")
+import drawing
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
@@ -168,7 +169,7 @@ def draw(rows, path):
     axes.grid(alpha=0.3)
     axes.legend()
     figure.tight_layout()
-    figure.savefig(path, dpi=150)
+    drawing.save(path, figure, dpi=150)
 
 
 def main():

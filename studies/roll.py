@@ -110,7 +110,7 @@ def draw(found):
     ]
     figure = plots.curves(
         drawn,
-        x=plots.Axis("stiffness of the hand at the tip", "N/m", log=True, limits=(None, 6e3)),
+        x=plots.Axis("stiffness of the hand at the tip", "N/m", log=True),
         y=plots.Axis("bounces", "Hz", limits=(0.0, 130.0)),
         title="Buzz of a stick of 50 g, pressed with 1.5 N",
     )

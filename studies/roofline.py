@@ -16,6 +16,7 @@ from pathlib import Path
 import matplotlib
 
 matplotlib.use("Agg")
+import drawing
 import matplotlib.pyplot as plt
 import numba
 import numpy as np
@@ -162,7 +163,7 @@ def main() -> None:
     axes.grid(alpha=0.3)
     axes.legend()
     figure.tight_layout()
-    figure.savefig(out / "roofline.png", dpi=150)
+    drawing.save(out / "roofline.png", figure, dpi=150)
 
 
 if __name__ == "__main__":

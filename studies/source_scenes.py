@@ -12,6 +12,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+import drawing
 import numpy as np
 from scipy.signal import find_peaks
 
@@ -128,7 +129,7 @@ def publish(name: str, figure: Any, columns: dict[str, Any]) -> None:
     """Write NAME.png and NAME.csv to the folder given on the command line, or to studies/out."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "out"
     folder.mkdir(parents=True, exist_ok=True)
-    fi.figures.save(folder / f"{name}.png", figure)
+    drawing.save(folder / f"{name}.png", figure)
     with (folder / f"{name}.csv").open("w", newline="") as file:
         table = csv.writer(file)
         table.writerow(columns)

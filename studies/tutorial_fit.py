@@ -13,6 +13,7 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
+import drawing
 import numpy as np
 from scipy.signal import resample
 
@@ -179,7 +180,7 @@ def draw_double_hits(path: Path, limits: dict[float, list[float | None]]) -> Non
         y=plots.Axis("stiffness over that of the tip found", log=True, limits=(float(TIPS[0]), float(TIPS[-1]))),
         title="The softest tip with which a hammer hits the plate twice",
     )  # fmt: skip
-    fi.figures.save(path, figure)
+    drawing.save(path, figure)
 
 
 def main(folder: Path) -> dict:
@@ -204,8 +205,8 @@ def main(folder: Path) -> dict:
     for name in ("power law behind a springy tip", BEST):
         print(f"\nWhat is left of each tap predicted from the other three, by the {name}:")
         print("\n".join(leftover(by_name[name], taps)))
-    fi.figures.save(folder / "fit_pulses.png", fit_page.pulses(best))
-    fi.figures.save(folder / "fit_profiles.png", fit_page.profiles(free))
+    drawing.save(folder / "fit_pulses.png", fit_page.pulses(best))
+    drawing.save(folder / "fit_profiles.png", fit_page.profiles(free))
 
     print(f"\nA hinged plate of {PLATE['mass']:g} kg, struck in its middle at {SPEED:g} m/s:")
     modes, limits = plate(), {}

@@ -7,6 +7,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import drawing
 import numpy as np
 
 import fem_impact as fi
@@ -93,7 +94,7 @@ def main(folder: Path, max_frequency: float = 8e3) -> list[Verdict]:
         )
         advice = f"tips from {hammer.softest:.3g} N/m to {end} work" if hammer.works else "no tip works"
         print(f"In the middle, with a hammer of {1e3 * hammer.mass:g} g: {advice}.")
-    fi.figures.save(folder / "hammer_test.png", draw(modes))
+    drawing.save(folder / "hammer_test.png", draw(modes))
     print(f"{folder / 'hammer_test.png'}")
     return verdicts
 

@@ -6,6 +6,7 @@ python studies/tutorial_outline_to_sound.py [FOLDER]
 import sys
 from pathlib import Path
 
+import drawing
 import numpy as np
 
 import fem_impact as fi
@@ -32,7 +33,7 @@ def main(folder: Path, tolerance: float = 1e-3) -> dict[str, fi.Response]:
     print("3. All modes up to 8 kHz.")
     modes = fi.find_modes(system, max_frequency=8e3, damping_ratio=0.01)
     print(f"   {modes.n_modes}, the lowest at {', '.join(f'{f:.0f}' for f in modes.frequencies[:5])} Hz")
-    missing = fi.pictures.mode_shapes(folder / "ukulele_modes.png", modes)
+    missing = fi.pictures.mode_shapes(drawing.named(folder / "ukulele_modes.png"), modes)
     print(f"   ukulele_modes.png{f' (in two dimensions; {missing})' if missing else ''}")
 
     print("4. Two taps at the same point and speed: with a soft, lossy fingertip and with a fingernail.")
@@ -45,9 +46,9 @@ def main(folder: Path, tolerance: float = 1e-3) -> dict[str, fi.Response]:
         print(f"   {name}: {hit.n_impacts} impact(s), {1e3 * hit.contact_time:.2f} ms in contact, "
               f"{hit.peak_force:.1f} N, {lost:.0%} of the energy goes into the top")  # fmt: skip
         print(f"   estimated error {hit.error.total:.0e}, tolerance {tolerance:.0e}")
-        fi.figures.save(folder / f"ukulele_{name}.png", fi.figures.force(hit))
+        drawing.save(folder / f"ukulele_{name}.png", fi.figures.force(hit))
         hits[name] = hit
-    fi.pictures.wave(folder / "ukulele_wave.png", hits["fingernail"])
+    fi.pictures.wave(drawing.named(folder / "ukulele_wave.png"), hits["fingernail"])
 
     print("5. The sound half a metre in front of the top. In both files 1.0 means 200 Pa, so you can compare them.")
     for name, hit in hits.items():

@@ -13,6 +13,7 @@ import os
 import time
 from pathlib import Path
 
+import drawing
 import numpy as np
 import source_scenes as source
 from scipy import stats
@@ -83,7 +84,7 @@ def main():
                 f"statistics in {time.perf_counter() - began:.2f} s"
             )
     print(found.summary())
-    fi.figures.save(PICTURE, fi.figures.spread(found))
+    drawing.save(PICTURE, fi.figures.spread(found))
     (value, low, high), exact = chance_from_map()
     print(
         f"chance of a double hit: {100 * value:.2f} % ({100 * low:.2f} to {100 * high:.2f} %), map {100 * exact:.2f} %"

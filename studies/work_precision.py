@@ -29,6 +29,7 @@ from pathlib import Path
 import matplotlib
 
 matplotlib.use("Agg")
+import drawing
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -308,7 +309,7 @@ def draw(rows: list[dict], path: Path) -> None:
     panels[0][0].set_ylabel("error of rebound and impulse (-)")
     panels[0][-1].legend(fontsize=7)
     figure.tight_layout()
-    figure.savefig(path, dpi=150)
+    drawing.save(path, figure, dpi=150)
 
 
 def main() -> None:

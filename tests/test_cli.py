@@ -349,3 +349,20 @@ def test_uncompiled_kernels_run_as_plain_python(monkeypatch, tmp_path):
     (tmp_path / "kept" / "compiled_0").mkdir()
     (tmp_path / "kept" / "compiled_0" / "energy.run_energy-1.py311.nbi").write_text("")
     assert not cli._prepare({"NUMBA_CACHE_DIR": str(tmp_path / "kept")}, once=True)
+
+
+def test_pictures_come_in_the_format_asked_for(scene, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert cli.main(["strike", str(scene), "--out", str(out), "--format", "svg"]) == 0
+    assert (out / "force.svg").read_text().startswith("<?xml") and not (out / "force.png").exists()
+    assert "force.svg" in json.loads((out / "response.json").read_text())["files"]
+    assert cli.main(["mesh", str(scene), "--out", str(out / "edges.png"), "--format", "pdf"]) == 0
+    assert (out / "edges.pdf").read_bytes().startswith(b"%PDF") and "edges.pdf" in capsys.readouterr().out
+
+
+def test_a_map_takes_a_format_of_its_numbers_and_one_of_its_pictures(tmp_path, capsys):
+    path = tmp_path / "map.toml"
+    path.write_text(TEXT + '[map.over]\n"striker.mass" = [0.03, 0.05]\n"contact.stiffness" = [1e5, 2e5]\n')
+    assert cli.main(["map", str(path), "--out", str(tmp_path / "map"), "--format", "nc", "--format", "svg"]) == 0
+    endings = {file.suffix for file in (tmp_path / "map").iterdir()}
+    assert endings == {".nc", ".csv", ".svg"}

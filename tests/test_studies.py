@@ -1,12 +1,15 @@
 """The studies still reproduce what they were made to show."""
 
 import importlib.util
+import re
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 STUDIES = Path(__file__).parents[1] / "studies"
+sys.path.append(str(STUDIES))  # for what they share
 
 
 def study(name):
@@ -181,3 +184,20 @@ def test_a_marimba_bar_is_tuned_within_a_cent_and_its_mallet_suits(tmp_path, mon
     monkeypatch.setattr(marimba, "PICTURE", tmp_path / "bars.png")
     marimba.fi.figures.save(marimba.PICTURE, marimba.draw({"F4": found}))
     assert marimba.PICTURE.stat().st_size > 10_000  # two panels
+
+
+def test_studies_save_pictures_in_the_format_of_the_command(tmp_path):
+    drawing = study("drawing")
+    arguments = ["fig05.py", "--format", "svg", "out"]
+    assert drawing.taken(arguments) == ".svg" and arguments == ["fig05.py", "out"]
+    arguments = ["fig05.py", "out", "--format=pdf"]
+    assert drawing.taken(arguments) == ".pdf" and arguments == ["fig05.py", "out"]
+    assert drawing.taken(["fig05.py"]) == ".png"
+    with pytest.raises(SystemExit, match="--format must be one of png, pdf, svg, got 'bmp'"):
+        drawing.taken(["fig05.py", "--format", "bmp"])
+
+
+def test_every_picture_of_a_study_is_saved_in_one_place():
+    for path in STUDIES.glob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        assert path.name == "drawing.py" or not re.search(r"savefig\(|figures\.save\(", text), path.name

@@ -24,7 +24,7 @@ from .schema import MAKERS, Part
 SLOW = {"loss", "hard_stiffness", "yield_approach", "hysteresis"}  # axes of the contact that take longer per blow
 SLOW |= {f"contact.{name}" for name in SLOW}
 FORMATS = ("nc", "zarr")
-FILES = (".nc", ".zarr", ".csv", ".png")  # a folder name must not end like this
+FILES = (".nc", ".zarr", ".csv", ".png", ".pdf", ".svg")  # a folder name must not end like this
 MOST_ROWS = 10**6  # [-] a larger map gets no CSV file
 PICTURED = {  # layers drawn for a map with two axes: name in the picture
     "n_impacts": "number of impacts",
@@ -284,7 +284,7 @@ def can_write(form: str, folder: Path | None = None) -> str:
     return form
 
 
-def write(folder: Path, table: xarray.Dataset, form: str = "nc") -> list[str]:
+def write(folder: Path, table: xarray.Dataset, form: str = "nc", picture: str = "png") -> list[str]:
     """Write map.nc or map.zarr, map.csv and, for a map with two axes, a picture of each layer; return the names.
 
     A map of more than MOST_ROWS cells gets no CSV file: it would be slow to write and useless.
@@ -301,8 +301,8 @@ def write(folder: Path, table: xarray.Dataset, form: str = "nc") -> list[str]:
     if len(table.n_impacts.dims) == 2:
         for layer in PICTURED:
             if layer in table and bool((table.n_impacts >= 0).any()):
-                figures.save(folder / f"{layer}.png", draw(table, layer))
-                names.append(f"{layer}.png")
+                figures.save(folder / f"{layer}.{picture}", draw(table, layer))
+                names.append(f"{layer}.{picture}")
     return names
 
 

@@ -522,8 +522,8 @@ def _table(
     return xarray.Dataset(data)
 
 
-def write(folder: Path, found: Spread) -> list[str]:
-    """Write spread.json, spread.nc, spread.csv and spread.png; return the names.
+def write(folder: Path, found: Spread, picture: str = "png") -> list[str]:
+    """Write spread.json, spread.nc, spread.csv and spread.png, or another format; return the names.
 
     A spread of more than `maps.MOST_ROWS` blows gets no CSV file: it would be slow to write and useless.
     """
@@ -534,6 +534,6 @@ def write(folder: Path, found: Spread) -> list[str]:
         names.append("spread.csv")
         found.table.to_dataframe().to_csv(folder / "spread.csv")
     if len(found.own):
-        names.append("spread.png")
-        figures.save(folder / "spread.png", figures.spread(found))
+        names.append(f"spread.{picture}")
+        figures.save(folder / f"spread.{picture}", figures.spread(found))
     return names

@@ -3,6 +3,8 @@
 Nothing of the package is imported here but how files appear and how progress is told, and pyvista only to draw.
 """
 
+import base64
+import io
 import os
 import pickle
 import sys
@@ -16,7 +18,8 @@ from PIL import Image
 from .._base import progress
 from .._base.files import replacing
 
-NAMES = ("modes.png", "wave.png", "wave.gif")
+FORMATS = ("png", "pdf", "svg")  # of pictures; what is rendered stays an image within a PDF or SVG file
+NAMES = ("modes", "wave")  # of the pictures of a blow, besides wave.gif
 PROBE = (
     "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=(16, 16)); p.add_mesh(pyvista.Sphere()); "
     "assert p.screenshot(None).std() > 0"
@@ -62,17 +65,17 @@ class Gallery(NamedTuple):
 def main() -> None:
     """The process: reads folder, film and shapes, writes the pictures, and prints the progress."""
     exec(PROBE, {})  # takes seconds, during which the response is computed; dies here if nothing renders
-    folder, film, shapes = pickle.load(sys.stdin.buffer)
+    folder, film, shapes, form = pickle.load(sys.stdin.buffer)
     with progress.heard(lambda _, done, total: print(f"{done}/{total}", flush=True)):
-        draw(folder, film, shapes)
+        draw(folder, film, shapes, form)
 
 
-def draw(folder: Path, film: Film, shapes: Gallery) -> None:
-    """Draw all pictures of a blow into a folder."""
+def draw(folder: Path, film: Film, shapes: Gallery, form: str = "png") -> None:
+    """Draw all pictures of a blow into a folder, in a format of `FORMATS`."""
     pictures = list(frames(film))
     write_gif(folder / "wave.gif", pictures)
-    write(folder / "wave.png", pictures[film.telling])
-    write(folder / "modes.png", gallery(shapes))
+    write(folder / f"wave.{form}", pictures[film.telling])
+    write(folder / f"modes.{form}", gallery(shapes))
 
 
 def frames(film: Film) -> Iterator[Image.Image]:
@@ -105,9 +108,20 @@ def gallery(shown: Gallery) -> Image.Image:
 
 
 def write(path: str | Path, picture: Image.Image) -> None:
-    """Write a picture, whole or not at all."""
+    """Write a picture, whole or not at all; the ending sets the format."""
     with replacing(path) as temporary:
-        picture.save(temporary)
+        if Path(path).suffix.lower() != ".svg":
+            picture.save(temporary)
+            return
+        file = io.BytesIO()
+        picture.save(file, format="png")
+        data, (width, height) = base64.b64encode(file.getvalue()).decode("ascii"), picture.size
+        size = f'width="{width}" height="{height}"'
+        temporary.write_text(
+            f'<svg xmlns="http://www.w3.org/2000/svg" {size} viewBox="0 0 {width} {height}">'
+            f'<image {size} href="data:image/png;base64,{data}"/></svg>\n',
+            encoding="utf-8",
+        )
 
 
 def write_gif(path: str | Path, pictures: list[Image.Image]) -> None:

@@ -20,18 +20,21 @@ from ..impact.response import Response
 from . import canvas, pictures
 
 
-def draw(folder: Path, response: Response) -> str:
-    """Draw all pictures of a blow into a folder; empty, or what to install for pictures in 3D."""
+def draw(folder: Path, response: Response, form: str = "png") -> str:
+    """Draw all pictures of a blow into a folder, in a format of `canvas.FORMATS`.
+
+    Returns an empty text, or what to install for pictures in 3D.
+    """
     pictures.animation(folder / "wave.gif", response)
-    pictures.wave(folder / "wave.png", response)
-    return pictures.mode_shapes(folder / "modes.png", response.target)
+    pictures.wave(folder / f"wave.{form}", response)
+    return pictures.mode_shapes(folder / f"modes.{form}", response.target)
 
 
 class Painter:
     """The other process; it ends with the block."""
 
     def __init__(self) -> None:
-        self.task: tuple[Path, Response] | None = None
+        self.task: tuple[Path, Response, str] | None = None
         self.stack = ExitStack()
 
     def __enter__(self) -> "Painter":
@@ -56,13 +59,13 @@ class Painter:
         self.process.wait()
         self.stack.close()
 
-    def begin(self, folder: Path, response: Response) -> None:
+    def begin(self, folder: Path, response: Response, form: str = "png") -> None:
         """Start drawing the pictures of a blow into a folder."""
-        self.task = folder, response
+        self.task = folder, response, form
         assert self.process.stdin is not None
         with suppress(BrokenPipeError):  # the process is gone, which `finish` deals with
             shown = pictures.film(response), pictures.gallery(response.target)
-            pickle.dump((folder, *shown), self.process.stdin, protocol=pickle.HIGHEST_PROTOCOL)
+            pickle.dump((folder, *shown, form), self.process.stdin, protocol=pickle.HIGHEST_PROTOCOL)
             self.process.stdin.close()
 
     def finish(self) -> str:

@@ -21,6 +21,7 @@ from . import canvas, figures, sampling
 
 PATIENCE = 60.0  # [s] time limit of the rendering test
 REMEDY = "for 3D pictures install libegl1 and libgl1-mesa-dri"
+STILL = tuple(f".{name}" for name in canvas.FORMATS)
 FRAMES = 48  # [-] default length of an animation: four seconds
 
 
@@ -42,7 +43,7 @@ def mode_shapes(path: str | Path, modes: Modes, *, count: int = 12, columns: int
 
     Parameters
     ----------
-    path : path ending in .png
+    path : path ending in .png, .pdf or .svg, in which a surface stays an image
     modes : Modes of a plate or a beam
     count : int, largest number of modes
     columns : int
@@ -53,7 +54,7 @@ def mode_shapes(path: str | Path, modes: Modes, *, count: int = 12, columns: int
         Empty, or what to install for a 3D picture if only the flat one of `figures.mode_shapes` could be drawn.
     """
     check.between("dimension of modes", modes.dimension, 1, 2)
-    _ending(path, ".png")
+    _ending(path, *STILL)
     if not can_render():
         figures.save(path, figures.mode_shapes(modes, count=count, columns=columns))
         return REMEDY
@@ -75,7 +76,7 @@ def wave(path: str | Path, response: Response, *, time: float | None = None) -> 
 
     Parameters
     ----------
-    path : path ending in .png
+    path : path ending in .png, .pdf or .svg, in which the surface stays an image
     response : Response of a struck plate or beam
     time : float [s], optional
         By default when the deflection under the striker reaches half of its largest value.
@@ -85,7 +86,7 @@ def wave(path: str | Path, response: Response, *, time: float | None = None) -> 
     str
         Empty, or what to install for a 3D picture if only a flat one could be drawn.
     """
-    _ending(path, ".png")
+    _ending(path, *STILL)
     times = np.linspace(0.0, sampling.end_of(response), FRAMES)
     instant = times[sampling.telling(response, times)] if time is None else check.non_negative("time", time, "s")
     (frame,) = _frames(response, np.array([instant]))

@@ -90,6 +90,8 @@ def curves(
     """
     panels = list(dict.fromkeys(curve.panel for curve in drawn))
     with styled(6.4, 3.8 if len(panels) == 1 else 2.2 * len(panels)) as figure:
+        called = {tuple(curve.label for curve in drawn if curve.panel == panel and curve.label) for panel in panels}
+        same = len(panels) > 1 and len(called) == 1  # then one legend below tells the curves of all panels
         all_axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
         for axes, panel in zip(all_axes, panels):
             if filled is not None:
@@ -102,9 +104,14 @@ def curves(
             x.apply(axes, "x")
             y.apply(axes, "y")
             axes.label_outer()
-            if any(curve.label for curve in mine):
+            if same:
+                axes.set_title(f"{title}\n{panel}" if title and panel == panels[0] else panel)
+            elif any(curve.label for curve in mine):
                 axes.legend(loc="best", title=panel or None, alignment="left")
-        all_axes[0].set_title(title)
+        if same:
+            figure.legend(*all_axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        else:
+            all_axes[0].set_title(title)
     return figure
 
 

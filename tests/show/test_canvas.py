@@ -1,7 +1,10 @@
 """Pictures from arrays: what they show, and that their process needs next to nothing of the package."""
 
+import base64
+import io
 import subprocess
 import sys
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -57,8 +60,22 @@ def test_pictures_are_drawn_from_arrays_alone(tmp_path):
     told = []
     with progress.heard(lambda *each: told.append(each)):
         canvas.draw(tmp_path, film, canvas.Gallery(plane, cells, bump[:, None], ["1"], 1, 1))
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(canvas.NAMES)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["modes.png", "wave.gif", "wave.png"]
     assert told == [("frames", 1, 2), ("frames", 2, 2)]
     flat, bent = (np.asarray(picture, float) for picture in canvas.frames(film))
     assert np.array_equal(bent, np.asarray(Image.open(tmp_path / "wave.png"), float))  # the telling one
     assert np.abs(flat - bent).max() > 50.0  # of 255: the bump is coloured
+
+
+@pytest.mark.parametrize("form", canvas.FORMATS)
+def test_a_picture_is_written_in_every_format(tmp_path, form):
+    picture = Image.fromarray(np.random.default_rng(1).integers(0, 255, (20, 30, 3), np.uint8))
+    canvas.write(tmp_path / f"a.{form}", picture)
+    raw = (tmp_path / f"a.{form}").read_bytes()
+    if form == "svg":
+        root = ElementTree.fromstring(raw)
+        assert (root.get("width"), root.get("height")) == ("30", "20")
+        within = base64.b64decode(root[0].get("href").partition(",")[2])
+        assert np.array_equal(np.asarray(Image.open(io.BytesIO(within))), np.asarray(picture))
+    else:
+        assert raw.startswith({"png": b"\x89PNG", "pdf": b"%PDF"}[form])

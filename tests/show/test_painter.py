@@ -7,7 +7,6 @@ from PIL import Image
 import fem_impact as fi
 from fem_impact._base import progress
 from fem_impact.show import painter, pictures
-from fem_impact.show.canvas import NAMES
 from fem_impact.show.painter import Painter
 
 
@@ -23,7 +22,7 @@ def test_it_draws_what_this_process_would_and_counts_the_frames(hit, tmp_path, m
     with Painter() as other, progress.heard(lambda *each: told.append(each)):
         other.begin(tmp_path, hit)
         missing = other.finish()
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(NAMES)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["modes.png", "wave.gif", "wave.png"]
     assert told[-1] == ("frames", pictures.FRAMES, pictures.FRAMES)
     assert missing == ("" if pictures.can_render() else pictures.REMEDY)
     pictures.wave(tmp_path / "own.png", hit)
@@ -45,4 +44,4 @@ def test_if_it_dies_this_process_draws(hit, tmp_path, monkeypatch):
         other.process.wait()
         other.begin(tmp_path, hit)
         assert other.finish() == "flat"
-    assert drawn == [(tmp_path, hit)]
+    assert drawn == [(tmp_path, hit, "png")]
