@@ -299,6 +299,18 @@ def _parser() -> argparse.ArgumentParser:
     add("--port", metavar="N", type=int, default=0, help="port on 127.0.0.1 (default: any free port)")
     add("--no-open", action="store_true", help="print the address, but do not open it in a browser")
 
+    add = verb(_play, "play", "strike a scene from the keyboard, a MIDI file or a MIDI port, and hear it at once")
+    add("--midi", metavar="FILE", type=_place, help="play the notes of a MIDI file: middle C is the first point")
+    add("--port", metavar="NAME", nargs="?", const="", help="play from the MIDI input whose name begins so")
+    add("--at", metavar="X", nargs="+", type=float, action="append", help="a point to strike [m]; repeatable "
+        "(default: ten points, the scene's and others over the whole body)")  # fmt: skip
+    add("--modes", metavar="N", type=int, default=300, help="number of modes (default: 300)")
+    add("--fastest", metavar="V", type=float, help="speed of the loudest stroke [m/s] (default: twice the scene's)")
+    add("--duration", metavar="S", type=float, default=600.0, help="when to end at the latest [s] (default: 600)")
+    add("--block", metavar="N", type=int, default=64, help="frames computed at a time, of 48000 a second (default: 64)")
+    add("--silent", action="store_true", help="play into the file only, and count the deadlines that would be missed")
+    add("--out", metavar="FILE", type=_place, help="the sound as a .wav file (default: out/NAME/play.wav)")
+
     add = verb(_new, "new", "write a commented scene to begin with", scene="")
     add("kind", metavar="KIND", nargs="?", default="plate", help="plate, disk, beam or map (default: plate)")
     add("--out", metavar="FILE", type=_place, help="the file to write (default: KIND.toml)")
@@ -652,6 +664,34 @@ def _explore(options: argparse.Namespace) -> None:
             webbrowser.open(address)
 
     fi.explore.serve(scene, port=options.port, ready=ready, watch=Display())
+
+
+def _play(options: argparse.Namespace) -> None:
+    from .live import devices, prompt  # imported only when needed
+
+    scene = fi.load_scene(options.scene)
+    path = options.out if options.out is not None else Path("out") / options.scene.stem / "play.wav"
+    with fi.export.staged(path.parent) as staging:
+        with Display()("modes"):
+            modes = scene.modes(options.modes)
+        with Display()("preparing, and compiling if not yet done"):
+            player = prompt.player_of(scene, modes, options)
+        with prompt.source_of(options, player) as (source, told):
+            device, missing = prompt.device_of(options, source.live)
+            if missing:
+                _tell(missing)
+            _tell(told)
+            played = devices.perform(player, source, options.duration, device)
+        (staging / path.name).write_bytes(played.sound.wav())
+    _say(_title(scene))
+    _print_notes(modes.notes)
+    happened = ", ".join(f"{count} {name}" for name, count in player.counted.items())
+    _say(f"Played: {happened} of at most {1e6 * player.step:.3g} us, {modes.n_modes} modes")
+    _say(
+        f"Blocks: {len(played.seconds)} of {1e3 * player.block / player.rate:.3g} ms; the 99th percentile of their "
+        f"computing time is {1e3 * played.slowest:.3g} ms; {played.missed} missed their deadline"
+    )
+    _say(f"Files: {path}")
 
 
 def _modes(options: argparse.Namespace) -> None:

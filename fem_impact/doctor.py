@@ -32,6 +32,7 @@ EXTRAS = {  # extra: its purpose and the modules it needs
     "hdf5": ("meshes in HDF5", "h5py"),
     "completion": ("shell completion", "shtab"),
     "spread": ("Sobol indices", "SALib"),
+    "play": ("playing", "mido", "rtmidi", "sounddevice"),
     "web": ("report and explore", "plotly", "bokeh", "jinja2"),
 }
 

@@ -12,6 +12,7 @@ import time
 from functools import partial
 from pathlib import Path
 
+import drawing
 import numpy as np
 
 import fem_impact as fi
@@ -105,7 +106,7 @@ def main():
             f"{1e3 * hit.contact_time:.4f} ms, wanted {500.0 / pitch:.4f} ms, {hit.n_impacts} impact; a finer model "
             f"changes the contact time by {checked.differences['']['contact_time']:.1e} of it"
         )
-    fi.figures.save(PICTURE, draw(designs))
+    drawing.save(PICTURE, draw(designs))
     return designs
 
 

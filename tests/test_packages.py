@@ -9,9 +9,8 @@ from scipy.sparse import coo_matrix
 
 HOME = Path(__file__).parents[1] / "fem_impact"
 ORDER = [
-    "_base", "mesh", "fe", "modes", "impact/compiled", "impact", "model", "sweeps", "show", "scenes", "taps", "designs",
-    "pages",
-    "",
+    "_base", "mesh", "fe", "modes", "impact/compiled", "impact", "model", "sweeps", "show", "scenes", "live", "taps",
+    "designs", "pages", "",
 ]  # fmt: skip
 OWNERS = {
     "numba": ("impact/compiled/",),

@@ -182,7 +182,7 @@ def test_a_marimba_bar_is_tuned_within_a_cent_and_its_mallet_suits(tmp_path, mon
     assert hit.n_impacts == 1
     np.testing.assert_allclose(hit.contact_time, 0.5 / pitch, rtol=1e-5)  # asked to 1e-6, struck again to as much
     monkeypatch.setattr(marimba, "PICTURE", tmp_path / "bars.png")
-    marimba.fi.figures.save(marimba.PICTURE, marimba.draw({"F4": found}))
+    marimba.drawing.save(marimba.PICTURE, marimba.draw({"F4": found}))
     assert marimba.PICTURE.stat().st_size > 10_000  # two panels
 
 

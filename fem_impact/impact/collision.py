@@ -309,6 +309,13 @@ def met(
     return _follow(bodies, contacts, parts, arriving, options, others=others)
 
 
+def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[_System, float]:
+    """Two bodies that are to touch, the first moving, as the kernels take them, and how long the contact may last."""
+    parts, _ = _parts(bodies, [touch], [speed, 0.0], None, None, residual)
+    system = _joined(parts, [touch])
+    return system, _pace(system)[0]
+
+
 def _moving(part: _Part, q: np.ndarray, p: np.ndarray) -> _Part:
     return replace(part, q=q, p=p)
 

@@ -1,0 +1,374 @@
+"""A body that is played: strokes at any frame of a sound, contacts by scheme A4, ringing by recursion, block by block.
+
+All modes are in one list: those of each stick, slot after slot, then those of the body. Between frames the state goes
+ahead by exact steps ``period / 2**level``, whose tables are made beforehand. In contact a step is no longer than that
+of ``limits.contact``; a step in which a contact opens or closes is halved, until it ends there to ``limits.closing`` or
+``limits.opening``. In flight a step is as long as the bounds of `flight` allow, but never below ``limits.flight``.
+Here nothing allocates: what does could not be compiled as part of `follow`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .build import LOOSE, inner, outer
+from .energy import contact_sums, keep_in_mind, predict, solve_step
+from .events import dipped
+from .flight import approach, motion_bounds, quadratic_wait
+from .law import MEMORY, at, harden, meet, rest_of, special_of, spring_of
+from .propagation import commit, glide, restore
+
+FULL = 1 << 20  # [-] ticks of a frame: the shortest step is one, 2e-11 s at 48 kHz
+LEVELS = 21  # [-] lengths of steps, from a frame to a tick
+LOOKS = 64  # [-] looks of a flight after which its bounds are drawn anew, as they loosen
+FAINT = 1e-140  # [-] of sqrt(J): a mode with less is at rest, before its numbers get slow to calculate with
+SWEEP = 1024  # [-] frames after which modes are looked at for that
+STRUCK, STOLEN, TOUCHED, TRACED, STEPS, LOST, COUNTERS = 0, 1, 2, 3, 4, 5, 6  # what is counted; how many counters
+
+
+class Body(NamedTuple):
+    """The modes of all sticks and of the body, and what is known of them beforehand."""
+
+    omega: np.ndarray  # (n_modes,) [rad/s]
+    zeta: np.ndarray  # (n_modes,) [-]
+    twice: np.ndarray  # (n_modes,) [rad/s] 2 zeta omega
+    tables: np.ndarray  # (LEVELS, N_LANE, n_modes) of the steps
+    listen: np.ndarray  # (n_modes,) what is heard of each velocity
+
+
+class Pads(NamedTuple):
+    """The points that can be struck, and the stick."""
+
+    rows: np.ndarray  # (n_pads, n_body) signed shapes of the body
+    own: np.ndarray  # (n_pads, n_own) those of a stick, with what stands for the modes left out
+    laws: np.ndarray  # (n_pads, 9) see `law.spring_of`
+    offsets: np.ndarray  # (n_pads,) [m] approach at zero state
+    motion: np.ndarray  # (n_own,) modal velocities of a stick per unit speed
+    push: np.ndarray  # (n_own,) constant modal forces on a stick
+
+
+class Limits(NamedTuple):
+    """Levels of steps, and when contacts end."""
+
+    contact: int  # longest step while something touches
+    closing: int  # shortest step that ends at an onset
+    opening: int  # shortest step that ends at a release
+    flight: int  # shortest step in flight
+    lasts: int  # frames after which a stick is lifted, as soon as it does not touch
+    period: float  # [s] of a frame
+    depth: float  # [m] approaches that are rounding
+    still: float  # [m/s] speeds that are rounding
+
+
+class State(NamedTuple):
+    """What moves, for up to n_sticks sticks on the body; the first ``m`` rows are in use."""
+
+    q: np.ndarray  # (n_modes,)
+    p: np.ndarray  # (n_modes,)
+    free_q: np.ndarray  # (n_modes,)
+    free_p: np.ndarray  # (n_modes,)
+    bias: np.ndarray  # (n_modes,)
+    rows: np.ndarray  # (n_sticks, n_modes)
+    law: np.ndarray  # (n_sticks, 9)
+    offset: np.ndarray  # (n_sticks,)
+    slot: np.ndarray  # (n_sticks,) which part of the modes is this stick's
+    pad: np.ndarray  # (n_sticks,) which point it strikes
+    until: np.ndarray  # (n_sticks,) frame when it is lifted
+    pressed: np.ndarray  # (n_sticks,)
+    now: np.ndarray  # (6, n_sticks) see `schemes.point_of`
+    end: np.ndarray  # (3, n_sticks)
+    found: np.ndarray  # (5, n_sticks) of a step: approach, mean force, slope, rate, memory
+    bounds: np.ndarray  # (n_sticks, 6) see `flight.motion_bounds`
+    sums: np.ndarray  # (LEVELS, 6, n_sticks, n_sticks)
+    known: np.ndarray  # (LEVELS,) whether those are of the present sticks
+    work: np.ndarray  # (5, n, n)
+    place: np.ndarray  # (4,) sticks on the body, looks since the bounds were drawn, frames so far, whether forces act
+    counted: np.ndarray  # (COUNTERS,)
+    trace: np.ndarray  # (n, 6) [s], [s], [-], [N], [m], [N]: end of a step in contact, length, pad, mean, approach, end
+
+
+@inner()
+def take_off(pads, state, i):
+    """Lift stick i, and close the gap in the list."""
+    n_own = pads.motion.size
+    first = state.slot[i] * n_own
+    for n in range(first, first + n_own):
+        state.q[n] = 0.0
+        state.p[n] = 0.0
+        state.bias[n] = 0.0
+    m = state.place[0] - 1
+    for k in range(i, m):
+        for n in range(state.q.size):
+            state.rows[k, n] = state.rows[k + 1, n]
+        for n in range(state.law.shape[1]):
+            state.law[k, n] = state.law[k + 1, n]
+        for n in range(state.now.shape[0]):
+            state.now[n, k] = state.now[n, k + 1]
+        state.offset[k] = state.offset[k + 1]
+        state.slot[k] = state.slot[k + 1]
+        state.pad[k] = state.pad[k + 1]
+        state.until[k] = state.until[k + 1]
+        state.pressed[k] = state.pressed[k + 1]
+    renewed(state, m)
+
+
+@inner()
+def renewed(state, m):
+    """Note that there are other sticks on the body than before, m now."""
+    state.place[0] = m
+    state.place[3] = 1
+    for level in range(LEVELS):
+        state.known[level] = 0
+
+
+@inner()
+def put_on(body, pads, limits, state, pad, speed):
+    """A stick arrives at the surface of a point, wherever that is, instead of another if all are in use.
+
+    Before the first one, a free body comes to rest as a whole: what it lies on holds it.
+    """
+    n_own = pads.motion.size
+    n_sticks = state.slot.size
+    base = n_sticks * n_own
+    if state.place[0] == n_sticks:
+        gone = 0
+        for i in range(n_sticks - 1, -1, -1):
+            if not state.pressed[i]:
+                gone = i
+        take_off(pads, state, gone)
+        state.counted[STOLEN] += 1
+    m = state.place[0]
+    if m == 0:
+        for n in range(base, state.q.size):
+            if body.omega[n] == 0.0:
+                state.q[n] = 0.0
+                state.p[n] = 0.0
+    slot = 0
+    for _ in range(m):
+        for i in range(m):
+            if state.slot[i] == slot:
+                slot += 1
+    surface = 0.0
+    for n in range(base):
+        state.rows[m, n] = 0.0
+    for n in range(pads.rows.shape[1]):
+        state.rows[m, base + n] = pads.rows[pad, n]
+        surface -= pads.rows[pad, n] * state.q[base + n]
+    for n in range(n_own):
+        k = slot * n_own + n
+        state.rows[m, k] = pads.own[pad, n]
+        state.q[k] = surface * pads.motion[n]
+        state.p[k] = speed * pads.motion[n]
+        state.bias[k] = pads.push[n]
+    for n in range(state.law.shape[1]):
+        state.law[m, n] = pads.laws[pad, n]
+    state.offset[m] = pads.offsets[pad]
+    state.slot[m] = slot
+    state.pad[m] = pad
+    state.until[m] = state.place[2] + limits.lasts
+    _, state.now[4, m] = approach(state.rows, state.offset, m, state.q, state.p)
+    state.now[0, m] = state.offset[m]
+    state.pressed[m] = state.offset[m] >= 0.0 and state.now[4, m] > 0.0
+    state.counted[STRUCK] += 1
+    renewed(state, m + 1)
+
+
+@inner(fastmath=LOOSE)
+def heard(listen, p):
+    """What is heard of a state."""
+    total = 0.0
+    for n in range(p.size):
+        total += listen[n] * p[n]
+    return total
+
+
+@inner()
+def flight(body, pads, limits, state, level):
+    """Level of a step, no longer than the given, in which surely nothing touches; -1 if a stick left for good."""
+    m = state.place[0]
+    if state.place[3] == 1 or state.place[1] >= LOOKS:
+        state.place[1] = 0
+        state.place[3] = 0
+        for i in range(m - 1, -1, -1):
+            r0, r1, r2, reach, fastest, hardest = motion_bounds(
+                state.rows, body.omega, body.zeta, state.bias, i, state.q, state.p
+            )
+            r0 += state.offset[i]
+            if r1 <= limits.still and r2 <= 0.0 and r0 + reach <= limits.depth:
+                take_off(pads, state, i)
+                return -1
+            state.bounds[i, 0] = r0
+            state.bounds[i, 1] = r1
+            state.bounds[i, 2] = r2
+            state.bounds[i, 3] = reach
+            state.bounds[i, 4] = fastest
+            state.bounds[i, 5] = hardest
+    state.place[1] += 1
+    wait = np.inf
+    for i in range(m):
+        d = min(state.now[0, i], 0.0)
+        r0, r1, r2, reach = state.bounds[i, 0], state.bounds[i, 1], state.bounds[i, 2], state.bounds[i, 3]
+        bound = quadratic_wait(d, state.now[4, i], state.bounds[i, 5] + max(r2, 0.0))
+        bound = max(bound, quadratic_wait(d, max(0.0, r1 + state.bounds[i, 4]), max(r2, 0.0)))
+        if r2 <= 0.0 and r0 + reach <= 0.0:
+            bound = max(bound, quadratic_wait(r0 + reach, max(0.0, r1), 0.0))
+        wait = min(wait, bound)
+    while level < limits.flight and limits.period * 0.5**level > wait:
+        level += 1
+    return level
+
+
+@inner()
+def glided(limits, state, h, end):
+    """Take over a step in which nothing touched."""
+    restore(state.free_q, state.free_p, state.q, state.p)
+    for i in range(state.place[0]):
+        state.now[0, i] = end[0, i]
+        state.now[4, i] = end[2, i]
+        state.bounds[i, 0] += h * (state.bounds[i, 1] + 0.5 * state.bounds[i, 2] * h)
+        state.bounds[i, 1] += h * state.bounds[i, 2]
+        rest_of(state.law, i, h)
+
+
+@inner()
+def noted(state, time, h, force):
+    """Write a step of the contacts that push to the trace."""
+    for i in range(state.place[0]):
+        if force[i] > 0.0 and state.counted[TRACED] < state.trace.shape[0]:
+            row = state.trace[state.counted[TRACED]]
+            spring = spring_of(state.law, i)
+            pushes = at(state.now[0, i], spring).force * (1.0 + spring.loss * state.now[4, i])
+            row[0] = time
+            row[1] = h
+            row[2] = state.pad[i]
+            row[3] = force[i]
+            row[4] = state.now[0, i]
+            row[5] = max(0.0, pushes - spring.hard * spring.memory)  # of felt, what it remembers
+            state.counted[TRACED] += 1
+
+
+@inner()
+def step(body, limits, state, level, time):
+    """Go ahead by a step of at most that level; its level."""
+    m = state.place[0]
+    rows, end = state.rows[:m], state.end[:, :m]
+    y, f, s = state.found[0, :m], state.found[1, :m], state.found[2, :m]
+    rate, after, pressed = state.found[3, :m], state.found[4, :m], state.pressed[:m]
+    special, _ = special_of(state.law)
+    touching = False
+    for i in range(m):
+        touching = touching or pressed[i]
+    fresh = True
+    while True:
+        h = limits.period * 0.5**level
+        predict(
+            rows, body.tables, level, h, body.twice, state.offset, state.bias,
+            state.q, state.p, state.free_q, state.free_p, end,
+        )  # fmt: skip
+        if not touching:
+            meets = False
+            for i in range(m):
+                meets = meets or end[0, i] > 0.0
+            if not meets:
+                glided(limits, state, h, end)
+                return level
+            if level < limits.closing:
+                level += 1
+                continue
+        if state.known[level] == 0:
+            contact_sums(rows, body.tables[level], h, state.sums[level])
+            state.known[level] = 1
+        for i in range(m):
+            if special and fresh:
+                meet(state.law, i, state.now[0, i], state.now[4, i])
+                deeper = harden(state.law, i, state.now[0, i])
+                state.offset[i] -= deeper
+                state.now[0, i] -= deeper
+                end[0, i] -= deeper
+                end[1, i] -= deeper
+            point = at(state.now[0, i], spring_of(state.law, i))
+            state.now[1, i] = point.compression
+            state.now[2, i] = point.force
+            state.now[3, i] = point.energy
+        fresh = False
+        fine = solve_step(1, h, state.sums, level, state.law, state.now, end, state.work, y, f, s, rate)
+        if special:
+            keep_in_mind(h, state.law, state.now, y, f, s, rate, fine, after)
+        shorter = False
+        for i in range(m):
+            if pressed[i]:
+                shorter = shorter or (y[i] <= 0.0 and level < limits.opening)
+            else:
+                shorter = shorter or (y[i] > 0.0 and level < limits.closing)
+            shorter = shorter or (level < limits.opening and dipped(state.now, pressed, y, rate, h, i))
+        if not shorter:
+            break
+        level += 1
+    commit(rows, body.tables[level], h, f, s, state.free_q, state.free_p, state.q, state.p)
+    for i in range(m):
+        state.now[0, i] = y[i]
+        state.now[4, i] = rate[i]
+        if special:
+            state.law[i, MEMORY] = after[i]
+        if pressed[i] and y[i] <= 0.0:
+            state.counted[TOUCHED] += 1
+        pressed[i] = y[i] > 0.0
+    state.place[3] = 1
+    state.counted[STEPS] += 1
+    noted(state, time + h, h, f)
+    return level
+
+
+@inner()
+def tidied(body, pads, state):
+    """Put modes at rest that hardly move; if a number is no longer one, lift all sticks and still the body."""
+    lost = False
+    for n in range(state.q.size):
+        size = abs(state.p[n]) + body.omega[n] * abs(state.q[n])
+        lost = lost or not size < 1e300
+        if size < FAINT and body.omega[n] > 0.0:
+            state.q[n] = 0.0
+            state.p[n] = 0.0
+    if lost:
+        while state.place[0] > 0:
+            take_off(pads, state, 0)
+        for n in range(state.q.size):
+            state.q[n] = 0.0
+            state.p[n] = 0.0
+        state.counted[LOST] += 1
+
+
+@outer()
+def play(body, pads, limits, state, when, pad, speed, n_events, gain, out):
+    """Fill a block of sound (n_frames,), and leave the state at its end.
+
+    ``when`` (ascending frames of the block), ``pad`` and ``speed`` [m/s] are the strokes, of which the first
+    ``n_events`` count; ``gain`` multiplies what is heard.
+    """
+    event = 0
+    for k in range(out.size):
+        while event < n_events and when[event] <= k:
+            put_on(body, pads, limits, state, pad[event], speed[event])
+            event += 1
+        out[k] = gain * heard(body.listen, state.p)
+        for i in range(state.place[0] - 1, -1, -1):
+            if state.place[2] >= state.until[i] and not state.pressed[i]:
+                take_off(pads, state, i)
+        tick = 0
+        while tick < FULL:
+            level = 0
+            while FULL >> level > FULL - tick:
+                level += 1
+            if state.place[0] == 0:
+                glide(body.tables[level], limits.period * 0.5**level, state.bias, state.q, state.p)
+                tick += FULL >> level
+                continue
+            touching = False
+            for i in range(state.place[0]):
+                touching = touching or state.pressed[i]
+            level = max(level, limits.contact) if touching else flight(body, pads, limits, state, level)
+            if level >= 0:
+                tick += FULL >> step(body, limits, state, level, (state.place[2] + tick / FULL) * limits.period)
+        state.place[2] += 1
+        if state.place[2] % SWEEP == 0:
+            tidied(body, pads, state)

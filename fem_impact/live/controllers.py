@@ -1,0 +1,213 @@
+"""Where strokes come from: a MIDI file, a live MIDI port or the keys of a terminal."""
+
+import os
+import select
+import sys
+import threading
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from .._base import check
+from ..modes.modal import Modes
+from ..modes.viewing import grid
+from .player import AT_ONCE, Stroke
+
+FIRST_NOTE = 60  # [-] the note (middle C) of the first point; each semitone up is the next one, round and round
+LOUDEST_NOTE = 127  # [-] the MIDI velocity of the fastest stroke; speeds go with it
+LARGEST_FILE = 10_000_000  # [byte] of a MIDI file: days of music
+KEYS = ("zxcvbnm,./", "asdfghjkl;", "qwertyuiop", "1234567890")  # a column strikes one point, a row up is louder
+SOFTEST = 0.125  # [-] of the fastest stroke, by the lowest row; each row up is twice as fast
+ENDS = ("\x1b", "\x04", "\x03")  # Escape, Ctrl-D and Ctrl-C end the playing
+PATIENCE = 0.05  # [s] between looks whether the playing has ended
+
+
+class Source(Protocol):
+    """What strokes a body."""
+
+    live: bool  # whether strokes come at any moment, and not from a file
+
+    def due(self, begin: int, end: int) -> Sequence[Stroke]:
+        """The strokes of a block, by frames of the block."""
+
+    def over(self, frame: int) -> bool:
+        """Whether none follows from a frame on."""
+
+
+class Score:
+    """Strokes known beforehand."""
+
+    live = False
+
+    def __init__(self, strokes: Sequence[Stroke]) -> None:
+        self.strokes = sorted(strokes)
+        self._next = 0
+
+    def due(self, begin: int, end: int) -> list[Stroke]:
+        """The strokes of a block, by frames of the block; what is too much at once comes in the next."""
+        first = self._next
+        while self._next < len(self.strokes) and self.strokes[self._next].frame < end and self._next - first < AT_ONCE:
+            self._next += 1
+        return [stroke._replace(frame=max(0, stroke.frame - begin)) for stroke in self.strokes[first : self._next]]
+
+    def over(self, frame: int) -> bool:
+        """Whether none follows."""
+        return self._next == len(self.strokes)
+
+
+class Hands:
+    """Strokes that come at any moment, each struck at the start of the next block."""
+
+    live = True
+
+    def __init__(self) -> None:
+        self._waiting: deque[Stroke] = deque()
+        self._ended = threading.Event()
+
+    def strike(self, point: int, speed: float) -> None:
+        """Strike as soon as possible."""
+        self._waiting.append(Stroke(0, point, speed))
+
+    def stop(self) -> None:
+        """Let the playing end."""
+        self._ended.set()
+
+    def due(self, begin: int, end: int) -> list[Stroke]:
+        """What came since the last block."""
+        return [self._waiting.popleft() for _ in range(min(len(self._waiting), AT_ONCE))]
+
+    def over(self, frame: int) -> bool:
+        """Whether the playing was ended."""
+        return self._ended.is_set() and not self._waiting
+
+
+def spread(modes: Modes, first: Any, count: int) -> np.ndarray:
+    """Points over a body, the given one and then by their distance from it, (count, dimension) [m].
+
+    Each is the point of a fine grid that lies farthest from those before (Gonzalez 1985, Theor. Comput. Sci. 38, 293).
+    """
+    points = grid(modes)[0]
+    points = points[modes.shapes.contains(points)]
+    chosen = [modes.point("at", first)[0]]
+    least = np.linalg.norm(points - chosen[0], axis=1)
+    while len(chosen) < count:
+        chosen.append(points[int(np.argmax(least))])
+        least = np.minimum(least, np.linalg.norm(points - chosen[-1], axis=1))
+    return np.array(sorted(chosen, key=lambda point: float(np.linalg.norm(point - chosen[0]))))
+
+
+def of_note(note: int, velocity: int, n_points: int, fastest: float) -> tuple[int, float]:
+    """Point and speed [m/s] of a MIDI note."""
+    return (note - FIRST_NOTE) % n_points, fastest * velocity / LOUDEST_NOTE
+
+
+def read_midi(path: Path, n_points: int, fastest: float, rate: int) -> list[Stroke]:
+    """The notes of all tracks of a MIDI file as strokes; pauses, controllers and the ends of notes say nothing."""
+    mido = check.extra("mido", "play", "a MIDI file")
+    if path.stat().st_size > LARGEST_FILE:
+        raise ValueError(f"{path}: a MIDI file must have at most {LARGEST_FILE / 1e6:g} MB")
+    strokes, now = [], 0.0
+    try:
+        for message in mido.MidiFile(str(path)):
+            now += message.time
+            if message.type == "note_on" and message.velocity > 0:
+                struck = of_note(message.note, message.velocity, n_points, fastest)
+                strokes.append(Stroke(round(now * rate), *struck))
+    except (EOFError, IndexError, KeyError, OSError, TypeError, ValueError, ZeroDivisionError) as error:
+        if isinstance(error, OSError) and error.errno:
+            raise
+        raise ValueError(f"{path}: not a MIDI file that can be read ({error or type(error).__name__})") from None
+    if not strokes:
+        raise ValueError(f"{path}: holds no notes")
+    return strokes
+
+
+@contextmanager
+def port(name: str, hands: Hands, n_points: int, fastest: float) -> Iterator[str]:
+    """Listen to the MIDI input whose name begins so, or to the first; yields its name."""
+    mido = check.extra("mido", "play", "a MIDI port")
+    check.extra("rtmidi", "play", "a MIDI port")
+    names = mido.get_input_names()
+    found = [each for each in names if each.startswith(name)]
+    if not found:
+        known = ", ".join(names) or "none"
+        raise ValueError(f"port must be a MIDI input of this machine, got {name!r}; there are: {known}")
+
+    def heard(message: Any) -> None:
+        if message.type == "note_on" and message.velocity > 0:
+            hands.strike(*of_note(message.note, message.velocity, n_points, fastest))
+
+    with mido.open_input(found[0], callback=heard):
+        yield found[0]
+
+
+@contextmanager
+def keys(hands: Hands, n_points: int, fastest: float) -> Iterator[None]:
+    """Listen to the keys of the terminal, or to what is piped in; Escape or the end of the input end the playing."""
+    thread = threading.Thread(target=_listen, args=(hands, n_points, fastest), daemon=True)
+    with _raw(sys.stdin):
+        thread.start()
+        try:
+            yield
+        finally:
+            hands.stop()
+            thread.join()
+
+
+def of_key(key: str, n_points: int, fastest: float) -> tuple[int, float] | None:
+    """Point and speed [m/s] of a key; None if it has none."""
+    for row, keys in enumerate(KEYS):
+        if key.lower() in keys:
+            return keys.index(key.lower()) % n_points, fastest * SOFTEST * 2.0**row
+    return None
+
+
+def _listen(hands: Hands, n_points: int, fastest: float) -> None:
+    for key in _pressed(hands):
+        if key in ENDS:
+            break
+        struck = of_key(key, n_points, fastest)
+        if struck is not None:
+            hands.strike(*struck)
+    hands.stop()
+
+
+def _pressed(hands: Hands) -> Iterator[str]:
+    """Keys as they are pressed, until the input or the playing ends."""
+    if os.name == "nt" and sys.stdin.isatty():
+        import msvcrt
+
+        while not hands.over(0):
+            if msvcrt.kbhit():  # type: ignore[attr-defined]
+                yield msvcrt.getwch()  # type: ignore[attr-defined]
+            else:
+                threading.Event().wait(PATIENCE / 10.0)
+        return
+    handle = sys.stdin.fileno()
+    while not hands.over(0):
+        if select.select([handle], [], [], PATIENCE)[0]:
+            text = os.read(handle, 64).decode("utf-8", "replace")
+            if not text:
+                return
+            yield from text
+
+
+@contextmanager
+def _raw(stream: Any) -> Iterator[None]:
+    """Have the terminal hand over each key at once, without showing it."""
+    if os.name == "nt" or not stream.isatty():
+        yield
+        return
+    import termios
+    import tty
+
+    before = termios.tcgetattr(stream)
+    tty.setcbreak(stream)
+    try:
+        yield
+    finally:
+        termios.tcsetattr(stream, termios.TCSADRAIN, before)

@@ -1,0 +1,72 @@
+"""`fem-impact play`: a scene as a player, its strokes from where the command line says, its sound to where it says."""
+
+import argparse
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+from ..modes.modal import Modes
+from ..scenes.scene import Scene
+from .controllers import KEYS, Hands, Score, Source, keys, port, read_midi, spread
+from .devices import Clock, Device, Speaker
+from .player import LOUDEST, Player, Stroke
+
+FASTER = 2.0  # [-] fastest stroke over the speed of the scene
+N_POINTS = len(KEYS[0])  # [-] points to strike, one for each column of keys
+
+
+def player_of(scene: Scene, modes: Modes, options: argparse.Namespace) -> Player:
+    """The scene as something to play, with the volume set by one stroke at full speed."""
+    blow = scene.blow.values
+    fastest = options.fastest if options.fastest is not None else FASTER * blow["speed"]
+    points = options.at or list(spread(modes, blow["at"], N_POINTS))
+    player = Player(
+        modes, scene.make_striker(), scene.make_contact(), points=points, fastest=fastest, listen=scene.points[0],
+        block=options.block,
+    )  # fmt: skip
+    peak = max(abs(player.play([Stroke(0, 0, player.fastest)], 0.1).samples).max(), 1e-30)
+    player.gain *= LOUDEST / float(peak)
+    player.reset()
+    return player
+
+
+@contextmanager
+def source_of(options: argparse.Namespace, player: Player) -> Iterator[tuple[Source, str]]:
+    """Where the strokes come from, and that in words."""
+    if options.midi is not None:
+        strokes = read_midi(options.midi, len(player.points), player.fastest, player.rate)
+        yield Score(strokes), f"{len(strokes)} notes of {options.midi}"
+        return
+    hands = Hands()
+    with ExitStack() as open_now:
+        open_now.enter_context(_ended_by_hand(hands))
+        if options.port is not None:
+            name = open_now.enter_context(port(options.port, hands, len(player.points), player.fastest))
+            yield hands, f"MIDI port {name}; Ctrl-C ends"
+        else:
+            open_now.enter_context(keys(hands, len(player.points), player.fastest))
+            yield hands, f"keys {KEYS[0]} to {KEYS[-1]}: a column for each point, louder from row to row; Esc ends"
+
+
+def device_of(options: argparse.Namespace, live: bool) -> tuple[Device | None, str]:
+    """What plays, and why not the loudspeaker."""
+    if options.silent:
+        return (Clock() if live else None), ""
+    try:
+        return Speaker(), ""
+    except ValueError as error:
+        return (Clock() if live else None), str(error)
+
+
+@contextmanager
+def _ended_by_hand(hands: Hands) -> Iterator[None]:
+    """Let Ctrl-C end the playing, and not the program."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, lambda *_: hands.stop())
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

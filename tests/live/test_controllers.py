@@ -1,0 +1,146 @@
+"""Keys, MIDI files and ports become strokes of the right point, speed and frame."""
+
+import os
+import sys
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import fem_impact as fi
+from fem_impact.live import controllers
+from fem_impact.live.controllers import Hands, Score, Stroke
+
+
+def test_a_score_gives_every_stroke_once_in_its_block():
+    score = Score([Stroke(130, 1, 0.5), Stroke(3, 0, 1.0), Stroke(64, 2, 2.0)])
+    assert score.due(0, 64) == [(3, 0, 1.0)] and not score.over(0)
+    assert score.due(64, 128) == [(0, 2, 2.0)]
+    assert score.due(128, 192) == [(2, 1, 0.5)] and score.over(192)
+    crowd = Score([Stroke(1, 0, 0.1)] * 100)
+    first = crowd.due(0, 64)
+    assert len(first) == controllers.AT_ONCE and len(crowd.due(64, 128)) == 100 - len(first)
+
+
+def test_points_are_spread_over_any_outline():
+    modes = fi.find_modes(
+        fi.assemble(
+            fi.mesh.polygon([(0, 0), (1, 0), (1, 0.3), (0.3, 0.3), (0.3, 1), (0, 1)], size=0.3),
+            fi.Plate(fi.Material(E=7e10, nu=0.3, rho=2700.0), thickness=2e-3), supports={"boundary": "hinged"},
+        ),
+        n_modes=4,
+    )  # fmt: skip
+    points = controllers.spread(modes, (0.1, 0.2), 8)
+    assert modes.shapes.contains(points).all() and points[0] == pytest.approx((0.1, 0.2))
+    apart = np.linalg.norm(points[:, None] - points, axis=2)[~np.eye(8, dtype=bool)]
+    assert apart.min() > 0.15
+    assert (np.diff(np.linalg.norm(points - points[0], axis=1)) >= 0.0).all()
+
+
+def test_a_column_of_keys_is_a_point_and_a_row_a_loudness():
+    assert controllers.of_key("z", 10, 2.0) == (0, 0.25)
+    assert controllers.of_key("S", 10, 2.0) == (1, 0.5)
+    assert controllers.of_key("0", 10, 2.0) == (9, 2.0)
+    assert controllers.of_key("p", 3, 2.0) == (0, 1.0)  # fewer points than columns: round again
+    assert controllers.of_key(" ", 10, 2.0) is None
+    assert controllers.of_note(60, 127, 10, 2.0) == (0, 2.0)
+    assert controllers.of_note(59, 64, 10, 127.0) == (9, 64.0)
+
+
+def test_piped_keys_strike_and_the_end_of_the_pipe_ends(monkeypatch):
+    there, here = os.pipe()
+    with os.fdopen(there) as reader:
+        monkeypatch.setattr(sys, "stdin", reader)
+        hands = Hands()
+        with controllers.keys(hands, 10, 1.0):
+            os.write(here, b"z 2")
+            os.close(here)
+            end = time.monotonic() + 20.0
+            found = []
+            while len(found) < 2 and time.monotonic() < end:
+                found += hands.due(0, 64)
+        assert found == [(0, 0, 0.125), (0, 1, 1.0)] and hands.over(0)
+
+
+def test_escape_ends_and_what_was_struck_before_is_played(monkeypatch):
+    there, here = os.pipe()
+    with os.fdopen(there) as reader:
+        monkeypatch.setattr(sys, "stdin", reader)
+        hands = Hands()
+        os.write(here, b"1\x1b2")
+        with controllers.keys(hands, 10, 1.0):
+            end = time.monotonic() + 20.0
+            while not hands._ended.is_set() and time.monotonic() < end:
+                time.sleep(0.001)
+        os.close(here)
+        assert not hands.over(0) and hands.due(0, 64) == [(0, 0, 1.0)] and hands.over(0)
+
+
+def midi(path):
+    """A file of two tracks in which the tempo doubles after a beat."""
+    mido = pytest.importorskip("mido", reason="the extra play is missing")
+    file = mido.MidiFile(ticks_per_beat=480)
+    file.tracks.append(mido.MidiTrack([
+        mido.MetaMessage("set_tempo", tempo=500_000), mido.Message("note_on", note=60, velocity=127),
+        mido.Message("note_off", note=60, time=480), mido.MetaMessage("set_tempo", tempo=250_000),
+        mido.Message("note_on", note=61, velocity=64, time=480), mido.Message("note_on", note=61, velocity=0, time=10),
+    ]))  # fmt: skip
+    file.tracks.append(mido.MidiTrack([mido.Message("note_on", note=59, velocity=1, time=240)]))
+    file.save(path)
+    return path
+
+
+def test_a_midi_file_keeps_its_tempo_in_all_tracks(tmp_path):
+    strokes = controllers.read_midi(midi(tmp_path / "a.mid"), 10, 1.27, 48_000)
+    assert [(s.frame, s.point) for s in strokes] == [(0, 0), (12_000, 9), (36_000, 1)]
+    assert [s.speed for s in strokes] == pytest.approx([1.27, 0.01, 0.64])
+
+
+def test_what_is_no_midi_file_is_one_clear_error(tmp_path):
+    whole = midi(tmp_path / "a.mid").read_bytes()
+    rng = np.random.default_rng(1)
+    cases = [b"", b"RIFF", whole[:30], whole[:14]]
+    for _ in range(60):
+        broken = bytearray(whole)
+        broken[rng.integers(len(whole))] = rng.integers(256)
+        cases.append(bytes(broken))
+    for case in cases:
+        (tmp_path / "b.mid").write_bytes(case)
+        try:
+            controllers.read_midi(tmp_path / "b.mid", 10, 1.0, 48_000)
+        except ValueError as error:
+            assert str(error).startswith(str(tmp_path / "b.mid")) and "\n" not in str(error)
+    with pytest.raises(FileNotFoundError):
+        controllers.read_midi(tmp_path / "none.mid", 10, 1.0, 48_000)
+
+
+def test_a_midi_port_is_found_by_the_start_of_its_name(monkeypatch):
+    heard = []
+
+    class Input:
+        def __enter__(self):
+            heard[0](SimpleNamespace(type="note_on", note=62, velocity=127))
+            heard[0](SimpleNamespace(type="note_on", note=62, velocity=0))
+            heard[0](SimpleNamespace(type="control_change", value=3))
+
+        def __exit__(self, *_):
+            pass
+
+    def open_input(name, callback):
+        assert name == "Pads 20:0"
+        heard.append(callback)
+        return Input()
+
+    fake = SimpleNamespace(get_input_names=lambda: ["Through 14:0", "Pads 20:0"], open_input=open_input)
+    monkeypatch.setitem(sys.modules, "mido", fake)
+    monkeypatch.setitem(sys.modules, "rtmidi", fake)
+    hands = Hands()
+    with controllers.port("Pads", hands, 10, 1.5) as name:
+        assert name == "Pads 20:0"
+    assert hands.due(0, 64) == [(0, 2, 1.5)]
+    with (
+        pytest.raises(ValueError, match="port must be a MIDI input of this machine, got 'Drum'; there are: Through"),
+        controllers.port("Drum", hands, 10, 1.5),
+    ):
+        pass
