@@ -386,7 +386,7 @@ def _strike(options: argparse.Namespace) -> bool:
     if options.listener is not None:
         scene = scene.heard_from(*options.listener)
     if scene.stroke:
-        return _play(options, scene)
+        return _strike_in_turn(options, scene)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     display = Display()
     with fi.export.staged(folder) as staging, Painter() if options.pictures else nullcontext() as painter:
@@ -478,7 +478,7 @@ def _write(
     return data
 
 
-def _play(options: argparse.Namespace, scene: Any) -> bool:
+def _strike_in_turn(options: argparse.Namespace, scene: Any) -> bool:
     """Play the strokes of a scene and write what they did; returns whether the tolerance was missed."""
     from .model.target import Stages  # imported only when needed
     from .scenes import hearing, sequence
