@@ -118,13 +118,14 @@ def fit(
     (True, 1.0)
     """
     striker.let_go("a fit")
-    taps = windows.joined(taps)
+    given = windows.joined(taps)
+    taps = windows.levelled(given)
     laws = [contact] if isinstance(contact, Contact) else list(check.several("contact", contact, Contact))
     options = {
         "target": target, "at": at, "striker": striker, "unknown": unknown, "known": arguments.table("known", known),
         "response_at": response_at, "window": window, "starts": check.count("starts", starts), "robust": robust,
         "rig": Rig(taps.rate, anti_alias, tip_mass, resonance), "watch": watch,
-        "rng": arguments.generator("rng", rng),
+        "rng": arguments.generator("rng", rng), "noted": len(given.notes),
         "per_tap": arguments.texts("per_tap", [per_tap] if isinstance(per_tap, str) else per_tap),
     }  # fmt: skip
     found = [_fit(taps, contact=law, **options) for law in laws]
@@ -146,12 +147,13 @@ def _law_name(law: Contact) -> str:
 
 
 def _fit(
-    taps, *, target, at, striker, contact, unknown, known, per_tap, response_at, window, starts, robust, rig, watch, rng
-):
+    taps, *, target, at, striker, contact, unknown, known, per_tap, response_at, window, starts, robust, rig, watch,
+    rng, noted
+):  # fmt: skip
     names = checked(unknown, target, striker, contact, known)
     for name in per_tap:
         check.one_of("per_tap", name, unknown)
-    notes: list[str] = []
+    notes = list(taps.notes[noted:])
     points, n_points = None, 0
     if response_at is not None:
         n_points = taps.response.shape[2]
@@ -161,13 +163,16 @@ def _fit(
             points = target.points("response_at", response_at)
             if len(points) != n_points:
                 raise ValueError(f"response_at must be {n_points} points, one for each response, got {len(points)}")
-    if taps.cut_short.any():
-        whole = np.flatnonzero(~taps.cut_short)
-        short = ", ".join(taps.labels[i] for i in np.flatnonzero(taps.cut_short))
-        notes.append(f"left out, because their record begins or ends within a pulse: {short}")
-        if not whole.size:
-            raise ValueError("taps must hold one at least whose record holds its whole pulse; trigger earlier")
-        taps = taps.pick(whole)
+    for bad, why, advice in (
+        (taps.impulse <= 0.0, "their force never pushes", "whose force pushes; a negative one has the wrong sign"),
+        (taps.cut_short, "their record begins or ends within a pulse",
+         "whose record holds its whole pulse; trigger earlier"),
+    ):  # fmt: skip
+        if bad.any():
+            notes.append(f"left out, because {why}: {', '.join(taps.labels[i] for i in np.flatnonzero(bad))}")
+        if bad.all():
+            raise ValueError(f"taps must hold one at least {advice}")
+    taps = taps.pick(~(taps.cut_short | (taps.impulse <= 0.0)))
     cut, noise = windows.cut(taps, window), taps.noise / taps.peak
     if cut.overload.any():
         bad = np.flatnonzero(cut.overload)

@@ -98,8 +98,7 @@ class Taps:
                     f"overload must be bools of shape ({n_taps}, {1 + n_channels}), got {check.shown(overload)}"
                 )
             cut = np.broadcast_to(flags, (n_taps, 1 + n_channels)).tolist()
-        begun = [triggers.starts(f, triggers.level(f), n_times) for f in rows]
-        onset = np.array([each[0] if each.size else 0 for each in begun]) / rate
+        onset = np.array([triggers.onset(f) for f in rows]) / rate
         table = xr.Dataset(
             {
                 "force": (("tap", "time"), rows, {"units": "N"}),

@@ -6,6 +6,7 @@ from scipy.interpolate import interp1d
 from .._base import check
 
 LEVEL = 0.05  # [-] of the largest force: a tap begins where the force rises above this
+LOW = 0.25  # [-] quantile of a record of one tap that is at rest: no pulse fills three quarters of it
 NOISE = 8.0  # [-] standard deviations of the noise that the trigger stays above at least
 GAUSS = 1.4826  # [-] standard deviation over median absolute deviation of Gaussian noise
 PULSE = 0.1, 0.05  # [-] of a tap's largest force: a pulse rises above the first and ends below the second
@@ -31,6 +32,14 @@ def noise(force: np.ndarray) -> float:
 def level(force: np.ndarray) -> float:
     """The trigger [N] for a record (n_samples,)."""
     return max(LEVEL * float(force.max(initial=0.0)), NOISE * noise(force))
+
+
+def onset(force: np.ndarray) -> int:
+    """First sample of a tap (n_times,) above the trigger, whatever offset the record has; 0 if there is none."""
+    rest = float(np.quantile(force, LOW))
+    moved = force - (rest if abs(rest) > 2.0 * noise(force) else 0.0)
+    above = moved > level(moved)
+    return int(above.argmax())
 
 
 def starts(force: np.ndarray, trigger: float, together: int) -> np.ndarray:

@@ -9,6 +9,9 @@ from . import triggers
 from .records import Taps
 from .solver import Data
 
+GUARD = 3  # [samples] before the onset, where a tap may have begun
+UNSURE = 6.0  # [-] standard deviations of a mean: an offset of less is noise
+SLIGHT = 0.002  # [-] of the largest force: a smaller offset is left
 BEFORE = 12  # [samples] before the tap that are compared: the filter rings there
 AFTER = 1.5  # [-] of the length from the first to the last pulse: what is compared after it, at least BEFORE samples
 
@@ -32,6 +35,27 @@ def joined(taps: Any, name: str = "taps") -> Taps:
         overload=np.concatenate([each.table["overload"].values for each in several]),
         notes=[note for each in several for note in each.notes],
     )
+
+
+def levelled(taps: Taps) -> Taps:
+    """The taps without offsets of their force that are more than noise, each with a note of what was done."""
+    rates, moved = taps.rate, np.zeros(taps.n_taps)
+    for i, (row, onset) in enumerate(zip(taps.force, taps.onset)):
+        rest = row[: max(0, round(onset * rates) - GUARD)]
+        rest = rest if len(rest) >= triggers.FEWEST else row[-(len(row) // 3) :]
+        middle, sure = float(np.median(rest)), UNSURE * triggers.noise(row) / np.sqrt(len(rest))
+        if abs(middle) > max(sure, SLIGHT * float(np.ptp(row))):
+            moved[i] = middle
+    if not moved.any():
+        return taps
+    force = taps.force - moved[:, None]
+    table = taps.table.assign(
+        force=(("tap", "time"), force, {"units": "N"}),
+        onset=("tap", np.array([triggers.onset(row) for row in force]) / rates, {"units": "s"}),
+    )
+    named = ", ".join(taps.labels[i] for i in np.flatnonzero(moved))
+    note = f"offsets of the force were removed, up to {moved[np.abs(moved).argmax()]:.2g} N: {named}"
+    return Taps(table, (*taps.notes, note))
 
 
 def same_rate(tap: Taps, taps: Taps) -> None:

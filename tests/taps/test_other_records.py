@@ -188,3 +188,17 @@ def test_double_hits_on_a_known_wooden_plate_tell_the_hammer(tmp_path):
     assert made.point["contact.exponent"] == pytest.approx(1.5, abs=0.05)
     rise = made.left_out(rise_only=True)[4]  # the later pulses follow from the rise of the first
     assert rise.error < 0.05  # 2.2 % of the rms force is noise
+
+
+def test_taps_of_the_wrong_sign_and_empty_ones_are_left_out(force):
+    rows = np.array([force[int(RATE * t) - 50 :][:150] for t in BEFORE + GAP * np.arange(5)])
+    rows[1] *= -1.0
+    rows[3] = 0.0
+    rows[4] += 0.2 * force.max()
+    made = fitted(fi.Taps.from_arrays(rows, rate=RATE), unknown={"contact.stiffness": RANGES["contact.stiffness"]},
+                  contact=LAW, starts=1, robust=False)  # fmt: skip
+    assert made.taps.labels == ("tap 1", "tap 3", "tap 5") and made.error < 0.06
+    assert "left out, because their force never pushes: tap 2, tap 4" in made.notes
+    assert any(note.startswith("offsets of the force were removed") for note in made.notes)
+    with pytest.raises(ValueError, match="a negative one has the wrong sign"):
+        fitted(fi.Taps.from_arrays(-rows[:1], rate=RATE))

@@ -36,3 +36,16 @@ def test_all_onsets_come_to_the_same_place():
 def test_records_are_scaled_to_their_peaks_over_the_weights():
     data = windows.data(windows.joined([tap(50), tap(83)]), 0, np.array([2.0]))
     assert np.allclose(data.scale, PULSE.max() / 2.0) and np.allclose(np.abs(data.values).max(axis=2), 2.0)
+
+
+def test_offsets_beyond_the_noise_are_removed_and_said():
+    rng = np.random.default_rng(1)
+    pulse = np.pad(100.0 * np.sin(np.linspace(0.0, np.pi, 12)) ** 2, (40, 60)) + 0.2 * rng.standard_normal(112)
+    rows = np.array([pulse, pulse + 20.0, pulse - 7.0, np.roll(pulse, -37) + 5.0])  # the last begins with its pulse
+    taps = fi.Taps.from_arrays(rows, rate=25600.0, notes=["as given"])
+    assert (np.abs(taps.onset * 25600.0 - [42, 42, 42, 5]) <= 1.0).all()  # an offset moves no onset
+    made = windows.levelled(taps)
+    assert np.allclose(made.peak, taps.peak[0], atol=0.3)
+    assert np.array_equal(made.force[0], taps.force[0])  # noise is no offset
+    assert made.notes == ("as given", "offsets of the force were removed, up to 20 N: tap 2, tap 3, tap 4")
+    assert windows.levelled(taps.pick([0])).notes == ("as given",)
