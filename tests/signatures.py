@@ -59,7 +59,7 @@ INNER = {
     "explore.serve",  # ends at an interruption only, see test_explore
     "ToleranceWarning", "analytic.closed_form", "Striker.let_go",
     "Taps", "Taps.summary",  # made by read_taps and Taps.from_arrays
-    "pictures.gallery", "pictures.film", "hammers.choose_on",
+    "pictures.gallery", "pictures.film", "figures.chladni", "hammers.choose_on",
     "Modes", "sound.Sound.audible", "sound.Sound.normalised", "sound.Sound.faded", "sound.Sound.wav",
     "hammers.Hammer.data",
 }  # fmt: skip
@@ -335,6 +335,7 @@ def table() -> dict[str, dict[str, Any]]:
         "figures.save": {"path": folder / "force.png", "figure": fi.figures.energies(t["hit"])},
         "figures.force": {**hit, "band": (10.0, 1e3)},
         "figures.energies": hit,
+        "pictures.chladni": {"modes": t["modes"], "count": 2, "columns": 2},
         "figures.mode_energies": hit,
         "figures.mobility": {"modes": t["modes"], "at": at, "to": at, "band": (10.0, 1e3)},
         "figures.mode_shapes": {"modes": t["modes"], "count": 2, "columns": 2},

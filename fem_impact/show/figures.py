@@ -18,7 +18,7 @@ from .._base.files import replacing
 from ..impact import spectra
 from ..impact.response import Response
 from ..mesh import edge_table
-from ..mesh.mesh_files import boundary
+from ..mesh.mesh_files import boundary, quartered
 from ..mesh.meshes import Mesh
 from ..model.playing import Strokes
 from ..modes.modal import Modes
@@ -51,6 +51,8 @@ SPECTRUM_DEPTH = 1e-4  # [-] bottom of the spectrum axis: 80 dB below the larges
 MOST_NUMBERS = 20  # [-] with more contacts than this, the numbers would overlap and are left out
 HEADROOM = 1.15  # [-] top of the force axis over the peak force: leaves room for the numbers
 TIMES = 800  # [-] instants in the plot of energies
+SAND = 1e-3  # [-] the same for lines alone: along a clamped edge the elements err by less
+FINER = 1  # [-] times the triangles are split in four to draw nodal lines, which then look smooth
 MODE_DEPTH = 1e-8  # [-] bottom of the energy axis: 80 dB below the most energetic mode
 FLAT = 1e-9  # [-] a shape below this share of its largest deflection is zero up to rounding
 BINS = 60  # [-] of a histogram
@@ -270,6 +272,38 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
     return figure
 
 
+def chladni(modes: Modes, count: int, columns: int) -> Figure:
+    """As `pictures.chladni`."""
+    check.between("dimension of modes", modes.dimension, 2, 2)
+    flexible = modes.n_modes - modes.n_rigid
+    if not flexible:
+        raise ValueError("modes must have a flexible mode: a rigid motion has no Chladni figure")
+    count = min(check.count("count", count), flexible)
+    columns = min(check.count("columns", columns), count)
+    points, cells = sampling.grid(modes)
+    rim = boundary(cells)
+    for _ in range(FINER):
+        cells, sides = quartered(cells, len(points))
+        points = np.concatenate([points, points[sides].mean(axis=1)])
+    numbers = modes.n_rigid + np.arange(count)
+    shapes = modes.truncated(n_modes=int(numbers[-1]) + 1).shapes.at(points)[:, numbers]
+    shapes = shapes / np.abs(shapes).max(axis=0)
+    rows = -(-count // columns)
+    tall = min(1.6, max(0.4, float(np.ptp(points[:, 1]) / np.ptp(points[:, 0]))))
+    with styled(2.0 * columns, rows * (2.0 * tall + 0.35)) as figure:
+        grid = figure.subplots(rows, columns, squeeze=False)
+        for i, axes in enumerate(grid.flat):
+            axes.set_axis_off()
+            if i >= count:
+                continue
+            axes.tricontour(*points.T, cells, _unflattened(shapes[:, i], cells, SAND), levels=[0.0], colors="black")
+            axes.add_collection(LineCollection(list(points[rim]), colors="#777777", linewidths=1.0))
+            axes.set_aspect("equal")
+            axes.autoscale_view()
+            axes.set_title(f"{numbers[i] + 1}   {in_hertz(modes.frequencies[numbers[i]])}")
+    return figure
+
+
 def snapshot(plane: np.ndarray, cells: np.ndarray, deflection: np.ndarray, at: np.ndarray, title: str) -> Figure:
     """Draw the deflection of a surface at one instant in colour, from -1 to 1, and mark the strike point.
 
@@ -296,7 +330,7 @@ def in_hertz(value: float) -> str:
     return f"{value:.4g} Hz" if value < 1e4 else f"{value * 1e-3:.4g} kHz"
 
 
-def _unflattened(shape: np.ndarray, cells: np.ndarray) -> np.ndarray:
+def _unflattened(shape: np.ndarray, cells: np.ndarray, flat: float = FLAT) -> np.ndarray:
     """The shape (n_points,), with zeros replaced by a tiny share of the neighbouring values.
 
     A supported edge is zero up to rounding; without this, parts of it would be drawn as nodal lines.
@@ -305,7 +339,7 @@ def _unflattened(shape: np.ndarray, cells: np.ndarray) -> np.ndarray:
     for i in range(3):
         np.add.at(total, cells[:, i], shape[cells].sum(axis=1))
         np.add.at(count, cells[:, i], 3.0)
-    return np.where(np.abs(shape) < FLAT, FLAT * total / np.maximum(count, 1.0), shape)
+    return np.where(np.abs(shape) < flat, FLAT * total / np.maximum(count, 1.0), shape)
 
 
 @check.typed

@@ -62,6 +62,29 @@ def mode_shapes(path: str | Path, modes: Modes, *, count: int = 12, columns: int
     return ""
 
 
+@check.typed
+def chladni(modes: Modes, *, count: int = 12, columns: int = 4) -> figures.Figure:
+    """Draw the nodal lines of a plate's first flexible modes within its outline, flat, as Chladni's sand shows them.
+
+    Parameters
+    ----------
+    modes : Modes of a plate
+    count : int, largest number of modes
+    columns : int
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Lines only, which stay lines in PDF and SVG files of `figures.save`; above each, its number and frequency.
+
+    Examples
+    --------
+    >>> plate = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=6)
+    >>> fi.figures.save("chladni.svg", fi.pictures.chladni(plate, columns=3))
+    """
+    return figures.chladni(modes, count, columns)
+
+
 def gallery(modes: Modes, count: int = 12, columns: int = 4) -> canvas.Gallery:
     """The first mode shapes of a plate or a beam, ready to be drawn."""
     points, cells, plane = sampling.surface(modes)

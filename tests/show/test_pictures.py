@@ -108,3 +108,26 @@ def test_strike_writes_them_when_asked(tmp_path, monkeypatch, capsys):
     said = capsys.readouterr()
     assert pictures.REMEDY in " ".join(said.err.split())
     assert ", pictures " in " ".join(said.out.partition("Time:")[2].split())
+
+
+def lines(axes):
+    """Points (n, 2) of the nodal lines of one figure."""
+    return np.vstack([path.vertices for path in axes.collections[0].get_paths()])
+
+
+def test_chladni_figures_of_a_hinged_plate_are_straight_and_of_a_free_disk_diameters(tmp_path):
+    plate = fi.analytic.rectangle(0.5, 0.3, mass=0.2, first_frequency=100.0, n_modes=3)
+    drawn = pictures.chladni(plate, columns=3)
+    assert [axes.get_title(loc="left").split()[0] for axes in drawn.axes] == ["1", "2", "3"]
+    assert not drawn.axes[0].collections[0].get_paths()[0].vertices.size  # the edge, where it is held, is no nodal line
+    assert np.ptp(lines(drawn.axes[1])[:, 1]) > 0.28  # from side to side
+    np.testing.assert_allclose(lines(drawn.axes[1])[:, 0], 0.25, atol=2e-3)  # of mode (2, 1); a third of a triangle
+    free = fi.analytic.disk(0.2, edge="free", mass=0.2, first_frequency=100.0, n_modes=6)
+    diameters = lines(pictures.chladni(free, count=1).axes[0])
+    angle = np.degrees(np.arctan2(diameters[:, 1], diameters[:, 0]))[np.linalg.norm(diameters, axis=1) > 0.05]
+    assert np.abs((angle - angle[0] + 45.0) % 90.0 - 45.0).max() < 0.5  # two, at right angles
+    fi.figures.save(tmp_path / "chladni.svg", drawn)
+    assert "<image" not in (tmp_path / "chladni.svg").read_text()
+    for wrong in (fi.Modes.rigid(1.0), fi.analytic.beam(0.4, mass=0.2, first_frequency=100.0, n_modes=3)):
+        with pytest.raises(ValueError, match="dimension of modes must lie between 2 and 2"):
+            pictures.chladni(wrong)
