@@ -86,12 +86,18 @@ def of_striker(striker: Striker) -> Body:
     return _body(modes, striker.shape, striker.motion, np.zeros((0, modes.n_modes)), rest)
 
 
-def of_target(modes: Modes, at: Any, points: Any = None) -> Body:
-    """A struck body at its strike point, and where its response is measured."""
+def of_target(modes: Modes, at: Any, points: Any = None, softness: float | None = None) -> Body:
+    """A struck body at its strike point, and where its response is measured.
+
+    ``softness`` is the static compliance at the strike point [m/N], if it is known already.
+    """
     place = modes.point("at", at)
     row = modes.shape_at(place)[0]
     rows = np.zeros((0, modes.n_modes)) if points is None else modes.shape_at(points)
-    rest = float(modes.residual_compliance(place)[0, 0]) if modes.dimension else 0.0
+    if softness is not None:
+        rest = max(0.0, softness - float(modes.modal_compliance(place)[0, 0]))
+    else:
+        rest = float(modes.residual_compliance(place)[0, 0]) if modes.dimension else 0.0
     return _body(modes, row, np.zeros(modes.n_modes), rows, rest)
 
 

@@ -2,13 +2,14 @@
 
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from scipy.special import gamma
 
 from .._base import check
@@ -24,6 +25,7 @@ MODE = ("frequency", "mass", "damping", "gain")
 MOST_MODES = 6  # [-] of an unknown target
 DAMPING = 0.02  # [-] of unknown modes, unless it is unknown too
 RATIO = 1.0  # [-] mode ratio of a striker, unless it is unknown too: two equal masses and a spring
+PLACES = 5  # [-] along each unknown coordinate of the strike point at which the compliance is computed
 NAME = re.compile(r"(contact|striker|target|mode\d)\.(\w+)")
 UNITS = {
     "stiffness": "N/m**exponent", "exponent": "", "loss": "s/m", "mass": "kg", "first_frequency": "Hz",
@@ -142,6 +144,14 @@ def _check_contact(contact: Contact, unknown: list[Unknown], known: Mapping[str,
             raise ValueError(f"unknown and known must make a contact within all ranges: {error}") from None
 
 
+def _products(rows: np.ndarray) -> np.ndarray:
+    """Products of Chebyshev polynomials of coordinates (n_rows, n_axes) within -1 and 1, (n_rows, PLACES**n_axes)."""
+    found = np.ones((len(rows), 1))
+    for column in rows.T:
+        found = (found[:, :, None] * chebyshev.chebvander(column, PLACES - 1)[:, None]).reshape(len(rows), -1)
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Setting:
     """What is known of a blow, and what is not."""
@@ -202,7 +212,7 @@ class Setting:
                 moved = np.array(self.at, float).ravel()
                 for i, axis in enumerate("xy"[: len(moved)]):
                     moved[i] = moved[i] if part[axis] is None else part[axis]
-                body = blows.of_target(self.target, moved, self.points)
+                body = blows.of_target(self.target, moved, self.points, self._softness(moved))
             else:
                 body = self._structure
             body = body.scaled(part["mass"], part["first_frequency"], part["damping"])
@@ -213,6 +223,24 @@ class Setting:
             gain = np.full(self.n_points, values.get(f"mode{i}.gain", 1.0))
             body = body.with_mode(frequency, mass, values.get(f"mode{i}.damping", DAMPING), gain)
         return body
+
+    @cached_property
+    def _softness(self) -> Callable[[np.ndarray], float]:
+        """Static compliance [m/N] of the target over the places (dimension,) [m] that are not known.
+
+        Each needs a solution with finite elements, so that a few are interpolated by polynomials.
+        """
+        target, place = cast(Modes, self.target), np.array(self.at, float).ravel()
+        ranges = {each.name: (each.low, each.high) for each in self.unknown}
+        limits = np.array([ranges.get(f"target.{axis}", (x, x)) for axis, x in zip("xyz", place)])
+        middle, half = limits.mean(axis=1), 0.5 * np.ptp(limits, axis=1)
+        free = np.flatnonzero(half > 0.0)
+        rows = np.array(list(product(chebyshev.chebpts1(PLACES), repeat=len(free))))  # (n_places, n_free)
+        places = np.tile(middle, (len(rows), 1))
+        places[:, free] += half[free] * rows
+        values = np.diag(target.shapes.compliance(target.points("the range of target.x and target.y", places)))
+        weights = np.linalg.solve(_products(rows), values)
+        return lambda at: float(_products(((at - middle)[free] / half[free])[None])[0] @ weights)
 
     def felt_mass(self, values: Mapping[str, float]) -> float:
         """Mass of the striker at its contact point [kg]."""

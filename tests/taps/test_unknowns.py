@@ -48,3 +48,17 @@ def test_a_rigid_hammer_gets_a_mode_and_a_wall_gets_modes():
     assert not len(setting.structure({}).omega)
     body = setting.structure({"target.mass": 2.0, "mode1.frequency": 300.0, "mode1.mass": 0.5})
     assert body.omega.tolist() == pytest.approx([0.0, 600.0 * np.pi])
+
+
+def test_a_strike_point_within_its_range_has_the_compliance_of_the_body():
+    plate = fi.analytic.rectangle(0.5, 0.4, mass=1.5, first_frequency=90.0, n_modes=30)
+    ranges = (unknowns.Unknown("target.x", 0.15, 0.25), unknowns.Unknown("target.y", 0.1, 0.2))
+    setting = unknowns.Setting(plate, (0.2, 0.15), HAMMER, LAW, Rig(25600.0), ranges, None, 0, 0.2)
+    for x, y in ((0.16, 0.12), (0.2, 0.2), (0.25, 0.1)):
+        body = setting.structure({"target.x": x, "target.y": y})
+        exact, whole = plate.residual_compliance((x, y))[0, 0], plate.shapes.compliance(np.array([[x, y]]))[0, 0]
+        assert abs(body.rest - exact) < 2e-4 * whole  # polynomials of degree 4; 4e-5 measured
+    outside = unknowns.Setting(plate, (0.2, 0.15), HAMMER, LAW, Rig(25600.0), (unknowns.Unknown("target.x", 0.2, 3.0),),
+                               None, 0, 0.2)  # fmt: skip
+    with pytest.raises(ValueError, match="range of target"):
+        outside.structure({"target.x": 0.3})
