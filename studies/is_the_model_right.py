@@ -167,7 +167,7 @@ def stretched(path: Path) -> None:
     print(
         "speed [m/s], deflection over thickness without and with stretching, change of the restitution: by stretching,"
     )
-    print("as estimated without it, and as estimated for what Berger's tension misses")
+    print("as estimated without it, and as estimated for the stress fields left out")
     for row in rows:
         print("  " + "  ".join(f"{x:8.3g}" for x in row))
     figure, (one, two) = plt.subplots(1, 2, figsize=(10.0, 4.0), layout="constrained")
@@ -177,7 +177,7 @@ def stretched(path: Path) -> None:
     one.set(xlabel="speed [m/s]", ylabel="deflection over thickness [-]")
     two.loglog(speed, true, label="by stretching")
     two.loglog(speed, told, "--", label="estimated without it")
-    two.loglog(speed, left, ":", label="estimated: what Berger's tension misses")
+    two.loglog(speed, left, ":", label="estimated: stress fields left out")
     two.set(xlabel="speed [m/s]", ylabel="change of the restitution [-]", ylim=(0.1 * true.min(), 2.0))
     for axes in (one, two):
         axes.legend(frameon=False, fontsize=9)

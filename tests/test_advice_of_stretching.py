@@ -129,8 +129,8 @@ def test_following_the_advice_works(name):
 
 @pytest.mark.slow
 @pytest.mark.xdist_group("stretched")
-def test_steps_too_long_for_the_motion_to_settle_are_shortened():
-    """The motion takes the steps of the run, in which the contact helped the stretching forces to settle."""
+def test_steps_too_long_to_settle_are_shortened():
+    """A run halves them; the motion splits those in which only the contact let the stretching forces settle."""
 
     def moved(**how):
         hit = fi.strike(
@@ -139,10 +139,8 @@ def test_steps_too_long_for_the_motion_to_settle_are_shortened():
         )  # fmt: skip
         return hit.modal_state(np.linspace(0.0, 0.012, 50))[0]
 
-    words = r"the stretching did not settle in \d+ steps of the motion; lower dt, or the tolerance without a dt$"
-    for how in ({"dt": 1e-3}, {"tolerance": 1e-2}):
-        with pytest.raises(fi.SimulationError, match=words):
-            moved(**how)
     fine = moved(dt=1e-5)
-    for how in ({"dt": 1e-4}, {"tolerance": 1e-4}):
-        assert moved(**how) == pytest.approx(fine, abs=2e-2 * np.abs(fine).max())
+    for how in ({"dt": 1e-3}, {"dt": 1e-4}, {"tolerance": 0.1}, {"tolerance": 1e-4}):
+        # steps as long as the contact lets the plate ring otherwise, but as far
+        bound = 2e-2 if how in ({"dt": 1e-4}, {"tolerance": 1e-4}) else 2.0
+        assert np.abs(moved(**how) - fine).max() < bound * np.abs(fine).max()

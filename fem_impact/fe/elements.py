@@ -314,6 +314,18 @@ def triangles(points: np.ndarray, cells: np.ndarray) -> MeshTri:
     return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
 
 
+def inverses(space: Any, X: np.ndarray) -> np.ndarray:
+    """Inverse Jacobians (n_cells, n_q, 2, 2) of the map from the reference triangle at its points (2, n_q)."""
+    J = np.broadcast_to(space.jacobian[:, None], (len(space.origin), X.shape[1], 2, 2)).copy()
+    if space.bent is not None:
+        cells = space.bent.cells
+        area = np.broadcast_to(np.stack([1.0 - X[0] - X[1], *X], axis=1), (len(cells), X.shape[1], 3))
+        gradient = space.bent.shift(cells, area)[1]
+        # a triangle with two curved sides is listed twice, each time with the whole shift
+        J[cells] = space.jacobian[cells][:, None] + gradient[..., 1:] - gradient[..., :1]
+    return np.linalg.inv(J)
+
+
 def quadrature(mesh, space, order: int, mapping=None) -> tuple[np.ndarray, np.ndarray]:
     """Quadrature on every cell: points (n_cells, n_q, dimension) and weights (n_cells, n_q)."""
     X, weight = get_quadrature(space.element.refdom, order)

@@ -33,16 +33,14 @@ def products(system: System, vectors: np.ndarray, weight: np.ndarray) -> np.ndar
     return 0.5 * (result + result.T) * frame.length ** (size - 2) / frame.mass
 
 
-def places(system: System) -> tuple[np.ndarray, np.ndarray]:
+def places(system: System, nodes: int = NODES) -> tuple[np.ndarray, np.ndarray]:
     """Points of a quadrature on every cell (n_cells, n_q, dimension) and their weights (n_cells, n_q), in the frame."""
     space: Any = system.space
     if system.mesh.dimension == 1:
         x, dx = beam_elements.quadrature(space)
         return x[..., None], dx
-    node, weight = np.polynomial.legendre.leggauss(NODES)
-    a, b = (x.ravel() for x in np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij"))
-    share = 0.25 * np.outer(weight, weight).ravel() * (1.0 - a)
-    local = np.column_stack([a, b * (1.0 - a)])
+    weight, local = np.polynomial.legendre.leggauss(nodes)[1], reference(nodes)
+    share = 0.25 * np.outer(weight, weight).ravel() * (1.0 - local[:, 0])
     x = space.origin[:, None] + (local - 1.0 / 3.0) @ space.jacobian.transpose(0, 2, 1)
     dx = np.abs(np.linalg.det(space.jacobian))[:, None] * share
     if space.bent is not None:
@@ -53,6 +51,13 @@ def places(system: System) -> tuple[np.ndarray, np.ndarray]:
         steep = space.jacobian[cells][:, None] + gradient[..., 1:] - gradient[..., :1]
         dx[cells] = np.abs(np.linalg.det(steep)) * share
     return x, dx
+
+
+def reference(nodes: int) -> np.ndarray:
+    """These points (n_q, 2) of the unit triangle."""
+    node = np.polynomial.legendre.leggauss(nodes)[0]
+    a, b = (x.ravel() for x in np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij"))
+    return np.column_stack([a, b * (1.0 - a)])
 
 
 def softness(system: System) -> float:

@@ -51,7 +51,7 @@ from skfem.quadrature import get_quadrature
 from .._base import check
 from ..mesh.meshes import Mesh
 from . import splitting, supports
-from .elements import ArgyrisSpace, Bent
+from .elements import ArgyrisSpace, Bent, inverses
 from .section import SOFT, Plate, evaluate
 from .springs import at_facets
 
@@ -100,17 +100,6 @@ class MindlinSpace:
         """Unknowns (n_all, 3) of the deflections 1, x and y, which have no shear strain."""
         return self.flat.linear(element_dofs, n_all)
 
-    def inverses(self, X: np.ndarray) -> np.ndarray:
-        """Inverse Jacobians (n_cells, n_q, 2, 2) of the map from the reference triangle at its points (2, n_q)."""
-        J = np.broadcast_to(self.jacobian[:, None], (len(self.origin), X.shape[1], 2, 2)).copy()
-        if self.bent is not None:
-            cells = self.bent.cells
-            area = np.broadcast_to(np.stack([1.0 - X[0] - X[1], *X], axis=1), (len(cells), X.shape[1], 3))
-            gradient = self.bent.shift(cells, area)[1]
-            # a triangle with two curved sides is listed twice, each time with the whole shift
-            J[cells] = self.jacobian[cells][:, None] + gradient[..., 1:] - gradient[..., :1]
-        return np.linalg.inv(J)
-
 
 @dataclass(frozen=True, eq=False)
 class Fields:
@@ -131,7 +120,7 @@ def strains(space: MindlinSpace, fields: Fields, cells: np.ndarray) -> tuple[np.
     value, slope, hessian = space.flat.functions(cells, fields.x[cells], (0, 1, 2))
     shape, gradient = reference(X)
     n, n_q = value.shape[:2]
-    gradient = np.einsum("eqji,jqk->eqik", space.inverses(X)[cells], gradient)  # of gamma's shapes in x and y
+    gradient = np.einsum("eqji,jqk->eqik", inverses(space, X)[cells], gradient)  # of gamma's shapes in x and y
     deflection, rotation = np.zeros((n, n_q, LOCAL)), np.zeros((n, n_q, 2, LOCAL))
     shear, curvature = np.zeros((n, n_q, 2, LOCAL)), np.zeros((n, n_q, 3, LOCAL))
     first, second = slice(21, 21 + SHEAR), slice(21 + SHEAR, LOCAL)

@@ -807,9 +807,9 @@ def _run(
             f"{_sooner(history)}"
         )
     if status == record.FAILED:
-        raise SimulationError(
-            f"scheme {scheme} found no valid next step at {time:.4g} s; use scheme A4, or check the units of the scene"
-        )
+        if scheme == "collocation":
+            raise SimulationError(f"scheme collocation found no valid next step at {time:.4g} s; use A4")
+        raise SimulationError(f"scheme {scheme} found no valid next step at {time:.4g} s; check the units of the scene")
     return history
 
 

@@ -47,6 +47,5 @@ class Stretched:
         )  # fmt: skip
         history.reached["last"] = time, step, state, hint
         if failed:
-            steps = f"{failed} steps of the motion"
-            raise SimulationError(f"the stretching did not settle in {steps}; lower dt, or the tolerance without a dt")
+            raise SimulationError(f"the stretching of the motion did not settle at {time:.4g} s in any step")
         return q, p

@@ -1,9 +1,9 @@
 """Are the deflections small? What the stretching of the body, which the linear theory leaves out, does to a blow.
 
 Berger's tension N = E h / (2 A (1 - nu**2)) int |grad w|**2 of the motion found stiffens every mode by
-N int |grad phi|**2. It is exact for a beam with held ends and 14 % too stiff for a hinged square that cannot slip at
+N int |grad phi|**2. It is exact for a beam with held ends and 13 % too stiff for a hinged square that cannot slip at
 its edges; one that can slip is a quarter as stiff. During the blow the bent part of the plate, as far as its waves have
-come, is held by the part around it.
+come, is held by the part around it. A blow that has stretching in it is struck again with half the stress fields.
 
 References
 ----------
@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..fe import membrane
 from ..fe.section import Plate
 from ..impact.assumption import Assumption
 from ..modes.modal import Modes
@@ -31,7 +32,7 @@ DENT = 0.7  # [-] stiffening of a wide plate under a point force over (deflectio
 SLOWER = 3.0  # [-] a mode that is slower or faster than bending waves by this rocks or is pulled; wood differs by less
 NUMBER = "deflection over thickness"
 GONG = 1.0  # [-] deflection over thickness beyond which no first-order estimate of the stretching helps
-SOFTER = 0.14  # [-] of Berger's stiffness of a plate: what it has too much, from a hinged square
+FEWER = 2  # [-] the stress fields of a body that stretches over those left in the blow to compare with
 PERIODS, PER_PERIOD = 2.0, 64.0  # [-] periods of the first mode after a blow that are looked through for its deflection
 REMEDY = "take a softer blow or a thicker body: stretching is not modelled"
 BETTER = "let it stretch, stretching = true, or take a softer blow or a thicker body"
@@ -90,40 +91,35 @@ def of_target(struck: Struck) -> Assumption:
 
 
 def _stretched(struck: Struck, body: Known, integrals: Bending) -> tuple[float, dict[str, float | None], str]:
-    """A blow that has Berger's tension in it: how large it gets, and what that tension misses.
+    """A blow that has stretching in it: how large it gets, and what stress fields and modes left out would change.
 
-    Berger's stiffness of a plate is SOFTER too large where the whole plate bends, and too small where a part of it does
-    that is held by the part around it.
+    The fields that are not kept change less than the smaller half of those that are.
     """
     hit, mine, history = struck.hit, struck.mine, struck.hit.history
     assert history.stretched is not None and body.thickness is not None
     end = max((impact.end for impact in hit.impacts), default=history.end_time)
     after = PERIODS * 2.0 * np.pi / float(history.omega[mine][0])
-    times = np.linspace(0.0, end, TIMES + 1)[1:]
-    moved = history.states(np.append(times, np.linspace(end, end + after, int(PERIODS * PER_PERIOD))))[0][:, mine]
+    times = np.append(np.linspace(0.0, end, TIMES + 1)[1:], np.linspace(end, end + after, int(PERIODS * PER_PERIOD)))
+    longest = max(history.stretched.base, 2.0 * np.pi / float(history.omega[mine][0]) / PER_PERIOD)
+    states = replace(history, stretched=replace(history.stretched, base=longest)).states(times)[0]
+    moved = states[:, mine]
     value = float(np.abs(moved @ history.shape[0, mine]).max(initial=0.0)) / body.thickness
-    effect: dict[str, float | None] = dict.fromkeys(struck.quantities, 0.0)
     if value > GONG:
         return value, dict.fromkeys(struck.quantities), A_GONG
-    if isinstance(body.section, Plate):
-        stretch = moved[: len(times)] ** 2 @ integrals.slope
-        whole = _tension(body, stretch, np.full(len(times), body.extent))
-        more = _tension(body, stretch, _bent_area(body, integrals, times)) - whole
-        held = float(more @ stretch / stretch.sum()) if stretch.any() else 0.0
-        omega = np.sqrt(history.omega[mine] ** 2 + held * integrals.slope)
-        less = replace(history.stretched, forms=np.sqrt(1.0 - SOFTER) * history.stretched.forms)
-        changes = [struck.changes(omega=struck.of_target(omega)), struck.changes(stretched=less)]
-        whole_effect = struck.changes(stretched=None)  # a part of it may cancel by chance, but not be counted on to
-        changes.append({name: None if x is None else SOFTER * x for name, x in whole_effect.items()})
-        for name in effect:
-            parts = [change[name] for change in changes]
-            effect[name] = None if None in parts else max(x for x in parts if x is not None)
+    forms = history.stretched.forms
+    if len(forms) < membrane.most(forms.shape[1]):
+        return value, dict.fromkeys(struck.quantities, 0.0), ""
+    n = forms.shape[1] if forms.shape[1] == moved.shape[1] else forms.shape[1] // FEWER
+    fewer = replace(history.stretched, forms=np.ascontiguousarray(forms[: len(forms) // FEWER, :n, :n]))
+    effect = struck.changes(stretched=fewer)
     if "sound" in effect:
+        whole, part = (sum(each.energy(q) for q in states[TIMES:]) for each in (history.stretched, fewer))
         soft = integrals.slope / history.omega[mine] ** 2
-        mean = float(np.mean(_tension(body, moved[len(times) :] ** 2 @ integrals.slope, np.array([body.extent]))))
+        mean = float(np.mean(_tension(body, moved[TIMES:] ** 2 @ integrals.slope, np.array([body.extent]))))
         rise = np.sqrt(1.0 + mean * soft) - 1.0
-        weight = struck.energy / (struck.energy.sum() or 1.0)
-        effect["sound"] = SOFTER * float(weight @ rise) if isinstance(body.section, Plate) else 0.0
+        effect["sound"] = (
+            (1.0 - part / whole) * float(struck.energy @ rise) / (struck.energy.sum() or 1.0) if whole else 0.0
+        )
     return value, effect, ""
 
 

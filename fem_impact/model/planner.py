@@ -877,8 +877,8 @@ def strike(
     striker_force, target_force : float [N]
         Constant forces at the contact points, positive along the blow; for example the weight of a falling ball.
     stretching : bool
-        Whether deflections that are not small stretch a body held all round, and so stiffen it: Berger's tension, good
-        up to deflections of about the thickness. Scheme A or A4; the motion after the blow stretches, too.
+        Whether deflections that are not small stretch a body held all round, and so stiffen it: von Karman's cubic
+        term, good up to deflections of about the thickness. Scheme A or A4; the motion after the blow stretches, too.
     damping_ratio : float or function of frequency [Hz], optional
         Damping of a system, which has none of its own.
     strict : bool

@@ -58,17 +58,17 @@ def test_one_mode_rings_at_the_frequency_of_a_duffing_oscillator(speed):
 
 @pytest.mark.parametrize("amplitude", list(CHU_HERRMANN))
 def test_frequency_of_a_hinged_square_rises_as_chu_and_herrmann_say(amplitude):
-    # Berger stiffens by 1.5 where von Karman's stresses give 1.316: 14 % more of the rise
+    # their edges slide along themselves, these do not: 0.5 % more of the rise
     modes = plate(1, sides=(0.2, 0.2))
     q = amplitude * H / modes.shape_at([(0.1, 0.1)])[0, 0]
     rise = duffing(modes.omega[0], stretch(modes).forms[0, 0, 0] ** 2, q) / modes.omega[0] - 1.0
-    assert rise == pytest.approx(1.5 / 1.316 * (CHU_HERRMANN[amplitude] - 1.0), rel=0.03)
+    assert rise == pytest.approx(CHU_HERRMANN[amplitude] - 1.0, rel=0.02)  # of the four digits
 
 
 def direct(modes, law, speed, until):
     """The same blow by DOP853: impulse, contact time, final speed of the hammer, modal state at ``until``."""
     n, mass = modes.n_modes, HAMMER.mass
-    row, form = modes.shape_at([AT])[0], stretch(modes).forms[0]
+    row, forms = modes.shape_at([AT])[0], stretch(modes).forms
     omega, zeta = modes.omega, modes.damping_ratio
 
     def rates(_, x):
@@ -77,8 +77,8 @@ def direct(modes, law, speed, until):
         force = 0.0
         if approach > 0.0:
             force = max(0.0, law.stiffness * approach**law.exponent * (1.0 + law.loss * rate))
-        bent = form @ q
-        pulled = -(omega**2) * q - 2.0 * zeta * omega * p - (q @ bent) * bent + row * force
+        bent = forms @ q
+        pulled = -(omega**2) * q - 2.0 * zeta * omega * p - (bent @ q) @ bent + row * force
         return np.concatenate([[x[1], -force / mass], p, pulled, [force]])
 
     def meets(t, x):
@@ -202,8 +202,8 @@ def test_every_contact_law_keeps_energy():
 
 def test_error_estimates_hold():
     modes, law = plate(60), fi.Contact.hertz(1e7)
-    hit = fi.strike(modes, HAMMER, law, at=AT, speed=3.0, tolerance=2e-2, stretching=True)
-    fine = fi.strike(plate(600), HAMMER, law, at=AT, speed=3.0, tolerance=1e-3, stretching=True)
+    hit = fi.strike(modes, HAMMER, law, at=AT, speed=1.0, tolerance=2e-2, stretching=True)
+    fine = fi.strike(plate(600), HAMMER, law, at=AT, speed=1.0, tolerance=1e-3, stretching=True)
     true = max(
         abs(hit.restitution - fine.restitution),
         *(abs(getattr(hit, name) / getattr(fine, name) - 1.0) for name in ("impulse", "contact_time", "peak_force")),

@@ -7,12 +7,16 @@ from fem_impact.modes.stretching import stretch
 E, NU, RHO, H = 210e9, 0.3, 7850.0, 1e-3
 STEEL = fi.Material(E=E, nu=NU, rho=RHO)
 PLATE = fi.Plate(STEEL, H)
-SPRUCE = fi.Material.orthotropic(E_along=11e9, E_across=0.8e9, nu=0.37, G=0.7e9, rho=430.0)
 
 
 def energy(modes, q):
     """V = 1/4 sum (q' B q)**2."""
     return 0.25 * sum(float(q @ form @ q) ** 2 for form in stretch(modes).forms)
+
+
+def dent(modes, at):
+    """The energy in the static dent under a force of 1 N; signs and turns of equal modes do not matter."""
+    return energy(modes, modes.shape_at([at])[0] / modes.omega**2)
 
 
 def same_forms(one, other, rel):
@@ -21,13 +25,47 @@ def same_forms(one, other, rel):
     assert values[0] == pytest.approx(values[1], rel=rel, abs=1e-12 * values[1].max())  # a stout beam only turns in one
 
 
-def test_energy_of_a_hinged_square_is_bergers():
-    # w = a sin sin: int |grad w|**2 = a**2 pi**2 / 2, energy E h / (8 A (1 - nu**2)) times its square
+def test_energy_of_a_hinged_square_is_that_of_chu_and_herrmann():
+    # 1.316 / 1.5 of Berger's E h / (8 A (1 - nu**2)) (int |grad w|**2)**2, and 0.5 % more as no edge slides
     side, a = 0.2, 0.7e-3
     modes = fi.analytic.rectangle(side, side, section=PLATE, n_modes=1)
     q = np.array([a / modes.shape_at([(side / 2, side / 2)])[0, 0]])
-    wanted = E * H / (8.0 * side**2 * (1.0 - NU**2)) * (a**2 * np.pi**2 / 2.0) ** 2
-    assert energy(modes, q) == pytest.approx(wanted, rel=1e-12)
+    berger = E * H / (8.0 * side**2 * (1.0 - NU**2)) * (a**2 * np.pi**2 / 2.0) ** 2
+    assert energy(modes, q) == pytest.approx(1.316 / 1.5 * berger, rel=6e-3)
+
+
+def radial(modes):
+    """Energy of stretching of the first mode of a disk, by the ordinary differential equation of its radial motion.
+
+    ``(r u')' - u / r = -r w' w'' - (1 - nu) / 2 w'**2`` with u = 0 in the middle and at the edge (Timoshenko and
+    Woinowsky-Krieger, art. 96), by polynomials.
+    """
+    radius = modes.shapes.base.radius if hasattr(modes.shapes, "base") else modes.shapes.radius
+    n = 24
+    node = 0.5 * radius * (1.0 - np.cos(np.pi * np.arange(n + 1) / n))
+    power = np.vander(node / radius, n + 1, increasing=True)
+    grow = np.arange(n + 1)
+    rise = np.hstack([np.zeros((n + 1, 1)), power[:, :-1] * grow[1:]]) / radius
+    bend = np.hstack([np.zeros((n + 1, 2)), power[:, :-2] * (grow[2:] * (grow[2:] - 1))]) / radius**2
+    shape = np.linalg.solve(power, modes.shape_at(np.column_stack([node, 0.0 * node]))[:, 0])
+    w1, w2, r = rise @ shape, bend @ shape, node
+    rows = r[:, None] ** 2 * bend + r[:, None] * rise - power
+    right = -(r**2) * w1 * w2 - 0.5 * (1.0 - NU) * r * w1**2
+    rows[[0, -1]], right[[0, -1]] = power[[0, -1]], 0.0
+    u = np.linalg.solve(rows, right)
+    x, weight = np.polynomial.legendre.leggauss(40)
+    r = 0.5 * radius * (x + 1.0)
+    power = np.vander(r / radius, n + 1, increasing=True)
+    rise = np.hstack([np.zeros((40, 1)), power[:, :-1] * grow[1:]]) / radius
+    out, around = rise @ u + 0.5 * (rise @ shape) ** 2, power @ u / r
+    density = E * H / (1.0 - NU**2) * (out**2 + around**2 + 2.0 * NU * out * around)
+    return float(0.5 * np.pi * radius * (weight * r) @ density)
+
+
+@pytest.mark.parametrize("edge", ["clamped", "hinged"])
+def test_the_first_mode_of_a_disk_stretches_as_its_radial_equation_says(edge):
+    modes = fi.analytic.disk(0.2, edge=edge, section=PLATE, n_modes=1)
+    assert energy(modes, np.ones(1)) == pytest.approx(radial(modes), rel=1e-4)  # of the triangles
 
 
 @pytest.mark.parametrize("theory, height", [("euler", 3e-3), ("timoshenko", 3e-3), ("timoshenko", 0.05)])
@@ -51,45 +89,41 @@ def test_a_beam_between_walls_stretches_as_woinowsky_krieger_says():
 def test_disks_by_elements_and_by_formulas(edge):
     closed = fi.analytic.disk(0.2, edge=edge, section=PLATE, n_modes=14)
     found = fi.find_modes(fi.assemble(fi.mesh.disk(0.2), PLATE, {"boundary": edge}), n_modes=14)
-    same_forms(closed, found, 3e-5)  # 1e-5 from the shapes of the highest modes
+    assert dent(found, (0.05, 0.03)) == pytest.approx(dent(closed, (0.05, 0.03)), rel=1e-4)
 
 
 def test_rectangles_by_elements_and_by_formulas():
     closed = fi.analytic.rectangle(0.2, 0.3, section=PLATE, n_modes=12)
     found = fi.find_modes(fi.assemble(fi.mesh.rectangle(0.2, 0.3), PLATE, {"boundary": "hinged"}), n_modes=12)
-    same_forms(closed, found, 1e-7)
+    assert dent(found, (0.09, 0.13)) == pytest.approx(dent(closed, (0.09, 0.13)), rel=3e-5)
 
 
 def test_grain_along_and_across():
-    # a hinged wooden rectangle: s = int sqrt(C11) w_x**2 + sqrt(C22) w_y**2, turned with the grain
-    sides = np.array([0.2, 0.3])
-    local = SPRUCE.plane_stress
-    for angle, order in ((0.0, (0, 1)), (np.pi / 2.0, (1, 0))):
+    # a wooden rectangle turned with its grain is the same; across it, the stretch is softer by far
+    found = []
+    for angle, (a, b) in ((0.0, (0.2, 0.3)), (np.pi / 2.0, (0.3, 0.2)), (np.pi / 2.0, (0.2, 0.3))):
         wood = fi.Material.orthotropic(E_along=11e9, E_across=0.8e9, nu=0.37, G=0.7e9, rho=430.0, angle=angle)
-        system = fi.assemble(fi.mesh.rectangle(*sides), fi.Plate(wood, H), {"boundary": "hinged"})
-        modes = fi.find_modes(system, n_modes=1)
-        roots = np.sqrt(local.diagonal()[:2])[list(order)]
-        gram = float((np.pi / sides) ** 2 @ roots) / (430.0 * H)
-        assert stretch(modes).forms[0, 0, 0] == pytest.approx(gram / np.sqrt(2.0 * sides.prod() / H), rel=1e-9)
+        modes = fi.find_modes(
+            fi.assemble(fi.mesh.rectangle(a, b), fi.Plate(wood, H), {"boundary": "hinged"}), n_modes=4
+        )
+        found.append(energy(modes, np.eye(4)[0]))
+    assert found[1] == pytest.approx(found[0], rel=1e-4) and found[2] < 0.5 * found[0]
 
 
 def test_modes_in_air_stretch_as_their_mixture():
-    modes = fi.analytic.rectangle(0.2, 0.3, section=PLATE, n_modes=12)
+    modes = fi.analytic.rectangle(0.2, 0.3, section=PLATE, n_modes=5)
     mixed = fi.in_air(modes, density=300.0)  # dense enough to mix them visibly
-    mix = mixed.shapes.mix
-    wanted = mix.T @ stretch(modes).forms[0] @ mix
-    assert stretch(mixed).forms[0] == pytest.approx(wanted, rel=1e-12, abs=1e-9 * wanted.max())
-    assert np.abs(wanted - np.diag(wanted.diagonal())).max() > 1e-3 * wanted.max()
+    q = np.array([0.3, -0.2, 0.5, 0.1, 0.4])
+    assert np.abs(mixed.shapes.mix - np.diag(mixed.shapes.mix.diagonal())).max() > 1e-3
+    assert energy(mixed, q) == pytest.approx(energy(modes, mixed.shapes.mix @ q), rel=1e-5)  # of the fields left out
 
 
 def test_ritz_vectors_stretch_as_modes_do():
     # the same static dent under a point force, of which a few vectors hold all: the same energy
     system = fi.assemble(fi.mesh.rectangle(0.2, 0.3), PLATE, {"boundary": "hinged"}, near=[(0.08, 0.1)])
-    vectors = fi.ritz_modes(system, [(0.08, 0.1)], max_frequency=3e3, n_vectors=60)
-    modes = fi.analytic.rectangle(0.2, 0.3, section=PLATE, n_modes=1500)
-    found = [each.shape_at([(0.08, 0.1)])[0] / each.omega**2 for each in (vectors, modes)]
-    # 1 - 4e-7 of int |grad w|**2 is in these modes
-    assert energy(vectors, found[0]) == pytest.approx(energy(modes, found[1]), rel=1e-5)
+    vectors = fi.ritz_modes(system, [(0.08, 0.1)], max_frequency=3e3, n_vectors=20)
+    modes = fi.analytic.rectangle(0.2, 0.3, section=PLATE, n_modes=40)
+    assert dent(vectors, (0.08, 0.1)) == pytest.approx(dent(modes, (0.08, 0.1)), rel=5e-3)  # 40 modes lack 3e-3
 
 
 @pytest.mark.parametrize(

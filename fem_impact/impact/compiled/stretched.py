@@ -216,9 +216,9 @@ def attempt(body, room, tables, all_sums, slot, h, ramp, given, offset, law, now
         change = 0.0
         size = 0.0
         for i in range(room.pull.shape[1]):
-            change = max(change, abs(room.pull[0, i] - room.pull[2, i]), abs(room.pull[1, i] - room.pull[3, i]))
-            size = max(size, abs(room.pull[0, i]), abs(room.pull[1, i]))
-        if not change < 1e300:
+            change += abs(room.pull[0, i] - room.pull[2, i]) + abs(room.pull[1, i] - room.pull[3, i])
+            size += abs(room.pull[0, i]) + abs(room.pull[1, i])
+        if not change < 1e300:  # a sum keeps what is no number; a maximum may drop it
             return False, fine
         if change <= SETTLES * size or (change <= STALLS * size and change >= 0.5 * best):
             return True, fine
@@ -587,8 +587,9 @@ def replay_stretched(
     """States (n_times, n_modes) at ascending times, from that at the start of step j and the recorded contact forces.
 
     The stretching forces are found again, step by step, and after the end of the run in steps of length base or less.
-    ``out_state`` (2, n_modes) and ``out_hint`` (count,) are where to start, and become those of the step that holds the
-    last time. Returns the number of steps that did not settle, and start and number of that step.
+    Without the contacts, which helped them to settle, a recorded step may have to be split. ``out_state`` (2, n_modes)
+    and ``out_hint`` (count,) are where to start, and become those of the step that holds the last time. Returns whether
+    it failed, and start and number of that step.
     """
     m, n_modes = shape.shape
     n_steps = steps.shape[0]
@@ -614,10 +615,22 @@ def replay_stretched(
     failed = 0
     while k < times.size:
         flight = j >= n_steps
-        h = base * 0.5**halved if flight else steps[j, 1]
-        for i in range(m):
-            f[i] = 0.0 if flight else steps[j, 6 + 5 * i] + 0.5 * steps[j, 7 + 5 * i]
-            s[i] = 0.0 if flight else steps[j, 7 + 5 * i]
+        if flight:
+            h = base * 0.5**halved
+            ends = time + h
+            f[:] = 0.0
+            s[:] = 0.0
+        else:
+            whole = steps[j, 1]
+            until = steps[j + 1, 0] if j + 1 < n_steps else steps[j, 0] + whole
+            h = whole * 0.5**halved
+            ends = time + h
+            if halved == 0 or ends > until - 0.5 * h:
+                ends = until
+                h = min(whole, until - time)
+            for i in range(m):
+                s[i] = steps[j, 7 + 5 * i] * h / whole
+                f[i] = steps[j, 6 + 5 * i] + steps[j, 7 + 5 * i] * (time - steps[j, 0] + 0.5 * h) / whole
         if h != known:
             lane_table(omega, zeta, h, WHOLE, tables[0])
             known = h
@@ -625,16 +638,13 @@ def replay_stretched(
             body, room, tables, all_sums, 0, h, ramp, True, offset, law, now, q, p, hint, nothing, f, s, nothing
         )
         if not good:
-            if flight and halved < LEVELS:
-                halved += 1
-                for i in range(hint.size):
-                    hint[i] = 0.0
-                continue
-            failed += 1
+            if halved >= LEVELS:
+                failed = 1
+                break
+            halved += 1
+            hint[:] = 0.0
+            continue
         halved = max(0, halved - 1)
-        ends = time + h
-        if not flight and j + 1 < n_steps:
-            ends = steps[j + 1, 0]
         while k < times.size and times[k] < ends:
             restore(q, p, out_q[k], out_p[k])
             length = times[k] - time
@@ -648,7 +658,8 @@ def replay_stretched(
             hint[i] = room.pull[1, i] / h
         finish(body, room, tables[0], h, f, s, q, p)
         time = ends
-        j += 1
+        if not flight and ends >= until:
+            j += 1
     return failed, time, j
 
 

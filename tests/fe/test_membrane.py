@@ -1,0 +1,94 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fem_impact as fi
+from fem_impact.fe import membrane
+
+E, NU, H, SIDE = 210e9, 0.3, 1e-3, 0.2
+PLATE = fi.Plate(fi.Material(E=E, nu=NU, rho=7850.0), H)
+SQUARE = np.pi**2 / 2.0  # int |grad w|**2 of w = sin sin on any square
+
+
+def sheet(size=0.05, sides=(SIDE, SIDE), section=PLATE):
+    return membrane.Sheet.of(fi.assemble(fi.mesh.rectangle(*sides, size=size), section, {"boundary": "clamped"}))
+
+
+def sines(numbers, side=SIDE):
+    """Slopes of the products of sines of a square, whose frame has its origin in the middle."""
+    m, n = np.transpose(numbers) * np.pi
+
+    def steep(_, x):
+        x, y = (x[..., :1] + 0.5) * m, (x[..., 1:] + 0.5) * n
+        return np.stack([m * np.cos(x) * np.sin(y), n * np.sin(x) * np.cos(y)], 2) / side
+
+    return steep
+
+
+def energies(forms, q):
+    return 0.5 * np.einsum("kij,i,j->k", forms, q, q) ** 2
+
+
+def over_berger(energy):
+    return energy / (E * H / (8.0 * SIDE**2 * (1.0 - NU**2)) * SQUARE**2)
+
+
+def test_a_square_whose_edges_slide_along_themselves_is_that_of_chu_and_herrmann():
+    # their energy is the mean stress's 3/4 (1 + nu) and Airy's 12 (1 - nu**2) / 32, where Berger has 3/2
+    whole = sheet()
+    n = (whole.dofs.max() + 1) // 2
+    x = np.zeros((2 * n, 2))
+    system = fi.assemble(fi.mesh.rectangle(SIDE, SIDE, size=0.05), PLATE, {"boundary": "clamped"})
+    place = nodes(system)
+    x[whole.dofs[:, :15]] = x[whole.dofs[:, 15:]] = place
+    ends = np.abs(x) > 0.5 - 1e-9
+    slides = replace(whole, held=np.flatnonzero(np.concatenate([ends[:n, 0], ends[n:, 1]])))
+    found = membrane.forms(slides, sines([(1, 1)]), np.ones(1))
+    wanted = (0.75 * (1.0 + NU) + 12.0 * (1.0 - NU**2) / 32.0) / 1.5
+    assert over_berger(energies(found, np.ones(1)).sum()) == pytest.approx(wanted, rel=3e-5)  # 2e-6 with half the size
+
+
+def nodes(system):
+    """Places (n_cells, 15, 2) of the nodes of quartic triangles in the frame: corners, sides, inside."""
+    corner = system.space.inner.corners
+    part = np.array([0.25, 0.5, 0.75])[:, None]
+    sides = [(1.0 - part) * corner[:, None, p] + part * corner[:, None, q] for p, q in membrane.SIDES]
+    inside = np.array([[2, 1, 1], [1, 2, 1], [1, 1, 2]]) / 4.0
+    return np.concatenate([corner, *sides, inside @ corner], axis=1)
+
+
+def test_a_square_held_all_round_is_a_little_stiffer():
+    found = [membrane.forms(sheet(size), sines([(1, 1)]), np.ones(1)) for size in (0.05, 0.025)]
+    coarse, fine = (over_berger(energies(each, np.ones(1)).sum()) for each in found)
+    assert 0.877 < fine < 0.883  # 1.316 / 1.5 where the edges slide, 1.323 / 1.5 computed on twice as many triangles
+    assert fine < coarse < (1.0 + 1e-4) * fine  # the plane settles where its energy is least: always from above
+
+
+def test_fields_of_stress_are_kept_in_order_and_each_adds_energy():
+    numbers = [(1, 1), (1, 2), (2, 1), (2, 2), (1, 3), (3, 1)]
+    omega = np.square(numbers).sum(axis=1).astype(float)
+    found = membrane.forms(sheet(), sines(numbers), omega)
+    assert len(found) == 21  # every pair of modes
+    mean = np.zeros(len(found))
+    for q in np.random.default_rng(1).normal(size=(2000, 6)):
+        mean += energies(found, q / omega)
+    assert (mean[:3] > mean[3:].max()).all()
+    one = membrane.forms(sheet(), sines(numbers[:1]), omega[:1])
+    q = np.eye(6)[0]
+    assert energies(found, q).sum() == pytest.approx(energies(one, np.ones(1)).sum(), rel=1e-9)
+
+
+def test_the_softer_part_of_a_plate_takes_the_stretch():
+    # bent in one wave along x, and alike along y, it is a beam: N = mean of w'**2 / 2 over the mean of 1 / (E h)
+    wedge = fi.Plate(fi.Material(E=E, nu=0.0, rho=7850.0), lambda x: H * (1.0 + 2.0 * x[:, 0] / SIDE))
+    strip = fi.assemble(fi.mesh.rectangle(SIDE, SIDE, size=0.05), wedge, {"left": "clamped", "right": "clamped"})
+
+    def steep(_, x):
+        slope = np.pi / SIDE * np.cos(np.pi * (x[..., 0] + 0.5))
+        return np.stack([slope, 0.0 * slope], 2)[..., None]
+
+    found = membrane.forms(membrane.Sheet.of(strip), steep, np.ones(1))
+    soft = SIDE * np.log(3.0) / (2.0 * E * H)  # int dx / (E h)
+    stretch = SIDE * (np.pi / SIDE) ** 2 / 4.0  # int w'**2 / 2
+    assert energies(found, np.ones(1)).sum() == pytest.approx(0.5 * SIDE * stretch**2 / soft, rel=1e-6)
