@@ -647,7 +647,7 @@ def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance
     allowed = STRIKER_SHARE * tolerance / (LOSSY_STRIKER if contact.rated else 1.0)
     omega_0 = 2.0 * np.pi * accuracy.contact_resonance(**law)
     whole = modes.truncated(n_modes=modes.n_rigid).residual_compliance(striker.at[None])[0, 0]
-    if striker.felt_mass * omega_0**2 * whole <= allowed:
+    if striker.felt_mass * omega_0**2 * whole <= allowed and not contact.rated:  # what replaces modes needs one below
         return modes.n_rigid, allowed
     limit = accuracy.cutoff_frequency(modes, striker.at, tolerance=allowed, **law)
     kept = min(modes.n_modes, max(modes.n_rigid + 2, int(np.searchsorted(modes.frequencies, limit, side="right"))))

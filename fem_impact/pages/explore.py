@@ -2,6 +2,7 @@
 
 import logging
 import socket
+import sys
 from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Any
@@ -9,9 +10,10 @@ from typing import Any
 from .._base import check
 from ..model.planner import Watch
 from ..scenes.scene import Scene
-from .explore_model import Bench, blow
+from .explore_model import Bench, blow, quick
 from .explore_view import Page
 
+SWITCH = 1e-3  # [s] for which a map or a sound computed beside the page may keep it waiting; Python's own is 5e-3
 LOCAL = "127.0.0.1"
 LARGEST_REQUEST = 64 * 1024  # [byte] of a request or a message: a slider's value takes a few hundred
 LARGEST_HEADER = 16 * 1024  # [byte] of a request: browsers send one or two thousand
@@ -51,6 +53,8 @@ def serve(
     with (watch or nullcontext)("modes"):
         bench = Bench.of(scene)
         blow(bench.case(bench.start))  # compile the kernels before the page opens
+        quick(bench.case(bench.start))
+    sys.setswitchinterval(SWITCH)
     server, address = _server(bench, port)
     server.start()
     if ready is not None:

@@ -198,3 +198,10 @@ def test_the_error_is_what_it_claims_for_random_blows(seed):
     assert usual.n_impacts == fine.n_impacts
     assert missed < tolerance
     assert usual.energy_error < 1e-12
+
+
+def test_a_stick_that_bends_too_little_to_matter_still_meets_a_lossy_contact():
+    stick, law = fi.Striker.stick(mass=0.1, first_frequency=10e3), fi.Contact.power(1e4, 1.5, loss=0.1)
+    found = [fi.strike(PLATE, stick, law, at=AT, speed=0.1, tolerance=tolerance) for tolerance in (0.1, 1e-4)]
+    assert found[0].n_impacts == 1
+    assert found[0].impulse == pytest.approx(found[1].impulse, rel=1e-2)  # a tenth of what was asked for

@@ -115,6 +115,11 @@ def test_nothing_fails_and_nothing_is_asked_for_elsewhere(opened, address):
     assert shown.tab.title() == "<b>small</b>" and shown.tab.locator("h1").inner_text() == "<b>small</b>"
 
 
+SAYS = (
+    "[...document.querySelectorAll('.readout *')].some(e => e.shadowRoot?.textContent.toLowerCase()"
+    '.includes("TEXT".toLowerCase()))'
+)
+MASS = 4  # its slider: those of the strike point, the listener and the roll come before
 MAP = "Bokeh.documents[0].get_model_by_name('cells').data.left.length > 0"
 
 
@@ -156,7 +161,7 @@ def test_click_moves_the_strike_point(opened):
 @pytest.mark.slow
 def test_quick_hand_does_not_queue_up_blows(opened):
     shown = opened()
-    box = shown.tab.locator(".noUi-handle").first.bounding_box()
+    box = shown.tab.locator(".noUi-handle").nth(MASS).bounding_box()
     x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
     page = "Bokeh.documents[0].get_model_by_name"
     followed = f"Math.abs(Math.log10({page}('here').data.x[0]) - {page}('mass').value) < 1e-9"
@@ -185,6 +190,56 @@ def test_button_plays_the_sound(opened):
     shown.until("document.getElementById('player').readyState >= 1")
     assert shown.tab.evaluate("document.getElementById('player').duration") == pytest.approx(2.0, abs=0.01)
     shown.until("document.getElementById('heard').innerText.includes('Full scale is 10 m/s')")
+    shown.tab.get_by_role("button", name="Play a roll").click()
+    shown.until("document.getElementById('heard').innerText.includes('Computing')")
+    shown.until("document.getElementById('heard').innerText.includes('Full scale is 10 m/s')")
+    before = shown.tab.evaluate("document.getElementById('player').src")
+    page = "Bokeh.documents[0].get_model_by_name"
+    shown.tab.evaluate(f"{page}('height').value = 1.5")
+    shown.tab.get_by_role("button", name="Strike and listen").click()
+    shown.until("document.getElementById('heard').innerText.includes(' above (')")
+    assert "Pa; peak" in shown.tab.inner_text("#heard")
+    assert shown.tab.evaluate("document.getElementById('player').src") != before
+
+
+@pytest.mark.slow
+def test_a_click_moves_the_listening_point_too(opened):
+    shown = opened()
+    page = "Bokeh.documents[0].get_model_by_name"
+    shown.tab.get_by_role("button", name="Click listens").click()
+    shown.until(f"{page}('moves').active === 1")
+    struck, ear = (shown.tab.evaluate(f"JSON.stringify({page}('{name}').data)") for name in ("at", "ear"))
+    box = shown.tab.locator("figure >> nth=0").bounding_box()
+    shown.tab.mouse.click(box["x"] + 0.6 * box["width"], box["y"] + 0.4 * box["height"])
+    shown.until(f"JSON.stringify({page}('ear').data) !== '{ear}'")
+    assert shown.tab.evaluate(f"JSON.stringify({page}('at').data)") == struck
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [390, 768])
+def test_the_map_stands_with_its_legend_and_each_slider_with_what_it_changes(opened, width):
+    shown = opened(width=width, height=900)
+    assert shown.tab.evaluate("document.documentElement.scrollWidth") == width
+    cards = shown.tab.locator(".card").evaluate_all(
+        """cards => cards.map(card => [
+            ...[card, card.querySelector('figure'), card.querySelector('.legend'), card.lastElementChild].map(
+                part => part ? Object.values(part.getBoundingClientRect().toJSON()) : null)
+        ])"""
+    )  # each [x, y, width, height, top, right, bottom, left]
+    assert len(cards) == 4
+    for card, figure, legend, hands in cards:
+        assert card[7] >= 0 and card[5] <= width and figure[2] > 0.6 * min(card[2], 300)
+        if legend:
+            assert 0 <= legend[4] - figure[6] < 40 and legend[7] >= card[7] and legend[5] <= card[5]
+        assert hands[4] >= figure[6] and hands[4] - (legend or figure)[6] < 60  # right below
+    under = shown.tab.evaluate(
+        """['body', 'map', 'force', 'spectrum'].map(name => Bokeh.documents[0].get_model_by_name('hands-' + name)
+            .children.map(child => child.name))"""
+    )
+    assert under[1] == ["mass", "stiffness"] and under[2] == ["speed", "exponent", "loss"]
+    assert under[0] == ["moves", "x", "y", "height", "rate", "listen", "roll"]
+    shown.until(SAYS.replace("TEXT", "Tolerance 0.001 met"))
+    shown.until(SAYS.replace("TEXT", "he model's own error"))
 
 
 @pytest.mark.slow
@@ -209,7 +264,7 @@ def test_keyboard_turns_every_slider(opened):
     assert [stop for stop in stops if not stop[2]] == []
     mass = "Bokeh.documents[0].get_model_by_name('mass').value"
     before = shown.tab.evaluate(mass)
-    shown.tab.locator(".noUi-handle").first.focus()
+    shown.tab.locator(".noUi-handle").nth(MASS).focus()
     shown.tab.keyboard.press("ArrowRight")
     shown.until(f"{mass} > {before}")
     spoken = (

@@ -122,3 +122,21 @@ def test_hard_blows_on_elements_are_resolved_by_vectors(tmp_path):
 
 def test_bodies_in_closed_form_keep_their_modes(stand):
     assert not stand.told and stand.seen(stand.start.at) is None
+
+
+def test_the_first_answer_to_a_slider_is_the_blow_but_for_small_errors(stand):
+    rng, compared = np.random.default_rng(5), 0
+    for _ in range(12):
+        settings = replace(stand.start, **{
+            name: float(np.exp(rng.uniform(*np.log(stand.range(name))))) for name in ("mass", "stiffness", "speed")
+        }, loss=float(rng.choice([0.0, 0.3]) / stand.start.speed))  # fmt: skip
+        case = stand.case(settings)
+        fast = explore_model.quick(case)
+        assert len(fast.history.steps) < 5_000  # some 5 ms
+        slow = explore_model.blow(case)
+        if slow.n_impacts <= 2:  # more of them are sensitive to everything
+            compared += 1
+            assert fast.n_impacts == slow.n_impacts
+            assert fast.peak_force == pytest.approx(slow.peak_force, rel=2e-2)
+            assert fast.impulse == pytest.approx(slow.impulse, rel=2e-2)
+    assert compared >= 6

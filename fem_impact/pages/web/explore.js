@@ -55,8 +55,9 @@
     const sound = page.get_model_by_name("sound");
     sound.properties.data.change.connect(() => {
       const player = document.getElementById("player");
-      player.src = sound.data.uri[0];
       document.getElementById("heard").textContent = sound.data.note[0];
+      if (!sound.data.uri[0]) return;   // not there yet
+      player.src = sound.data.uri[0];
       player.play().catch(() => {});   // the browser may require another click before it plays
     });
     document.documentElement.dataset.ready = "true";
