@@ -11,6 +11,7 @@ import drawing
 import numpy as np
 
 import fem_impact as fi
+from fem_impact.fe.assembly import System
 from fem_impact.impact import accuracy
 from fem_impact.show import plots
 from fem_impact.sweeps import hammers
@@ -20,6 +21,7 @@ HAMMER = 0.1  # [kg]
 TIPS = {"rubber": 3e5, "nylon": 3e6, "steel": 3e7}  # [N/m] linear, as data sheets state them
 PLACES = {"middle": (0.3, 0.2), "corner": (0.02, 0.02)}  # [m]
 SPEED = 0.5  # [m/s]
+DAMPING = 0.002  # [-]
 
 
 @dataclass(frozen=True)
@@ -38,11 +40,15 @@ class Verdict:
         return self.n_impacts == 1 and self.reach >= BANDWIDTH
 
 
-def structure(max_frequency: float = 8e3) -> fi.Modes:
+def plate() -> System:
     """An aluminium plate with free edges, as if hung on soft cords."""
-    mesh = fi.mesh.rectangle(0.6, 0.4)
-    plate = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), thickness=4e-3)
-    return fi.find_modes(fi.assemble(mesh, plate), max_frequency=max_frequency, damping_ratio=0.002)
+    aluminium = fi.Material(E=70e9, nu=0.33, rho=2700.0)
+    return fi.assemble(fi.mesh.rectangle(0.6, 0.4), fi.Plate(aluminium, thickness=4e-3))
+
+
+def structure(max_frequency: float = 8e3) -> fi.Modes:
+    """The modes of the plate."""
+    return fi.find_modes(plate(), max_frequency=max_frequency, damping_ratio=DAMPING)
 
 
 def judge(modes: fi.Modes) -> list[Verdict]:

@@ -55,6 +55,9 @@ ELSEWHERE = {  # advice followed in a test of its own: the test, and patterns of
     "test_advice_of_files.py::test_a_body_that_the_mesher_cannot_fill_is_filled_as_advised": (
         "remove very thin necks or spikes",
     ),
+    "designs/test_clearance.py::test_a_run_that_goes_on_has_none": (
+        "must end with its first impact; give max_impacts",
+    ),
     "base/test_isolated.py::test_reader_that_never_ends_is_stopped": ("reading took longer than .*; export it again",),
     "fe/test_eigenvalues.py::test_where_a_pivot_vanishes_another_number_of_modes_is_counted": ("a pivot vanished",),
     "fe/test_eigenvalues.py::test_a_beam_whose_slice_misses_modes_is_found_with_another_number": (

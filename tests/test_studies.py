@@ -201,3 +201,29 @@ def test_every_picture_of_a_study_is_saved_in_one_place():
     for path in STUDIES.glob("*.py"):
         text = path.read_text(encoding="utf-8")
         assert path.name == "drawing.py" or not re.search(r"savefig\(|figures\.save\(", text), path.name
+
+
+@pytest.mark.slow
+def test_the_heaviest_hammer_is_held_by_the_corner_and_the_bandwidth(monkeypatch):
+    monkeypatch.syspath_prepend(str(STUDIES))
+    hammer = study("design_hammer")
+    monkeypatch.setattr(hammer, "POINTS", {"corner": (0.02, 0.02), "middle": (0.3, 0.2)})  # the two that decide
+    monkeypatch.setattr(hammer, "N_MODES", 90)
+    found = hammer.designed(hammer.tutorial.plate(), "most")
+    held = [each.goal.name for each in found.reached if abs(each.goal.low - each.value) < 1e-3 * abs(each.goal.scale)]
+    assert found.met and held[0] == "clearance" and held[-1] == hammer.LEVEL
+    np.testing.assert_allclose(found.values["mass"], 0.0470, rtol=1e-2)  # 47.04 g at all points with twice the modes
+    for name, at in hammer.POINTS.items():
+        told = {**hammer.blows(found.hits[name].bodies[-1])(found.values)[name], "tolerance": 1e-3}
+        hit = hammer.fi.strike(told.pop("target"), told.pop("striker"), told.pop("contact"), **told)
+        assert hit.n_impacts == 1, at  # all of the blow, not only its first impact
+        assert hammer.hammers.bandwidth_of(hit, 10.0) > 799.0  # 800 to the tolerance of the design
+
+
+@pytest.mark.slow
+def test_a_tip_is_as_bright_as_wanted_at_two_dynamics():
+    drumstick = study("design_drumstick")
+    body, wishes = drumstick.plate(80), drumstick.WISHES["dark"]
+    found = drumstick.designed(body, *wishes)
+    heard = drumstick.brightness(body, found.values, list(drumstick.DYNAMICS.values()))
+    np.testing.assert_allclose(heard, wishes, rtol=1e-3)  # struck again to 1e-3

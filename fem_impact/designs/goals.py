@@ -10,8 +10,12 @@ from .._base import check
 from ..impact.gradient import UNIT_OF
 
 MODE = re.compile(r"mode([1-9]\d*)\.(frequency|ratio)")
-BLOW = "restitution", "impulse", "contact_time", "peak_force", "peak_time", "spectral_centroid"
-KNOWN = (*BLOW, "mode1.frequency", "mode2.ratio")
+KNOWN = (
+    "restitution", "impulse", "contact_time", "peak_force", "peak_time", "spectral_centroid", "spectral_level",
+    "n_impacts", "clearance", "mode1.frequency", "mode2.ratio",
+)  # fmt: skip
+CLEAR = 0.01  # [-] clearance of a blow that shall hit once: far beside what grazes, little beside an impact
+DECIBELS = 20.0 / math.log(10.0)  # [dB] a miss of a level is told as that of the force
 EXAMPLE = '{"mode1.frequency": 262.0, "contact_time": (1e-3, 2e-3)}'
 
 
@@ -48,8 +52,10 @@ class Goal:
     @property
     def scale(self) -> float:
         """What a miss is told relative to: the wanted value, 1 for a restitution."""
-        if self.name == "restitution":
+        if self.name in ("restitution", "clearance"):
             return 1.0
+        if self.name.startswith("spectral_level"):
+            return DECIBELS
         return max(abs(end) for end in (self.low, self.high) if math.isfinite(end)) or 1.0
 
     @property
@@ -99,13 +105,13 @@ def _goal(where: str, name: str, value: Any, blow: str) -> Goal:
     plain, equals, _ = name.partition("=")
     if not MODE.fullmatch(name):
         check.one_of(where, plain, KNOWN)
-        if (plain == "spectral_centroid") != bool(equals):
-            rule = (
-                "needs a band in Hz, such as 'spectral_centroid=5000'"
-                if not equals
-                else f"has no band, write {plain!r}"
-            )
+        if plain.startswith("spectral") != bool(equals):
+            rule = f"needs a frequency, such as '{plain}=5000'" if not equals else f"has no frequency, write {plain!r}"
             raise ValueError(f"{where}: {plain} {rule}")
+    if plain == "n_impacts":
+        if value != 1 or isinstance(value, bool):
+            raise ValueError(f"{label} must be 1, the only count with a smooth measure, got {check.shown(value)}")
+        return Goal("clearance", CLEAR, math.inf, blow)
     ends = value if isinstance(value, (tuple, list)) else (value, value)
     if len(ends) != 2 or (ends[0] is None and ends[1] is None):
         raise ValueError(

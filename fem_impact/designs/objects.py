@@ -52,9 +52,10 @@ class Piece:
         assert self.striker is not None and self.contact is not None
         return Blow(self.target, self.striker, self.contact, self.arguments)
 
-    def strike(self, modes: Modes, tolerance: float) -> Response:
-        """The blow on these modes of the body; its own tolerance counts if it has one that is smaller."""
+    def strike(self, modes: Modes, tolerance: float, once: bool = False) -> Response:
+        """The blow on these modes of the body, or only its first impact; a tolerance of its own counts if smaller."""
         given = {**self.arguments, "tolerance": min(tolerance, self.arguments.get("tolerance", tolerance))}
+        given |= {"max_impacts": 1} if once else {}
         return collision.strike(modes, self.blow.striker, self.blow.contact, **given)
 
     @cached_property

@@ -21,7 +21,7 @@ from ..modes import varied
 from ..modes.modal import Modes
 from ..taps import arguments
 from ..taps.unknowns import Unknown
-from . import goals
+from . import clearance, goals
 from .goals import Goal
 from .objects import Maker, Piece, Rate
 
@@ -150,6 +150,7 @@ def design(
     free: Mapping[str, Any],
     *,
     least: str | None = None,
+    most: str | None = None,
     start: Mapping[str, float] | None = None,
     tolerance: float = TOLERANCE,
     tries: int = 1,
@@ -166,18 +167,22 @@ def design(
         dict of such dicts by name; if only frequencies are wanted, the body alone will do.
     wanted : mapping of quantity to a value, or to a range (low, high) with None for an open end
         Of the body "mode1.frequency" [Hz] (flexible modes from 1) and "mode2.ratio" (over the first frequency); of each
-        blow "contact_time", "restitution", "impulse", "peak_force", "peak_time" and "spectral_centroid=5000" (its band
-        in Hz). With the name of one of several blows as key, a mapping of what is wanted of that one.
+        blow "contact_time", "restitution", "impulse", "peak_force", "peak_time", "spectral_centroid=5000" (its band in
+        Hz), "spectral_level=800" (of the force at 800 Hz, dB re 0 Hz) and "n_impacts", of which only 1 can be wanted:
+        then all quantities are those of the first impact, and the smallest gap after it, the "clearance", is at least
+        1 % of the way that the striker goes in the time of the contact at the speed of its arrival. With the name of
+        one of several blows as key, a mapping of what is wanted of that one.
     free : mapping of number to (low, high)
         What may change, and how far; by its logarithm where both ends are positive.
-    least : str, optional
-        The free number that shall be as small as the goals allow, such as the mass of a hammer.
+    least, most : str, optional
+        The free number that shall be as small, or as large, as the goals allow, such as the mass of a hammer.
     start : mapping of number to value, optional
         Where the search begins; by default the middle of each range.
     tolerance : float [-]
         Largest miss of a goal, relative to the wanted value (of a restitution absolute).
     tries : int
-        Searches from further points, spread over the ranges, until one finds a design.
+        Most points, spread over the ranges, where a search begins: until one finds a design; with ``least`` or ``most``
+        all of them.
     n_modes : int, optional
         Modes of the body in each blow; by default as many as the plan of the first takes.
 
@@ -195,7 +200,7 @@ def design(
 
     Notes
     -----
-    Goals without ``least`` are met by least squares within bounds (``scipy.optimize.least_squares``), with it by
+    Goals alone are met by least squares within bounds (``scipy.optimize.least_squares``), with ``least`` or ``most`` by
     sequential quadratic programming (SLSQP). All derivatives are exact but for the finite elements: those of a blow
     from its recorded steps (`Response.gradient`), those of frequencies and shapes from the derivatives of stiffness and
     mass along the modes. Modes that share a frequency answer a blow smoothly, but their single frequencies split, which
@@ -215,8 +220,11 @@ def design(
     begin = arguments.table("start", start)
     for name in begin:
         check.one_of("start", name, names)
-    if least is not None:
-        check.one_of("least", least, names)
+    for label, sought in (("least", least), ("most", most)):
+        if sought is not None:
+            check.one_of(label, sought, names)
+    if least is not None and most is not None:
+        raise ValueError("most must be left out where least is given")
     tolerance = check.between("tolerance", tolerance, 1e-9, 0.5)
     maker = Maker.of(objects, names)
     middle = {each.name: float(each.outside(np.mean(each.bounds))) for each in ranges} | begin
@@ -224,7 +232,12 @@ def design(
         check.between(f"start[{each.name!r}]", middle[each.name], each.low, each.high)
     wishes = goals.read(wanted, tuple(maker.pieces(middle)))
     search = _Search(
-        maker, ranges, wishes, least, None if n_modes is None else check.count("n_modes", n_modes, high=MOST_MODES)
+        maker,
+        ranges,
+        wishes,
+        least or most,
+        -1.0 if most else 1.0,
+        None if n_modes is None else check.count("n_modes", n_modes, high=MOST_MODES),
     )
     first = np.array([float(each.inside(middle[each.name])) for each in ranges])
     found = search.run(first, tolerance)
@@ -232,13 +245,13 @@ def design(
     points = qmc.Sobol(len(ranges), seed=0).random_base2(max(1, math.ceil(math.log2(tries))))
     low, high = search.bounds
     for point in points[: tries - 1]:
-        if found.met:
+        if found.met and search.least is None:
             break
         try:
             other = search.run(low + point * (high - low), tolerance)
         except (SimulationError, ValueError):
             continue
-        found = min(found, other, key=lambda each: max(abs(one.miss) for one in each.reached))
+        found = min(found, other, key=search.rank)
     found = replace(found, n_evaluations=len(search.seen))
     if not found.met:
         warnings.warn(found.verdict, ToleranceWarning, stacklevel=promise._callers_level())
@@ -263,7 +276,8 @@ class _Search:
     maker: Maker
     ranges: tuple[Unknown, ...]
     goals: tuple[Goal, ...]
-    least: str | None
+    least: str | None  # free number to be made small
+    sign: float  # -1.0 if it is to be made large
     n_modes: int | None
     seen: dict[bytes, Any] = field(default_factory=dict)  # point -> _State, or the error that it met
     slopes: dict[bytes, np.ndarray] = field(default_factory=dict)
@@ -304,7 +318,8 @@ class _Search:
                 count = max(self._count(name, piece) if struck else 0, highest + RIGID if highest else 0)
                 modes[name] = self._body(piece, count)
             if struck:
-                hits[name] = piece.strike(modes[name], STRIKE)
+                once = any(goal.name == "clearance" for goal in self.goals if goal.blow == name)
+                hits[name] = piece.strike(modes[name], STRIKE, once)
         first = next(iter(pieces))
         found = [_of_modes(modes[first], goal) if goal.mode else _of_hit(hits[goal.blow], goal) for goal in self.goals]
         return _State(values, pieces, modes, hits, np.array(found))
@@ -354,7 +369,9 @@ class _Search:
         low, high = self.bounds
         inside = np.clip(first, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
         self.state(inside)  # an error at the start is the user's
-        x = self._least(inside) if self.least is not None else self._squares(inside)
+        x = self._squares(inside)  # with a number to make least, this finds where the goals are met at all
+        if self.least is not None:
+            x = self._least(x, tolerance)
         state, slopes = self.state(x), self.slope(x)
         reached = tuple(
             Reached(goal, float(value), dict(zip(self.maker.names, row.tolist())))
@@ -366,6 +383,11 @@ class _Search:
             MappingProxyType(state.values), reached, tolerance, ends, len(self.seen), self.maker,
             MappingProxyType(state.hits),
         )  # fmt: skip
+
+    def rank(self, found: Design) -> tuple[float, float]:
+        """What makes one design better than another: smaller misses beyond the tolerance, then the number sought."""
+        missed = max(0.0, max(abs(each.miss) for each in found.reached) - found.tolerance)
+        return missed, self.sign * found.values[self.least] if self.least else 0.0
 
     def _misses(self, x: np.ndarray) -> np.ndarray:
         try:
@@ -393,8 +415,8 @@ class _Search:
         )  # fmt: skip
         return np.asarray(found.x)
 
-    def _least(self, first: np.ndarray) -> np.ndarray:
-        """The smallest value of one number that meets all goals."""
+    def _least(self, first: np.ndarray, tolerance: float) -> np.ndarray:
+        """Where one number is smallest or largest of all points seen that meet the goals; else where it ends."""
         which = self.maker.names.index(self.least or "")
         unit = np.eye(len(first))[which]
         low, high = self.bounds
@@ -406,11 +428,14 @@ class _Search:
                 sides += [(i, s, end) for s, end in ((1.0, goal.low), (-1.0, goal.high)) if math.isfinite(end)]
         constraints = [self._constraint(*side) for side in sides]
         found = minimize(
-            lambda x: (x[which] - first[which]) / (high[which] - low[which]), first,
-            jac=lambda x: unit / (high[which] - low[which]), bounds=list(zip(low, high)), constraints=constraints,
-            method="SLSQP", options={"maxiter": ENOUGH, "ftol": CLOSE},
+            lambda x: self.sign * (x[which] - first[which]) / (high[which] - low[which]), first,
+            jac=lambda x: self.sign * unit / (high[which] - low[which]), bounds=list(zip(low, high)),
+            constraints=constraints, method="SLSQP", options={"maxiter": ENOUGH, "ftol": CLOSE},
         )  # fmt: skip
-        return np.clip(found.x, low, high)
+        ends = np.clip(found.x, low, high)
+        points = [np.frombuffer(key) for key, state in self.seen.items() if isinstance(state, _State)]
+        met = [x for x in [ends, *points] if np.abs(self._misses(x)).max() <= tolerance]
+        return min(met, key=lambda x: self.sign * x[which]) if met else first
 
     def _constraint(self, i: int, sign: float, limit: float) -> dict[str, Any]:
         goal, factor = self.goals[i], sign or 1.0
@@ -456,6 +481,10 @@ def _of_modes(modes: Modes, goal: Goal) -> float:
 def _of_hit(hit: Response, goal: Goal) -> float:
     """The quantity of a blow."""
     name, _, band = goal.name.partition("=")
+    if name == "clearance":
+        return clearance.nearest(hit)[0]
+    if name == "spectral_level":
+        return gradient.level_of(hit.spectrum(np.array([0.0, float(band)])))
     if name == "peak_time":
         return float(hit.time[int(np.argmax(hit.force))])
     return float(hit.spectral_centroid(float(band)) if band else getattr(hit, name))
@@ -483,11 +512,16 @@ def _hit_slopes(hit: Response, labels: list[str], values: Mapping[str, float], r
     if not numbers and not sections:
         return np.zeros((len(labels), len(rates)))
     marked = {f"free {name}": each for name, each in sections.items()}  # apart from numbers of the blow
-    found = gradient.gradients(hit, labels, (*numbers, *marked), marked)
-    result = np.zeros((len(labels), len(rates)))
-    for i, each in enumerate(found.values()):
-        for j, (name, rate) in enumerate(rates.items()):
-            result[i, j] = sum(each[number] * slope for number, slope in rate.numbers.items())
-            if name in sections:
-                result[i, j] += each[f"free {name}"]
-    return result
+    names = (*numbers, *marked)
+    told = dict.fromkeys(["contact_time", *(label for label in labels if label != "clearance")])
+    found = {name: each.slopes for name, each in gradient.gradients(hit, tuple(told), names, marked).items()}
+    if "clearance" in labels:
+        changes = {name: change for name, (_, change) in marked.items()}
+        found["clearance"] = clearance.slopes(hit, names, changes, found["contact_time"])
+    chain = np.zeros((len(names), len(rates)))
+    for j, (name, rate) in enumerate(rates.items()):
+        for number, slope in rate.numbers.items():
+            chain[names.index(number), j] = slope
+        if name in sections:
+            chain[names.index(f"free {name}"), j] = 1.0
+    return np.array([found[label] for label in labels]) @ chain

@@ -20,11 +20,12 @@ if TYPE_CHECKING:
     from .response import History, Response
 
 QUANTITIES = (
-    "restitution", "impulse", "contact_time", "peak_force", "peak_time", "spectral_centroid", "modal_energy",
+    "restitution", "impulse", "contact_time", "peak_force", "peak_time", "spectral_centroid", "spectral_level",
+    "modal_energy",
 )  # fmt: skip
 UNIT_OF = {
     "impulse": "N s", "contact_time": "s", "peak_force": "N", "peak_time": "s", "spectral_centroid": "Hz",
-    "modal_energy": "J",
+    "spectral_level": "dB", "modal_energy": "J",
 }  # fmt: skip
 GRAZE = 1e-3  # [-] of the deepest approach: a touch or gap below it may come or go with a small change
 TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a small change may make the other the largest
@@ -163,15 +164,17 @@ def _asked(item: Any) -> tuple[str, float | None]:
     name, equals, band = str(item).partition("=")
     name = {"force": "peak_force"}.get(name.strip(), name.strip())
     check.one_of("quantity", name, QUANTITIES)
-    if (name == "spectral_centroid") != bool(equals):
-        rule = "needs a band, such as 'spectral_centroid=5000'" if not equals else f"has no band, write {name!r}"
+    if name.startswith("spectral") != bool(equals):
+        rule = f"needs a frequency, such as '{name}=5000'" if not equals else f"has no frequency, write {name!r}"
         raise ValueError(f"quantity {name} {rule}")
     if not equals:
         return name, None
     try:
-        return name, check.positive("band of spectral_centroid", float(band), "Hz")
+        return name, check.positive(f"frequency of {name}", float(band), "Hz")
     except ValueError:
-        raise ValueError(f"band of {name} must be a positive number in Hz, got {check.shown(band.strip())}") from None
+        raise ValueError(
+            f"frequency of {name} must be a positive number in Hz, got {check.shown(band.strip())}"
+        ) from None
 
 
 def _slopes(
@@ -196,10 +199,22 @@ def _slopes(
         whole = np.trapezoid(size, frequencies)
         centre = float(np.trapezoid(frequencies * size, frequencies) / whole)
         return centre, np.trapezoid((frequencies - centre)[:, None] * change, frequencies, axis=0) / whole
+    if name == "spectral_level":
+        assert band is not None
+        ends = np.array([0.0, band])
+        spectrum = hit.spectrum(ends)
+        rates = np.real(found.spectrum(ends) / spectrum[:, None])  # (2, n) of the logarithms
+        return level_of(spectrum), 20.0 / np.log(10.0) * (rates[1] - rates[0])
     if name == "peak_time":
         return found.when_largest, found.peak_time
     value: float = getattr(hit, name)
     return value, getattr(found, name)
+
+
+def level_of(spectrum: np.ndarray) -> float:
+    """Level [dB] of the second of two values of a force spectrum re the first."""
+    size = np.abs(spectrum)
+    return 20.0 * float(np.log10(size[1] / size[0]))
 
 
 def _check_tie(history: "History") -> None:

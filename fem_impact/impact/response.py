@@ -493,7 +493,8 @@ class Response(Totals):
         ----------
         quantity : str or sequence of str
             "restitution", "impulse", "contact_time", "peak_force", "peak_time", "spectral_centroid=5000" (its band in
-            Hz) or "modal_energy" (the energy left in each mode of the target at the last separation).
+            Hz), "spectral_level=800" (of the force at 800 Hz, in dB re 0 Hz) or "modal_energy" (the energy left in each
+            mode of the target at the last separation).
         wrt : str or sequence of str, optional
             Names of numbers as in a scene file: "striker.mass", "striker.first_frequency", "striker.damping_ratio",
             "contact.stiffness", "contact.exponent", "contact.loss", "contact.gap", "strike.speed", "strike.x",

@@ -37,11 +37,24 @@ def test_goals_hold_for_each_blow_or_for_one():
         ({"impulse": (2.0, 1.0)}, r"wanted\['impulse'\] must be a range \(low, high\), got \(2, 1\)"),
         ({"impulse": (None, None)}, "must be a number or a range .* None leaves an end open"),
         ({"impulse": np.nan}, r"wanted\['impulse'\]"),
-        ({"impulse=5": 1.0}, "impulse has no band, write 'impulse'"),
-        ({"spectral_centroid": 1.0}, "needs a band in Hz, such as 'spectral_centroid=5000'"),
+        ({"impulse=5": 1.0}, "impulse has no frequency, write 'impulse'"),
+        ({"spectral_centroid": 1.0}, "needs a frequency, such as 'spectral_centroid=5000'"),
         ({"loud": {"impulse": 1.0}}, "the blow in wanted must be one of"),
     ],
 )
 def test_what_cannot_be_wanted_is_said(wanted, words):
     with pytest.raises(ValueError, match=words):
         goals.read(wanted, ("",))
+
+
+def test_one_impact_is_wanted_as_a_clearance():
+    (found,) = goals.read({"n_impacts": 1}, ("",))
+    assert found.name == "clearance" and found.low == goals.CLEAR and found.high == np.inf
+    assert found.miss(0.5) == 0.0 and found.miss(-0.5) == -0.5 - goals.CLEAR
+    with pytest.raises(ValueError, match=r"wanted\['n_impacts'\] must be 1, the only count"):
+        goals.read({"n_impacts": 2}, ("",))
+
+
+def test_levels_miss_as_their_forces():
+    (found,) = goals.read({"spectral_level=800": (-10.0, None)}, ("",))
+    assert_allclose(found.miss(-10.0 - 20.0 * np.log10(1.01)), -np.log(1.01))  # one per cent

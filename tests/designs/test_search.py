@@ -84,7 +84,7 @@ FREE = {"height": (0.01, 0.03), "deep": (1e-3, 15e-3), "yarn": (1e6, 1e9)}
 def test_all_slopes_are_differences():
     ranges = tuple(Unknown(name, *limits) for name, limits in FREE.items())
     names = {"mode1.frequency": 1.0, "mode2.ratio": 1.0, "contact_time": 1.0, "restitution": 1.0}
-    run = search._Search(Maker.of(undercut, tuple(FREE)), ranges, goals.read(names, ("",)), None, 12)
+    run = search._Search(Maker.of(undercut, tuple(FREE)), ranges, goals.read(names, ("",)), None, 1.0, 12)
     x = np.array([float(each.inside(value)) for each, value in zip(ranges, (0.022, 8e-3, 3e7))])
     slopes = run.slope(x)
     for j, each in enumerate(ranges):

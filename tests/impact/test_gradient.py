@@ -249,11 +249,25 @@ def test_what_has_no_gradient_says_why():
         ball(fi.Contact.hertz(1e6)).gradient("impulse", "striker.colour")
     with pytest.raises(ValueError, match="quantity must be one of"):
         ball(fi.Contact.hertz(1e6)).gradient("loudness")
-    with pytest.raises(ValueError, match="needs a band, such as 'spectral_centroid=5000'"):
+    with pytest.raises(ValueError, match="needs a frequency, such as 'spectral_centroid=5000'"):
         ball(fi.Contact.hertz(1e6)).gradient("spectral_centroid")
     chain = [fi.Touch(fi.Contact.linear(1e6), 0, 1), fi.Touch(fi.Contact.linear(1e6, gap=1e-3), 1, 2)]
     with pytest.raises(ValueError, match="gradient needs a blow of `strike`"):
         fi.collide([fi.Modes.rigid(0.1)] * 3, chain, speeds=[1.0, 0.0, 0.0]).gradient("impulse")
+
+
+def test_the_level_of_a_half_sine_falls_by_the_formula():
+    """The spectrum of a half sine of duration T is cos(pi f T) / (1 - (2 f T)^2) of that at 0 Hz, T = pi sqrt(m/k)."""
+    mass, stiffness, frequency = 0.1, 1e6, 900.0
+    hit = fi.strike(
+        fi.Modes.rigid(1e12), fi.Striker.rigid(mass), fi.Contact.linear(stiffness), at=None, speed=1.0, tolerance=1e-9
+    )
+    found = hit.gradient(f"spectral_level={frequency:g}", ("striker.mass", "contact.stiffness"))
+    x = frequency * np.pi * np.sqrt(mass / stiffness)
+    whole = 20.0 * np.log10(np.cos(np.pi * x) / (1.0 - 4.0 * x**2))
+    slope = 20.0 / np.log(10.0) * x * (8.0 * x / (1.0 - 4.0 * x**2) - np.pi * np.tan(np.pi * x))
+    assert_allclose(found.value, whole, rtol=1e-6)  # the wall moves by 1e-13 of the ball's way; the run errs by 1e-9
+    assert_allclose(found.slopes * (mass, stiffness), [0.5 * slope, -0.5 * slope], rtol=1e-6)
 
 
 def test_a_gradient_reads_as_a_table():
