@@ -79,11 +79,13 @@ def test_a_map_of_too_many_modes_proposes_a_tolerance(tmp_path, monkeypatch):
     monkeypatch.setitem(planner.MOST_MODES, "fe", 150)
     text = QUICK.replace('source = "analytic"', 'source = "fe"').replace("[strike]", "[strike]\nresidual = false")
     found, over = loaded(tmp_path, text), {"contact.stiffness": [1e3, 1e5]}
-    with pytest.raises(fi.SimulationError, match="leave out the stiffest contacts") as caught:
+    with pytest.raises(fi.SimulationError, match="leave out the contacts stiffer than") as caught:
         maps.map_scene(found, over=over, tolerance=1e-9)
     enough = float(re.search(r"tolerance = (\S+) is affordable", str(caught.value))[1])
-    with pytest.raises(fi.SimulationError, match="leave out the stiffest contacts"):
-        maps.map_scene(found, over=over, tolerance=enough / 3.0)
+    words = r"leave out the contacts stiffer than (\S+)"
+    softest = advice(words, lambda: maps.map_scene(found, over=over, tolerance=enough / 3.0), fi.SimulationError)
+    soft = {"contact.stiffness": [1e3, float(softest)]}
+    assert (maps.map_scene(found, over=soft, tolerance=enough / 3.0).n_impacts > 0).all() and float(softest) > 1e3
     assert (maps.map_scene(found, over=over, tolerance=enough).n_impacts > 0).all()
 
 

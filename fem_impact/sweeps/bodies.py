@@ -31,6 +31,7 @@ from .cells import REACH, Case, checked_axes, sampled
 FIRST_LOOK = 40  # [-] modes found first, to estimate how many a map needs
 STRUCK = 10, 4  # [-] cells in all, and at each strike point at least, by which the vectors are judged
 SPARED = 0.2  # [-] of these may miss the tolerance: beside a cell with another number of impacts no error is small
+SOFTER, MUCH_SOFTER = 0.5, 60  # [-] factor between contact stiffnesses tried in advice, and number of tries
 SEED = 0  # [-] of the choice of cells: the same map gives the same vectors
 
 Axes = Mapping[str, np.ndarray]
@@ -102,7 +103,7 @@ def corners(axes: Axes) -> list[dict[str, Any]]:
 def _by_modes(target: Target, case: Case, axes: Axes, tolerance: float, keep: Path | None) -> Case:
     """The blow on as many modes as the shortest contact of the map needs."""
 
-    def reach(tolerance: float) -> float:
+    def reach(tolerance: float, axes: Axes = axes) -> float:
         found = (case.with_values(values) for values in corners(axes))
         return max(
             needed_frequency(corner, tolerance) * case.modes.frequencies[-1] / corner.modes.frequencies[-1]
@@ -115,9 +116,14 @@ def _by_modes(target: Target, case: Case, axes: Axes, tolerance: float, keep: Pa
     number, most = number_of_modes(modes, needed), planner.MOST_MODES[target.kind]
     if number > most:
         enough = accuracy.least_tolerance(lambda tolerance: number_of_modes(modes, reach(tolerance)) <= most)
+        stiffest = float(np.max(axes.get("stiffness", case.contact.stiffness)))
+        softer = (float(f"{stiffest * SOFTER**n:.1e}") for n in range(1, MUCH_SOFTER))
+        fits = (
+            k for k in softer if number_of_modes(modes, reach(tolerance, {**axes, "stiffness": np.array([k])})) <= most
+        )
         raise check.SimulationError(
             f"the shortest blow of the map needs about {number} modes, at most {most} are allowed; "
-            f"{_affordable(enough)}"
+            f"{_affordable(enough, next(fits, None))}"
         )
     first = None
     if keep is not None and target.kind == "fe":
@@ -126,10 +132,12 @@ def _by_modes(target: Target, case: Case, axes: Axes, tolerance: float, keep: Pa
     return replace(case, modes=target.surrounded(more))
 
 
-def _affordable(enough: float | None) -> str:
-    """What a user can change of a map that needs too much."""
+def _affordable(enough: float | None, softest: float | None) -> str:
+    """What a user can change of a map that needs too much: its tolerance, or its largest contact stiffness."""
     said = "no tolerance is large enough" if enough is None else f"tolerance = {enough:g} is affordable"
-    return f"{said}; or leave out the stiffest contacts and the lightest strikers"
+    return (
+        f"{said}; or leave out the {'lightest strikers' if softest is None else f'contacts stiffer than {softest:g}'}"
+    )
 
 
 def needed_frequency(case: Case, tolerance: float) -> float:
