@@ -11,6 +11,7 @@ from .records import Taps
 from .solver import HALF_LOST, Problem
 from .unknowns import TIME
 
+CLOSE = 1e-5  # [-] change of the sum of squares that ends a fit without one tap: what is left counts by its root
 QUICK = 12  # [-] iterations for speed, onset and what else a tap has of its own
 
 
@@ -83,6 +84,6 @@ def left_out(problem: Problem, x: np.ndarray, taps: Taps, rise_only: bool = Fals
     for tap in range(n_taps):
         others = [i for i in range(n_taps) if i != tap]
         part = replace(problem, data=problem.data.pick(others), _last={})
-        without = solver.solve(part, x[problem.kept(others)])
+        without = solver.solve(part, x[problem.kept(others)], close=CLOSE)
         found.append(predicted(part, part.values(without.x), taps.pick(tap), rise_only))
     return tuple(found)
