@@ -28,6 +28,7 @@ _NAMES = {
     "sweeps.grid": "sweep",
     "taps.records": "Taps read_taps",
     "taps.rig": "measure",
+    "taps.roving": "plan_test",
     "taps.fit": "fit",
     "taps.transfer": "frf mac matched",
     "taps.update": "update",

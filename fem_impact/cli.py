@@ -284,6 +284,10 @@ def _parser() -> argparse.ArgumentParser:
         help="how far the spectrum may fall within the bandwidth [dB] (default: 10)",
     )  # fmt: skip
     add("--masses", metavar="KG", type=float, nargs="+", help="masses of the hammers [kg] (default: 1 g to 1 kg)")
+    add(
+        "--rove", metavar="N", type=int,
+        help="plan a test of about N points over the body, the sensor at the strike point; --out also writes a CSV",
+    )  # fmt: skip
     add("--out", metavar="FILE", type=_place, help="write a picture to this file: .png, .pdf or .svg")
     _add_format(add, None)
     add("--json", action="store_true", help="print the numbers as JSON")
@@ -606,6 +610,9 @@ def _hammer(options: argparse.Namespace) -> None:
     scene = fi.load_scene(options.scene)
     drawn = _drawn(options)
     masses = options.masses or [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]
+    if options.rove is not None:
+        _rove(options, scene, masses, drawn)
+        return
     with Display(_tell)("hammers"):
         hammers = maps.hammers_for(scene, options.bandwidth, masses, drop=options.drop)
         if drawn is not None:
@@ -639,6 +646,27 @@ def _hammer(options: argparse.Namespace) -> None:
         _say(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; try lighter hammers")
     if drawn is not None:
         _say(f"Files: {drawn}")
+
+
+def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], drawn: Path | None) -> None:
+    """Plan a test with a roving hammer."""
+    from ._base import check  # imported only when needed
+    from .taps import roving
+
+    number = check.count("--rove", options.rove)
+    with Display(_tell)("points"):
+        plan = roving.of_scene(scene, masses, options.bandwidth, options.drop, number)
+        if drawn is not None:
+            drawn.parent.mkdir(parents=True, exist_ok=True)
+            fi.figures.save(drawn, plan.figure())
+            plan.write_csv(drawn.with_suffix(".csv"))
+    if options.json:
+        data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
+        _print_json({**data, "versions": fi.export.versions()})
+        return
+    _say(_title(scene), *plan.summary().splitlines())
+    if drawn is not None:
+        _say(f"Files: {drawn}, {drawn.with_suffix('.csv')}")
 
 
 def _report(options: argparse.Namespace) -> bool:

@@ -350,6 +350,10 @@ def table() -> dict[str, dict[str, Any]]:
             "modes": t["modes"], "at": at, "bandwidth": 300.0, "masses": [0.1], "drop": 10.0,
         },
         "hammers.choose": {"modes": t["modes"], "at": at, "bandwidth": 300.0, "masses": [0.1], "drop": 10.0},
+        "plan_test": {
+            "system": t["modes"], "hammers": {"a": (0.1, {"soft": 1e3})}, "points": [at], "bandwidth": 30.0,
+            "sensor": at, "drop": 10.0, "noise": 1e-3, "duration": 1.0, "damping_ratio": None,
+        },
         "read_taps": {
             "path": t["file of taps"], "force": "force", "response": (), "rate": 25600.0, "scale": 1.0,
             "units": {"force": "N"}, "trigger": 1.0, "before": 5e-4, "length": 2e-3, "together": 0.05,

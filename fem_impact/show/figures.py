@@ -273,7 +273,7 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
 
 
 def chladni(modes: Modes, count: int, columns: int) -> Figure:
-    """As `pictures.chladni`."""
+    """Draw the nodal lines as `pictures.chladni` describes."""
     check.between("dimension of modes", modes.dimension, 2, 2)
     flexible = modes.n_modes - modes.n_rigid
     if not flexible:

@@ -1,11 +1,12 @@
 """Curves, maps and sketches for studies and sweeps, in the style of `figures`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -15,12 +16,16 @@ from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatt
 from scipy.interpolate import RegularGridInterpolator
 
 from ..impact import accuracy
+from ..mesh.mesh_files import boundary
+from ..modes.modal import Modes
 from ..sweeps.hammers import Hammer, half_sine_reach
+from . import sampling
 from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, styled
 
 BLACK, GREY = "#222222", "#777777"
 PALETTE = "cividis"  # perceptually uniform, also for colour-blind readers
 FINER = 8  # [-] each pixel is split into this many parts to draw contours
+PALETTE_OF_POINTS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY)
 MOST_NAMES = 5  # [-] most names along an axis: more would overlap
 FEW = 10  # [-] a range of fewer whole numbers gets one colour per number
 HALO = withStroke(linewidth=2.2, foreground=BLACK)  # keeps white lines visible on bright colours
@@ -239,3 +244,44 @@ def hammers(found: Sequence[Hammer], bandwidth: float, drop: float = 10.0) -> An
     x, y = Axis("mass of the hammer", "g", log=True), Axis("stiffness of the tip", "N/m", log=True)
     title = f"Hammers for {bandwidth:g} Hz at -{drop:g} dB without a double hit"
     return curves(drawn, x=x, y=y, title=title, between=(mass, softest, hardest))
+
+
+def places(
+    modes: Modes, groups: Mapping[str, np.ndarray], crossed: Mapping[str, str], sensor: np.ndarray, title: str
+) -> Figure:
+    """Draw groups of points (n, dimension) [m] on the outline of a body, each in its colour, and a star at the sensor.
+
+    ``crossed`` are markers of groups that are drawn in black.
+    """
+    _, cells, plane = sampling.surface(modes)
+    tall = float(np.ptp(plane[:, 1]) / np.ptp(plane[:, 0]))
+    with styled(7.0, 6.0 * min(1.4, max(0.2, tall)) + 1.2) as figure:
+        axes = figure.subplots()
+        axes.add_collection(LineCollection(list(plane[boundary(cells)]), colors=GREY, linewidths=1.0))
+        flat = {name: np.column_stack([some, np.zeros(len(some))])[:, :2] for name, some in groups.items()}
+        painted = [name for name in flat if name not in crossed]
+        for name, some in flat.items():
+            if name in crossed:
+                axes.plot(*some.T, crossed[name], color=BLACK, ms=8, mew=1.8, label=name)
+            else:
+                i = painted.index(name)
+                style = PALETTE_OF_POINTS[i % len(PALETTE_OF_POINTS)], "o^sD"[i // len(PALETTE_OF_POINTS) % 4]
+                axes.plot(*some.T, style[1], color=style[0], ms=8, label=name)
+        axes.plot(*np.append(sensor, 0.0)[:2], "*", color=BLACK, ms=15, mfc="none", mew=1.2)
+        axes.set_aspect("equal")
+        axes.autoscale_view()
+        axes.margins(0.05)
+        axes.set_title(title)
+        _coordinates(axes, modes.dimension)
+        figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+def _coordinates(axes: Any, dimension: int) -> None:
+    axes.set_xlabel("x")
+    axes.xaxis.set_major_formatter(EngFormatter(unit="m", sep=" "))
+    axes.yaxis.set_major_formatter(EngFormatter(unit="m", sep=" "))
+    if dimension == 1:
+        axes.set_yticks([])
+    else:
+        axes.set_ylabel("y")
