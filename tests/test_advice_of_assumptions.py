@@ -59,6 +59,12 @@ def flapping():
     return fi.find_modes(system, n_modes=60, damping_ratio=0.01)
 
 
+def elements(element="argyris"):
+    body = fi.mesh.rectangle(*SIDES, size=0.1), fi.Plate(STEEL, 5e-4), {"boundary": "hinged"}
+    return fi.find_modes(fi.assemble(*body, element=element), n_modes=12, damping_ratio=0.01)
+
+
+quadratic = partial(elements, "morley")
 on_bar = partial(blow, striker=fi.Striker.rigid(0.1), at=0.15, speed=1.0)
 by_rod = partial(blow, law=fi.Contact.hertz(1e9), speed=1.0)
 by_stick = partial(fi.Striker.stick, mass=0.05, first_frequency=500.0)
@@ -110,12 +116,22 @@ REMEDIES = {
         [lambda: blow(flapping(), speed=0.1), lambda: blow(plate(3e-3), speed=2.0)],
     ),
     "small deflections, a dent": (
-        lambda: blow(plate(5e-4), speed=2.0, stretching=True),
+        lambda: blow(plate(5e-4), speed=3.0, stretching=True),
         "^take a softer blow or a thicker body: local stretching is not modelled$",
         [
             lambda: blow(plate(5e-4), speed=0.1, stretching=True),
             lambda: blow(plate(3e-3), speed=2.0, stretching=True),
         ],
+    ),
+    "small deflections, elements without shear forces": (
+        lambda: blow(quadratic(), speed=1.0),
+        "^(?:take element 'argyris'|\\{\\}) and (?:let it stretch|\\{\\})",
+        [lambda: blow(plate(5e-4, n_modes=7), speed=1.0, stretching=True), lambda: blow(quadratic(), speed=0.1)],
+    ),
+    "thin target, elements without shear forces": (
+        lambda: blow(quadratic()),
+        "^take element 'argyris'$",
+        [lambda: blow(elements())],
     ),
     "small deflections, scaled": (lambda: blow(scaled()), "^give material and section$", [lambda: blow()]),
     "no yielding, a dent": (
@@ -172,6 +188,11 @@ REMEDIES = {
         "^give it as a sphere or a bar$",
         [lambda: blow(), lambda: by_rod(striker=rod())],
     ),
+    "quasi-static contact, a head and its handle": (
+        lambda: blow(striker=fi.Striker.hammer(0.03, 0.06, stiffness=2e4, damping=5.0), law=fi.Contact.hertz(1e9)),
+        "^give it as a sphere or a bar$",
+        [lambda: blow(), lambda: by_rod(striker=rod())],
+    ),
     "still air, a light plate": (
         lambda: blow(plate(1e-3, SPRUCE, 20), law=fi.Contact.hertz(1e7)),
         r'^take the modes in air: air = "both sides" under \[target\], or `fi\.in_air`$',
@@ -202,7 +223,9 @@ def examined(hit, name):
     return next(each for each in hit.assumptions if name.startswith(each.name))
 
 
-STRETCH = "small deflections, large", "small deflections, a dent"  # one worker compiles the kernels of stretching
+STRETCH = tuple(
+    f"small deflections, {case}" for case in ("large", "a dent", "elements without shear forces")
+)  # one worker compiles the kernels of stretching
 MARKS = pytest.mark.slow, pytest.mark.xdist_group("stretched")
 
 

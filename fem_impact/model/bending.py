@@ -14,7 +14,7 @@ Mindlin (1951), J. Appl. Mech. 18, 31-38; Cowper (1966), J. Appl. Mech. 33, 335-
 Elasticity, art. 109 (torsion of a strip).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ from ..modes.air import MixedShapes
 from ..modes.analytic import BeamShapes, DiskShapes, RectangleShapes
 from ..modes.modal import FieldShapes, Modes, ScaledShapes, Shapes
 from ..modes.ritz import RitzShapes
+from ..modes.timoshenko import TimoshenkoShapes
 
 LOW = 40  # [-] flexible modes that are integrated; a blow's results depend on few others one by one
 TRUE_VECTORS = 4  # [-] of so many Ritz pairs the lowest one is a mode: those above are packets, whose shear is singular
@@ -115,8 +116,6 @@ def known(modes: Modes) -> Known | None:
     """What the modes of a plate or beam tell of it; None if its shapes are known at points only, or it is rigid."""
     shapes = unwrapped(modes.shapes)[0]
     if isinstance(shapes, (FieldShapes, RitzShapes)):
-        if shapes.system.element == "morley":  # its quadratic shapes have no shear force
-            return None
         return around(modes, modes.section, shapes.system.mesh, shapes.system.supports)
     if isinstance(shapes, RectangleShapes):
         sides = shapes.length, shapes.width
@@ -124,9 +123,15 @@ def known(modes: Modes) -> Known | None:
     if isinstance(shapes, DiskShapes):
         a = shapes.radius
         return Known(modes, modes.section, np.pi * a**2, float(shapes.edge != "free"), 2.0 * np.pi * a)
-    if isinstance(shapes, BeamShapes):
+    if isinstance(shapes, (BeamShapes, TimoshenkoShapes)):
         return Known(modes, modes.section, shapes.length, _held(list(shapes.ends)), 0.0)
     return None
+
+
+def quadratic(modes: Modes) -> bool:
+    """Whether the shapes are those of Morley's element, whose quadratics have no shear force."""
+    shapes = unwrapped(modes.shapes)[0]
+    return isinstance(shapes, (FieldShapes, RitzShapes)) and shapes.system.element == "morley"
 
 
 def around(modes: Modes, section: Plate | Beam | None, mesh: Mesh, supports: Any) -> Known:
@@ -152,25 +157,30 @@ def bending(body: Known) -> Bending:
     n_rigid = modes.n_rigid
     few = (modes.n_modes - n_rigid) // TRUE_VECTORS if isinstance(shapes, RitzShapes) else LOW
     low = slice(n_rigid, min(n_rigid + max(1, min(LOW, few)), modes.n_modes))
-    section = body.section
+    thick = body.section is not None and not quadratic(modes)
     if isinstance(shapes, (FieldShapes, RitzShapes)):
         system = shapes.system
         if isinstance(shapes, FieldShapes):
             vectors = shapes.vectors[:, low]
         else:
             vectors = shapes.basis.T @ shapes.turn[:, : low.stop - n_rigid]
-        found = (_plate if modes.dimension == 2 else _beam)(system, vectors, section is not None)
+        found = (_plate if modes.dimension == 2 else _beam)(system, vectors, thick)
         found[:2] = found[:2] * amplitude ** np.array([[2.0], [1.0]])
     elif isinstance(shapes, RectangleShapes):
         found = _rectangle(shapes.take(low.stop), body, amplitude)
     elif isinstance(shapes, DiskShapes):
         found = _disk(shapes, low, body, amplitude)
+    elif isinstance(shapes, TimoshenkoShapes):  # rotary inertia and shear are in its frequencies
+        found = np.zeros((5, low.stop - low.start))
+        node, weight = np.polynomial.legendre.leggauss(ALONG)
+        slope = replace(shapes, p=shapes.p[low], weights=shapes.weights[low]).slopes(0.5 * (node + 1.0))
+        found[0] = 0.5 * weight @ slope**2 * amplitude**2 / shapes.length
     else:
         assert isinstance(shapes, BeamShapes)
         found = _beam_shapes(shapes, low, body, amplitude)
     left = _mixture(modes.shapes, low)
     found[:3] *= np.stack([left**2, left, left**2])
-    return _extended(modes, low, found, body.per_extent, section is not None)
+    return _extended(modes, low, found, body.per_extent, thick)
 
 
 def _extended(modes: Modes, low: slice, found: np.ndarray, per_extent: float, thick: bool) -> Bending:

@@ -19,7 +19,7 @@ from ..fe import membrane
 from ..fe.section import Plate
 from ..impact.assumption import Assumption
 from ..modes.modal import Modes
-from .bending import Bending, Known, known
+from .bending import Bending, Known, known, quadratic
 from .idealisation import Waves
 from .restrike import Struck
 
@@ -36,6 +36,7 @@ FEWER = 2  # [-] the stress fields of a body that stretches over those left in t
 PERIODS, PER_PERIOD = 2.0, 64.0  # [-] periods of the first mode after a blow that are looked through for its deflection
 REMEDY = "take a softer blow or a thicker body: stretching is not modelled"
 BETTER = "let it stretch, stretching = true, or take a softer blow or a thicker body"
+OTHER = "take element 'argyris'"
 LOCAL = "take a softer blow or a thicker body: local stretching is not modelled"
 A_GONG = "this is a gong: large deflections are not modelled"
 
@@ -45,7 +46,9 @@ def of_target(struck: Struck) -> Assumption:
     body, quantities = struck.target, struck.quantities
 
     def told(value: float | None, effect: dict, unknown: str = "") -> Assumption:
-        remedy, limit = REMEDY if body is None or body.held != 1.0 else BETTER, LIMIT
+        remedy, limit = REMEDY, LIMIT
+        if body is not None and body.held == 1.0:
+            remedy = f"{OTHER} and {BETTER}" if quadratic(body.modes) else BETTER
         if struck.hit.history.stretched is not None:
             return Assumption("small deflections", value, GONG, effect, quantities, LOCAL, NUMBER, unknown)
         remedy = "give material and section" if unknown else A_GONG if value is not None and value > GONG else remedy

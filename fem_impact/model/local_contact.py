@@ -15,6 +15,7 @@ import numpy as np
 from ..fe.section import Material
 from ..impact.assumption import Assumption
 from ..impact.contact import YIELDS, Contact, loss_number
+from ..modes.modal import SampledShapes
 from .restrike import Struck, softer
 
 SMALL = 0.5  # [-] contact radius over half the thickness, over a wavelength / (2 pi) or over the distance to an edge
@@ -140,7 +141,8 @@ def slow(struck: Struck) -> Assumption:
     """Whether the contact lasts much longer than the striker's own vibration."""
     hit, quantities, striker = struck.hit, struck.quantities, struck.hit.striker
     number = "own period of the striker over the contact time"
-    if striker is not None and striker.modes.dimension:
+    lumps = striker is not None and striker.modes.thick and isinstance(striker.modes.shapes, SampledShapes)
+    if striker is not None and striker.modes.dimension and not lumps:
         value = None  # its modes are part of the blow
         return Assumption("quasi-static contact", value, SLOW, dict.fromkeys(quantities, 0.0), quantities, "", number)
     if striker is None or striker.radius is None or striker.material is None:

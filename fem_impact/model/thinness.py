@@ -15,6 +15,7 @@ import numpy as np
 from ..fe.section import SHEAR, Plate
 from ..impact.assumption import Assumption
 from .bending import Bending, Known
+from .deflection import OTHER
 from .restrike import Struck, softer
 
 LIMIT = 0.23  # [-] thickness times wavenumber at which a wave is 1 % too fast for nu = 0.3
@@ -24,6 +25,7 @@ NUMBER = "thickness times wavenumber"
 THICKER = 'take a thick plate, theory = "mindlin", or a softer contact'
 SLENDER = 'take a thick beam, theory = "timoshenko", or a softer contact'
 NO_SECTION = "the thickness is not stated; give material and section instead of mass and first frequency"
+MORLEY = "the shear forces of element 'morley'"
 NO_SLENDERNESS = "give the slenderness of a stick, or material and section of a bar"
 
 
@@ -38,7 +40,7 @@ def of_target(struck: Struck) -> Assumption:
 
     def told(value: float | None, effect: dict, unknown: str = "") -> Assumption:
         plate = body is None or body.modes.dimension == 2
-        remedy = NO_SECTION if unknown else THICKER if plate else SLENDER
+        remedy = OTHER if unknown == MORLEY else NO_SECTION if unknown else THICKER if plate else SLENDER
         return Assumption("thin target", value, LIMIT, effect, quantities, remedy, NUMBER, unknown)
 
     if struck.hit.bodies[-1].dimension == 0 or struck.hit.bodies[-1].thick:
@@ -48,7 +50,9 @@ def of_target(struck: Struck) -> Assumption:
     if struck.ideal:
         return told(*_simplified(struck, body))
     integrals, history = struck.bending, struck.hit.history
-    assert integrals is not None and integrals.thick is not None
+    assert integrals is not None
+    if integrals.thick is None:
+        return told(None, dict.fromkeys(quantities), MORLEY)
     wave = integrals.wave
     weight = struck.energy.sum()
     value = body.thickness * float(np.sqrt(struck.energy @ wave**2 / weight)) if weight else 0.0

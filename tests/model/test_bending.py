@@ -145,3 +145,13 @@ def test_a_drumhead_has_the_waves_of_its_membrane():
     skin = fi.Plate(fi.Material(E=4e9, nu=0.38, rho=1390.0), 0.1e-3, tension=4000.0)
     modes = by_elements(fi.mesh.disk(0.3), skin, {"boundary": "hinged"}, 3)
     assert integrals(modes).wave[0] == pytest.approx(jn_zeros(0, 1)[0] / 0.3, rel=1e-3)
+
+
+@pytest.mark.parametrize("ends", [("hinged", "clamped"), ("free", "free")])
+def test_a_stout_beam_by_formulas_has_the_slopes_of_one_by_elements(ends):
+    section = fi.Beam.rectangular(STEEL, width=0.02, height=0.03)
+    closed = fi.analytic.beam(0.3, ends=ends, section=section, n_modes=8, theory="timoshenko")
+    supports = {"left": ends[0], "right": ends[1]}
+    found = fi.find_modes(fi.assemble(fi.mesh.line(0.3), section, supports, theory="timoshenko"), n_modes=8)
+    np.testing.assert_allclose(integrals(closed).slope, integrals(found).slope, rtol=1e-6, atol=1e-6)
+    assert module.known(closed).held == float(ends[0] == "hinged")
