@@ -28,7 +28,7 @@ WANTED = {"n_impacts": 1, LEVEL: (-tutorial.DROP, None), "impulse": (IMPULSE, No
 FREE = {"mass": (5e-3, 0.5), "tip": (1e4, 1e7)}  # [kg], [N/m]
 START = {"mass": 0.05, "tip": 3e5}
 N_MODES = 180  # [-] of the plate, up to 8 kHz
-MAP = 31  # [-] masses and tips of the picture
+MAP = 17  # [-] masses and tips of the picture
 PICTURE = Path(__file__).parent / "pictures" / "design_hammer.png"
 
 

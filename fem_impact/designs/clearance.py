@@ -64,7 +64,7 @@ def slopes(
     row = np.zeros((1, history.steps.shape[1]))
     row[0, :2] = history.end_time, when - history.end_time
     longer = replace(history, steps=np.vstack([history.steps, row]), end_time=when, status=record.HORIZON)
-    found = Sensitivity.of(longer, Parameters(hit, sections).change(names))
+    found = Sensitivity.of(longer, Parameters(hit, sections).change(names), peak=False)
     scale = hit.speed * hit.impacts[0].duration
     faster = np.array([float(name == "strike.speed") for name in names])
     change = -found.found.ends[-1, 0] / scale - gap * (times / hit.impacts[0].duration + faster / hit.speed)

@@ -136,9 +136,10 @@ def gradients(
             f"no gradient: runs of different steps find {len(coarse.contacts)} and {hit.n_impacts} impacts; give a "
             "smaller tolerance and no dt, or max_impacts"
         )
-    fine = Sensitivity.of(hit.history, change)
+    peak = any(name.startswith("peak") for name, _ in wanted)
+    fine = Sensitivity.of(hit.history, change, peak)
     _check_grazing(fine)
-    rough = None if coarse is None else Sensitivity.of(coarse, change)
+    rough = None if coarse is None else Sensitivity.of(coarse, change, peak)
     numbers = np.array([sections[name][0] if name in sections else parameters.values[name] for name in names])
     found = {}
     for name, band in wanted:

@@ -1,11 +1,10 @@
 """What small changes of a blow's numbers do to it, to first order, from the record of one run."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import brentq
 
 from .._base import check
 from .._base.check import SimulationError
@@ -19,15 +18,17 @@ NODES = 3, 5  # [-] Gauss nodes per piece: for a force that is linear in each st
 # [-] fractions of the first step of a contact in which its force is no polynomial, and mirrored of the last: there the
 # slope of a power law goes as (exponent - 1) powers of time
 GRADED = (4.0**-4, 4.0**-3, 4.0**-2, 4.0**-1)
-LOOKS = 16  # [-] samples per step in the search for the largest force
+LOOKS, ROUNDS = 16, 2  # [-] samples per step in the search for the largest force; one step of Newton's method follows
 NUDGE = 1e-5  # [-] relative change at which the curvature of a contact law is taken; leaves 1e-10
 SLOW, MORE = 0.3, 12  # [rad], [-] half the phase over a piece up to which its own nodes make a spectrum; else so many
 EDGE = 1e-9  # [-] of a step: what lies nearer to its ends is at them
 ROUNDING = 1e-14  # [-] of the duration: the same
+ALIKE = 1e-11  # [-] difference of lengths of pieces that rounding leaves
 CANCELS = 1e-12  # [-] of the changes of the approach at the start: what they leave if they cancel
 AT_ZERO = 1e-7  # [-] of the deepest approach: a contact that ends deeper lets go by its loss
 
 
+@cache
 def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss nodes on [0, 1] with 1 appended, (count + 1,), and Lagrange polynomials in powers, (count, count)."""
     nodes = 0.5 * (np.polynomial.legendre.leggauss(count)[0] + 1.0)
@@ -55,22 +56,25 @@ class Sensitivity:
     __repr__ = check.brief
 
     @classmethod
-    def of(cls, history: "History", change: Change) -> "Sensitivity":
-        """Follow the record; raises SimulationError where it passed over contacts without locating them."""
+    def of(cls, history: "History", change: Change, peak: bool = True) -> "Sensitivity":
+        """Follow the record; raises SimulationError where it passed over contacts without locating them.
+
+        ``peak`` says whether the largest force is wanted.
+        """
         if history.n_blind:
             raise SimulationError(
                 "no gradient: the bodies chatter, and the run passed over contacts without locating them; give "
                 "max_impacts, a shorter duration or no dt"
             )
-        peak = _peak(history)
-        time, row, part = _cut(history, peak)
+        top = _peak(history) if peak else None
+        time, row, part = _cut(history, top)
         nodes, powers = gauss(NODES[int(history.n_coefficients > 2)])
         n, n_modes, s = len(change.offset), len(history.omega), len(powers)
-        wanted = [0.0, *(when for each in history.impacts for when in (each.start, each.end)), peak or 0.0, time[-1]]
+        wanted = [0.0, *(when for each in history.impacts for when in (each.start, each.end)), top or 0.0, time[-1]]
         marks = np.unique([int(np.abs(time - when).argmin()) for when in wanted])
         mark = np.full(len(time), -1)
         mark[marks] = np.arange(len(marks))
-        length, closed, step = np.diff(time), history.pressed[row, 0], history.steps[row, 1:2]
+        length, closed, step = _alike(np.diff(time)), history.pressed[row, 0], history.steps[row, 1:2]
         within = part[:, None] + nodes[:-1] * length[:, None] / step
         force = np.zeros((len(length), s))
         for c in history.steps[row, 6 : 6 + history.n_coefficients].T[::-1]:
@@ -87,7 +91,7 @@ class Sensitivity:
             float(history.offset[0]), history.law,
         )  # fmt: skip
         follow(blow, change, pieces, found)
-        at = -1 if peak is None else int(np.abs(time - peak).argmin())
+        at = -1 if top is None else int(np.abs(time - top).argmin())
         return cls(history, change, time, pieces, found, at)
 
     @cached_property
@@ -253,6 +257,16 @@ class Sensitivity:
         return float(fastest[0]), float(fastest[1])
 
 
+def _alike(length: np.ndarray) -> np.ndarray:
+    """Lengths (n,) of pieces, those equal but for rounding made equal: pieces of one length share their tables."""
+    order = np.argsort(length)
+    ascending = length[order]
+    first = np.append(True, np.diff(ascending) > ALIKE * ascending[1:])[: len(length)]
+    found = np.empty(len(length))
+    found[order] = ascending[first][np.cumsum(first) - 1]
+    return found
+
+
 def _force_rate(state: np.ndarray, law: np.ndarray) -> float:
     """Rate [N/s] of the contact force at an approach and its first two rates, (3,)."""
     d, v, a = state.tolist()
@@ -272,12 +286,14 @@ def _peak(history: "History") -> float | None:
     low, high = (times[1 + k] - length[i] / LOOKS), (times[1 + k] + length[i] / LOOKS)
     low, high = max(low, start[0]), min(high, start[-1] + length[-1])
 
-    def rate(time: float) -> float:
-        return float(history.force_at(np.array([time]), 0)[1][0])
-
-    if rate(low) > 0.0 > rate(high):
-        return float(brentq(rate, low, high, xtol=1e-12 * history.end_time))
-    return float(times[1 + k])
+    for _ in range(ROUNDS):
+        near = np.linspace(low, high, LOOKS + 1)
+        rate = history.force_at(near, 0)[1]
+        falls = int(np.argmax((rate[:-1] > 0.0) & (rate[1:] <= 0.0)))
+        if not rate[falls] > 0.0 >= rate[falls + 1]:
+            return float(times[1 + k])
+        low, high = float(near[falls]), float(near[falls + 1])
+    return low + (high - low) * float(rate[falls] / (rate[falls] - rate[falls + 1]))
 
 
 def _cut(history: "History", peak: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
