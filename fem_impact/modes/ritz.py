@@ -164,7 +164,7 @@ class Krylov:
         start, end = self._latest[1:]
         latest = end - start
         both = np.vstack([self.vectors[start:end], new.T])
-        heavy = np.ascontiguousarray((self.system.M @ both.T).T)
+        heavy = np.vstack([self._carried[:, -latest:].T, (self.system.M @ new).T])
         rows, worst = max(1, PIECE // (8 * both.shape[1])), 0.0
         for i in range(0, start, rows):  # a few rows at a time: memory is read once for both products
             known = self.vectors[i : min(i + rows, start)]
