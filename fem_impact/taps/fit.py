@@ -21,6 +21,8 @@ from .unknowns import TIME, Setting, Unknown, checked
 STARTS = 5  # [-] searches, from the best of `solver.SCREENED` points
 QUICK = 12  # [-] iterations of every search before the best two go on
 POORER = 4.0  # [-] ratio of sums of squares from which the second of them does not go on
+POOR = 0.06  # [-] rms of the residual over that of the records: after a poorer fit the search goes on
+PATIENCE = 3  # [-] times the number of starts, at most
 OUTLIER = 4.0  # [-] a tap that the others predict worse than this times the median of their own errors does not agree
 UNEQUAL = 1.5  # [-] ratio of noise over peak from which taps count differently: less is how well noise is known
 MOST_OUTLIERS = 0.34  # [-] of the taps may disagree
@@ -86,7 +88,7 @@ def fit(
     window : (before, after) [s], optional
         What is compared around each onset; by default the pulses and 1.5 times their length after them.
     starts : int
-        Searches from different points of the ranges.
+        Searches from different points of the ranges; up to three times as many if all of them end poorly.
     robust : bool
         Whether a tap that the others predict badly is left out and named.
     profiles : bool
@@ -238,16 +240,19 @@ def _sureness(residual: np.ndarray, noise: np.ndarray) -> np.ndarray:
 def _search(problem: Problem, taps: Taps, length: float, starts: int, rng: Any, watch: Watch | None):
     """The best of several searches, and the sums of squares of all; they begin with what all taps share."""
     common = replace(problem, own=(), _last={})
-    begun = solver.starts(common, length, taps.impulse, starts, rng)
-    found = []
-    for i, x in enumerate(begun):
+    begun = solver.starts(common, length, taps.impulse, rng)
+    found: list[solver.Solution] = []
+    poor = POOR**2 * float(np.square(problem.data.values).sum())
+    for i, x in enumerate(begun[: PATIENCE * starts]):
+        if i >= starts and found and min(one.cost for one in found) < poor:
+            break
         try:
             found.append(solver.solve(common, x, QUICK, 1e-5))
         except SimulationError:
             continue
         finally:
             if watch is not None:
-                watch(i + 1, len(begun))
+                watch(min(i + 1, starts), starts)
     if not found:
         raise SimulationError("no search ended: blows in the ranges of unknown do not end; narrow the ranges")
     found.sort(key=lambda one: one.cost)

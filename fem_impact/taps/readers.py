@@ -248,8 +248,10 @@ def _numbers(rows: list[str], separator: str | None, use: list[int], comma: bool
 
 def _round_rate(rate: float) -> float:
     """A rate as it was set: times are written with few digits."""
-    near = round(rate, 1)
-    return float(near) if abs(near - rate) < 1e-5 * rate else float(rate)
+    for near in (round(rate), round(rate, 1)):
+        if abs(near - rate) < 1e-5 * rate:
+            return float(near)
+    return float(rate)
 
 
 def table(path: Path) -> Recording:

@@ -19,6 +19,7 @@ HALF_LOST = 0.6  # [-] momentum over impulse of a blow that comes back with two 
 STEP = 1e-4  # [-] of coordinates, for derivatives by differences: blows with a fixed step are smooth to 1e-6
 TIMES = 30.0  # [-] the contact time is sought within this factor of the measured one
 SCREENED = 64  # [-] starting points that are looked at
+NEIGHBOURS = 0.25  # [-] of the ranges: starting points nearer than this often lead to the same minimum
 FELT = 0.1, 5.0  # [-] frequency times contact time of modes that shape a pulse: where their searches begin
 LOOKS = 3  # [-] Gauss-Newton steps in speed and onset while looking
 ENOUGH = 60  # [-] iterations of one search
@@ -369,8 +370,8 @@ def pulse_length(taps: Any) -> float:
     return float(np.median(0.5 * np.pi * taps.impulse / taps.peak))
 
 
-def starts(problem: Problem, length: float, momentum: np.ndarray, count: int, rng: np.random.Generator) -> list:
-    """Starting points in order of their sums of squares, of `SCREENED` that fill the ranges evenly.
+def starts(problem: Problem, length: float, momentum: np.ndarray, rng: np.random.Generator) -> list:
+    """Starting points in order of their sums of squares, of `SCREENED` that fill the ranges evenly; neighbours last.
 
     Parameters
     ----------
@@ -398,4 +399,9 @@ def starts(problem: Problem, length: float, momentum: np.ndarray, count: int, rn
     if not looked:
         raise SimulationError("no starting point in the ranges of unknown makes a blow that ends; narrow the ranges")
     looked.sort(key=lambda pair: pair[0])
-    return [x for _, x in looked[:count]]
+    chosen: list[np.ndarray] = []
+    later: list[np.ndarray] = []
+    for _, x in looked:
+        away = [np.abs((x - other)[:n] / (high - low)).max(initial=0.0) for other in chosen]
+        (later if away and min(away) < NEIGHBOURS else chosen).append(x)
+    return chosen + later

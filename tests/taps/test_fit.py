@@ -184,3 +184,23 @@ def test_wrong_arguments_are_refused(structure):
     cut = fi.Taps.from_arrays(taps[0].force, rate=RATE, overload=True)
     with pytest.raises(ValueError, match="not cut off"):
         fi.fit(cut, **given)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
+def test_a_search_goes_on_where_all_starts_end_in_a_poor_minimum():
+    plate = fi.analytic.rectangle(0.5, 0.4, mass=1.5, first_frequency=90.0, n_modes=30, damping_ratio=0.01)
+    law = fi.Contact.power(3e8, 1.6, loss=0.2)
+    hits = [fi.strike(plate, fi.Striker.rigid(0.1), law, at=(0.21, 0.13), speed=v) for v in (0.5, 1.0, 1.6)]
+    taps = [fi.measure(hit, rate=51200.0, noise=2e-3, rng=i, duration=6e-3) for i, hit in enumerate(hits)]
+    found = fi.fit(
+        taps, target=plate, at=(0.21, 0.13), striker=fi.Striker.rigid(0.1), contact=fi.Contact.hertz(1e7),
+        unknown={"contact.stiffness": (1e6, 1e11), "contact.exponent": (1.0, 3.0), "contact.loss": (0.0, 2.0),
+                 "target.first_frequency": (60.0, 150.0), "target.mass": (0.5, 5.0)},
+        starts=1, profiles=False,
+    )  # fmt: skip
+    assert (
+        len(found.minima) > 1 and max(found.minima) > 50.0 * found.best.cost
+    )  # others end at a bound of the frequency
+    assert found.point["target.mass"] == pytest.approx(1.5, rel=0.02)  # 0.3 % was found in 0.2 % of noise
+    assert found.point["target.first_frequency"] == pytest.approx(90.0, rel=0.01)
