@@ -125,6 +125,10 @@ def things() -> dict[str, Any]:
         "sphere": fi.Striker.sphere(metal, 0.01), "free": fi.Modes.rigid(1.0), "folder": folder, "path": path,
         "system": fi.assemble(square, plate, {"boundary": "hinged"}), "scene": scene, "uff": uff, "mesh": mesh,
         "sequence": fi.load_scene(several), "tone": fi.sound.Sound(np.ones(100), 8000, 1.0),
+        "bar hit": fi.strike(
+            fi.analytic.beam(0.4, ends=("free", "free"), mass=0.2, first_frequency=100.0, n_modes=12), striker, law,
+            at=0.15, speed=1.0, tolerance=1e-2,
+        ),
         "hit": fi.strike(modes, striker, law, at=(0.13, 0.1), speed=1.0, tolerance=1e-2),
         "outline": Outline.around(circle((0.0, 0.0), 1.0, "rim")),
         "plan": scene.plan(), "run": scene.run(target="modal"),
@@ -345,6 +349,10 @@ def table() -> dict[str, dict[str, Any]]:
         "sound.radiate": {
             **hit, "listener": (0.1, 0.1, 1.0), "duration": 0.01, "rate": 8000, "normalise": False,
             "air": (1.2, 343.0),
+        },
+        "sound.radiate_bar": {
+            "response": t["bar hit"], "listener": (0.1, 0.1, 1.0), "width": 0.02, "height": 0.01, "duration": 0.01,
+            "rate": 8000, "air": (1.2, 343.0),
         },
         "hammers.highest_frequency": {
             "modes": t["modes"], "at": at, "bandwidth": 300.0, "masses": [0.1], "drop": 10.0,

@@ -259,8 +259,13 @@ ADVICE = {  # what fails, the message, and what it advises
     "fewer values": (lambda _: swept(), "give fewer values", lambda _: swept(over={"mass": [0.02, 0.03]})),
     "sound of a beam": (
         lambda _: fi.sound.radiate(of_a_beam(), (0.0, 0.0, 1.0)),
-        "use synthesise",
-        lambda _: fi.sound.synthesise(of_a_beam(), 0.1),
+        "use radiate_bar",
+        lambda _: fi.sound.radiate_bar(of_a_beam(), (0.0, 0.0, 1.0), width=0.02, height=0.01, duration=0.01),
+    ),
+    "sound of a plate as a bar": (
+        lambda _: fi.sound.radiate_bar(struck(), (0.0, 0.0, 1.0), width=0.02, height=0.01),
+        "use radiate$",
+        lambda _: fi.sound.radiate(struck(), (0.0, 0.0, 1.0), duration=0.01),
     ),
     "listener": (
         lambda _: fi.sound.radiate(struck(), (0.1, 0.1, 0.0), duration=0.01),
