@@ -27,6 +27,11 @@ def plate(n_modes=20):
     return fi.analytic.rectangle(*SIDES, section=PLATE, n_modes=n_modes)
 
 
+def together(body):
+    touch = fi.Touch(fi.Contact.linear(1e5), 0, 1, [0.0, 0.0], AT)
+    return fi.collide([fi.Modes.rigid(0.1), body], [touch], speeds=[1.0, 0.0], tolerance=1e-2)
+
+
 def scaled():
     return fi.analytic.rectangle(*SIDES, mass=0.5, first_frequency=100.0, n_modes=20)
 
@@ -100,6 +105,11 @@ STRETCHING = {
             lambda: blow(bar("clamped", "hinged", theory="timoshenko")),
             lambda: linear(bar("clamped", "free", theory="timoshenko")),
         ],
+    ),
+    "several bodies": (
+        lambda: together(replace(plate(), stretches=True)),
+        "can only be struck once, by `fi.strike`; leave stretching out$",
+        [lambda: blow(replace(plate(), stretches=True)), lambda: together(plate())],
     ),
     "collocation": (
         lambda: blow(plate(), scheme="collocation"),

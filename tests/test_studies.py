@@ -33,6 +33,15 @@ def test_sdnl32_does_not_depend_on_the_modes_kept():
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("stretched")  # one worker compiles its kernels
+@pytest.mark.parametrize("kind", ["stretching", "air", "quasi-static contact", "damping"])
+def test_the_models_own_error_is_told_in_random_scenes(kind):
+    assumptions = study("assumptions")
+    for seed in range(100, 103):  # not those of the study's table
+        assert assumptions.judge(kind, seed)["verdict"] in ("right", "silent", "beyond", "hardly beyond")
+
+
+@pytest.mark.slow
 def test_random_scenes_keep_their_promise():
     effectivity = study("effectivity")
     rng = np.random.default_rng(11)

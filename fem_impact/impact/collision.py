@@ -289,6 +289,8 @@ def met(
     """`collide` without a word on its tolerance; ``pushes`` are constant modal forces on the first bodies."""
     options = Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
     bodies, contacts = check.several("bodies", bodies, Modes), check.several("contacts", contacts, Touch)
+    if any(body.stretches for body in bodies):
+        raise ValueError("a body that stretches can only be struck once, by `fi.strike`; leave stretching out")
     before = start.state() if isinstance(start, Response) else start
     if before is not None:
         if states is not None:

@@ -15,6 +15,7 @@ import numpy as np
 from ..fe.section import Material
 from ..impact.assumption import Assumption
 from ..impact.contact import YIELDS, Contact, loss_number
+from ..impact.response import History
 from ..modes.modal import SampledShapes
 from .restrike import Struck, softer
 
@@ -23,6 +24,7 @@ NEAREST = 1e-6  # [-] least distance to an edge over the thickness
 SLOW = 0.2  # [-] longest period of the striker's own vibration over the contact time
 HARDLY = 1e-6  # [-] loss times speed of a contact that loses nothing
 LAMB = 2.64  # [-] lowest spheroidal mode of a sphere, omega R / c_s, for nu = 0.25; 2.65 for 0.33
+INERT = 10.0  # [-] frequency over that of this mode from which on it does not swing: it leaves 1 % of the effect
 LIVELY = 2.5  # [-] squared shape of that mode at its pole times the mass of the sphere
 EDGE = "contact radius over the distance to the edge"
 SPHERE = "give the striker as a sphere with its material, and the contact between the two"
@@ -152,7 +154,16 @@ def slow(struck: Struck) -> Assumption:
         )
     E, nu, rho = striker.material.E, striker.material.nu, striker.material.rho
     own = LAMB * np.sqrt(E / (2.0 * (1.0 + nu) * rho)) / striker.radius
-    late = LIVELY / (striker.mass * own**2) * (struck.omega / own) ** 2  # what inertia adds to the static give
-    effect = struck.changes(**softer(hit.history, late))
+    shape = (LIVELY / striker.mass) ** 0.5
+    # Hertz's law has the static give of the mode, as has a mode too fast to swing
+    effect = struck.between(_with(hit.history, INERT * own, INERT * shape), _with(hit.history, own, shape))
     remedy = "take a striker with its own modes: a bar, or a flexible one"
     return Assumption("quasi-static contact", 2.0 * struck.omega / own, SLOW, effect, quantities, remedy, number)
+
+
+def _with(history: History, omega: float, shape: float) -> dict[str, np.ndarray]:
+    """The fields of a history that change if the striker gets one more mode at rest."""
+    column = np.zeros((len(history.shape), 1))
+    column[0] = shape
+    rest = {name: np.append(getattr(history, name), 0.0) for name in ("zeta", "bias", "start_q", "start_p")}
+    return {"omega": np.append(history.omega, omega), "shape": np.hstack([history.shape, column]), **rest}

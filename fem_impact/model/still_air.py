@@ -1,9 +1,10 @@
 """Is the air negligible? Its mass, which moves with the body, and the sound that carries energy away.
 
 Each side of a plate whose bending waves are shorter than those of sound moves rho_0 / sqrt(k**2 - k_0**2) of air per
-area; longer ones radiate with the efficiency 1 / sqrt(1 - k**2 / k_0**2). Below coincidence a finite plate in a baffle
-radiates from its edges, and its lowest modes as sources of their volume; without a baffle it radiates less. A strip of
-width b moves pi rho_0 b**2 / 4 per length. A damping that was stated stands for all of it, the sound included.
+area, and a finite plate some more; longer ones radiate with the efficiency 1 / sqrt(1 - k**2 / k_0**2). Below
+coincidence a finite plate in a baffle radiates from its edges, and its lowest modes as sources of their volume; without
+a baffle it radiates less. A strip of width b moves pi rho_0 b**2 / 4 per length. A damping that was stated stands for
+all of it, the sound included.
 
 References
 ----------
@@ -22,6 +23,8 @@ from .thinness import plane_wave
 
 LIMIT = 0.02  # [-] mass of the air over that of the body at which frequencies drop by 1 %
 ROUNDED = 0.1  # [-] of k**2: k**2 - k_0**2 does not get smaller, as the waves of a finite plate are not straight
+RIM = 0.5  # [-] of perimeter / (k area): the air that a finite plate moves beside its waves; with SWELL within 11 %
+SWELL = 0.6  # [-] of (int w)**2 / (area int w**2): what its volume adds (`fi.in_air`, five rectangles and two disks)
 NUMBER = "mass of the air moved over that of the body"
 IN_AIR = 'take the modes in air: air = "both sides" under [target], or `fi.in_air`'
 
@@ -86,7 +89,8 @@ def loading(body: Known, integrals: Bending) -> tuple[np.ndarray, np.ndarray] | 
         sound = 0.25 * np.pi * mass * (0.5 * k0 * width) ** 2
         return np.where(moving, mass, 0.0), np.where(moving, sound, 0.0)
     short = np.sqrt(np.maximum(k**2 - k0**2, ROUNDED * k**2))
-    mass = np.where(k > k0, 2.0 * rho / (per_extent * short), 0.0)
+    finite = 1.0 + RIM * body.perimeter / (k * body.extent) + SWELL * integrals.volume**2 * per_extent / body.extent
+    mass = np.where(k > k0, 2.0 * rho / (per_extent * short) * finite, 0.0)
     share = np.maximum(k / k0, 1.0 + 0.5 * ROUNDED)  # k / k_0 below coincidence
     edges = body.perimeter / (2.0 * np.pi * k * body.extent * np.sqrt(share**2 - 1.0))
     edges *= np.log((share + 1.0) / (share - 1.0)) + 2.0 * share / (share**2 - 1.0)
