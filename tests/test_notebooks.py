@@ -44,6 +44,13 @@ def test_every_object_is_short_as_text(hit, cradle, tmp_path):
     assert "speed=2.0" in repr(hit) and isinstance(run, Run)
 
 
+def test_a_system_is_drawn_with_its_supports():
+    plate = fi.Plate(fi.Material(E=7e10, nu=0.3, rho=2700.0), 2e-3)
+    system = fi.assemble(fi.mesh.rectangle(1.0, 0.5, size=0.4), plate, supports={"left": "clamped"})
+    shown = system._repr_html_()
+    assert shown.count("<svg") == 1 and "left clamped" in shown and "2.7 kg" in shown and str(system.n_dofs) in shown
+
+
 def test_a_figure_shows_itself_as_a_picture(hit):
     assert fi.figures.force(hit)._repr_png_().startswith(b"\x89PNG")
 

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, eye_array, vstack
 
-from .._base import check
+from .._base import check, markup
+from ..mesh import sketch
 from ..mesh.facets import Curves
 from ..mesh.meshes import Mesh, aligned, pierced
 from . import beam_elements, plausible, shear_beam, thick
@@ -140,6 +141,13 @@ class System:
     unresolved: float = 0.0  # [-] approximate relative error that singular corners leave on any mesh
 
     __repr__ = check.brief
+
+    def _repr_html_(self) -> str:
+        """Notebook view: the body with its supports, and a table of its size."""
+        held = ", ".join(f"{name} {kind}" for name, kind in self.supports.items())
+        rows = [("theory", self.theory), ("mass", f"{self.mass:.4g} kg"), ("supports", held), ("unknowns", self.n_dofs)]
+        drawn = sketch.body(self.mesh, supports=self.supports, title=f"Outline of a body of {self.mass:.4g} kg: {held}")
+        return markup.side_by_side(drawn, markup.table(rows))
 
     @property
     def theory(self) -> str:
