@@ -126,15 +126,15 @@ def table_columns(table: Any, *layers: str) -> dict[str, np.ndarray]:
 
 
 def publish(name: str, figure: Any, columns: dict[str, Any]) -> None:
-    """Write NAME.png and NAME.csv to the folder given on the command line, or to studies/out."""
+    """Write NAME.png, in the format of `drawing`, and NAME.csv to the folder of the command line, or to studies/out."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "out"
     folder.mkdir(parents=True, exist_ok=True)
-    drawing.save(folder / f"{name}.png", figure)
+    written = drawing.save(folder / f"{name}.png", figure)
     with (folder / f"{name}.csv").open("w", newline="") as file:
         table = csv.writer(file)
         table.writerow(columns)
         table.writerows(zip_longest(*([_text(value) for value in values] for values in columns.values())))
-    print(f"{folder / name}.png and .csv")
+    print(f"{written} and .csv")
 
 
 def _text(value: Any) -> str:

@@ -100,8 +100,7 @@ def main(folder: Path, max_frequency: float = 8e3) -> list[Verdict]:
         )
         advice = f"tips from {hammer.softest:.3g} N/m to {end} work" if hammer.works else "no tip works"
         print(f"In the middle, with a hammer of {1e3 * hammer.mass:g} g: {advice}.")
-    drawing.save(folder / "hammer_test.png", draw(modes))
-    print(f"{folder / 'hammer_test.png'}")
+    print(drawing.save(folder / "hammer_test.png", draw(modes)))
     return verdicts
 
 
