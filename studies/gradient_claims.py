@@ -6,8 +6,8 @@ Sticks that bend strike damped plates through power laws with and without loss, 
 a blow change together, along a random direction; slopes are told relative to the sum of what each number contributes.
 Differences are of fourth order, of blows told to 1e-10; each blow has steps of its own, and where differences of one
 and of two steps disagree, neither is a truth. So a slope counts as right if it is within 1e-6 and that doubt. The same
-blow told to 1e-4 gives slopes with larger errors, which are compared with what they state. Next to a grazing contact no
-gradient is told: there differences must disagree, or the count change.
+blow told to 1e-4 gives slopes with larger errors, which are compared with what they state. Blows whose gradient is
+refused, as next to a grazing contact, are listed with the reason.
 """
 
 import argparse
