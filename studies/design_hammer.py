@@ -14,6 +14,7 @@ from pathlib import Path
 import drawing
 import numpy as np
 import tutorial_hammer_test as tutorial
+from scipy.ndimage import zoom
 
 import fem_impact as fi
 from fem_impact.designs import clearance
@@ -28,7 +29,7 @@ WANTED = {"n_impacts": 1, LEVEL: (-tutorial.DROP, None), "impulse": (IMPULSE, No
 FREE = {"mass": (5e-3, 0.5), "tip": (1e4, 1e7)}  # [kg], [N/m]
 START = {"mass": 0.05, "tip": 3e5}
 N_MODES = 180  # [-] of the plate, up to 8 kHz
-MAP = 17  # [-] masses and tips of the picture
+MAP, FINER = 17, 16  # [-] masses and tips of the picture, and how many pixels are drawn of each
 PICTURE = Path(__file__).parent / "pictures" / "design_hammer.png"
 
 
@@ -84,8 +85,10 @@ def draw(survey, designs):
     with styled(6.4, 4.6) as figure:
         axes = figure.subplots()
         x, y = 1e3 * masses, 1e-3 * tips
-        spare = np.minimum(np.minimum(gaps, levels + tutorial.DROP), impulses / IMPULSE - 1.0)
-        axes.contourf(x, y, spare.T, [0.0, 1e3], colors=[plots.GREEN], alpha=0.3)
+        fine = [zoom(field, FINER, order=1) for field in (gaps, levels, impulses)]  # linear in between
+        good = (fine[0] > 0.0) & (fine[1] > -tutorial.DROP) & (fine[2] > IMPULSE)
+        across, up = (np.geomspace(each[0], each[-1], len(good)) for each in (x, y))
+        axes.contourf(across, up, good.T.astype(float), [0.5, 1.5], colors=[plots.GREEN], alpha=0.3)
         axes.contourf(x, y, gaps.T, [-1e3, 0.0], colors=[plots.VERMILION], alpha=0.25)
         for field, limit, colour, name in (
             (levels, -tutorial.DROP, plots.BLUE, "force at 800 Hz 10 dB down"),

@@ -64,6 +64,7 @@ ELSEWHERE = {  # advice followed in a test of its own: the test, and patterns of
         "modes lie between eigenvalues",
     ),
     "fe/test_eigenvalues.py::test_modes_that_stay_missing_are_found_by_asking_for_more": ("ask for a few more modes",),
+    "impact/test_parameters.py::test_what_makes_no_section_is_said": ("no section can be made on either side of",),
     "fe/test_variation.py::test_morley_elements_have_none": ("unknown for element 'morley'; take 'argyris'",),
     "fe/test_point_load.py::test_modes_softer_than_the_body_are_an_error": ("find the modes on a finer mesh",),
     "impact/test_promise.py::test_the_modes_advised_meet_the_tolerance": ("^keep .* modes of .* instead of",),

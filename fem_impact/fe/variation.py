@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from .._base import check
 from . import slopes
 from .assembly import System, curvatures
 from .section import Beam, Plate
@@ -15,6 +16,7 @@ DIFFERENCES = (
     ((0, 1, 2, 3, 4), (-25 / 12, 4.0, -3.0, 4 / 3, -1 / 4)),
     ((0, -1, -2, -3, -4), (25 / 12, -4.0, 3.0, -4 / 3, 1 / 4)),
 )
+STEP = 1e-5  # [-] of a number, for these differences: they round to 1e-11
 CHUNK = 256  # [-] cells whose shapes are computed together, to limit memory
 
 
@@ -28,6 +30,23 @@ class SectionChange:
     def of(self, name: str, points: np.ndarray) -> np.ndarray:
         """Rate of "stiffness", "inertia", "shear" or "rotary" at points (n, dimension) [m]."""
         return sum(weight * getattr(each, name)(points) for each, weight in zip(self.sections, self.weights))
+
+    @classmethod
+    def along(cls, name: str, value: Any, made: Any) -> "SectionChange":
+        """How a section changes with a number, at a value of it, from a function that makes it; ValueError names it."""
+        value = check.number(name, value)
+        if not callable(made):
+            raise ValueError(f"{name} must be a pair of a value and a function that makes a section of it")
+        step = STEP * (abs(value) or 1.0)
+        for multiples, weights in DIFFERENCES:
+            try:
+                found = tuple(made(value + step * k) for k in multiples)
+            except ValueError:
+                continue
+            for each in found:
+                check.instance(name, each, Plate, Beam)
+            return cls(found, tuple(weight / step for weight in weights))
+        raise ValueError(f"{name}: no section can be made on either side of {value:g}; change the value")
 
 
 def energies(system: System, change: SectionChange, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

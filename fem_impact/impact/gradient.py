@@ -160,6 +160,19 @@ def gradients(
     return found
 
 
+def section_changes(sections: Any) -> dict[str, tuple[float, SectionChange]]:
+    """The value of each further number, and how the section changes with it; see `Response.gradient`."""
+    if sections is None:
+        return {}
+    if not isinstance(sections, Mapping) or not all(
+        isinstance(name, str) and isinstance(pair, (tuple, list)) and len(pair) == 2 for name, pair in sections.items()
+    ):
+        raise ValueError(f"sections must be a dict of names to (value, function), got {check.shown(sections)}")
+    return {
+        name: (float(pair[0]), SectionChange.along(f"sections[{name!r}]", *pair)) for name, pair in sections.items()
+    }
+
+
 def _asked(item: Any) -> tuple[str, float | None]:
     """A quantity and its band [Hz]."""
     name, equals, band = str(item).partition("=")

@@ -137,7 +137,7 @@ class Parameters:
     def checked(self, wrt: Any) -> tuple[str, ...]:
         """Names as a tuple; all that there are if None. ValueError tells which there are, and why one is not."""
         if wrt is None:
-            return tuple(self.values)
+            return (*self.values, *(name for name in self.sections if name not in self.values))
         names = (wrt,) if isinstance(wrt, str) else check.several("wrt", wrt, str)
         for name in names:
             if name in self.sections:

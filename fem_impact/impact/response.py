@@ -486,7 +486,7 @@ class Response(Totals):
         return frequencies, self.spectrum(frequencies)
 
     @check.typed
-    def gradient(self, quantity: Any, wrt: Any = None) -> Any:
+    def gradient(self, quantity: Any, wrt: Any = None, *, sections: Mapping[str, Any] | None = None) -> Any:
         """Derivatives of what the blow does in the numbers that make it, from the steps of this run.
 
         Parameters
@@ -504,6 +504,10 @@ class Response(Totals):
             it, a damping ratio is added to all of them. Numbers of section and material change at a fixed contact law;
             the scale multiplies all lengths along the target, the strike point moves along. A body that moves already
             keeps its displacement and velocity at the start.
+        sections : mapping of name to (value, function), optional
+            Further numbers that the target's section depends on, such as the thickness of a patch or the depth of an
+            undercut: of each its value, and a function of the number that makes the section. For modes of finite
+            elements, of `find_modes`; also for modes that share a frequency.
 
         Returns
         -------
@@ -531,7 +535,7 @@ class Response(Totals):
         >>> slopes.relative.round(3).tolist()  # 0.4 and -0.4 on a rigid wall
         [0.423, -0.355]
         """
-        found = gradient.gradients(self, quantity, wrt)
+        found = gradient.gradients(self, quantity, wrt, gradient.section_changes(sections))
         return next(iter(found.values())) if isinstance(quantity, str) else found
 
     def body_slice(self, body: int) -> slice:
