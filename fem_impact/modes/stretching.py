@@ -6,8 +6,8 @@ is ``N = E A s / (2 L)`` with ``s = int w'**2``, and the energy ``N s / 4``; if 
 integral.
 
 It is the leading term: good for deflections up to about the thickness, where the frequency of a hinged square rises by
-half. Only the first 40 modes of a plate stretch, and 18 or more stress fields count: at a deflection of one thickness
-more of both change a restitution by some 5e-4 and a peak force by 2e-3 (`studies/is_the_model_right.py`).
+half. Only the first 40 modes of a plate stretch, and 18 or more stress fields count: half as many of both change the
+restitution by 2e-4 at a deflection of one thickness (`studies/is_the_model_right.py`).
 
 References
 ----------
