@@ -46,7 +46,8 @@ class Parameters:
 
     hit: "Response"
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @cached_property
     def values(self) -> dict[str, float]:

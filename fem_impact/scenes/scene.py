@@ -45,7 +45,8 @@ class Scene:
     observe: Part | None = None
     map: Part | None = None
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def strike(self, *, strict: bool = False, **changes: Any) -> Response:
         """Build everything and strike.

@@ -156,7 +156,8 @@ class Setting:
     n_points: int
     impulse: float  # [N s] of a typical tap: sets the speed at which the contact time is stated
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def bodies(self, values: Mapping[str, float]) -> tuple[blows.Pair, float]:
         """Both bodies and the contact that the values make, and the mass of the tip [kg]."""
