@@ -412,7 +412,7 @@ def _strike(options: argparse.Namespace) -> bool:
     _say(_title(scene), run.response.summary())
     if not run.rings:
         _say(f"Model: {run.plan.reasons[0]}; no modes and no sound (use --target modal or --quantity sound=5000)")
-    if run.verified is not None:
+    if run.verified is not None and run.finer is not None:
         coarse = run.finer.target in ("rigid", "infinite")
         tested = f" (which also treats the body as {run.finer.target}: it has too many modes)" if coarse else ""
         differences = ", ".join(f"{name} {value:.1e}" for name, value in run.verified.items())

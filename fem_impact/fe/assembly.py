@@ -1,10 +1,11 @@
 """Assemble the stiffness and mass matrices of a body from its mesh, section and supports."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import qr
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, eye_array, vstack
 
@@ -91,7 +92,8 @@ class Strain:
     stiffness: np.ndarray  # (n_cells, n_q, 3, 3) times the quadrature weights
     springs: csc_matrix  # (n_all, n_all) stiffness of elastic supports and tension
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def energy(self, system: "System", vectors: np.ndarray) -> np.ndarray:
         """Twice the strain energy (n_modes,) of vectors (n_dofs, n_modes)."""
@@ -133,14 +135,15 @@ class System:
     rim: Rim | None = field(default=None, repr=False)  # boundary of the triangles used, in the frame; None on a beam
     order: float = np.inf  # [-] power of the element size with which corners let the frequency error fall
     softness: float = 1.0  # [-] largest inertia over stiffness on the body, in the frame; sets the shortest waves
-    point_masses: tuple = ()  # pairs of point [m] and mass [kg]
-    point_supports: tuple = ()  # pairs of point [m] and stiffness [N/m], infinite if hinged
+    point_masses: tuple[Any, ...] = ()  # pairs of point [m] and mass [kg]
+    point_supports: tuple[Any, ...] = ()  # pairs of point [m] and stiffness [N/m], infinite if hinged
     strain: Strain | ThickStrain | None = field(default=None, repr=False)
     near: np.ndarray | None = None  # (n_points, 2) [m] points towards which the triangles shrink
     layer: float = 1.0  # [-] size of triangles along free edges of a thick plate, over the usual one
     unresolved: float = 0.0  # [-] approximate relative error that singular corners leave on any mesh
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def _repr_html_(self) -> str:
         """Notebook view: the body with its supports, and a table of its size."""
@@ -182,12 +185,12 @@ class System:
 def assemble(
     mesh: Mesh,
     section: Plate | Beam,
-    supports: dict | None = None,
+    supports: Mapping[str, str | Elastic] | None = None,
     element: str | None = None,
     *,
     theory: str | None = None,
-    point_masses: Sequence = (),
-    point_supports: Sequence = (),
+    point_masses: Sequence[tuple[ArrayLike, float]] = (),
+    point_supports: Sequence[ArrayLike | tuple[ArrayLike, float]] = (),
     near: Any = None,
     graded: bool = True,
 ) -> System:
@@ -250,7 +253,7 @@ def assemble(
 
 
 def _made(
-    mesh: Mesh, section: Any, supports: dict, element: str, masses: Attached, near: np.ndarray | None, graded: bool,
+    mesh: Mesh, section: Any, supports: Any, element: str, masses: Attached, near: np.ndarray | None, graded: bool,
     layer: float = 1.0,
 ) -> System:  # fmt: skip
     """`assemble` with checked arguments, and `System.layer`."""

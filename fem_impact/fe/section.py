@@ -87,7 +87,17 @@ class Material:
 
     @classmethod
     def orthotropic(
-        cls, *, E_along, E_across, nu, G, rho, angle=0.0, yield_strength=None, G_xz=None, G_yz=None
+        cls,
+        *,
+        E_along: float,
+        E_across: float,
+        nu: float,
+        G: float,
+        rho: float,
+        angle: float = 0.0,
+        yield_strength: float | None = None,
+        G_xz: float | None = None,
+        G_yz: float | None = None,
     ) -> "Material":
         """Orthotropic material such as tonewood.
 

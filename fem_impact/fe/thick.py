@@ -166,7 +166,8 @@ class ThickStrain:
     fields: Fields
     springs: csc_matrix  # (n_all, n_all) stiffness of elastic supports and tension
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def energy(self, system: Any, vectors: np.ndarray) -> np.ndarray:
         """Twice the strain energy (n_modes,) of vectors (n_dofs, n_modes)."""

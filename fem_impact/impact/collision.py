@@ -83,7 +83,8 @@ class Touch:
     first_at: Any = None  # point on the first body [m]
     second_at: Any = None  # point on the second body [m]
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.instance("law", self.law, Contact)

@@ -50,7 +50,8 @@ class Gradient:
     slopes: np.ndarray  # (n,), or (n, n_modes), quantity over number
     error: np.ndarray  # like slopes, their estimated error from the time steps
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)

@@ -44,7 +44,8 @@ class Parameters:
     hit: "Response"
     sections: Mapping[str, SectionChange] = field(default_factory=dict)  # how numbers of the user's change the section
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @cached_property
     def values(self) -> dict[str, float]:

@@ -109,7 +109,8 @@ class History:
     stretched: Stretched | None = None  # if one of the bodies stretches
     reached: dict[str, Any] = field(default_factory=dict, init=False, repr=False)  # where its motion goes on
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)
@@ -304,7 +305,8 @@ class Response(Totals):
     vectors: Modes | None = field(default=None, repr=False)  # all Ritz pairs of the target, if it is described by them
     coarse: History | None = field(default=None, repr=False)  # the last run before `history`, of longer steps
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)

@@ -53,7 +53,8 @@ class Sensitivity:
     found: Found
     peak: int  # index in `time` of the largest force; -1 without contact
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @classmethod
     def of(cls, history: "History", change: Change, peak: bool = True) -> "Sensitivity":

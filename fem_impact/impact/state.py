@@ -29,7 +29,8 @@ class State:
     at: np.ndarray | None = None  # (dimension,) [m] strike point
     remembers: bool = False  # whether a contact may have yielded or be felt that has not recovered
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)

@@ -19,7 +19,8 @@ class Stretched:
     base: float = 0.0  # [s] longest step; the motion after the run takes the same
     ramp: bool = True  # whether the forces are linear over a step (scheme A4), not constant (A)
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)

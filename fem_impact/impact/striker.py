@@ -56,7 +56,8 @@ class HeldShapes(Shapes):
     base: Shapes
     omega: float  # [rad/s] of that motion
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def dimension(self) -> int:
@@ -97,7 +98,8 @@ class Striker:
     fixed: bool = True  # True: a blow keeps all modes; False: only those its tolerance needs
     hand: Hand | None = None  # what holds it, see `held`
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.instance("modes", self.modes, Modes)

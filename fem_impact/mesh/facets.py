@@ -24,12 +24,12 @@ class Curves:
     ends bends the triangle to follow its facet.
     """
 
-    def __init__(self, ends, middles, tangents, curvatures) -> None:
+    def __init__(self, ends: np.ndarray, middles: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> None:
         chord = ends[:, 1] - ends[:, 0]  # (n, 2)
-        self.length = np.linalg.norm(chord, axis=1)
-        self.along = chord / self.length[:, None]
-        self.out = np.column_stack([self.along[:, 1], -self.along[:, 0]])
-        self.centre = ends.mean(axis=1)
+        self.length: np.ndarray = np.linalg.norm(chord, axis=1)
+        self.along: np.ndarray = chord / self.length[:, None]
+        self.out: np.ndarray = np.column_stack([self.along[:, 1], -self.along[:, 0]])
+        self.centre: np.ndarray = ends.mean(axis=1)
         lean = np.einsum("nei,ni->ne", tangents, self.out) / np.einsum("nei,ni->ne", tangents, self.along)
         slope = lean * self.length[:, None]
         bend = -curvatures * (1.0 + lean**2) ** 1.5 * self.length[:, None] ** 2
@@ -38,7 +38,7 @@ class Curves:
         values = np.column_stack([start, stop, 0.5 * bend[:, 0] + start, -0.5 * bend[:, 1] - stop, 4.0 * height])
         k = np.arange(5.0)
         conditions = np.array([k == 0, np.ones(5), k == 1, k, 0.5**k], float)
-        self.p = np.linalg.solve(conditions, values.T).T  # (n, 5) ascending powers of s
+        self.p: np.ndarray = np.linalg.solve(conditions, values.T).T  # (n, 5) ascending powers of s
 
     def graph(self, rows: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """p and dp/ds for curves ``rows`` (n,) at s (n, n_q)."""

@@ -43,9 +43,12 @@ class Mesh:
     size: float = 0.0  # [m] requested element size
     size_stated: bool = True  # True if the user chose the size; otherwise find_modes may change it
     notes: tuple[str, ...] = ()  # what was repaired or assumed
-    form: tuple = ()  # ("rectangle", length, width), ("disk", radius) or ("line", length) [m]; empty for any other body
+    form: tuple[
+        Any, ...
+    ] = ()  # ("rectangle", length, width), ("disk", radius) or ("line", length) [m]; empty for any other body
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)
@@ -92,7 +95,9 @@ class Mesh:
         return replace(finer, notes=self.notes)
 
 
-def straight(points: np.ndarray, cells: np.ndarray, facets: np.ndarray, edges: dict, **rest) -> Mesh:
+def straight(
+    points: np.ndarray, cells: np.ndarray, facets: np.ndarray, edges: dict[str, np.ndarray], **rest: Any
+) -> Mesh:
     """A plane mesh with straight edges only."""
     ends = points[facets]
     along = ends[:, 1] - ends[:, 0]

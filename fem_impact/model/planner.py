@@ -107,7 +107,8 @@ class Plan:
     notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
     first: Modes | None = field(default=None, repr=False, compare=False)  # first modes of the target, if needed
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def error(self) -> float:
@@ -200,7 +201,8 @@ class Run:
     verified: Mapping[str, float] | None = None  # [-] differences from a finer run, see `verify`
     finer: Plan | None = None  # plan of the finer run
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def rings(self) -> bool:

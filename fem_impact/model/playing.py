@@ -51,7 +51,8 @@ class Strokes(Totals):
     tolerance: float  # [-] requested
     notes: tuple[str, ...] = field(default=(), repr=False)
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)
@@ -225,7 +226,7 @@ class _Stick:
 @check.typed
 def strokes(
     modes: Modes,
-    strokes: Sequence,
+    strokes: Sequence[tuple[float, Striker, Contact, Any, float] | tuple[float, Striker, Contact, Any, float, float]],
     *,
     tolerance: float = TOLERANCE,
     quantity: Any = None,

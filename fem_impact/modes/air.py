@@ -56,7 +56,8 @@ class MixedShapes(Shapes):
     base: Shapes
     mix: np.ndarray  # (n_base, n_modes) [-]
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def dimension(self) -> int:

@@ -152,7 +152,8 @@ class RectangleShapes(Shapes):
     numbers: np.ndarray  # (n_modes, 2) half waves along length and width
     dimension: int = 2
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         phase = np.pi * points / (self.length, self.width)  # (n_points, 2)
@@ -335,7 +336,8 @@ class BeamShapes(BeamlikeShapes):
     k: np.ndarray  # (n_modes,) wavenumber times length; 0 for rigid motions
     weights: np.ndarray  # (n_modes, 4)
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         x = points[:, :1] / self.length  # (n_points, 1)
@@ -610,7 +612,8 @@ class DiskShapes(Shapes):
     scale: np.ndarray  # (n_modes,)
     dimension: int = 2
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         r = np.hypot(points[:, 0], points[:, 1])[:, None] / self.radius

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._base import check, markup
 from .._base.remembered import Remembered
@@ -101,7 +102,8 @@ class ScaledShapes(Shapes):
     amplitude: float  # [-] new shape divided by old
     frequency: float  # [-] new frequency divided by old
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def dimension(self) -> int:
@@ -162,7 +164,8 @@ class SampledShapes(Shapes):
     static: np.ndarray  # (n_points, n_points) [m/N] static compliance of the complete body
     cells: np.ndarray | None = None  # (n_cells, dimension + 1) lines or triangles between the points, for drawing
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)
@@ -229,7 +232,8 @@ class Modes:
     air: bool = field(default=False, repr=False)  # whether the air around the body is in them
     stretches: bool = field(default=False, repr=False)  # whether a blow lets them stretch the body, see `stretching`
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         omega = check.ascending("omega", self.omega, "rad/s")
@@ -254,7 +258,15 @@ class Modes:
 
     @classmethod
     def from_arrays(
-        cls, frequencies, shapes, *, points, mass, damping_ratio=0.0, compliance=None, cells=None
+        cls,
+        frequencies: ArrayLike,
+        shapes: ArrayLike,
+        *,
+        points: ArrayLike,
+        mass: float,
+        damping_ratio: Any = 0.0,
+        compliance: ArrayLike | None = None,
+        cells: ArrayLike | None = None,
     ) -> "Modes":
         """Modes known only at points, as from a modal test.
 
@@ -570,7 +582,8 @@ class FieldShapes(Shapes):
     _under: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), repr=False)  # deflections, by loads
     _at: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), init=False, repr=False)  # shapes, by point
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)

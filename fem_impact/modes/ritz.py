@@ -248,7 +248,8 @@ class RitzShapes(Shapes):
     turn: np.ndarray  # (n_vectors, n_vectors) [-] from the basis to the flexible shapes
     kept: int | None = None  # number of shapes that count as modes; the others are left out
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def dimension(self) -> int:

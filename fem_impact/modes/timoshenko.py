@@ -157,7 +157,8 @@ class TimoshenkoShapes(BeamlikeShapes):
     p: np.ndarray  # (n_modes,) omega squared; 0 for rigid motions
     weights: np.ndarray  # (n_modes, 4)
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         x, flexible = points[:, 0] / self.length, self.p > 0.0

@@ -63,7 +63,8 @@ class Scene:
     map: Part | None = None
     stroke: tuple[Part, ...] = ()  # blows one after another, for `sequence.play`; [strike] says what they share
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def strike(self, *, strict: bool = False, **changes: Any) -> Response:
         """Build everything and strike.

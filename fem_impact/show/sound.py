@@ -41,7 +41,8 @@ class Sound:
     full_scale: float  # [m/s] or [Pa], value of a sample of 1.0
     unit: str = "m/s"
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)

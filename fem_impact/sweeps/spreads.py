@@ -74,7 +74,8 @@ class Spread:
     notes: tuple[str, ...] = ()
     why_no_shares: str = ""  # why there are no Sobol indices
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -42,7 +42,8 @@ class Body:
     dimension: int = 0
     mass: float = np.inf  # [kg]
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def felt_mass(self) -> float:
@@ -121,7 +122,8 @@ class Pair:
     rows: np.ndarray
     rated: bool  # whether the force depends on how fast the contact is pressed
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
 
 def pair(striker: Body, target: Body, contact: Contact) -> Pair:

@@ -41,7 +41,8 @@ class Found:
     compared: Mapping[str, float]  # contact law -> root mean square of its errors at left-out taps [-]; if several
     watch: Watch | None = None
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @cached_property
     def _noise(self) -> tuple[float, int, float]:

@@ -26,7 +26,8 @@ class Prediction:
     onset: float  # [s]
     own: Mapping[str, float]  # unknown freed for each tap -> its value here
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def residual(self) -> np.ndarray:

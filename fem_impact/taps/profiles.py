@@ -49,7 +49,8 @@ class Profile:
     high: float
     log: bool
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def _coordinate(self, value: Any) -> Any:
         return np.log(value) if self.log else np.asarray(value, float)

@@ -41,7 +41,8 @@ class Recording:
     rate: float | None  # [Hz] None: the file does not state it
     notes: tuple[str, ...] = ()
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         for segment in self.segments:

@@ -23,7 +23,8 @@ class Scatter:
     relative: bool  # whether the range is positive, so that ratios count
     freedom: int  # degrees of freedom of the noise variance
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def chance(self) -> float:

@@ -44,7 +44,8 @@ class Data:
     impulse: np.ndarray  # (n_taps,) [N s], measured
     lead: int  # [samples] of every record before the blow begins in the simulation
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def n_taps(self) -> int:
@@ -73,7 +74,8 @@ class Problem:
     momentum: bool = True  # False: the coordinate of a tap is the logarithm of its speed itself
     _last: dict[bytes, np.ndarray] = field(default_factory=dict, repr=False)
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def n_shared(self) -> int:
@@ -279,7 +281,8 @@ class Solution:
     jacobian: np.ndarray  # (n_residuals, n_coordinates less those held)
     ended: bool = True  # False: the iterations were used up
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
 
 def solve(

@@ -166,7 +166,8 @@ class Setting:
     n_points: int
     impulse: float  # [N s] of a typical tap: sets the speed at which the contact time is stated
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def blow(self, values: Mapping[str, float]) -> tuple[blows.Pair, float, float]:
         """Both bodies and the contact that the values make, the mass of the tip [kg], and `duration`."""

@@ -36,7 +36,8 @@ class Updated:
     modes: Modes
     n_solves: int
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def error(self) -> float:
