@@ -48,6 +48,7 @@ if TYPE_CHECKING:  # the same names for type checkers; test_typing.py compares
     from . import mesh as mesh
     from ._base.check import SimulationError as SimulationError
     from ._base.check import ToleranceWarning as ToleranceWarning
+    from .designs.search import design as design
     from .fe.assembly import assemble as assemble
     from .fe.section import Beam as Beam
     from .fe.section import Elastic as Elastic
@@ -90,6 +91,7 @@ if TYPE_CHECKING:  # the same names for type checkers; test_typing.py compares
     from .taps.records import Taps as Taps
     from .taps.records import read_taps as read_taps
     from .taps.rig import measure as measure
+    from .taps.roving import plan_test as plan_test
     from .taps.transfer import frf as frf
     from .taps.transfer import mac as mac
     from .taps.transfer import matched as matched

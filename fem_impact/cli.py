@@ -695,7 +695,7 @@ def _explore(options: argparse.Namespace) -> None:
 
 
 def _play(options: argparse.Namespace) -> None:
-    from .live import devices, prompt  # imported only when needed
+    from .live import command, devices  # imported only when needed
 
     scene = fi.load_scene(options.scene)
     path = options.out if options.out is not None else Path("out") / options.scene.stem / "play.wav"
@@ -703,9 +703,9 @@ def _play(options: argparse.Namespace) -> None:
         with Display()("modes"):
             modes = scene.modes(options.modes)
         with Display()("preparing, and compiling if not yet done"):
-            player = prompt.player_of(scene, modes, options)
-        with prompt.source_of(options, player) as (source, told):
-            device, missing = prompt.device_of(options, source.live)
+            player = command.player_of(scene, modes, options)
+        with command.source_of(options, player) as (source, told):
+            device, missing = command.device_of(options, source.live)
             if missing:
                 _tell(missing)
             _tell(told)

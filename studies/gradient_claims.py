@@ -16,6 +16,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+import drawing
 import numpy as np
 
 import fem_impact as fi
@@ -201,7 +202,7 @@ def publish(cases):
                 [case.seed, case.n_impacts, int(case.lossy), case.why, *(f"{x:.9g}" for x in columns.ravel())]
             )
     print("\n".join(summary(cases)))
-    fi.figures.save(HERE / "pictures" / "gradient_claims.png", draw(cases))
+    drawing.save(HERE / "pictures" / "gradient_claims.png", draw(cases))
 
 
 def main():

@@ -55,6 +55,12 @@ ELSEWHERE = {  # advice followed in a test of its own: the test, and patterns of
     "test_advice_of_files.py::test_a_body_that_the_mesher_cannot_fill_is_filled_as_advised": (
         "remove very thin necks or spikes",
     ),
+    "taps/test_readers.py::test_what_contradicts_itself_is_read_once_it_is_exported_again": (
+        "states a rate of .*; export it again",
+        "states different rates, .*; give one of them",
+        "states the unit .* means .*; export it again",
+        "states .* samples of .*; export it again",
+    ),
     "designs/test_clearance.py::test_a_run_that_goes_on_has_none": (
         "must end with its first impact; give max_impacts",
     ),

@@ -163,6 +163,35 @@ def test_a_file_that_contradicts_itself_says_where(tmp_path, name):
     assert str(error.value).startswith(name)
 
 
+UNCLOSED = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # pyuff leaves files open
+
+
+@UNCLOSED
+def test_what_contradicts_itself_is_read_once_it_is_exported_again(tmp_path):
+    path = tmp_path / "t.lvm"
+    path.write_bytes(DAMAGED["lie.lvm"][0])
+    with pytest.raises(ValueError, match="; export it again"):
+        readers.arrays(path)
+    path.write_bytes(labview(times=True))
+    assert recording(path)[1] == RATE
+    path = tmp_path / "t.npz"
+    np.savez(path, force=np.arange(40.0), rate=RATE, fs=2 * RATE)
+    with pytest.raises(ValueError, match=r"different rates.*; give one of them"):
+        readers.arrays(path)
+    np.savez(path, force=np.arange(40.0), rate=RATE)
+    assert recording(path)[1] == RATE
+    path = universal(tmp_path / "t.uff", {"ordinate_axis_units_lab": "g"})
+    with pytest.raises(ValueError, match="whose code 13 means N; export it again"):
+        readers.arrays(path)
+    path = universal(path, {"ordinate_axis_units_lab": "N"})
+    whole = path.read_bytes()
+    path.write_bytes(whole.replace(b"        40", b"        50", 1))
+    with pytest.raises(ValueError, match=r"samples of .* and holds 40; export it again"):
+        readers.arrays(path)
+    path.write_bytes(whole)
+    assert recording(path)[:2] == (["N"], RATE)
+
+
 def test_pickled_arrays_are_refused(tmp_path):
     np.save(tmp_path / "t.npy", np.array([{"a": 1}] * 20, dtype=object), allow_pickle=True)
     with pytest.raises(ValueError, match=r"t\.npy cannot be read"):
@@ -283,9 +312,6 @@ def universal(path, *changes, before=()):
     path.unlink(missing_ok=True)
     pyuff.UFF(str(path)).write_sets([*before, *(RECORD | each for each in changes)], mode="add")
     return path
-
-
-UNCLOSED = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # pyuff leaves files open
 
 
 @UNCLOSED
