@@ -71,7 +71,8 @@ class Sensitivity:
         time, row, part = _cut(history, top)
         nodes, powers = gauss(NODES[int(history.n_coefficients > 2)])
         n, n_modes, s = len(change.offset), len(history.omega), len(powers)
-        wanted = [0.0, *(when for each in history.impacts for when in (each.start, each.end)), top or 0.0, time[-1]]
+        wanted = [0.0, *(when for each in history.impacts for when in (each.start, each.end)), time[-1]]
+        wanted += [] if top is None else [top, *_step_at(history, top)]
         marks = np.unique([int(np.abs(time - when).argmin()) for when in wanted])
         mark = np.full(len(time), -1)
         mark[marks] = np.arange(len(marks))
@@ -200,7 +201,7 @@ class Sensitivity:
         """Change (n,) of the largest force [N]."""
         if self.peak < 0:
             return np.zeros(len(self.change.offset))
-        return self.found.ends[self._top, 3] + self._rate_change * self._late
+        return self._at_peak[1][3] + self._rate_change * self._late
 
     @property
     def peak_time(self) -> np.ndarray:
@@ -212,34 +213,52 @@ class Sensitivity:
         """Time of the largest force [s]."""
         return float(self.time[self.peak] + self._late)
 
-    @property
-    def _top(self) -> int:
-        return int(self.pieces.mark[self.peak])
+    @cached_property
+    def _at_peak(self) -> tuple[np.ndarray, np.ndarray]:
+        """Approach and its first three rates (4,) at the peak; changes (4, n) of the first three, and of the force.
+
+        A force that is linear in each step jumps between two, and the accelerations with it. There the approach is the
+        cubic through both ends of the step, as in the force that the peak was found in.
+        """
+        found, mark, h = self.found, self.pieces.mark, self.history
+        if h.n_coefficients > 2:
+            return found.base[mark[self.peak], :4], found.ends[mark[self.peak]]
+        start, end = _step_at(h, float(self.time[self.peak]))
+        ends = [int(mark[np.abs(self.time - when).argmin()]) for when in (start, end)]
+        length = end - start
+        x = (self.time[self.peak] - start) / length
+        powers = np.array([[1.0, x, x**2, x**3], [0.0, 1.0, 2.0 * x, 3.0 * x**2], [0, 0, 2.0, 6.0 * x], [0, 0, 0, 6.0]])
+        cubic = np.array([[1.0, 0, 0, 0], [0, length, 0, 0], [-3, -2 * length, 3, -length], [2, length, -2, length]])
+        rates = powers @ cubic / length ** np.arange(4.0)[:, None]
+        base = rates @ found.base[ends, :2].ravel()
+        changes = rates[:3] @ found.ends[ends, :2].reshape(4, -1)
+        slopes = np.zeros(N_LAW)
+        _, by_d, by_v = law_at(base[0], base[1], h.law, slopes)
+        return base, np.vstack([changes, by_d * changes[0] + by_v * changes[1] + self.change.law @ slopes])
 
     @cached_property
     def _late(self) -> float:
         """How much later than `peak` [s] the force is largest: one step of Newton's method."""
-        return -_force_rate(self.found.base[self._top, :3], self.history.law) / self._bend if self._bend else 0.0
+        return -_force_rate(self._at_peak[0][:3], self.history.law) / self._bend if self._bend else 0.0
 
     @cached_property
     def _bend(self) -> float:
         """Second rate of the force at its peak [N/s^2]; zero if the force is largest at an end of the blow."""
         if self.peak <= 0 or self.peak == len(self.time) - 1:
             return 0.0
-        return self._slope(self.found.base[self._top, 1:4], np.zeros(N_LAW))
+        return self._slope(self._at_peak[0][1:], np.zeros(N_LAW))
 
     @cached_property
     def _rate_change(self) -> np.ndarray:
         """Change (n,) of the rate of the force at its peak."""
-        ends = self.found.ends[self._top]
-        return np.array([self._slope(each[:3], law) for each, law in zip(ends.T, self.change.law)])
+        return np.array([self._slope(each, law) for each, law in zip(self._at_peak[1][:3].T, self.change.law)])
 
     def _slope(self, along: np.ndarray, dlaw: np.ndarray) -> float:
         """Slope of the force's rate at its peak along changes (3,) of the approach and its rates, and of the law.
 
         By a central difference.
         """
-        now = self.found.base[self._top, :3]
+        now = self._at_peak[0][:3]
         law, law_along = self.history.law, np.zeros(self.history.law.shape)
         width = min(len(dlaw), law.shape[1])
         law_along[0, :width] = dlaw[:width]
@@ -295,6 +314,13 @@ def _peak(history: "History") -> float | None:
             return float(times[1 + k])
         low, high = float(near[falls]), float(near[falls + 1])
     return low + (high - low) * float(rate[falls] / (rate[falls] - rate[falls + 1]))
+
+
+def _step_at(history: "History", time: float) -> tuple[float, float]:
+    """Start and end [s] of the step that holds a time."""
+    i = int(np.clip(np.searchsorted(history.steps[:, 0], time, side="right") - 1, 0, len(history.steps) - 1))
+    ends = np.append(history.steps[:, 0], history.end_time)
+    return float(ends[i]), float(ends[i + 1])
 
 
 def _cut(history: "History", peak: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
