@@ -12,6 +12,7 @@ refused, as next to a grazing contact, are listed with the reason.
 
 import argparse
 import csv
+import warnings
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -209,6 +210,7 @@ def main():
     """Examine, print, write and draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", type=int, default=500)
+    warnings.simplefilter("ignore", fi.ToleranceWarning)  # of modes left out: here the plate has 20
     wanted, cases, seed = parser.parse_args().scenes, [], 0
     while len(cases) < wanted:
         found = examine(seed)

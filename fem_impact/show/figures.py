@@ -12,6 +12,7 @@ from cycler import cycler
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, MaxNLocator
+from matplotlib.tri import Triangulation
 
 from .._base import check
 from .._base.files import replacing
@@ -296,7 +297,9 @@ def chladni(modes: Modes, count: int, columns: int) -> Figure:
             axes.set_axis_off()
             if i >= count:
                 continue
-            axes.tricontour(*points.T, cells, _unflattened(shapes[:, i], cells, SAND), levels=[0.0], colors="black")
+            flat = np.abs(shapes[cells, i]).max(axis=1) < SAND
+            mesh = Triangulation(*points.T, cells, mask=flat)
+            axes.tricontour(mesh, _unflattened(shapes[:, i], cells, SAND), levels=[0.0], colors="black")
             axes.add_collection(LineCollection(list(points[rim]), colors="#777777", linewidths=1.0))
             axes.set_aspect("equal")
             axes.autoscale_view()
