@@ -14,6 +14,7 @@ import argparse
 import csv
 import json
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -28,6 +29,7 @@ import fem_impact as fi
 from fem_impact.model.playing import Strokes
 
 HERE = Path(__file__).parent
+OVER = re.compile("emory|failed to map")  # what interpreters say when they get no more of it
 EVERYDAY_TOLERANCE = 1e-2  # [-] of every everyday scene, as their files say too
 THROUGH_MODES = {"target": "modal"}  # what a plan needs so that the body's modes carry the blow
 # the plate of frontier.py, by elements ("fe") or closed forms ("analytic")
@@ -203,7 +205,7 @@ def measured(path: Path, tolerance: float, changes: dict, limits: tuple[float, f
         return {"verdict": "over time", "seconds": limits[0]}
     if done.returncode:
         last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
-        return {"verdict": "over memory" if "emory" in done.stderr or done.returncode < 0 else f"failed: {last}"}
+        return {"verdict": "over memory" if OVER.search(done.stderr) or done.returncode < 0 else f"failed: {last}"}
     return json.loads(done.stdout.splitlines()[-1])
 
 

@@ -42,7 +42,6 @@ def test_samples_are_read_before_they_are_mutated(category, tmp_path, read_here)
 
 
 @pytest.mark.parametrize("category", HERE)
-@pytest.mark.slow
 def test_mutated_inputs_give_a_result_or_one_clear_error(category, tmp_path):
     known = samples(category)
     raws = [raw for _, raw in known]
@@ -59,6 +58,7 @@ def test_mutated_inputs_give_a_result_or_one_clear_error(category, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("category", fuzz.CATEGORIES)
 def test_very_many_mutated_inputs_give_a_result_or_one_clear_error(category, all_cases):
     skip_without_extras()

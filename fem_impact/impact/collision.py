@@ -646,6 +646,8 @@ def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance
     That error may take only STRIKER_SHARE of the tolerance, because striker modes cost little.
     """
     modes = striker.modes
+    if modes.n_modes == modes.n_rigid:
+        return modes.n_rigid, 0.0
     law: dict[str, Any] = {"contact": contact, "mass": striker.felt_mass, "speed": speed}
     allowed = STRIKER_SHARE * tolerance / (LOSSY_STRIKER if contact.rated else 1.0)
     omega_0 = 2.0 * np.pi * accuracy.contact_resonance(**law)

@@ -420,7 +420,7 @@ def fifty(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def many(tmp_path_factory, all_cases):
-    return judged_blows(SEED + 1, 225 if all_cases else 60, ALL, (-5.0, -2.0), tmp_path_factory.mktemp("many"))
+    return judged_blows(SEED + 1, 225 if all_cases else 30, ALL, (-5.0, -2.0), tmp_path_factory.mktemp("many"))
 
 
 def check_promises(judged, left):
