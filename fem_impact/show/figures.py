@@ -298,7 +298,7 @@ def chladni(modes: Modes, count: int, columns: int) -> Figure:
             if i >= count:
                 continue
             flat = np.abs(shapes[cells, i]).max(axis=1) < SAND
-            mesh = Triangulation(*points.T, cells, mask=flat)
+            mesh = Triangulation(points[:, 0], points[:, 1], cells, flat)
             axes.tricontour(mesh, _unflattened(shapes[:, i], cells, SAND), levels=[0.0], colors="black")
             axes.add_collection(LineCollection(list(points[rim]), colors="#777777", linewidths=1.0))
             axes.set_aspect("equal")
