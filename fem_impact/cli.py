@@ -28,10 +28,10 @@ import fem_impact as fi
 
 from ._base.files import undo_all
 from .display import Display
+from .show import FORMATS
 
 BAD_INPUT, FAILED, MISSED, INTERRUPTED = 2, 1, 3, 130  # exit statuses, as Unix tools use them; 130 is 128 + SIGINT
 WIDEST = 88  # [-] columns: printed text is never wider, and narrower on a narrow terminal
-FORMATS = ("png", "pdf", "svg")  # of pictures
 MOTION_TIMES = 100  # [-] instants in motion.pvd: four seconds at 25 per second
 SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` writes any number
 

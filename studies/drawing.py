@@ -10,7 +10,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 
 import fem_impact as fi
-from fem_impact.show.canvas import FORMATS
+from fem_impact.show import FORMATS
 
 
 def taken(arguments: list[str]) -> str:

@@ -43,9 +43,8 @@ class Mesh:
     size: float = 0.0  # [m] requested element size
     size_stated: bool = True  # True if the user chose the size; otherwise find_modes may change it
     notes: tuple[str, ...] = ()  # what was repaired or assumed
-    form: tuple[
-        Any, ...
-    ] = ()  # ("rectangle", length, width), ("disk", radius) or ("line", length) [m]; empty for any other body
+    # ("rectangle", length, width), ("disk", radius) or ("line", length) [m]; empty for any other body
+    form: tuple[Any, ...] = ()
 
     def __repr__(self) -> str:
         return check.brief(self)

@@ -18,7 +18,6 @@ from PIL import Image
 from .._base import progress
 from .._base.files import replacing
 
-FORMATS = ("png", "pdf", "svg")  # of pictures; what is rendered stays an image within a PDF or SVG file
 NAMES = ("modes", "wave")  # of the pictures of a blow, besides wave.gif
 PROBE = (
     "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=(16, 16)); p.add_mesh(pyvista.Sphere()); "
@@ -71,7 +70,7 @@ def main() -> None:
 
 
 def draw(folder: Path, film: Film, shapes: Gallery, form: str = "png") -> None:
-    """Draw all pictures of a blow into a folder, in a format of `FORMATS`."""
+    """Draw all pictures of a blow into a folder, in a format of `show.FORMATS`."""
     pictures = list(frames(film))
     write_gif(folder / "wave.gif", pictures)
     write(folder / f"wave.{form}", pictures[film.telling])

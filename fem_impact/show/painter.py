@@ -21,7 +21,7 @@ from . import canvas, pictures
 
 
 def draw(folder: Path, response: Response, form: str = "png") -> str:
-    """Draw all pictures of a blow into a folder, in a format of `canvas.FORMATS`.
+    """Draw all pictures of a blow into a folder, in a format of `show.FORMATS`.
 
     Returns an empty text, or what to install for pictures in 3D.
     """

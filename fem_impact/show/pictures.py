@@ -17,11 +17,11 @@ from .._base.files import replacing
 from ..impact.response import Response
 from ..mesh.mesh_files import boundary
 from ..modes.modal import Modes
-from . import canvas, figures, sampling
+from . import FORMATS, canvas, figures, sampling
 
 PATIENCE = 60.0  # [s] time limit of the rendering test
 REMEDY = "for 3D pictures install libegl1 and libgl1-mesa-dri"
-STILL = tuple(f".{name}" for name in canvas.FORMATS)
+STILL = tuple(f".{name}" for name in FORMATS)
 FRAMES = 48  # [-] default length of an animation: four seconds
 
 

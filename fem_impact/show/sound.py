@@ -391,8 +391,8 @@ def _length(response: Response | Strokes, heard: np.ndarray, duration: float | N
 
 
 def _scaled(signal: np.ndarray, rate: int, full_scale: float, unit: str, normalise: bool) -> Sound:
-    scale = float(np.abs(signal).max(initial=0.0)) if normalise else full_scale
-    return Sound(signal / (scale or 1.0), rate, scale or full_scale, unit)
+    sound = Sound(signal / full_scale, rate, full_scale, unit)
+    return sound.normalised() if normalise else sound
 
 
 def _roots(response: Response | Strokes, heard: np.ndarray) -> np.ndarray:

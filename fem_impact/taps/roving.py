@@ -230,7 +230,6 @@ def plan_test(
     (('works', 'works'), 'small')
     """
     target = Target.of(system, damping_ratio)
-    check.between("bandwidth", bandwidth, *chooser.BANDWIDTHS, "Hz")
     modes = _modes(target, bandwidth, Stages())
     return planned(target, modes, hammers, points, bandwidth, sensor=sensor, drop=drop, noise=noise, duration=duration)
 
@@ -248,9 +247,7 @@ def planned(
     duration: float | None = None,
 ) -> Roving:
     """As `plan_test`, on a body however it is known, and its modes up to beyond the band."""
-    centre = check.between("bandwidth", bandwidth, *chooser.BANDWIDTHS, "Hz") / chooser.half_sine_reach(
-        check.between("drop", drop, 1.0, 40.0, "dB")
-    )
+    centre = bandwidth / chooser.half_sine_reach(check.between("drop", drop, 1.0, 40.0, "dB"))
     names, tips, masses, stiffnesses = _kit(hammers, centre)
     noise = check.between("noise", noise, 0.0, 10.0)
     stages = Stages()
@@ -292,7 +289,8 @@ def planned(
 
 
 def _modes(target: Target, bandwidth: float, stages: Stages) -> Modes:
-    """The structure's modes up to beyond the band."""
+    """The structure's modes up to beyond the band; ValueError if that is none of a hammer."""
+    check.between("bandwidth", bandwidth, *chooser.BANDWIDTHS, "Hz")
     if target.modes is not None:
         return target.surrounded(target.modes)
     with stages("modes"):

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from fem_impact._base import progress
-from fem_impact.show import canvas, pictures
+from fem_impact.show import FORMATS, canvas, pictures
 
 HEAVY = "numba scipy skfem xarray shapely fem_impact.impact fem_impact.modes fem_impact.mesh"
 
@@ -67,7 +67,7 @@ def test_pictures_are_drawn_from_arrays_alone(tmp_path):
     assert np.abs(flat - bent).max() > 50.0  # of 255: the bump is coloured
 
 
-@pytest.mark.parametrize("form", canvas.FORMATS)
+@pytest.mark.parametrize("form", FORMATS)
 def test_a_picture_is_written_in_every_format(tmp_path, form):
     picture = Image.fromarray(np.random.default_rng(1).integers(0, 255, (20, 30, 3), np.uint8))
     canvas.write(tmp_path / f"a.{form}", picture)
