@@ -26,6 +26,7 @@ _NAMES = {
     "scenes.scene": "Scene load_scene plan",
     "scenes.uncertainty": "spread",
     "sweeps.grid": "sweep",
+    "sweeps.borders": "read_borders",
     "taps.records": "Taps read_taps",
     "taps.rig": "measure",
     "taps.roving": "plan_test",
@@ -86,6 +87,7 @@ if TYPE_CHECKING:  # the same names for type checkers; test_typing.py compares
     from .show import pictures as pictures
     from .show import sound as sound
     from .sweeps import hammers as hammers
+    from .sweeps.borders import read_borders as read_borders
     from .sweeps.grid import sweep as sweep
     from .taps.fit import fit as fit
     from .taps.records import Taps as Taps

@@ -222,7 +222,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--vtk", action="store_true", help="write motion.pvd, the motion for ParaView and pyvista")
     add(
         "--listener", metavar=("X", "Y", "Z"), nargs=3, type=float, action="append",
-        help="write radiated.wav, the sound the plate radiates to this point [m]; Z is the height above the plate; "
+        help="write radiated.wav, the sound the body radiates to this point [m]; Z is the height above its plane; "
         "repeatable; of two also stereo.wav",
     )  # fmt: skip
     _add_format(add)
@@ -240,12 +240,12 @@ def _parser() -> argparse.ArgumentParser:
     add("--json", action="store_true", help="print the numbers as JSON")
 
     add = verb(
-        _map, "map", "strike a scene on the grid of its table [map]; write numbers and pictures",
+        _map, "map", "strike a scene on the grid of its table [map]; write numbers, borders and pictures",
         scene="a TOML file, such as studies/scenes/drumstick_map.toml",
     )  # fmt: skip
     add(
         "--out", metavar="DIR", type=_place,
-        help="folder for map.nc, map.csv and, for two axes, a PNG of each layer (default: out/NAME-OF-SCENE)",
+        help="folder for map.nc, CSV files and, for two axes, a PNG of each layer (default: out/NAME-OF-SCENE)",
     )  # fmt: skip
     add("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
     add(
@@ -256,6 +256,20 @@ def _parser() -> argparse.ArgumentParser:
     add("--cluster", metavar="ADDRESS", help="run on the Dask cluster whose scheduler has this address")
     add("--store", metavar="DIR", type=_place, help="keep finished cells there; an interrupted run continues from them")
     add("--max-cells", metavar="N", type=float, default=1e8, help="refuse maps with more cells (default: 1e8)")
+    add(
+        "--cells", metavar="N", type=int,
+        help="values along an axis whose range has no count (default: 400, or 100 if each cell must be struck alone)",
+    )  # fmt: skip
+    add(
+        "--borders",
+        action="store_true",
+        help="locate where the number of impacts changes, also if all counts are given",
+    )
+    add(
+        "--every-cell", action="store_true",
+        help="compute all cells; by default, a map without counts that would take more than a second is computed where "
+        "its answer changes and interpolated elsewhere, to within the tolerance",
+    )  # fmt: skip
 
     add = verb(_spread, "spread", "strike a scene with uncertain inputs; tell how the answer is distributed, and why")
     add("--vary", metavar="INPUT=DISTRIBUTION", action="append", default=[], required=True,
@@ -522,13 +536,17 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> bool:
 def _say_sounds(sounds: Sequence[dict[str, Any]]) -> None:
     for heard in sounds:
         where = "Point" if "at" in heard else "Listener" if "listener" in heard else "Both listeners"
-        level = "silence" if heard["level"] is None or heard["level"] == -math.inf else f"peak {heard['stated']}"
-        _say(f"{where}: {level}; 1.0 in {heard['file']} is {heard['full_scale']:.4g} {heard['unit']}")
+        if heard.get("bound") == "low":  # the other one's line tells both
+            continue
+        level = heard["stated"] if "bound" in heard else f"peak {heard['stated']}"
+        level = "silence" if heard["level"] is None or heard["level"] == -math.inf else level
+        other = f"{heard['file'].replace('_high', '_low')} and " if "bound" in heard else ""
+        _say(f"{where}: {level}; 1.0 in {other}{heard['file']} is {heard['full_scale']:.4g} {heard['unit']}")
 
 
 def _plan(options: argparse.Namespace) -> None:
     scene = fi.load_scene(options.scene)
-    plan = scene.plan(watch=Display(), **_choices(options))
+    plan = (scene.plan_strokes if scene.stroke else scene.plan)(watch=Display(), **_choices(options))
     if options.json:
         _print_json({**plan.data(), "versions": fi.export.versions()})
         return
@@ -549,13 +567,17 @@ def _map(options: argparse.Namespace) -> None:
             table = maps.map_scene(
                 scene, tolerance=options.tolerance, workers=options.workers, client=options.cluster,
                 store=options.store, watch=partial(display.report, "cells"), max_cells=options.max_cells, tell=_tell,
-                stage=display,
+                stage=display, cells=options.cells, borders=True if options.borders else None,
+                refine=False if options.every_cell else None,
             )  # fmt: skip
         with display("files"):
             names = maps.write(staging, table, form, picture)
-    axes = ", ".join(f"{name} ({size})" for name, size in table.sizes.items())
+    axes = ", ".join(f"{name} ({size})" for name, size in table.n_impacts.sizes.items())
     single, failed = int((table.n_impacts == 1).sum()), int((table.n_impacts < 0).sum())
     _say(_title(scene), f"{table.n_impacts.size} blows over {axes}: {single} hit once, {failed} failed")
+    for name in ("cells", "borders"):
+        if name in table.attrs:
+            _say(f"{name.capitalize()}: {table.attrs[name]}")
     if "model_error" in table:
         own, unknown = table.model_error, table.model_error.attrs["not_known"]
         not_known = f", not counting what is not known ({unknown})" if unknown else ""
@@ -675,7 +697,13 @@ def _report(options: argparse.Namespace) -> bool:
     changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
     with fi.export.staged(path.parent) as staging:
         display = Display()
-        run = scene.run(display, before=partial(_announce, display, False), motion=True, **changes)
+        before = partial(_announce, display, False)
+        if scene.stroke:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
+                run: Any = scene.run_strokes(display, before=before, **changes)
+        else:
+            run = scene.run(display, before=before, motion=True, **changes)
         display.predict(None)
         with display("page"):
             fi.report.write(staging / path.name, scene, run)

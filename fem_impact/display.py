@@ -22,6 +22,13 @@ LEAST = 0.02  # [-] share of a count that must be done before the rest is estima
 class Count:
     """How many of something are done, since when."""
 
+    what: str
+    first: int  # already done when it began
+    began: float  # [s] on the monotonic clock
+    done: int
+    total: int
+    now: float  # [s] of the last change
+
     def __init__(self, what: str, done: int, total: int) -> None:
         self.what, self.first, self.began = what, done, time.monotonic()
         self.update(done, total)
@@ -50,7 +57,9 @@ class Display:
     """
 
     def __init__(self, tell: Callable[[str], object] | None = None) -> None:
-        self.console, self.tell = Console(stderr=True), tell
+        self.console: Console = Console(stderr=True)
+        self.tell = tell
+        self.task: bars.TaskID
         self.running: list[tuple[str, float]] = []  # name and start [s] of each stage, the innermost last
         self.count: Count | None = None
         self.end: float | None = None  # [s] predicted end of the command, on the monotonic clock

@@ -24,7 +24,7 @@ from .show import export, figures, pictures
 SQUARE = 2.0 * np.pi**2  # [-] omega of a hinged unit square of unit stiffness and mass
 
 UNKEPT = "make the folder of the compiled kernels writable; else costs are predicted for another machine"
-EXTRAS = {  # extra: its purpose and the modules it needs
+EXTRAS: dict[str, tuple[str, ...]] = {  # extra: its purpose and the modules it needs
     "cad": ("drawings", "svgelements", "ezdxf"),
     "film": ("films as MP4 files", "imageio_ffmpeg"),
     "uff": ("universal files", "pyuff"),
@@ -33,7 +33,7 @@ EXTRAS = {  # extra: its purpose and the modules it needs
     "completion": ("shell completion", "shtab"),
     "spread": ("Sobol indices", "SALib"),
     "play": ("playing", "mido", "rtmidi", "sounddevice"),
-    "web": ("report and explore", "plotly", "bokeh", "jinja2"),
+    "web": ("report and explore", "plotly", "tornado", "jinja2"),
 }
 
 

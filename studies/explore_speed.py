@@ -1,69 +1,108 @@
-"""Measures how quickly `fem-impact explore` answers: from a slider move in a browser to the new spectrum.
+"""Measures how quickly `fem-impact explore` answers: from a slider move in a browser to the page drawn again.
 
-python studies/explore_speed.py [SCENE]; needs chromium, and playwright (pip install -e '.[test]')
+python studies/explore_speed.py [SCENE ...]; needs chromium, and playwright (pip install -e '.[test]')
 
-First the CPU time that an answer takes without a browser, for sliders anywhere on their ways.
+First the CPU time that an answer takes without a browser, for sliders anywhere on their ways; then, in a headless
+browser, the time until force and numbers, and until everything that a slider moves has been drawn and the frame with
+it is done; then the first exact blow at a new strike point, and zooms of the map.
 """
 
+import argparse
 import os
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from playwright.sync_api import sync_playwright
 
 import fem_impact as fi
-from fem_impact.pages import explore_model, explore_view
+from fem_impact.pages import explore_desk, explore_model, explore_view
 
 TURNS = 30  # moves of each slider
+ZOOMS = 6
 ANSWERS = 300  # without a browser
 FLAGS = ("--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking", "--disable-sync")
-TURN = """name => new Promise(done => {
-    const page = Bokeh.documents[0], slider = page.get_model_by_name(name);
-    if (!slider) { done(null); return; }
-    const signal = page.get_model_by_name('spectrum-data').properties.data.change;
-    const said = page.get_model_by_name('said');
-    const began = performance.now(), before = JSON.stringify(said.data.text);
-    const then = () => {  // ignore the late answer to an earlier move
-        if (JSON.stringify(said.data.text) === before) return;
-        signal.disconnect(then);
-        done(performance.now() - began);
-    };
-    signal.connect(then);
-    slider.value += 0.005 * (slider.end - slider.start);
-})"""
+TURN = """async name => {
+    const slider = document.getElementById(name), root = document.documentElement;
+    if (!slider) return null;
+    const frame = () => new Promise(done => requestAnimationFrame(() => setTimeout(done)));
+    const first = String(Number(root.dataset.rested) + 1);
+    const seen = attribute => new Promise(done => {
+        const look = async () => {
+            if (root.dataset[attribute] !== first) return;
+            watch.disconnect();
+            await frame();
+            done(performance.now() - began);
+        };
+        const watch = new MutationObserver(look);
+        watch.observe(root, { attributes: true });
+    });
+    const began = performance.now(), both = Promise.all([seen("answered"), seen("rested")]);
+    slider.value = Number(slider.value) + (slider.value < slider.max / 2 ? 1 : -1) * Math.ceil(0.01 * slider.max);
+    slider.dispatchEvent(new Event("input"));
+    return both;
+}"""
+ZOOM = """async ([x0, y0, x1, y1]) => {
+    const canvas = document.getElementById("map-plot"), root = document.documentElement;
+    const frame = () => new Promise(done => requestAnimationFrame(() => setTimeout(done)));
+    const box = canvas.getBoundingClientRect();
+    const at = (kind, x, y) => canvas.dispatchEvent(new PointerEvent(kind, {
+        clientX: box.x + x * box.width, clientY: box.y + y * box.height, pointerId: 1, bubbles: true,
+    }));
+    canvas.setPointerCapture = () => {};
+    at("pointerdown", x0, y0);
+    at("pointermove", x1, y1);
+    const before = JSON.stringify(JSON.parse(root.dataset.map).slice(0, 2)), found = {};
+    const began = performance.now();
+    at("pointerup", x1, y1);
+    return new Promise(done => {
+        const watch = new MutationObserver(async () => {
+            const [mass, stiffness, columns, exact] = JSON.parse(root.dataset.map);
+            const stage = `${columns} points${exact ? ", each border pixel struck" : ""}`;
+            if (JSON.stringify([mass, stiffness]) === before || stage in found) return;
+            found[stage] = 0;
+            await frame();
+            found[stage] = performance.now() - began;
+            if (exact) { watch.disconnect(); done(found); }
+        });
+        watch.observe(root, { attributes: true });
+    });
+}"""
 
 
 def computed(scene: str) -> np.ndarray:
     """CPU times [ms] of answers in this process, each slider being moved anywhere in turn."""
-    from bokeh.document import Document
-
-    bench = explore_model.Bench.of(fi.load_scene(scene))
-    seen, rest = bench.seen(bench.start.at), bench.residual(bench.start)
-    page, rng, found = explore_view.Page(Document(), bench), np.random.default_rng(1), []
-    page.show()
-    page.refined, page.seen, page.rest = bench.start.at, seen, rest
-    names = [name for name in explore_view.LABELS if name in page.sliders]
+    desk = explore_desk.Desk(explore_model.Bench.of(fi.load_scene(scene)))
+    desk.look(desk.bench.start.at)
+    rng, found, settings = np.random.default_rng(1), [], desk.bench.start
+    ends = explore_view.ends(desk.bench)
+    names = [name for name in ends if name not in ("x", "y", "height", "rate")]
     for i in range(ANSWERS):
-        slider = page.sliders[names[i % len(names)]]
-        page.sliders[names[i % len(names)]].value = float(rng.uniform(slider.start, slider.end))
+        name = names[i % len(names)]
+        low, high, _ = ends[name]
+        logarithmic = name in explore_view.LOGARITHMIC
+        value = float(np.exp(rng.uniform(np.log(low), np.log(high))) if logarithmic else rng.uniform(low, high))
+        settings = replace(settings, **{name: value})
         begin = time.thread_time()
-        page.update()
-        found.append(1e3 * (time.thread_time() - begin))
-    page.pool.shutdown()
-    return np.array(found)
+        _, hit = desk.answer(settings)
+        middle = time.thread_time()
+        desk.rest_of(settings, hit)
+        found.append((middle - begin, time.thread_time() - begin))
+    return 1e3 * np.array(found)
 
 
 def main(scene: str) -> None:
     """Serve the scene, move every slider and print the response times."""
     parts = (50.0, 90.0, 99.0, 100.0)
-    taken = np.percentile(computed(scene), parts)
-    said = ", ".join(f"{part:g} %: {value:.1f}" for part, value in zip(parts, taken))
-    print(f"CPU time of an answer [ms], {ANSWERS} moves: {said}")
+    for what, times in zip(("force and numbers", "everything"), computed(scene).T):
+        said = ", ".join(f"{part:g} %: {value:.1f}" for part, value in zip(parts, np.percentile(times, parts)))
+        print(f"CPU time until {what} [ms], {ANSWERS} moves: {said}")
     command = [sys.executable, "-m", "fem_impact", "explore", scene, "--no-open"]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
@@ -71,21 +110,55 @@ def main(scene: str) -> None:
     try:
         with sync_playwright() as driver:
             browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=list(FLAGS))
-            page = browser.new_page()
+            page = browser.new_page(viewport={"width": 1280, "height": 1000})
+            begin = time.perf_counter()
             page.goto(address)
-            page.wait_for_selector("html[data-ready]")
-            page.wait_for_timeout(2000)  # wait for the map
+            page.wait_for_selector("html[data-judged]", timeout=600_000)
             print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
-            print(f"{'slider':<12}{'least':>8}{'median':>8}{'most':>8}   [ms] of {TURNS} moves, {Path(scene).stem}")
-            for name in ("mass", "stiffness", "exponent", "speed", "bending", "x", "y"):
-                times = [page.evaluate(TURN, name) for _ in range(TURNS)]
-                if times[0] is not None:
-                    print(f"{name:<12}{min(times):8.0f}{np.median(times):8.0f}{max(times):8.0f}")
+            print(f"first exact blow after {time.perf_counter() - begin:.1f} s")
+            zoomed(page)  # first, because a map takes longer once the contact loses energy
+            moved(page, scene)
             browser.close()
     finally:
         server.send_signal(signal.SIGINT)
         server.wait()
 
 
+def moved(page: Any, scene: str) -> None:
+    """Print how long each slider takes."""
+    print(f"[ms] of {TURNS} moves, {Path(scene).stem}{'force and numbers':>27}{'everything':>24}")
+    print(f"{'':<12}" + 2 * f"{'least':>8}{'median':>8}{'most':>8}")
+    whole: list[list[float]] = []
+    for name in explore_view.SLIDERS:
+        times = [page.evaluate(TURN, name) for _ in range(TURNS)]
+        if times[0] is None:
+            continue
+        whole += times
+        print(f"{name:<12}" + "".join(f"{f(part):8.0f}" for part in zip(*times) for f in (min, np.median, max)))
+    print(f"{'all':<12}" + "".join(f"{f(part):8.0f}" for part in zip(*whole) for f in (min, np.median, max)))
+
+
+def zoomed(page: Any) -> None:
+    """Print how long a new part of the map takes, by the number of its points along the mass."""
+    rng, found = np.random.default_rng(2), []
+    whole = "JSON.parse(document.documentElement.dataset.map ?? '[[]]')[0][0]"
+    while page.evaluate(whole) is None:
+        page.wait_for_timeout(100)
+    least = page.evaluate(whole)
+    for _ in range(ZOOMS):
+        x, y = rng.uniform(0.2, 0.6), rng.uniform(0.05, 0.45)
+        found.append(page.evaluate(ZOOM, [x, y, x + 0.3, y + 0.35]))
+        page.click("#whole")
+        while page.evaluate(whole) != least:
+            page.wait_for_timeout(100)
+    for stage in found[0]:
+        times = [one[stage] for one in found if stage in one]
+        best, median, most = (f(times) for f in (min, np.median, max))
+        print(f"zoom, {stage}: least {best:.0f}, median {median:.0f}, most {most:.0f} ms")
+
+
 if __name__ == "__main__":
-    main(sys.argv[1] if len(sys.argv) > 1 else str(Path(__file__).parent / "scenes" / "drumstick.toml"))
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("scenes", nargs="*", default=[str(Path(__file__).parent / "scenes" / "drumstick.toml")])
+    for one in parser.parse_args().scenes:
+        main(one)

@@ -92,11 +92,12 @@ def scene(name: str, thickness: float, speed: float) -> fi.Scene:
 def effects(hit: fi.Response) -> dict[str, float]:
     """Largest change of a quantity of the blow by each assumption [-]; NaN where it is not known.
 
-    The number of impacts does not count here: one more touch that changes nothing else is no matter.
+    The number of impacts counts only if nothing else was asked for: one more touch that changes nothing else is no
+    matter.
     """
-    found = {}
+    found, asked = {}, set(hit.quantities) - {"n_impacts"} or {"n_impacts"}
     for each in hit.assumptions:
-        known = [change for name, change in each.effect.items() if change is not None and name != "n_impacts"]
+        known = [change for name, change in each.effect.items() if change is not None and name in asked]
         found[each.name] = max(known) if each.known else np.nan
     return found
 
@@ -130,11 +131,14 @@ def draw(results: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]], path: Pa
         size, missing = np.nan_to_num(found), np.isnan(found).all(axis=2)
         worst, which = np.ma.masked_where(missing, size.max(axis=2)), size.argmax(axis=2)
         felt = ~missing & (size.max(axis=2) >= FELT)
+        silent = ~felt & np.isnan(found).any(axis=2)  # nothing that is known matters, but not all is known
         shown = np.ma.masked_where(~felt, which)
         drawn |= set(which[felt].tolist())
         axes.set_facecolor("#e6e6e6")  # where nothing is drawn
         limits = {"vmin": -0.5, "vmax": len(ALL) - 0.5}
         axes.pcolormesh(1e3 * thickness, speed, shown, cmap=colours, shading="nearest", **limits)
+        unknown = np.ma.masked_where(~silent, silent.astype(float))
+        axes.pcolormesh(1e3 * thickness, speed, unknown, cmap=ListedColormap(["white"]), shading="nearest")
         if np.ptp(worst) > 0.0:
             lines = axes.contour(1e3 * thickness, speed, worst, levels=LEVELS, colors="black", linewidths=0.9)
             axes.clabel(lines, fmt=lambda level: f"{100.0 * level:g} %", fontsize=8)
@@ -145,7 +149,8 @@ def draw(results: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]], path: Pa
         axes.set_title(BODIES[name][0], fontsize=9)
     patches = [plt.Rectangle((0, 0), 1, 1, color=COLOURS[i]) for i in sorted(drawn)]
     patches.append(plt.Rectangle((0, 0), 1, 1, color="#e6e6e6"))
-    names = [*(ALL[i] for i in sorted(drawn)), "below 0.01 %, or not computed"]
+    patches.append(plt.Rectangle((0, 0), 1, 1, facecolor="white", edgecolor="#999999"))
+    names = [*(ALL[i] for i in sorted(drawn)), "below 0.01 %", "not known"]
     figure.legend(patches, names, loc="outside lower center", ncols=len(names), frameon=False, fontsize=9)
     drawing.save(path, figure, dpi=130)
 

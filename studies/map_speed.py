@@ -3,6 +3,7 @@
     python studies/map_speed.py [--bounces 1000000]
     python studies/map_speed.py --cluster 10000000      threads against Dask with two workers of one thread
     python studies/map_speed.py --elements [NAME ...]   Ritz vectors against modes on plates by elements
+    python studies/map_speed.py --pictures [--centroid] 400 x 400 cells, all computed and refined; borders
 
 Stick and hinged plate of *Euphonics* 12.1, 300 modes, tolerance 1e-3. Times are the best of several runs and do not
 include compilation.
@@ -11,6 +12,10 @@ On plates by elements (scenes of `scene_speed.py`): a map of 20 x 20 cells at th
 the striker's mass and two decades of stiffness; the choice among ten hammers; and how long `fem-impact explore` takes
 to open and to know a new strike point. Through vectors and through modes in turn, one run each, compared cell by cell;
 in processor seconds, which tell more than wall time where others use the machine, too.
+
+Pictures: the source's maps at 20 x 20 and at 400 x 400 cells, all of them computed or only those where the answer
+changes, and what locating the borders between numbers of impacts costs; in processor seconds, the least of two runs.
+Single blows at a hundredth of the tolerance, up to 1e-3 of an axis to both sides of a border, check where it is.
 """
 
 import argparse
@@ -18,8 +23,10 @@ import os
 import resource
 import tempfile
 import time
+import warnings
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -207,17 +214,86 @@ def by_elements(only):
             )
 
 
+def spent(work, **wanted):
+    """Least processor time [s] of two runs, and what the work gives."""
+    times = []
+    for _ in range(2):
+        start = time.process_time()
+        found = work(**wanted)
+        times.append(time.process_time() - start)
+    return min(times), found
+
+
+NEAR = (-1.0, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 1.0)  # [1e-3 of an axis] tongues may be narrower than 1e-3
+
+
+def misplaced(modes, law, table, number=40):
+    """How many points of borders, of some at random, have the same number of impacts 1e-3 of the axes around them."""
+    places = [(border, point) for border in fi.read_borders(table) for point in border.points]
+    chosen = np.random.default_rng(0).choice(len(places), min(number, len(places)), replace=False)
+    wrong = 0
+    for border, point in (places[i] for i in chosen):
+        counts = []
+        for along, side in product((0, 1), NEAR):
+            stiffness, mass = point
+            ends = np.asarray(table[border.axes[along]])[[0, -1]]
+            if along == 0:
+                stiffness *= (ends[1] / ends[0]) ** (1e-3 * side)
+            else:
+                mass += 1e-3 * side * (ends[1] - ends[0])
+            contact = fi.Contact(stiffness=stiffness, exponent=law.exponent)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", fi.ToleranceWarning)  # of leaving out modes: maps have as many
+                hit = fi.strike(modes, source.stick(mass), contact, at=source.AT, speed=1.0, tolerance=1e-5)
+            counts.append(hit.n_impacts)
+        wrong += not min(counts) <= border.impacts < max(counts)
+    return wrong, len(chosen)
+
+
+def pictures(band):
+    """Compare ways to 400 x 400 cells of the source's maps."""
+    for name, mass, law, ends in (
+        ("2 kg, linear", 2.0, source.LINEAR, (1e4, 1e6)),
+        ("200 g, linear", 0.2, source.LINEAR, (1e4, 1e6)),
+        ("200 g, Hertz", 0.2, source.HERTZ, (1e5, 1e8)),
+    ):
+        modes = source.plate(mass)
+        over = {"stiffness": {"from": ends[0], "to": ends[1], "scale": "log"}, "mass": {"from": 10e-3, "to": 200e-3}}
+        shared = {"at": source.AT, "speed": 1.0, "over": over, "max_frequency": band}
+        work = partial(fi.sweep, modes, source.stick(), law, **shared)
+        work(cells=20, refine=False)  # compiles
+        small, _ = spent(work, cells=20, refine=False, borders=False)
+        dense, whole = spent(work, refine=False, borders=False)
+        refined, table = spent(work, refine=True, borders=False)
+        off, counts = apart(whole, table)
+        print(
+            f"{name}: 20 x 20 in {small:.2f} s; 400 x 400 in {dense:.2f} s, refined in {refined:.2f} s, "
+            f"{dense / refined:.1f} times; {table.attrs['cells']}; off by {off:.1e}, {counts} other numbers of impacts",
+            flush=True,
+        )
+        if band is None:
+            both, lined = spent(work, refine=True, borders=True)
+            wrong, tried = misplaced(modes, law, lined)
+            print(f"  borders in {both - refined:.2f} s: {lined.attrs['borders']}")
+            print(f"  {wrong} of {tried} points of borders farther off than 1e-3 of the axes", flush=True)
+
+
 def main():
     """Measure and print the times."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--bounces", type=int, default=1_000_000)
     parser.add_argument("--cluster", type=int, default=0, metavar="BOUNCES")
     parser.add_argument("--elements", nargs="*", metavar="NAME")
+    parser.add_argument("--pictures", action="store_true")
+    parser.add_argument("--centroid", action="store_true")
     wanted = parser.parse_args()
     bounces = wanted.bounces
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     if wanted.elements is not None:
         by_elements(wanted.elements)
+        return
+    if wanted.pictures:
+        pictures(source.BAND if wanted.centroid else None)
         return
     if wanted.cluster:
         by_cluster(wanted.cluster)

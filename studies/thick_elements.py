@@ -29,6 +29,9 @@ KAPPA = 5.0 / 6.0  # [-]
 N_MODES = 6
 THICKNESSES = 0.2, 0.1, 0.01, 1e-3, 1e-4  # [m] of a disk of radius 1 m and a square of side 1 m
 CHOSEN = "Argyris and shear"
+L_SHAPE = [(-1.0, -1.0), (1.0, -1.0), (1.0, 0.0), (0.0, 0.0), (0.0, 1.0), (-1.0, 1.0)]  # [m] of three unit squares
+# [1/m^2] squared wavenumbers of the membrane of this shape: Trefethen and Betcke (2006), Contemp. Math. 412, 297-314
+L_MEMBRANE = np.array([9.6397238440219, 15.1972519264, 2.0 * np.pi**2, 29.5214811141, 31.9126359571])
 REFERENCE = 0.05  # [m] triangles of the reference for the clamped square
 SIZES = {"P2": (0.1,), "P4": (0.2, 0.1), "MITC7": (0.1,), "Argyris and shear": (0.2, 0.1)}  # [m]
 
@@ -36,6 +39,12 @@ SIZES = {"P2": (0.1,), "P4": (0.2, 0.1), "MITC7": (0.1,), "Argyris and shear": (
 def rigidities(h: float) -> tuple[float, float, float, float]:
     """Bending stiffness D, shear stiffness S, mass and rotary inertia per area of a plate with E = rho = 1."""
     return h**3 / 12.0 / (1.0 - NU**2), KAPPA * h / 2.0 / (1.0 + NU), h, h**3 / 12.0
+
+
+def thin_rate(h: float) -> float:
+    """Frequency [rad/s] of a thin plate's waves over their squared wavenumber [1/m^2]."""
+    D, _, m, _ = rigidities(h)
+    return float(np.sqrt(D / m))
 
 
 # --- exact ---------------------------------------------------------------------------------------------------------
@@ -171,13 +180,14 @@ def matrices(plane: Any, h: float, elements: tuple[Any, Any], reduced: bool) -> 
         node = 0.5 * (np.polynomial.legendre.leggauss(SIDE)[0] + 1.0)[:, None]
         places = np.concatenate([ENDS[a] + node * (ENDS[b] - ENDS[a]) for a, b in SIDES] + [X.T]).T
         fields = Basis(plane, ElementVector(elements[1]), quadrature=(places, np.ones(places.shape[1]))).basis
-        values = np.stack([np.broadcast_to(f[0].value, (2, plane.t.shape[1], places.shape[1])) for f in fields])
+        values = np.stack([np.broadcast_to(np.asarray(f[0]), (2, plane.t.shape[1], places.shape[1])) for f in fields])
         covariant = np.einsum("jicp,kjcp->kicp", mapping.DF(places), values)
         kept = np.einsum("ipqj,kjcq->kicp", reduction(places, X, weight), covariant)
         inverse = np.linalg.inv(mapping.DF(X).transpose(2, 3, 0, 1))
         turned = np.einsum("cpji,kjcp->kicp", inverse, kept)
     else:
-        turned = np.stack([np.broadcast_to(f[0].value, (2, plane.t.shape[1], X.shape[1])) for f in rotation.basis])
+        whole = 2, plane.t.shape[1], X.shape[1]
+        turned = np.stack([np.broadcast_to(np.asarray(f[0]), whole) for f in rotation.basis])
     slope = np.stack([np.broadcast_to(f[0].grad, (2, plane.t.shape[1], X.shape[1])) for f in deflection.basis])
     dx = S * np.abs(mapping.detDF(X)) * weight
     every = np.concatenate([slope, -turned])
@@ -259,6 +269,23 @@ def exact(shape: str, edge: str, h: float) -> np.ndarray:
     return frequencies(CHOSEN, shape, edge, h, REFERENCE)[1]
 
 
+def l_shape() -> None:
+    """Print how far both hinged plates are from the membrane, from which Wang's relation starts."""
+    mesh, edge = fi.mesh.polygon(L_SHAPE, size=0.2), {"boundary": "hinged"}
+    print("\nhinged L-shape of three unit squares: relative distance of the first modes of the thin plate from the")
+    print("membrane, and of the thick plate from Wang's relation with the membrane and with the thin plate")
+    for h in (0.2, 0.05, 0.01):
+        section = fi.Plate(fi.Material(E=1.0, nu=NU, rho=1.0), h)
+        systems = (fi.assemble(mesh, section, edge, theory=theory) for theory in ("kirchhoff", "mindlin"))
+        thin, found = (refinement.solve(system, len(L_MEMBRANE), None).omega for system in systems)
+        membrane = L_MEMBRANE * thin_rate(h)
+        for name, ratio in (
+            ("thin", thin / membrane), ("membrane", found / hinged_polygon(membrane, h)),
+            ("Wang", found / hinged_polygon(thin, h)),
+        ):  # fmt: skip
+            print(f"h = {h:<5g} {name:<9}" + "".join(f"{error:>10.1e}" for error in ratio - 1.0))
+
+
 def main() -> None:
     head = f"{'element':<18}{'size':>6}{'unknowns':>9}" + "".join(f"{f'h = {h:g}':>11}" for h in THICKNESSES)
     for shape, edge in product(("disk", "square"), ("hinged", "clamped")):
@@ -269,6 +296,7 @@ def main() -> None:
                 found = [frequencies(name, shape, edge, h, size) for h in THICKNESSES]
                 errors = [np.abs(omega / truth[h] - 1.0).max() for (_, omega), h in zip(found, THICKNESSES)]
                 print(f"{name:<18}{size:>6g}{found[0][0]:>9}" + "".join(f"{error:>11.1e}" for error in errors))
+    l_shape()
 
 
 if __name__ == "__main__":

@@ -29,3 +29,28 @@ SMALL = (  # the same through a Hertz spring, damped, with no map
     .replace("first_frequency = 100.0", "first_frequency = 100.0\ndamping_ratio = 0.01")
     .replace('"linear"\nstiffness = 1e4', '"hertz"\nstiffness = 695e3')
 )
+BAR = """
+[mesh]
+shape = "line"
+length = 0.35
+[material]
+E = 12e9
+nu = 0.3
+rho = 800.0
+[section]
+kind = "beam"
+width = { x = [0.0, 0.175], values = [0.05, 0.04] }
+height = 0.02
+[target]
+damping_ratio = 0.005
+[striker]
+kind = "rigid"
+mass = 0.03
+[contact]
+kind = "linear"
+stiffness = 1e5
+[strike]
+at = [0.17]
+speed = 1.0
+tolerance = 1e-2
+"""

@@ -119,8 +119,12 @@ def things() -> dict[str, Any]:
     taps = fi.measure(tip, rate=25600.0, duration=5e-3)
     taps.save(folder / "taps.npz")
     bar = fi.Modes.from_arrays([100.0, 300.0], [[1.0, 0.5]], points=[[0.0]], mass=1.0)
+    few = fi.sweep(
+        modes, striker, law, at=(0.1, 0.1), speed=1.0, over={"mass": [0.02, 0.03], "speed": [1.0, 2.0]},
+        tolerance=1e-2, borders=True,
+    )  # fmt: skip
     return {
-        "taps": taps, "file of taps": folder / "taps.npz", "bar": bar,
+        "map": few, "taps": taps, "file of taps": folder / "taps.npz", "bar": bar,
         "metal": metal, "plate": plate, "beam": beam, "square": square, "modes": modes, "striker": striker, "law": law,
         "sphere": fi.Striker.sphere(metal, 0.01), "free": fi.Modes.rigid(1.0), "folder": folder, "path": path,
         "system": fi.assemble(square, plate, {"boundary": "hinged"}), "scene": scene, "uff": uff, "mesh": mesh,
@@ -257,6 +261,7 @@ def table() -> dict[str, dict[str, Any]]:
         },
         "spectra.half_sine_spectrum": {"frequencies": [50.0, 60.0], "contact_frequency": 100.0},
         "threshold_frequency": {"modes": t["modes"], "at": at, "mass": 0.03},
+        "threshold.thresholds": {"modes": t["modes"], "at": at, "masses": [0.01, 0.03]},
         "threshold.required_energy": {"modes": t["modes"], "at": at, "contact_frequency": 500.0},
         "strike system": {"modes": t["system"], **told, "size": 0.08, "n_modes": 12, "strict": False},
         "strike system band": {"modes": t["system"], **told, "target": "modal", "max_frequency": 2e3},
@@ -283,6 +288,10 @@ def table() -> dict[str, dict[str, Any]]:
         "Scene.changed": {"self": t["scene"], "values": {"contact.stiffness": 2e6}},
         "Scene.modes": {"self": t["scene"], "count": 5},
         "Scene.play": {"self": t["sequence"], "watch": None, "strict": False, "tolerance": 1e-1},
+        "Scene.plan_strokes": {"self": t["sequence"], "watch": None, "tolerance": 1e-1},
+        "Scene.run_strokes": {
+            "self": t["sequence"], "watch": None, "before": None, "strict": False, "tolerance": 1e-1,
+        },
         "Scene.plan": {"self": t["scene"], "watch": None, "tolerance": 1e-1},
         "Scene.run": {"self": t["scene"], "watch": None, "plan": None, "before": None, "verify": False,
                       "tolerance": 0.1},
@@ -295,8 +304,13 @@ def table() -> dict[str, dict[str, Any]]:
         "sweep": {
             **blow, "over": {"mass": [0.02, 0.03]}, "tolerance": 1e-1, "max_frequency": 1e3, "layers": None,
             "residual": True, "workers": 1, "store": None, "watch": None, "max_cells": 100.0,
-            "tell": None,
+            "tell": None, "borders": False, "cells": 3, "refine": False,
         },
+        "sweep ranges": {
+            **blow, "over": {"mass": {"from": 0.02, "to": 0.03}, "speed": {"from": 1.0, "to": 2.0, "scale": "log"}},
+            "tolerance": 1e-1, "max_frequency": 1e3, "workers": 1, "cells": 3, "refine": True, "borders": True,
+        },
+        "read_borders": {"table": t["map"]},
         "spread": {
             "scene": t["scene"], "vary": {"striker.mass": ("lognormal", 0.03, 0.1)}, "n": 8, "correlation": None,
             "sobol": False, "seed": 1, "tolerance": 1e-1, "max_frequency": 1e3, "workers": 1, "store": None,
@@ -353,6 +367,9 @@ def table() -> dict[str, dict[str, Any]]:
         "sound.radiate_bar": {
             "response": t["bar hit"], "listener": (0.1, 0.1, 1.0), "width": 0.02, "height": 0.01, "duration": 0.01,
             "rate": 8000, "air": (1.2, 343.0),
+        },
+        "sound.radiate_free": {
+            **hit, "listener": (0.1, 0.1, 1.0), "duration": 0.01, "rate": 8000, "air": (1.2, 343.0),
         },
         "hammers.highest_frequency": {
             "modes": t["modes"], "at": at, "bandwidth": 300.0, "masses": [0.1], "drop": 10.0,
@@ -443,7 +460,12 @@ def cases(names: Any = None) -> Iterator[tuple[str, str, str]]:
 
 # --- the judge -------------------------------------------------------------------------------------------------------
 
-INFINITE = {"threshold_frequency", "mobility", "Response.motion_error"}  # documented to give inf
+INFINITE = {
+    "threshold_frequency",
+    "threshold.thresholds",
+    "mobility",
+    "Response.motion_error",
+}  # documented to give inf
 ENDLESS = {"order", "point_supports"}  # fields documented to be infinite now and then
 OTHER_NAMES = {  # parameter: words under which an error may speak of it besides its own name
     **dict.fromkeys(("length", "width", "radius", "factor", "corners", "hole"), ("size", "outline", "max_frequency")),

@@ -75,6 +75,7 @@ def test_a_band_that_is_too_wide_gets_its_limit(tmp_path, quantity, target):
     assert found.plan(quantity=f"{quantity}={most}", target=target).n_modes <= 2000
 
 
+@pytest.mark.slow
 def test_a_map_of_too_many_modes_proposes_a_tolerance(tmp_path, monkeypatch):
     monkeypatch.setitem(planner.MOST_MODES, "fe", 150)
     text = QUICK.replace('source = "analytic"', 'source = "fe"').replace("[strike]", "[strike]\nresidual = false")
@@ -260,6 +261,11 @@ ADVICE = {  # what fails, the message, and what it advises
     "sound of a beam": (
         lambda _: fi.sound.radiate(of_a_beam(), (0.0, 0.0, 1.0)),
         "use radiate_bar",
+        lambda _: fi.sound.radiate_bar(of_a_beam(), (0.0, 0.0, 1.0), width=0.02, height=0.01, duration=0.01),
+    ),
+    "sound of a beam in free air": (
+        lambda _: fi.sound.radiate_free(of_a_beam(), (0.0, 0.0, 1.0)),
+        "use radiate_bar for a beam",
         lambda _: fi.sound.radiate_bar(of_a_beam(), (0.0, 0.0, 1.0), width=0.02, height=0.01, duration=0.01),
     ),
     "sound of a plate as a bar": (

@@ -19,7 +19,19 @@ def find(cls, name, path=None, target=None):
     return None if name.split(".")[0] in {hidden} else real(name, path, target)
 importlib.machinery.PathFinder.find_spec = classmethod(find)
 """
-HIDDEN = {"svgelements", "ezdxf", "pyuff", "h5py", "dask", "distributed", "zarr", "plotly", "bokeh", "jinja2", "shtab"}
+HIDDEN = {
+    "svgelements",
+    "ezdxf",
+    "pyuff",
+    "h5py",
+    "dask",
+    "distributed",
+    "zarr",
+    "plotly",
+    "tornado",
+    "jinja2",
+    "shtab",
+}
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="shells, limits and devices of POSIX")
 
@@ -101,7 +113,7 @@ CORE = ["strike scene.toml --out o", "modes scene.toml", "hammer scene.toml --ba
 CORE += ["map scene.toml --out m", "plan scene.toml"]
 EXTRA = [
     ("report scene.toml --out r/r.html", "a report needs jinja2: pip install 'fem-impact[web]'"),
-    ("explore scene.toml --no-open", "exploring needs bokeh: pip install 'fem-impact[web]'"),
+    ("explore scene.toml --no-open", "exploring needs tornado: pip install 'fem-impact[web]'"),
     ("map scene.toml --out m --format zarr", "format zarr needs zarr: pip install 'fem-impact[cluster]'"),
     ("map scene.toml --out m --store s", "a store needs zarr: pip install 'fem-impact[cluster]'"),
     ("map scene.toml --out m --cluster tcp://x:1", "client needs distributed: pip install 'fem-impact[cluster]'"),

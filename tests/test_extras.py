@@ -18,7 +18,7 @@ MAP = '[map.over]\n"striker.mass" = [0.02, 0.03]\n'
 @pytest.fixture
 def bare(monkeypatch):
     """No extra can be imported."""
-    for module in [*MODULES, "plotly.offline", "bokeh.server.tornado"]:
+    for module in [*MODULES, "plotly.offline"]:
         monkeypatch.setitem(sys.modules, module, None)
 
 
@@ -57,7 +57,7 @@ def test_core_commands_need_no_extra(bare, scene, tmp_path, words):
     [
         (["report", "SCENE", "--out", "OUT/r.html"], "a report needs jinja2: pip install 'fem-impact[web]'"),
         (["completion"], "completion needs shtab: pip install 'fem-impact[completion]'"),
-        (["explore", "SCENE", "--no-open"], "exploring needs bokeh: pip install 'fem-impact[web]'"),
+        (["explore", "SCENE", "--no-open"], "exploring needs tornado: pip install 'fem-impact[web]'"),
         (
             ["map", "SCENE", "--out", "OUT", "--format", "zarr"],
             "format zarr needs zarr: pip install 'fem-impact[cluster]'",

@@ -37,7 +37,8 @@ def test_sdnl32_does_not_depend_on_the_modes_kept():
 @pytest.mark.parametrize("kind", ["stretching", "air", "quasi-static contact", "damping"])
 def test_the_models_own_error_is_told_in_random_scenes(kind):
     assumptions = study("assumptions")
-    for seed in range(100, 103):  # not those of the study's table
+    chatter = [37, 72] if kind == "stretching" else []  # a first touch so short that few waves have left it
+    for seed in [*range(105, 108), *chatter]:  # the first not of the study's table
         assert assumptions.judge(kind, seed)["verdict"] in ("right", "silent", "beyond", "hardly beyond")
 
 

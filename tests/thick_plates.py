@@ -1,11 +1,14 @@
-"""References for thick plates that share no code with the package: Navier's series, Ritz, solids."""
+"""References for thick plates that share no elements with the package: Navier's series, Ritz, rotations, solids."""
 
 import numpy as np
 from numpy.polynomial import legendre
 from scipy.linalg import eigh, null_space
+from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import eigsh
 from scipy.special import j1
-from skfem import Basis, BilinearForm, ElementHex2, ElementVector, MeshHex
+from skfem import Basis, BilinearForm, ElementHex2, ElementTriP4, ElementVector, MeshHex, MeshTri
+
+from fem_impact.fe.corners import around_corners
 
 KAPPA = 5.0 / 6.0  # [-]
 
@@ -36,6 +39,33 @@ def spread_compliance(length, width, h, E, nu, at, radius, n=3000):
     k = np.hypot(kx, ky)
     seen = np.sin(kx * at[0]) * np.sin(ky * at[1]) * 2.0 * j1(k * radius) / (k * radius)
     return float((4.0 / (length * width) * seen**2 * (1.0 / (D * k**4) + 1.0 / (S * k**2))).sum())
+
+
+def by_rotations(mesh, h, n_modes, matrices):
+    """First omega [rad/s] of a hard-hinged polygon, E = rho = 1: quartic deflection and rotations on graded triangles.
+
+    ``matrices`` of `studies/thick_elements.py` knows neither our elements nor our edges.
+    """
+    fine = around_corners(mesh, ["hinged"] * len(mesh.facets), 0.3)[2]
+    plane = MeshTri(np.ascontiguousarray(fine.points.T), np.ascontiguousarray(fine.cells.T))
+    deflection, rotation, K, M = matrices(plane, h, (ElementTriP4(), ElementTriP4()), False)
+    n_w, across = deflection.N, {}
+    for facet in plane.boundary_facets():
+        a, b = plane.p[:, plane.facets[:, facet]].T
+        for i in np.unique(rotation.get_dofs(facets=np.array([facet])).all())[::2]:  # y components follow those of x
+            across.setdefault(int(i), []).append(np.array([a[1] - b[1], b[0] - a[0]]) / np.linalg.norm(b - a))
+    keep = np.setdiff1d(np.arange(n_w), deflection.get_dofs().all())
+    at_edge = np.array([[i, i + 1] for i in across]).ravel()
+    keep = np.concatenate([keep, n_w + np.setdiff1d(np.arange(rotation.N), at_edge)])
+    straight = [(i, n[0]) for i, n in across.items() if all(abs(n[0] @ other) > 0.999 for other in n)]
+    rows = np.concatenate([keep, *([n_w + i, n_w + i + 1] for i, _ in straight)])
+    columns = np.concatenate([np.arange(len(keep)), np.repeat(len(keep) + np.arange(len(straight)), 2)])
+    values = np.concatenate([np.ones(len(keep)), *(n for _, n in straight)])
+    expand = csr_matrix((values, (rows, columns)), shape=(n_w + rotation.N, len(keep) + len(straight)))
+    K, M = (expand.T @ matrix @ expand for matrix in (K, M))
+    even = diags(K.diagonal() ** -0.5)
+    value = eigsh((even @ K @ even).tocsc(), n_modes, (even @ M @ even).tocsc(), sigma=0.0, return_eigenvectors=False)
+    return np.sqrt(np.sort(value))
 
 
 def ritz(h, nu, sides, degree, n_modes):

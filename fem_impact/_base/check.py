@@ -30,6 +30,7 @@ SOURCES = {  # type -> how a user makes one, for error messages
     "Mesh": "fi.mesh",
     "Modes": "fi.find_modes, fi.analytic or fi.Modes",
     "Plan": "fi.plan",
+    "Played": "Scene.run_strokes",
     "Response": "fi.strike or fi.collide",
     "Run": "Scene.run",
     "Scene": "fi.load_scene",
@@ -180,7 +181,7 @@ def typed(function: Function) -> Function:
         kinds = get_args(stated) if isinstance(stated, UnionType) else (stated,)
         ours = tuple(kind for kind in kinds if isinstance(kind, type) and kind.__name__ in SOURCES)
         functions = all(get_origin(kind) is Callable or kind is NoneType for kind in kinds)
-        if ours or functions or Path in kinds or stated is bool:
+        if ours or functions or Path in kinds or {bool} <= set(kinds) <= {bool, NoneType}:
             checked[name] = kinds, ours
 
     @functools.wraps(function)

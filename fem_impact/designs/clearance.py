@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from .._base.check import SimulationError
 from ..fe.variation import SectionChange
-from ..impact.compiled import record
+from ..impact.compiled import layout, record
 from ..impact.parameters import Parameters
 from ..impact.response import History, Response
 from ..impact.sensitivity import Sensitivity
@@ -62,7 +62,7 @@ def slopes(
         return np.zeros(len(names))
     history = _released(hit)
     row = np.zeros((1, history.steps.shape[1]))
-    row[0, :2] = history.end_time, when - history.end_time
+    row[0, [layout.START, layout.LENGTH]] = history.end_time, when - history.end_time
     longer = replace(history, steps=np.vstack([history.steps, row]), end_time=when, status=record.HORIZON)
     found = Sensitivity.of(longer, Parameters(hit, sections).change(names), peak=False)
     scale = hit.speed * hit.impacts[0].duration

@@ -121,4 +121,6 @@ def _goal(where: str, name: str, value: Any, blow: str) -> Goal:
     high = math.inf if ends[1] is None else check.number(label, ends[1])
     if low > high:
         raise ValueError(f"{label} must be a range (low, high), got ({low:g}, {high:g})")
+    if high < 0.0 and plain not in ("spectral_level", "restitution"):
+        raise ValueError(f"{label} must not be negative, got {high:g}; nothing could meet it")
     return Goal(name, low, high, blow)

@@ -44,7 +44,8 @@ class Piece:
     arguments: Mapping[str, Any] = field(default_factory=dict)  # of `strike`
     key: Any = None  # bodies of the same key are the same
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def blow(self) -> Blow:
@@ -98,7 +99,8 @@ class Maker:
     names: tuple[str, ...]
     scene: Scene | None = None
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @classmethod
     def of(cls, objects: Any, names: tuple[str, ...]) -> "Maker":
@@ -148,7 +150,8 @@ class Rate:
     numbers: Mapping[str, float]  # those that change
     section: SectionChange | None  # how the section does; None if it stays
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @classmethod
     def of(cls, name: str, now: Piece, sides: list[Piece], weights: np.ndarray) -> "Rate":

@@ -20,7 +20,7 @@ from ..model import planner
 from ..modes import varied
 from ..modes.modal import Modes
 from ..taps import arguments
-from ..taps.unknowns import Unknown
+from ..taps.unknowns import Unknown, bounds
 from . import clearance, goals
 from .goals import Goal
 from .objects import Maker, Piece, Rate
@@ -60,7 +60,8 @@ class Checked:
     hits: Mapping[str, Response]  # by name of the blow
     differences: Mapping[str, Mapping[str, float]]  # of each from the finer blow, see `planner.differences`
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +76,8 @@ class Design:
     maker: Maker = field(repr=False)
     hits: Mapping[str, Response] = field(default_factory=dict, repr=False)  # by name of the blow
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
     def met(self) -> bool:
@@ -215,7 +217,8 @@ def design(
     >>> found.met, round(1e3 * found.values["height"], 1)  # mm
     (True, 12.4)
     """
-    ranges = tuple(Unknown(name, *limits) for name, limits in arguments.ranges("free", free).items())
+    limits = arguments.ranges("free", free)
+    ranges = tuple(Unknown(name, *bounds(f"free[{name!r}]", ends)) for name, ends in limits.items())
     names = tuple(each.name for each in ranges)
     begin = arguments.table("start", start)
     for name in begin:

@@ -10,13 +10,14 @@ from scipy.linalg import qr
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, eye_array, vstack
 
 from .._base import check, markup
+from .._base.untyped import Sparse
 from ..mesh import sketch
 from ..mesh.facets import Curves
 from ..mesh.meshes import Mesh, aligned, pierced
 from . import beam_elements, plausible, shear_beam, thick
 from .beam_elements import HermiteSpace
 from .corners import around_corners
-from .elements import ArgyrisSpace, Bent, BentMapping, MorleySpace, numbering, quadrature, triangles
+from .elements import ArgyrisSpace, Bent, MorleySpace, numbering, quadrature, triangles
 from .section import KINDS, SOFT, Beam, Elastic, Plate, evaluate
 from .shear_beam import TimoshenkoSpace
 from .splitting import towards_points
@@ -26,7 +27,7 @@ from .thick import MindlinSpace, ThickStrain
 
 THEORIES = {2: ("kirchhoff", "mindlin"), 1: ("euler", "timoshenko")}  # by dimension; the first is the default
 THICK = ("mindlin", "timoshenko")  # theories with shear and rotary inertia
-ELEMENTS = {
+ELEMENTS: dict[str, tuple[str, ...]] = {
     "kirchhoff": ("argyris", "morley"), "mindlin": ("argyris and shear",),
     "euler": ("hermite",), "timoshenko": ("hermite and shear",),
 }  # fmt: skip
@@ -90,7 +91,7 @@ class Strain:
 
     x: np.ndarray  # (n_cells, n_q, 2) quadrature points
     stiffness: np.ndarray  # (n_cells, n_q, 3, 3) times the quadrature weights
-    springs: csc_matrix  # (n_all, n_all) stiffness of elastic supports and tension
+    springs: Sparse  # (n_all, n_all) stiffness of elastic supports and tension
 
     def __repr__(self) -> str:
         return check.brief(self)
@@ -124,9 +125,9 @@ class System:
     element: str
     mass: float  # [kg] of the whole body
     frame: Frame
-    K: csc_matrix = field(repr=False)  # (n_dofs, n_dofs) [-] for the unknowns not fixed by supports
-    M: csc_matrix = field(repr=False)  # (n_dofs, n_dofs) [-]
-    expand: csr_matrix = field(repr=False)  # (n_all, n_dofs) from these unknowns to all unknowns of the elements
+    K: Sparse = field(repr=False)  # (n_dofs, n_dofs) [-] for the unknowns not fixed by supports
+    M: Sparse = field(repr=False)  # (n_dofs, n_dofs) [-]
+    expand: Sparse = field(repr=False)  # (n_all, n_dofs) from these unknowns to all unknowns of the elements
     element_dofs: np.ndarray = field(repr=False)  # (n_local, n_cells) unknowns of each cell, among all
     space: ArgyrisSpace | HermiteSpace | MorleySpace | MindlinSpace | TimoshenkoSpace = field(repr=False)
     rigid: np.ndarray = field(repr=False)  # (n_dofs, n_rigid) [-] mass-normalised rigid motions
@@ -172,7 +173,7 @@ class System:
         """Whether each point (n_points, dimension) [m] lies on the body, (n_points,) bool."""
         return self.space.locate(self.frame.local(points))[1]
 
-    def interpolate(self, points: np.ndarray) -> csr_matrix:
+    def interpolate(self, points: np.ndarray) -> Sparse:
         """Matrix (n_points, n_dofs) [-] from the unknowns to the deflection at points (n_points, dimension) [m].
 
         On a thick plate it is the mean over the disk on which a force at the point acts, see `thick`.
@@ -296,7 +297,7 @@ def _graded(
     return order, unresolved, fine
 
 
-def unknowns_near(mesh: Mesh, section: Plate, supports: dict, points: np.ndarray, graded: bool = True) -> int:
+def unknowns_near(mesh: Mesh, section: Plate, supports: dict[str, Any], points: np.ndarray, graded: bool = True) -> int:
     """About how many unknowns `assemble` makes of a thin plate with elements that shrink towards points; 1 % more."""
     fine = _graded(mesh, section, supports, "argyris", points, graded)[2]
     held = [HOLDS.get(kind, 0) for kind in _kinds(support_of_facets(fine, supports))]
@@ -329,7 +330,7 @@ def reassemble(
     return _made(mesh, system.section, system.supports, element or system.element, *rest)
 
 
-def clamped(supports: Any, n_clamps: int) -> dict:
+def clamped(supports: Any, n_clamps: int) -> dict[str, Any]:
     """Supports of the edges, with those of clamps by `pierced`."""
     if not isinstance(supports, dict):
         raise ValueError(f"supports must be a dict of edge name -> support, got {check.shown(supports)}")
@@ -346,7 +347,7 @@ def support_words(theory: str | None) -> tuple[str, ...]:
     return (*KINDS, SOFT) if theory == "mindlin" else KINDS
 
 
-def support_of_facets(mesh: Mesh, supports: dict, allowed: tuple[str, ...] = KINDS) -> list[str | Elastic]:
+def support_of_facets(mesh: Mesh, supports: dict[str, Any], allowed: tuple[str, ...] = KINDS) -> list[str | Elastic]:
     """The support of each facet; ``allowed`` are the words besides `Elastic`."""
     if not isinstance(supports, dict):
         raise ValueError(f"supports must be a dict of edge name -> support, got {check.shown(supports)}")
@@ -627,9 +628,8 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict, masses: Attached
     centre, length, points = _centred(mesh)
     plane = triangles(points, mesh.cells)
     bent = _bent(mesh, centre, length, points, plane)
-    mapping = None if bent is None else BentMapping(plane, bent)
     space = ArgyrisSpace(plane, bent)
-    x, dx = quadrature(plane, space, MASS_ORDER, mapping)
+    x, dx = quadrature(plane, space, MASS_ORDER, bent)
     frame, stiffness, inertia, softness = _plate_fields(section, x, centre, length)
     weighted = stiffness * dx[..., None, None], inertia * dx
     K, M = np.empty((len(x), 21, 21)), np.empty((len(x), 21, 21))
@@ -672,7 +672,9 @@ def _assemble_thick(mesh: Mesh, section: Plate, supports: dict, masses: Attached
     plane = triangles(points, mesh.cells)
     bent = _bent(mesh, centre, length, points, plane)
     space = MindlinSpace(plane, bent)
-    x, dx = quadrature(plane, space, MASS_ORDER, None if bent is None else BentMapping(plane, bent))
+    middle = centre + length * space.origin
+    space.turn(plane, evaluate("thickness", section.thickness, middle, "m") / length)
+    x, dx = quadrature(plane, space, MASS_ORDER, bent)
     frame, stiffness, inertia, softness = _plate_fields(section, x, centre, length)
     flat = centre + length * x.reshape(-1, 2)
     shear = section.shear(flat).reshape(*dx.shape, 2, 2) * length**2 / frame.stiffness

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from skfem import ElementLineHermite, MeshLine
 
+from .._base.untyped import Cells
 from ..mesh.facets import powers
 from .elements import ON_BODY
 
@@ -26,7 +27,7 @@ ROUNDING = 1e-14  # [-] a smaller misfit is just rounding
 MOST_BREAKS = 2000  # [-] most places where the section may jump or kink
 
 
-class Hermite(ElementLineHermite):
+class _Hermite(ElementLineHermite):
     """scikit-fem's Hermite element with bubbles, used only to number the unknowns."""
 
     interior_dofs = DEGREE - 3
@@ -38,9 +39,14 @@ class HermiteSpace:
     The bubbles are the modes of the element clamped at both ends, so they do not couple to each other.
     """
 
-    element = Hermite
+    element: type[Any] = _Hermite
 
-    def __init__(self, mesh: MeshLine) -> None:
+    start: np.ndarray  # (n_cells,)
+    length: np.ndarray  # (n_cells,)
+    origin: np.ndarray  # (n_cells, 1) the start
+    bubbles: np.ndarray  # (n_cells, DEGREE - 3, DEGREE - 3) of Legendre's bubbles in each shape function
+
+    def __init__(self, mesh: Cells) -> None:
         ends = mesh.p[0, mesh.t]  # (2, n_cells)
         self.start, self.length = ends[0], ends[1] - ends[0]
         self.origin = self.start[:, None]  # (n_cells, 1)
@@ -143,7 +149,7 @@ def quadrature(space: Any) -> tuple[np.ndarray, np.ndarray]:
     return space.start[:, None] + 0.5 * (node + 1.0) * space.length[:, None], 0.5 * weight * space.length[:, None]
 
 
-def divided(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes: np.ndarray) -> MeshLine:
+def divided(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes: np.ndarray) -> Cells:
     """Line elements between nodes, with more nodes until a polynomial fits the section between any two neighbours.
 
     Steps and kinks of stiffness and inertia are found by halving every interval that no polynomial fits. An interval
@@ -194,7 +200,7 @@ def _misfit(fields: Callable, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 def energy_errors(
     space: HermiteSpace, stiffness: np.ndarray, curvature: np.ndarray, load: np.ndarray, moments: np.ndarray,
-    hinges: Sequence = (),
+    hinges: Sequence[Any] = (),
 ) -> np.ndarray:  # fmt: skip
     """Error (n,) of the squared energy norm of solutions, from moments in equilibrium with the loads.
 

@@ -12,6 +12,7 @@ from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController
 
 from .._base import check, progress
+from .._base.untyped import Sparse
 
 DENSE = 300  # [-] up to this many unknowns a dense solver is faster
 BLOCK = 8  # [-] vectors per Lanczos step: 4 and 16 were 10 % slower for 200 modes of a plate
@@ -42,13 +43,13 @@ def one_thread(search: Callable) -> Callable:
     return alone
 
 
-def factorise(A: csc_matrix) -> Any:
+def factorise(A: Sparse) -> Any:
     """Sparse LU factorisation of a symmetric matrix with pivots on the diagonal."""
     options = {"SymmetricMode": True}
     return splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
 
 
-def count_below(K: csc_matrix, M: csc_matrix, shift: float) -> int:
+def count_below(K: Sparse, M: Sparse, shift: float) -> int:
     """Count the eigenvalues below a shift from the signs of the pivots of K - shift M (Sylvester's law of inertia)."""
     for nudge in NUDGES:  # if a pivot happens to vanish, SuperLU takes one off the diagonal and the signs are useless
         lu = factorise(K - shift * (1.0 + nudge) * M)
@@ -63,12 +64,12 @@ def count_below(K: csc_matrix, M: csc_matrix, shift: float) -> int:
 class Flexibility:
     """Inverse of K without rigid motions; K is factorised on first use, and again after unpickling."""
 
-    K: csc_matrix
-    M: csc_matrix
+    K: Sparse
+    M: Sparse
     rigid: np.ndarray  # (n_dofs, n_rigid) mass-normalised
     held: np.ndarray  # (n_rigid,) unknowns that, when fixed, just prevent rigid motion
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[type["Flexibility"], tuple[Sparse, Sparse, np.ndarray, np.ndarray]]:
         return Flexibility, (self.K, self.M, self.rigid, self.held)
 
     @cached_property

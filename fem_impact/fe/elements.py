@@ -1,5 +1,6 @@
 """Triangular elements whose shape functions stay accurate for any size, shape and position of the triangle."""
 
+from collections.abc import Callable
 from itertools import product
 from typing import Any
 
@@ -8,6 +9,7 @@ from scipy.spatial import cKDTree
 from skfem import Dofs, ElementTriArgyris, ElementTriMorley, MappingAffine, MeshTri
 from skfem.quadrature import get_quadrature
 
+from .._base.untyped import Cells
 from ..mesh.facets import Curves, powers
 from .supports import SIDES
 
@@ -30,7 +32,16 @@ def monomials(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
 class Bent:
     """Map that bends the triangles at curved facets onto the true curve and leaves the others straight."""
 
-    def __init__(self, curves: Curves, facets: np.ndarray, cells: np.ndarray, sides: np.ndarray, vertices) -> None:
+    curves: Curves
+    cells: np.ndarray  # (n,) of each curved facet
+    sides: np.ndarray  # (n,) of the cell
+    start: np.ndarray  # (n,) corner of the cell at which the facet starts
+    stop: np.ndarray  # (n,) and ends
+    of_side: np.ndarray  # (n_cells, 3) curved facet of every side, or -1
+
+    def __init__(
+        self, curves: Curves, facets: np.ndarray, cells: np.ndarray, sides: np.ndarray, vertices: np.ndarray
+    ) -> None:
         self.curves, self.cells, self.sides = curves, cells, sides
         corner = vertices[cells]  # (n, 3)
         self.start = (corner == facets[:, :1]).argmax(axis=1)
@@ -53,23 +64,25 @@ class Bent:
         return moved, gradient
 
 
-class BentMapping(MappingAffine):
+class _BentMapping(MappingAffine):
     """scikit-fem's mapping from the reference triangle, extended to bent triangles."""
 
-    def __init__(self, mesh: MeshTri, bent: Bent) -> None:
+    def __init__(self, mesh: Cells, bent: Bent) -> None:
         super().__init__(mesh)
         self.bent = bent
 
-    def _shift(self, X, tind):
+    def _shift(self, X: np.ndarray, tind: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         cells = np.arange(self.mesh.t.shape[1]) if tind is None else tind
         X = np.broadcast_to(X, (2, X.shape[-1]))
         area = np.broadcast_to(np.stack([1.0 - X[0] - X[1], X[0], X[1]], axis=1), (len(cells), X.shape[1], 3))
         return cells, *self.bent.shift(cells, area)
 
-    def F(self, X, tind=None):
+    def F(self, X: np.ndarray, tind: np.ndarray | None = None) -> np.ndarray:
+        """Where points of the reference triangle lie."""
         return super().F(X, tind) + self._shift(X, tind)[1].transpose(2, 0, 1)
 
-    def detDF(self, X, tind=None):
+    def detDF(self, X: np.ndarray, tind: np.ndarray | None = None) -> np.ndarray:
+        """Determinant of the map there."""
         cells, _, gradient = self._shift(X, tind)
         J = self.A[:, :, cells].transpose(2, 0, 1)[:, None] + gradient[..., 1:] - gradient[..., :1]
         return J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
@@ -78,7 +91,17 @@ class BentMapping(MappingAffine):
 class Triangles:
     """The triangles of one mesh: local coordinates, normals of sides, and a search for the triangle of a point."""
 
-    def __init__(self, mesh: MeshTri, bent: Bent | None = None) -> None:
+    corners: np.ndarray  # (n_cells, 3, 2)
+    vertices: np.ndarray  # (n_cells, 3)
+    bent: Bent | None
+    origin: np.ndarray  # (n_cells, 2) centre
+    jacobian: np.ndarray  # (n_cells, 2, 2) of the map from the reference triangle
+    inverse: np.ndarray  # (n_cells, 2, 2) of that
+    normals: np.ndarray  # (n_cells, 3, 2) of the sides, the same for both triangles beside one
+    curved: np.ndarray  # (n_cells,) bool
+    tree: Any  # scipy's search tree of the centres
+
+    def __init__(self, mesh: Cells, bent: Bent | None = None) -> None:
         corners = mesh.p[:, mesh.t].transpose(2, 1, 0)  # (n_cells, 3, 2)
         self.corners, self.vertices, self.bent = corners, mesh.t.T, bent
         self.origin = corners.mean(axis=1)
@@ -109,7 +132,10 @@ class Triangles:
             rows = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
         return np.stack([np.stack(row, axis=-1) for row in rows], axis=1)
 
-    def derivatives(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...], terms: Any, weights: Any):
+    def derivatives(
+        self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...],
+        terms: Callable[[np.ndarray, int, int], np.ndarray], weights: np.ndarray,
+    ) -> list[np.ndarray]:  # fmt: skip
         """Derivatives of polynomials, one array for each order, as in `ArgyrisSpace.functions`.
 
         ``terms(local, dx, dy)`` gives derivatives (..., n) of n terms; ``weights`` (n_cells, n, n_local) combine them.
@@ -181,9 +207,19 @@ class ArgyrisSpace:
     and its unknowns to the reference directions.
     """
 
-    element = ElementTriArgyris  # scikit-fem's class: it numbers the unknowns
+    element: type[Any] = ElementTriArgyris  # scikit-fem's class: it numbers the unknowns
+    inner: Triangles
+    origin: np.ndarray  # these and the next as in `Triangles`
+    inverse: np.ndarray
+    jacobian: np.ndarray
+    vertices: np.ndarray
+    curved: np.ndarray
+    bent: Bent | None
+    normals: np.ndarray  # (n_cells, 3, 2) at `middles`
+    middles: np.ndarray  # (n_cells, 3, 2) of the sides, on the true curve
+    coefficients: np.ndarray  # (n_cells, 21, 21) of the monomials in each shape function
 
-    def __init__(self, mesh: MeshTri, bent: Bent | None = None) -> None:
+    def __init__(self, mesh: Cells, bent: Bent | None = None) -> None:
         self.inner = Triangles(mesh, bent)
         self.origin, self.inverse, self.jacobian = self.inner.origin, self.inner.inverse, self.inner.jacobian
         self.vertices, self.curved, self.bent = self.inner.vertices, self.inner.curved, bent
@@ -268,9 +304,17 @@ class MorleySpace:
     them from above.
     """
 
-    element = ElementTriMorley
+    element: type[Any] = ElementTriMorley
+    inner: Triangles
+    origin: np.ndarray  # these and the next as in `Triangles`
+    inverse: np.ndarray
+    jacobian: np.ndarray
+    vertices: np.ndarray
+    normals: np.ndarray
+    bent: None
+    coefficients: np.ndarray  # (n_cells, 6, 6) of the monomials in each shape function
 
-    def __init__(self, mesh: MeshTri) -> None:
+    def __init__(self, mesh: Cells) -> None:
         self.inner = Triangles(mesh)
         self.origin, self.inverse, self.jacobian = self.inner.origin, self.inner.inverse, self.inner.jacobian
         self.vertices, self.normals, self.bent = self.inner.vertices, self.inner.normals, None
@@ -309,7 +353,7 @@ def _quadratic(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
     return x[..., i] * y[..., j]
 
 
-def triangles(points: np.ndarray, cells: np.ndarray) -> MeshTri:
+def triangles(points: np.ndarray, cells: np.ndarray) -> Cells:
     """Make scikit-fem's mesh of triangles."""
     return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
 
@@ -326,14 +370,14 @@ def inverses(space: Any, X: np.ndarray) -> np.ndarray:
     return np.linalg.inv(J)
 
 
-def quadrature(mesh, space, order: int, mapping=None) -> tuple[np.ndarray, np.ndarray]:
+def quadrature(mesh: Any, space: Any, order: int, bent: Bent | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Quadrature on every cell: points (n_cells, n_q, dimension) and weights (n_cells, n_q)."""
     X, weight = get_quadrature(space.element.refdom, order)
-    mapping = mesh._mapping() if mapping is None else mapping
+    mapping = mesh._mapping() if bent is None else _BentMapping(mesh, bent)
     return mapping.F(X).transpose(1, 2, 0), np.abs(mapping.detDF(X)) * weight
 
 
-def numbering(mesh, space) -> tuple[np.ndarray, int]:
+def numbering(mesh: Cells, space: Any) -> tuple[np.ndarray, int]:
     """Numbers of the unknowns of each cell, (n_local, n_cells), and how many unknowns there are."""
     dofs = Dofs(mesh, space.element())  # a new object: scikit-fem's elements remember their first mesh
     return dofs.element_dofs, dofs.N

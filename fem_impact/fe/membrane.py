@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_matrix
 
+from .._base.untyped import Sparse
 from . import slopes, thick
 from .assembly import System
 from .eigenvalues import factorise
@@ -51,7 +52,7 @@ class Sheet:
 
     @classmethod
     def of(cls, system: System) -> "Sheet":
-        """That of a plate whose hinged and clamped edges hold the plane."""
+        """That of a plate whose hinged and clamped edges hold the plane; free ones do not."""
         rim, section, frame = system.rim, system.section, system.frame
         assert rim is not None and isinstance(section, Plate)
         space: Any = system.space
@@ -67,7 +68,8 @@ class Sheet:
         local = np.column_stack([np.array(SIDES)[sides], 3 + 3 * sides[:, None] + np.arange(3)])
         holds = np.array([kind != "free" for kind in rim.kinds])
         held = np.unique(own[local[holds], cells[holds, None]])
-        return cls(x, moduli, gradient, np.vstack([own, n + own]).T, np.concatenate([held, n + held]))
+        held = np.concatenate([held, n + held]) if len(held) else _still(space, rim.points, own, n)
+        return cls(x, moduli, gradient, np.vstack([own, n + own]).T, held)
 
     def strains(self, cells: np.ndarray) -> np.ndarray:
         """Strains (n, n_q, 3, 30) of the unknowns of cells (n,)."""
@@ -83,7 +85,7 @@ class Sheet:
         return np.array_split(np.arange(len(self.x)), -(-len(self.x) // most))
 
     @property
-    def stiffness(self) -> csc_matrix:
+    def stiffness(self) -> Sparse:
         """Stiffness of the plane (n_dofs, n_dofs) [N m]."""
         n_dofs = self.dofs.max() + 1
         result = csc_matrix((n_dofs, n_dofs))
@@ -93,6 +95,14 @@ class Sheet:
             place = (np.broadcast_to(each, local.shape).ravel() for each in (dofs[:, :, None], dofs[:, None]))
             result = result + csc_matrix((local.ravel(), tuple(place)), shape=result.shape)
         return result
+
+
+def _still(space: Any, points: np.ndarray, own: np.ndarray, n: int) -> np.ndarray:
+    """Three of the unknowns u and v that keep a plane from moving rigidly, at the ends of its longer side."""
+    long = int(np.ptp(points[:, 1]) > np.ptp(points[:, 0]))
+    ends = points[:, long].argmin(), points[:, long].argmax()
+    first, last = (own[:3].T[space.vertices == end][0] for end in ends)
+    return np.array([first, first + n, last + (1 - long) * n])
 
 
 def most(n_modes: int) -> int:

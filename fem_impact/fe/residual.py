@@ -43,6 +43,11 @@ FIT = np.linalg.inv(_cubic(NODES, 0, 0))  # from values at NODES to the coeffici
 class Moments:
     """Bending moments of all triangles as cubic polynomials, their derivatives and the edge forces."""
 
+    space: Any  # of the system
+    n_cells: int
+    stiffness: np.ndarray  # (n_cells, n_q, 3, 3)
+    coefficients: np.ndarray  # (n_cells, 3, 10, 21) of the cubics
+
     def __init__(self, system: System) -> None:
         space: Any = system.space
         self.space, self.n_cells = space, len(space.origin)
@@ -89,6 +94,17 @@ def _stiffness(system: System, x: np.ndarray) -> np.ndarray:
 
 class Residual:
     """Residuals of a plate's solutions, as linear operators on the unknowns of each triangle and side."""
+
+    system: System
+    moments: Moments
+    inertia: np.ndarray  # (n_cells, n_q, 21)
+    balance: np.ndarray  # (n_cells, n_q, 21) what the moments leave of a load
+    beside: np.ndarray  # (n_sides, 2) cells
+    jumps: np.ndarray  # (n_sides, 2 n_q, 42) of moment and force
+    rim_cells: np.ndarray  # (n_facets,)
+    missed: np.ndarray  # (n_facets, 2 n_q, 21) of what a free edge asks
+    moved: np.ndarray  # (n_facets, 2, n_q, 21) of what a held edge forbids
+    reaction: np.ndarray  # (n_facets, 2, n_q, 21)
 
     def __init__(self, system: System) -> None:
         self.system, self.moments = system, Moments(system)

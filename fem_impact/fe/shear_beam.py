@@ -15,11 +15,12 @@ Timoshenko (1921), Phil. Mag. 41, 744-746; Cowper (1966), J. Appl. Mech. 33, 335
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix
-from skfem import MeshLine
 
+from .._base.untyped import Cells, Sparse
 from .beam_elements import DEGREE, HermiteSpace, quadrature, running_integral
 from .section import Elastic
 
@@ -31,7 +32,13 @@ Field = Callable[[np.ndarray], np.ndarray]
 class TimoshenkoSpace:
     """Shape functions of the elements of one line: `HermiteSpace` for W, then two hats and bubbles for s."""
 
-    def __init__(self, mesh: MeshLine) -> None:
+    bend: HermiteSpace
+    start: np.ndarray  # (n_cells,)
+    length: np.ndarray  # (n_cells,)
+    origin: np.ndarray  # (n_cells, 1)
+    vertices: np.ndarray  # (2, n_cells)
+
+    def __init__(self, mesh: Cells) -> None:
         self.bend = HermiteSpace(mesh)
         self.start, self.length, self.origin = self.bend.start, self.bend.length, self.bend.origin
         self.vertices = mesh.t  # (2, n_cells)
@@ -88,7 +95,7 @@ def integrals(space: TimoshenkoSpace, fields: list[Field]) -> tuple[np.ndarray, 
 
 def constrain(
     ends: list[tuple[bool, str | Elastic]], dofs: np.ndarray, n_all: int
-) -> tuple[tuple[csr_matrix, csr_matrix], list[tuple[dict[int, float], int, Elastic]]]:
+) -> tuple[tuple[Sparse, Sparse], list[tuple[dict[int, float], int, Elastic]]]:
     """Maps from the unknowns left free to all and back, and the springs.
 
     ``ends`` are pairs of whether the end is the left one, and its support. Each spring comes with the unknowns that
@@ -114,7 +121,7 @@ def constrain(
     return (csr_matrix((values, (rows, columns)), shape=(n_all, len(kept))), project), sprung
 
 
-def springs(sprung: list[tuple[dict[int, float], int, Elastic]], units: np.ndarray, n_all: int) -> csc_matrix:
+def springs(sprung: list[tuple[dict[int, float], int, Elastic]], units: np.ndarray, n_all: int) -> Sparse:
     """Stiffness (n_all, n_all) of elastic supports; ``units`` (2,) turn theirs into those of the frame."""
     total = csc_matrix((n_all, n_all))
     for deflection, turned, kind in sprung:
@@ -125,7 +132,12 @@ def springs(sprung: list[tuple[dict[int, float], int, Elastic]], units: np.ndarr
 
 
 def energy_errors(
-    space: TimoshenkoSpace, fields: list[Field], unknowns: np.ndarray, loads: np.ndarray, forces: list, hinges: list
+    space: TimoshenkoSpace,
+    fields: list[Field],
+    unknowns: np.ndarray,
+    loads: np.ndarray,
+    forces: list[Any],
+    hinges: list[Any],
 ) -> np.ndarray:
     """Error (n,) of the squared energy norm of solutions, from moments and shear forces in equilibrium with the loads.
 

@@ -121,6 +121,13 @@ def strip(points: list[np.ndarray], a: int, b: int, c: int, d: int) -> list[list
 class Rim:
     """The boundary facets while they are being split."""
 
+    facets: list[list[int]]  # vertices of each
+    number: dict[tuple[int, int], int]  # of the facet between two vertices
+    middles: list[np.ndarray]
+    tangents: list[np.ndarray]
+    curvatures: list[np.ndarray]
+    parent: list[int]  # facet of the whole mesh
+
     def __init__(self, mesh: Mesh) -> None:
         self.facets = mesh.facets.tolist()
         self.number = {(a, b): i for i, (a, b) in enumerate(self.facets)}

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import coo_matrix
 
 from .._base import check
+from .._base.untyped import Sparse
 from .section import Elastic
 
 FACET_POINTS = 8  # [-] Gauss points on a boundary facet; exact for products of quintics
@@ -45,7 +46,7 @@ def plate_springs(space: Any, facets: np.ndarray, cells: np.ndarray, springs: np
     return pushed + (across * (turn[:, None] * ds)[..., None]).transpose(0, 2, 1) @ across
 
 
-def beam_springs(dofs: list[tuple[int, int]], held: list[Elastic], frame: Any, n_all: int) -> csr_matrix:
+def beam_springs(dofs: list[tuple[int, int]], held: list[Elastic], frame: Any, n_all: int) -> Sparse:
     """Stiffness (n_all, n_all) of elastic supports, on the deflection and slope at the ends of a beam."""
     numbers = np.array(dofs, int).ravel()
     values = edge_springs(held, frame).ravel()

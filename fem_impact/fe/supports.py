@@ -6,6 +6,8 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.sparse import csr_matrix
 
+from .._base.untyped import Sparse
+
 SMOOTH = 1e-5  # [-] two facets join smoothly if tangents [rad] and curvatures times length differ by less
 RANK = 1e-5  # [-] singular values below this count as zero; directions in the smallest triangles are no more accurate
 SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in scikit-fem's order
@@ -106,7 +108,7 @@ def cells_of_facets(facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, 
     return found // 3, found % 3
 
 
-def constrain(rim: Rim, cells: np.ndarray, dofs: np.ndarray, n_all: int) -> tuple[csr_matrix, csr_matrix, np.ndarray]:
+def constrain(rim: Rim, cells: np.ndarray, dofs: np.ndarray, n_all: int) -> tuple[Sparse, Sparse, np.ndarray]:
     """Remove from the Argyris unknowns those that the supports fix.
 
     Each boundary vertex keeps the null space of the conditions of its two facets. At a corner, at a change of support

@@ -12,12 +12,21 @@ as unknowns, the shear energy is a difference of nearly equal numbers, (L/h)^2 t
 no digit is lost at h/L = 1e-6 (``studies/thick_elements.py`` compares four elements). The price is that w has no kinks:
 where the thickness jumps, w of a thick plate has one, and the frequencies converge slowly.
 
+In triangles much smaller than the thickness, as around a re-entrant corner, bending would in turn be the difference of
+grad w and gamma. There the nodes of gamma hold beta instead (`MindlinSpace.turned`): the same functions, as grad w of
+the quintic w is quartic itself.
+
 Edges, on the true curve (n outward, t along it):
 
     free         nothing
     soft hinged  w = 0
     hinged       w = 0 and beta_t = 0, as gamma_t = 0: a "hard" hinge; for polygons Wang's relation holds
     clamped      w = 0 and beta = 0, as gamma_t = 0, gamma_n = w_n
+
+Wang's relation is that of convex polygons. The modes of a hinged membrane that swing at a re-entrant corner as
+r**(pi / angle) have slopes of infinite bending energy, so they are no modes of either plate: the first frequency of an
+L-shaped plate is 33 % above that of Kirchhoff's plate by the membrane, and 13 % below Wang's at h = a / 5, where a is
+its shorter side (Sapondzhyan's paradox). Modes that are at rest there follow the relation.
 
 Free and soft edges let beta_t relax within a layer of width h / sqrt(12 kappa), about h/3. `towards_edges` makes the
 triangles shrink to a thickness there. If that takes too many, `layer_energy` tells what an unresolved layer misses: the
@@ -45,13 +54,14 @@ import numpy as np
 from scipy.sparse import block_diag, coo_matrix, csc_matrix, csr_matrix
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
-from skfem import Dofs, ElementTriP4, MeshTri
+from skfem import Dofs, ElementTriP4
 from skfem.quadrature import get_quadrature
 
 from .._base import check
+from .._base.untyped import Cells, Sparse
 from ..mesh.meshes import Mesh
 from . import splitting, supports
-from .elements import ArgyrisSpace, Bent, inverses
+from .elements import ArgyrisSpace, Bent, Triangles, inverses
 from .section import SOFT, Plate, evaluate
 from .springs import at_facets
 
@@ -65,6 +75,7 @@ LOOSE = "free", SOFT  # supports with a layer
 LAYER = 2.0  # [-] size of triangles in this layer over the thickness h: errors of some 2e-4 h / L of a frequency
 MOST_LAYER = 120.0  # [-] most triangles along these edges; a plate that needs more keeps larger ones
 SEEN, UNSEEN = 4.0, 9.0  # [-] sides over the thickness below which they resolve the layer, above which they miss it
+SMALL = 0.1  # [-] longest side over the thickness below which nodes hold rotations: either choice loses two digits here
 EVEN = 1.5  # [-] longest side of a triangle over the size asked for
 
 
@@ -80,12 +91,42 @@ def reference(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 class MindlinSpace:
     """Shape functions of one mesh: 21 of the deflection, then 15 for each component of the shear strain."""
 
-    element = ElementTriP4
+    element: type[Any] = ElementTriP4
+    flat: ArgyrisSpace
+    origin: np.ndarray  # these and the next as in `Triangles`
+    jacobian: np.ndarray
+    inverse: np.ndarray
+    vertices: np.ndarray
+    bent: Bent | None
+    inner: Triangles
 
-    def __init__(self, mesh: MeshTri, bent: Bent | None = None) -> None:
+    def __init__(self, mesh: Cells, bent: Bent | None = None) -> None:
         self.flat = ArgyrisSpace(mesh, bent)
         self.origin, self.jacobian, self.inverse = self.flat.origin, self.flat.jacobian, self.flat.inverse
         self.vertices, self.bent, self.inner = self.flat.vertices, bent, self.flat.inner
+        self.turned = np.zeros((len(self.vertices), SHEAR), bool)  # nodes that hold rotations, not shear strains
+
+    def turn(self, mesh: Cells, thickness: np.ndarray) -> None:
+        """Let the nodes of straight triangles much smaller than their ``thickness`` (n_cells,) hold rotations."""
+        corner = mesh.p.T[self.vertices]
+        longest = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1)
+        bends = np.zeros(len(longest), bool)
+        if self.bent is not None:
+            bends[self.bent.cells] = True
+        dofs = Dofs(mesh, ElementTriP4()).element_dofs.T  # (n_cells, 15)
+        small = np.setdiff1d(dofs[(longest < SMALL * thickness) & ~bends], dofs[bends])
+        self.turned = np.isin(dofs, small)
+
+    def kept(self, cells: np.ndarray, *shapes: np.ndarray) -> list[np.ndarray]:
+        """Part of grad w in the rotations of cells (n,): at nodes that hold shear strains; (.., n_q, 2, 21) each.
+
+        ``shapes`` (n, .., n_q, 15) are the quartic functions or their derivatives. For straight triangles.
+        """
+        node = ElementTriP4.doflocs - 1.0 / 3.0
+        x = self.origin[cells][:, None] + node @ self.jacobian[cells].transpose(0, 2, 1)
+        slope = self.flat.functions(cells, x, (1,))[0].transpose(0, 2, 1, 3)  # (n, 15, 2, 21)
+        slope = slope * ~self.turned[cells][:, :, None, None]
+        return [np.einsum("n...k,nkis->n...is", shape, slope, optimize=True) for shape in shapes]
 
     def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
         """The same as `ArgyrisSpace.functions`, with zeros for the shear strain, which moves no point."""
@@ -98,7 +139,11 @@ class MindlinSpace:
 
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 3) of the deflections 1, x and y, which have no shear strain."""
-        return self.flat.linear(element_dofs, n_all)
+        found = self.flat.linear(element_dofs, n_all)
+        for i in range(2):
+            rows = element_dofs[21 + i * SHEAR : 21 + (i + 1) * SHEAR].T[self.turned]
+            found[rows, 1 + i] = 1.0
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,17 +165,28 @@ def strains(space: MindlinSpace, fields: Fields, cells: np.ndarray) -> tuple[np.
     value, slope, hessian = space.flat.functions(cells, fields.x[cells], (0, 1, 2))
     shape, gradient = reference(X)
     n, n_q = value.shape[:2]
-    gradient = np.einsum("eqji,jqk->eqik", inverses(space, X)[cells], gradient)  # of gamma's shapes in x and y
+    gradient = np.einsum("eqji,jqk->eiqk", inverses(space, X)[cells], gradient)  # of gamma's shapes in x and y
     deflection, rotation = np.zeros((n, n_q, LOCAL)), np.zeros((n, n_q, 2, LOCAL))
     shear, curvature = np.zeros((n, n_q, 2, LOCAL)), np.zeros((n, n_q, 3, LOCAL))
     first, second = slice(21, 21 + SHEAR), slice(21 + SHEAR, LOCAL)
     deflection[..., :21] = value
-    shear[:, :, 0, first] = shear[:, :, 1, second] = shape
+    sign = np.where(space.turned[cells], -1.0, 1.0)[:, None]  # of the shear strains in the unknowns
+    shear[:, :, 0, first] = shear[:, :, 1, second] = sign * shape
     rotation[..., :21] = slope.transpose(0, 2, 1, 3)
     rotation -= shear
+    own = gradient * sign[:, None]
     curvature[..., :21] = hessian[:, [0, 2, 1]].transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]
-    curvature[:, :, 0, first] = curvature[:, :, 2, second] = -gradient[:, :, 0]
-    curvature[:, :, 1, second] = curvature[:, :, 2, first] = -gradient[:, :, 1]
+    curvature[:, :, 0, first] = curvature[:, :, 2, second] = -own[:, 0]
+    curvature[:, :, 1, second] = curvature[:, :, 2, first] = -own[:, 1]
+    small = np.flatnonzero(space.turned[cells].any(axis=1))
+    if small.size:
+        values = np.broadcast_to(shape, (len(small), *shape.shape))
+        tilt, bend = space.kept(cells[small], values, gradient[small])
+        shear[small, ..., :21] = rotation[small, ..., :21] - tilt
+        rotation[small, ..., :21] = tilt
+        curvature[small, ..., :21] = np.stack(
+            [bend[:, 0, :, 0], bend[:, 1, :, 1], bend[:, 0, :, 1] + bend[:, 1, :, 0]], axis=2
+        )
     return deflection, rotation, shear, curvature
 
 
@@ -164,7 +220,7 @@ class ThickStrain:
     """What `assembly.Strain` is for a thin plate: the strain energy from curvatures and shear strains."""
 
     fields: Fields
-    springs: csc_matrix  # (n_all, n_all) stiffness of elastic supports and tension
+    springs: Sparse  # (n_all, n_all) stiffness of elastic supports and tension
 
     def __repr__(self) -> str:
         return check.brief(self)
@@ -195,8 +251,8 @@ def held_as_thin(kind: str) -> str:
 
 
 def constrain(
-    space: MindlinSpace, rim: supports.Rim, kinds: list[str], mesh: MeshTri, flat: tuple[np.ndarray, int]
-) -> tuple[csr_matrix, csr_matrix, np.ndarray]:
+    space: MindlinSpace, rim: supports.Rim, kinds: list[str], mesh: Cells, flat: tuple[np.ndarray, int]
+) -> tuple[Sparse, Sparse, np.ndarray]:
     """Remove the unknowns that the supports fix; the same results as `supports.constrain`.
 
     Parameters
@@ -229,6 +285,8 @@ def constrain(
     for node, facets in at.items():
         clamped = next((place for place in facets if kinds[place[0]] == "clamped"), None)
         if clamped is not None:
+            if space.turned[cells[clamped[0]], local[clamped]]:
+                continue
             n = normal[clamped]
             row = n @ slope[clamped]  # (21,)
             mine = dofs[:21, cells[clamped[0]]]
@@ -294,7 +352,7 @@ def _nodes(
     return local, x, normal / np.linalg.norm(normal, axis=2)[..., None]
 
 
-def spread(space: MindlinSpace, points: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, csr_matrix]:
+def spread(space: MindlinSpace, points: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, Sparse]:
     """Places (n, 2) over which forces at points (n_points, 2) are spread, and their weights (n_points, n).
 
     Each disk, of its ``radius`` (n_points,), is cut at the edge of the body. A weight linear in the place moves its
@@ -385,7 +443,12 @@ def edge_springs(space: MindlinSpace, facets: np.ndarray, cells: np.ndarray, spr
     ds = np.linalg.norm(normal, axis=2)
     value, slope = space.functions(cells, x, (0, 1))
     shape = reference(area[..., 1:].reshape(-1, 2).T)[0].reshape(*x.shape[:2], SHEAR)
-    slope[:, 0, :, 21 : 21 + SHEAR] = slope[:, 1, :, 21 + SHEAR :] = -shape
+    slope[:, 0, :, 21 : 21 + SHEAR] = slope[:, 1, :, 21 + SHEAR :] = (
+        np.where(space.turned[cells], 1.0, -1.0)[:, None] * shape
+    )
+    small = np.flatnonzero(space.turned[cells].any(axis=1))
+    if small.size:
+        slope[small, ..., :21] = space.kept(cells[small], shape[small])[0].transpose(0, 2, 1, 3)
     turned = np.einsum("nqi,niqk->nqk", normal / ds[..., None], slope)
     push, turn = springs.T
     pushed = (value * (push[:, None] * ds)[..., None]).transpose(0, 2, 1) @ value

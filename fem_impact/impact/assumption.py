@@ -1,7 +1,7 @@
 """What a blow assumes of the model itself, as numbers: whether plates are thin, deflections small, air still."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -91,9 +91,12 @@ def _worst(effect: Mapping[str, float | None]) -> tuple[str, float]:
     return QUANTITY_NAMES.get(name, name), known[name]
 
 
-def unexamined(quantities: Sequence[str]) -> tuple[Assumption, ...]:
+def unexamined(
+    quantities: Iterable[str],
+    why: str = "blows of several bodies are not examined",
+    remedy: str = "examine each pair by `fi.strike`",
+) -> tuple[Assumption, ...]:
     """Every assumption as not known, for a blow that nobody examined."""
-    why, remedy = "blows of several bodies are not examined", "examine each pair by `fi.strike`"
     effect = dict.fromkeys(quantities)
     return tuple(Assumption(name, None, None, effect, tuple(quantities), remedy, "", why) for name in ALL)
 

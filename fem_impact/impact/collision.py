@@ -13,7 +13,7 @@ from .._base.check import SimulationError
 from ..modes.modal import Modes, left_out
 from ..modes.stretching import Stretching, stretch
 from . import accuracy, force_spectrum, promise
-from .compiled import build, record
+from .compiled import build, layout, record
 from .compiled.collocation import run_collocation
 from .compiled.energy import run_energy
 from .compiled.law import FELT
@@ -126,7 +126,11 @@ class Options:
     quantities: Mapping[str, float | None]  # that must meet the tolerance, each with its band [Hz]
 
     @classmethod
-    def checked(cls, tolerance, duration, max_impacts, scheme, dt, quantity) -> "Options":
+    def checked(
+        cls, tolerance: float, duration: float | None, max_impacts: int | None, scheme: str | None, dt: float | None,
+        quantity: Any,
+    ) -> "Options":  # fmt: skip
+        """The options, each of them checked."""
         return cls(
             check.tolerance(tolerance),
             np.inf if duration is None else check.positive("duration", duration, "s"),
@@ -284,8 +288,10 @@ def collide(
 
 
 def met(
-    bodies, contacts, *, speeds=None, states=None, tolerance=TOLERANCE, quantity=None, residual=True, duration=None,
-    max_impacts=None, scheme=None, dt=None, forces=None, start=None, pushes=(),
+    bodies: Sequence[Modes], contacts: Sequence[Touch], *, speeds: Any = None, states: Any = None,
+    tolerance: float = TOLERANCE, quantity: Any = None, residual: bool = True, duration: float | None = None,
+    max_impacts: int | None = None, scheme: str | None = None, dt: float | None = None, forces: Any = None,
+    start: State | Response | None = None, pushes: Sequence[np.ndarray] = (),
 ) -> Response:  # fmt: skip
     """`collide` without a word on its tolerance; ``pushes`` are constant modal forces on the first bodies."""
     options = Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
@@ -477,7 +483,7 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
             continue
         first, sign = part.touched[0]
         if len(part.touched) == 1 and not rated[first]:
-            law[first, 3] += part.rest[0, 0]
+            law[first, layout.COMPLIANCE] += part.rest[0, 0]
             offset[first] += sign * part.rest[0, 0] * part.force
             continue
         above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], bool(rated.any()))
@@ -499,7 +505,7 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
 
 def _rated(law: np.ndarray) -> np.ndarray:
     """Whether the force of each contact depends on more than the approach itself, (n_contacts,)."""
-    return (law[:, 2] > 0.0) | (law[:, 4] == FELT)
+    return (law[:, layout.LOSS] > 0.0) | (law[:, layout.KIND] == FELT)
 
 
 def _poorer(part: _Part, modes: Modes) -> _Part:
@@ -526,10 +532,10 @@ def _may_touch(history: History, other: History, duration: float) -> bool:
     """Whether two descriptions of a blow differ so much in some flight that one more impact cannot be ruled out.
 
     Wherever the open contacts of the first come nearest, the gap must exceed the largest difference of the two motions
-    since the first impact. Looks ahead until all modes together cannot bridge the gap. ``duration`` [s] is that of one
-    contact.
+    since both ended the first impact. Looks ahead until all modes together cannot bridge the gap. ``duration`` [s] is
+    that of one contact.
     """
-    if history.bias.any() or history.status != other.status or not len(history.contacts):
+    if history.bias.any() or history.status != other.status or not len(history.contacts) or not len(other.contacts):
         return False
     rigid, shape = history.omega == 0.0, history.shape
     size = np.hypot(history.end_q, history.end_p / np.where(rigid, 1.0, history.omega))
@@ -539,11 +545,12 @@ def _may_touch(history: History, other: History, duration: float) -> bool:
     end = history.end_time
     if history.status == record.FINISHED:
         end += max(0.0, float(ahead.max(initial=0.0)))
-    start = float(history.contacts[:, 1].min())
+    start = max(float(found.contacts[:, 1].min()) for found in (history, other))
+    end = max(start, end)
     times = np.linspace(start, end, int(min(LOOKS[1], LOOKS[0] * (end - start) / duration)) + 2)
     approach, doubt = history.motion(times), np.zeros((len(times), 1))
     doubt[:, 0] = np.maximum.accumulate(np.abs(approach - other.motion(times)).max(axis=1))
-    row = np.searchsorted(history.steps[:, 0], times, side="right") - 1
+    row = np.searchsorted(history.steps[:, layout.START], times, side="right") - 1
     closed = history.pressed[row] & (times < history.end_time)[:, None]
     nearest = np.zeros(approach.shape, bool)
     nearest[1:-1] = (approach[1:-1] >= approach[:-2]) & (approach[1:-1] >= approach[2:])
@@ -591,7 +598,7 @@ def _pace(system: _System, held: np.ndarray | bool = False) -> tuple[float, floa
     beyond = np.concatenate([omega[last][1:], [np.inf]])
     shortest, fastest = np.inf, 0.0
     for i, law in enumerate(system.law):
-        k, exponent, compliance = law[0], law[1], law[3]
+        k, exponent, compliance = law[layout.STIFFNESS], law[layout.EXPONENT], law[layout.COMPLIANCE]
         mobile = np.cumsum(system.shape[i, order] ** 2)[last]  # [1/kg] sum over the modes up to each
         above, mobile = beyond[mobile > 0.0], mobile[mobile > 0.0]
         if not mobile.size:
@@ -689,12 +696,13 @@ def _controlled(
         if scheme == "collocation":
             raise ValueError("scheme collocation knows no stretching; use A4")
         scheme = scheme or "A4"
-    scheme = scheme or _scheme_for(tolerance, float(system.law[:, 1].min()))
-    if scheme == "collocation" and (system.law[:, 1] < 1.0).any():
-        raise ValueError(f"scheme collocation needs exponents of at least 1, got {system.law[:, 1].min():g}; use A4")
+    scheme = scheme or _scheme_for(tolerance, float(system.law[:, layout.EXPONENT].min()))
+    if scheme == "collocation" and (system.law[:, layout.EXPONENT] < 1.0).any():
+        least = system.law[:, layout.EXPONENT].min()
+        raise ValueError(f"scheme collocation needs exponents of at least 1, got {least:g}; use A4")
     over = RICHARDSON[scheme]
     if scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
-        over = over[0], over[1] / (1.0 + 2.0 * pace[1] * system.law[:, 2].max())
+        over = over[0], over[1] / (1.0 + 2.0 * pace[1] * system.law[:, layout.LOSS].max())
     shortest = min(pace[0], horizon)  # or the horizon could cut both runs to one step, and they would always agree
     if dt is not None:
         dt = min(dt, 0.5 * horizon)
@@ -726,7 +734,7 @@ def _controlled(
             break
     if met is not None:
         return met
-    if free and scheme == "A4" and (system.law[:, 1] >= 1.0).all() and system.stretched is None:
+    if free and scheme == "A4" and (system.law[:, layout.EXPONENT] >= 1.0).all() and system.stretched is None:
         return _controlled(system, "collocation", dt, tolerance, quantities, pace, horizon, n_max, True)
     hint, enough = "", min(REACHED * best, 1.0)
     advice = f"raise tolerance to {float(f'{enough:.1e}'):g}" if free else "leave out scheme"
@@ -760,7 +768,7 @@ def _longest_lossy(system: _System, pace: tuple[float, float], tolerance: float)
     fastest = np.argsort(-system.omega, kind="stable")[: np.count_nonzero(system.omega)]
     order = fastest[system.zeta[fastest] < RINGING]
     omega = system.omega[order]
-    for shape, loss in zip(system.shape, system.law[:, 2]):
+    for shape, loss in zip(system.shape, system.law[:, layout.LOSS]):
         number = loss * pace[1]
         if number > 0.0 and len(omega):
             stiffness = (1.0 + number) * (np.pi / pace[0]) ** 2 / max(float(shape[slow] @ shape[slow]), 1e-300)
@@ -890,7 +898,7 @@ def _force_missed(history: History) -> float:
         return 0.0
     worst, peak, part = 0.0, history.contacts[:, 2].max(), np.array([0.0, 0.5, 1.0])
     mean = history.impulses / np.maximum(history.steps[:, 1:2], np.finfo(float).tiny)
-    for i, loss in enumerate(history.law[:, 2]):
+    for i, loss in enumerate(history.law[:, layout.LOSS]):
         closed = np.flatnonzero(history.pressed[:, i])
         force = history.force(closed, i, part)  # (n_closed, 3)
         near = force.max(axis=1, initial=0.0) > NEAR_PEAK[bool(loss)] * peak

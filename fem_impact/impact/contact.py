@@ -9,6 +9,7 @@ from scipy.special import gamma
 
 from .._base import check
 from .compiled.law import FELT, LAYERS, PLASTIC, POWER
+from .compiled.layout import DEPTH, EXPONENT, FIRST_YIELD, HARD, HARD_EXPONENT, KIND, RELAXATION, SHARE, STIFFNESS
 
 LOWEST_EXPONENT, HIGHEST_EXPONENT = 0.5, 100.0  # [-] limits: below, no longer a spring; above, a wall
 
@@ -65,7 +66,7 @@ class Contact:
                 f"{' and '.join(kinds)} cannot be given together: a contact has a loss factor, yields or is felt, and "
                 "a hard layer goes with a loss factor only"
             )
-        if (self.yield_approach or self.hysteresis) and self.exponent < 1.0:
+        if self.remembers and self.exponent < 1.0:
             raise ValueError(f"exponent must be at least 1 for a contact that yields or is felt, got {self.exponent:g}")
         if self.hysteresis and not self.relaxation:
             raise ValueError("relaxation must be positive for felt with hysteresis, got 0 s")
@@ -279,7 +280,12 @@ class Contact:
     @property
     def lossy(self) -> bool:
         """Whether the contact takes energy."""
-        return bool(self.loss or self.yield_approach or self.hysteresis)
+        return bool(self.loss or self.remembers)
+
+    @property
+    def remembers(self) -> bool:
+        """Whether the force depends on what was before: the contact yields, or is felt."""
+        return bool(self.yield_approach or self.hysteresis)
 
     @property
     def rated(self) -> bool:
@@ -371,31 +377,32 @@ def acting_stiffness(law: Any, mobility: Any, speed: Any) -> np.ndarray:
     Of masses 1 / ``mobility`` [1/kg] on a rigid wall; mobility and speed broadcast. The power law stores the same
     energy at the same deepest approach; felt has relaxed for about the contact time.
     """
-    k, a, kind = law[0], law[1], law[4]
+    k, a, kind = law[STIFFNESS], law[EXPONENT], law[KIND]
     whole = np.full(np.broadcast_shapes(np.shape(mobility), np.shape(speed)), k, float)
     if kind == POWER:
         return whole
     if kind == FELT:
         for _ in range(4):
             time = wall_time(whole, a, mobility, speed)
-            whole = k * np.maximum(1.0 - law[5] * time / (time + law[6]), LEAST_FELT)
+            whole = k * np.maximum(1.0 - law[SHARE] * time / (time + law[RELAXATION]), LEAST_FELT)
         return whole
     energy = 0.5 * np.asarray(speed) ** 2 / np.asarray(mobility)  # [J]
     deepest = ((a + 1.0) * energy / k) ** (1.0 / (a + 1.0))  # [m] by the power law alone
     if kind == PLASTIC:
-        first = law[5]
+        first = law[FIRST_YIELD]
         force, steep = k * first**a, a * k * first ** (a - 1.0)
         further = np.maximum(energy - force * first / (a + 1.0), 0.0)
         beyond = first + (np.sqrt(force * force + 2.0 * steep * further) - force) / steep
         deepest = np.where(deepest > first, beyond, deepest)
     else:
         low, high = np.zeros_like(deepest), deepest
+        hard, b = law[HARD], law[HARD_EXPONENT]
         for _ in range(60):
             middle = 0.5 * (low + high)
-            over = np.maximum(middle - law[5], 0.0)
-            stored = k * middle ** (a + 1.0) / (a + 1.0) + law[6] * over ** (law[7] + 1.0) / (law[7] + 1.0)
+            over = np.maximum(middle - law[DEPTH], 0.0)
+            stored = k * middle ** (a + 1.0) / (a + 1.0) + hard * over ** (b + 1.0) / (b + 1.0)
             low, high = np.where(stored < energy, middle, low), np.where(stored < energy, high, middle)
-        deepest = np.where(deepest > law[5], high, deepest)
+        deepest = np.where(deepest > law[DEPTH], high, deepest)
     return np.where(deepest > 0.0, (a + 1.0) * energy / np.maximum(deepest, 1e-300) ** (a + 1.0), k)
 
 

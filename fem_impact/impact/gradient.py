@@ -12,9 +12,9 @@ from .._base import check, markup
 from .._base.check import SimulationError
 from ..fe.variation import SectionChange
 from .compiled import record
-from .compiled.law import KIND
+from .compiled.layout import KIND
 from .parameters import POSSIBLE, UNITS, Parameters
-from .sensitivity import Sensitivity
+from .sensitivity import ENOUGH, Sensitivity, together
 
 if TYPE_CHECKING:
     from .response import History, Response
@@ -31,9 +31,11 @@ GRAZE = 1e-3  # [-] of the deepest approach: a touch or gap below it may come or
 TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a small change may make the other the largest
 LOOKS = 16.0, 20_000  # [-] times per contact at which a flight is searched for near misses, and their largest number
 WITHIN = np.linspace(0.0, 1.0, 9)  # [-] fractions of a piece of time at which its cubic is looked at
-ROUGH = "peak_time", "spectral_centroid", "spectral_level"  # halving the steps brings these no sure gain
+# halving the steps brings these no sure gain
+ROUGH = "contact_time", "peak_time", "spectral_centroid", "spectral_level"
 # [-] difference of two runs over the error of the finer one, for schemes A, A4 and collocation, of all others
 RICHARDSON = {"A": 3.0, "A4": 3.0, "collocation": 1.0}
+INSTEAD = "take differences of runs with the number changed, told to a smaller tolerance"
 LEAST = 1e-9  # [-] of a derivative: what is left of differences of shapes, and two runs may agree by chance
 
 
@@ -121,12 +123,12 @@ def gradients(
     several = (quantity,) if isinstance(quantity, str) else check.several("quantity", quantity, str)
     wanted = [_asked(item) for item in several]
     if hit.striker is None or len(hit.bodies) != 2:
-        raise ValueError("gradient needs a blow of `strike`, with one striker and one target")
+        raise ValueError(f"gradient needs a blow of `strike`, with one striker and one target; {INSTEAD}")
     if hit.history.law.shape[1] > KIND and hit.history.law[0, KIND] not in POSSIBLE:
-        raise SimulationError("no gradient: the contact yields or remembers, and its past is not followed yet")
+        raise SimulationError(f"no gradient: the contact yields or remembers, and its past is not followed; {INSTEAD}")
     if hit.history.stretched is not None or hit.striker.hand is not None:
         why = "the target stretches" if hit.history.stretched is not None else "a hand holds the striker"
-        raise SimulationError(f"no gradient: {why}, and what that changes is not followed yet")
+        raise SimulationError(f"no gradient: {why}, and what that changes is not followed; {INSTEAD}")
     if not hit.n_impacts:
         raise SimulationError("no gradient: the bodies never touched; check gap and speed")
     parameters = Parameters(hit, {name: change for name, (_, change) in sections.items()})
@@ -139,14 +141,15 @@ def gradients(
             "smaller tolerance and no dt, or max_impacts"
         )
     peak = any(name.startswith("peak") for name, _ in wanted)
-    fine = Sensitivity.of(hit.history, change, peak)
+    joined = 1 if coarse is None else together(coarse)
+    fine = Sensitivity.of(hit.history, change, peak, joined)
     _check_grazing(fine)
-    rough = None if coarse is None else Sensitivity.of(coarse, change, peak)
+    rough = None if coarse is None else Sensitivity.of(coarse, change, peak, joined)
     numbers = np.array([sections[name][0] if name in sections else parameters.values[name] for name in names])
     found = {}
+    if peak:
+        _check_tie(hit.history)
     for name, band in wanted:
-        if name.startswith("peak"):
-            _check_tie(hit.history)
         if name == "modal_energy" and (hit.rings is not None or hit.ringing is not None):
             raise SimulationError(
                 "no gradient of modal_energy: the modes that ring did not tell the blow; strike modes, of find_modes"
@@ -157,6 +160,8 @@ def gradients(
         else:
             apart = np.abs(slopes - _slopes(hit, rough, names, name, band)[1])
             gained = 1.0 if name in ROUGH else RICHARDSON[hit.scheme]
+            if name == "peak_time":
+                apart = np.maximum(apart, fine.peak_doubt)
             error = apart / gained + LEAST * np.abs(slopes)
         label = name if band is None else f"{name}={band:g}"
         found[label] = Gradient(label, value, names, numbers, slopes, error)
@@ -209,13 +214,18 @@ def _slopes(
         return energy, found.energies(part).T
     if name == "spectral_centroid":
         assert band is not None
-        frequencies, spectrum = hit.band_spectrum(band)
+        frequencies = hit._band(band)
+        if found.history is hit.history:
+            spectrum = hit.spectrum(frequencies)
+        else:  # the error of the coarser run's own spectrum counts, too
+            spectrum = found.even_spectrum(len(frequencies), frequencies[1])
         size = np.abs(spectrum)
-        unit = np.conj(spectrum) / np.where(size > 0.0, size, 1.0)
-        change = np.real(unit[:, None] * found.spectrum(frequencies))  # (n_frequencies, n)
         whole = np.trapezoid(size, frequencies)
         centre = float(np.trapezoid(frequencies * size, frequencies) / whole)
-        return centre, np.trapezoid((frequencies - centre)[:, None] * change, frequencies, axis=0) / whole
+        unit = np.conj(spectrum) / np.where(size > 0.0, size, 1.0)
+        share = np.gradient(frequencies)  # of the trapezoidal rule
+        share[[0, -1]] *= 0.5
+        return centre, found.spectral_sum(share * (frequencies - centre) / whole * unit, frequencies[1])
     if name == "spectral_level":
         assert band is not None
         ends = np.array([0.0, band])
@@ -237,7 +247,8 @@ def level_of(spectrum: np.ndarray) -> float:
 def _check_tie(history: "History") -> None:
     """Raise SimulationError where two maxima of the force are so alike that either may be the largest."""
     rows = np.flatnonzero(history.pressed[:, 0])
-    force = history.force(rows, 0, np.arange(16) / 16.0).ravel()
+    looks = int(np.clip(ENOUGH // len(rows), 4, 16))
+    force = history.force(rows, 0, np.arange(looks) / looks).ravel()
     before, after = np.append(0.0, force[:-1]), np.append(force[1:], 0.0)
     tops = np.sort(force[(force > before) & (force >= after)])[::-1]
     if len(tops) > 1 and tops[0] - tops[1] < TIE * tops[0]:

@@ -1,6 +1,6 @@
 """The numbers of a blow that a gradient can be taken in, and what each changes in the modes and contact of the run."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,8 @@ from .._base import check
 from ..fe.section import Beam, Elastic, Plate
 from ..fe.variation import DIFFERENCES, SectionChange
 from ..modes import varied
-from ..modes.modal import Modes, left_out
+from ..modes.modal import Modes
+from .compiled import layout
 from .compiled.law import LAYERS, POWER
 from .compiled.tangents import Change
 from .sensitivity import no_change
@@ -32,7 +33,8 @@ PLATE = {"section.thickness": (1.0, 1.0), "material.E": (0.5, 0.0), "material.rh
 BEAM = {"material.E": (0.5, 0.0), "material.rho": (-0.5, 1.0)}
 BAR = {"section.height": (1.0, 1.0), "section.width": (0.0, 1.0), **BEAM}
 ROD = {"section.diameter": (1.0, 2.0), **BEAM}
-SCALE = {Plate: (-2.0, 2.0), Beam: (-2.0, 1.0)}  # all lengths along the body, at the same thickness
+# all lengths along the body, at the same thickness
+SCALE: dict[type[object], tuple[float, float]] = {Plate: (-2.0, 2.0), Beam: (-2.0, 1.0)}
 SHIFT = 1e-3  # [rad] of the shortest wave kept: distance of the points whose shapes give the slope of each shape
 STATIC_SHIFT = 1e-3  # [-] of the body: the same for the static compliance, which has no short waves
 
@@ -85,7 +87,7 @@ class Parameters:
         barred, hit = {}, self.hit
         if hit.contact.gap == 0.0:
             barred["contact.gap"] = "the bodies touch at the start, and no gap is unlike a small one; give a gap"
-        if hit.contact.loss == 0.0 and hit.history.law[0, 3] > 0.0:
+        if hit.contact.loss == 0.0 and hit.history.law[0, layout.COMPLIANCE] > 0.0:
             barred["contact.loss"] = (
                 "without loss the modes left out act as a spring in series, with loss they cannot; give the contact a "
                 "small loss"
@@ -94,14 +96,14 @@ class Parameters:
             barred["strike.speed"] = "the speed is zero"
         return barred
 
-    @property
+    @cached_property
     def why_no_target(self) -> str:
         """Why numbers of the target have no gradient; empty if they have."""
         if self.hit.error.idealisation > 0.0:
             return "the target is treated as rigid or infinite; strike its modes, with target = 'modal'"
         return ""
 
-    @property
+    @cached_property
     def why_still(self) -> str:
         """Why the strike point has no gradient; empty if it has."""
         target = self.hit.bodies[-1]
@@ -109,7 +111,7 @@ class Parameters:
             return self.why_no_target
         return "" if target.continuous else "the shapes of the target are known at single points only"
 
-    @property
+    @cached_property
     def why_no_section(self) -> str:
         """Why numbers of section and material have no gradient; empty if they have."""
         target = self.hit.bodies[-1]
@@ -167,11 +169,16 @@ class Parameters:
     def change(self, names: tuple[str, ...]) -> Change:
         """What a unit of each number changes in the run."""
         found = no_change(self.hit.history, len(names))
+        axes = {}
         for i, name in enumerate(names):
             if name in self.sections:
                 self._vary(found, i, self.sections[name])
+            elif name in ("strike.x", "strike.y"):
+                axes[i] = "xy".index(name[-1])
             else:
                 self._enter(found, i, name)
+        if axes:
+            self._shift(found, axes)
         return found
 
     def _enter(self, found: Change, i: int, name: str) -> None:
@@ -185,8 +192,6 @@ class Parameters:
             striker = self.hit.striker
             assert striker is not None
             found.start_p[i, self._bodies[0]] = striker.motion  # the target may move already, whatever that speed
-        elif home == "strike":
-            self._shift(found, i, "xy".index(part))
         elif part == "damping_ratio":
             body = self._bodies[home == "target"]
             found.zeta[i, body] = self.hit.history.omega[body] > 0.0
@@ -214,8 +219,8 @@ class Parameters:
         if dips[0] is not None and hit.striker is not None:
             found[0] = float(hit.striker.left_out[0][0, 0])
         if dips[1] is not None and hit.at is not None:
-            target, place = hit.bodies[1], hit.at[None]
-            found[1] = float(left_out(target, place, target.shapes.at(place))[0][0, 0])
+            h, spring = hit.history, len(hit.history.omega) == self._bodies[1].stop
+            found[1] = h.law[0, layout.COMPLIANCE] - found[0] if spring else (h.shape[0, -1] / h.omega[-1]) ** 2
         return found[0], found[1]
 
     def _extra(self, body: int) -> int | None:
@@ -231,7 +236,7 @@ class Parameters:
         if extra is not None:
             found.shape[i, extra] += 0.5 * change / self._rest[body] * h.shape[0, extra]
         elif self._rest[body]:
-            found.law[i, 3] += change
+            found.law[i, layout.COMPLIANCE] += change
             dip = self.hit.dips[body]
             assert dip is not None
             found.offset[i] += dip.touched[0][1] * dip.force * change
@@ -271,25 +276,27 @@ class Parameters:
             carried = 2.0 * row / omega**2 @ (seen.shape[flexible] - row * seen.omega[flexible] / omega)
             self._soften(found, i, 1, seen.compliance - float(carried))
 
-    def _shift(self, found: Change, i: int, axis: int) -> None:
-        """The target struck further along an axis."""
+    def _shift(self, found: Change, axes: Mapping[int, int]) -> None:
+        """The target struck further along an axis, for each parameter its own."""
         hit, target, part = self.hit, self.hit.bodies[1], self._bodies[1]
         assert hit.at is not None
         corners = target.shapes.grid()[0]
         span = float(np.ptp(corners, axis=0).max())
         waves = np.pi * float(len(target.omega)) ** (1.0 / target.dimension) / span  # [rad/m] of the shortest wave
-        slope = _slope(target, hit.at, axis, SHIFT / waves, target.shapes.at)
-        force = hit._push
-        found.shape[i, part] = -slope
-        found.bias[i, part] = force * slope
+        slopes = _slopes(target, hit.at, axes.values(), SHIFT / waves, target.shapes.at)
+        flexible = target.omega > 0.0
+        carried = target.shapes.at(hit.at[None])[0, flexible] / target.omega[flexible] ** 2
+        rests = [None] * len(axes)
+        if self._rest[1]:
+            rests = _slopes(target, hit.at, axes.values(), STATIC_SHIFT * span, _softness(target, hit.at))
         striker = hit.striker
         assert striker is not None  # it starts at the surface, which may be displaced
-        found.start_q[i, self._bodies[0]] = float(slope @ hit.history.start_q[part]) * striker.motion
-        if self._rest[1]:
-            whole = _slope(target, hit.at, axis, STATIC_SHIFT * span, _softness(target, hit.at))[0]
-            flexible = target.omega > 0.0
-            carried = target.shapes.at(hit.at[None])[0, flexible] / target.omega[flexible] ** 2
-            self._soften(found, i, 1, float(whole - 2.0 * carried @ slope[flexible]))
+        for i, slope, rest in zip(axes, slopes, rests):
+            found.shape[i, part] = -slope
+            found.bias[i, part] = hit._push * slope
+            found.start_q[i, self._bodies[0]] = float(slope @ hit.history.start_q[part]) * striker.motion
+            if rest is not None:
+                self._soften(found, i, 1, float(rest[0] - 2.0 * carried @ slope[flexible]))
 
 
 def _softness(target: Modes, at: np.ndarray) -> Any:
@@ -297,13 +304,20 @@ def _softness(target: Modes, at: np.ndarray) -> Any:
     return lambda points: 2.0 * target.shapes.deflection(at[None], points)
 
 
-def _slope(target: Modes, at: np.ndarray, axis: int, distance: float, function: Any) -> np.ndarray:
-    """Derivative along an axis of a function of points (n, dimension) that returns (n, m), (m,)."""
+def _slopes(target: Modes, at: np.ndarray, axes: Iterable[int], distance: float, function: Any) -> list[Any]:
+    """Derivatives along axes of a function of points (n, dimension) that returns (n, m), (m,) each."""
+    stencils = [_stencil(target, at, axis, distance) for axis in axes]
+    values = np.split(function(np.vstack([points for points, _ in stencils])), np.cumsum([len(p) for p, _ in stencils]))
+    return [weights @ each / distance for (_, weights), each in zip(stencils, values)]
+
+
+def _stencil(target: Modes, at: np.ndarray, axis: int, distance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, dimension) [m] on the body along an axis, and the weights (n,) of their difference."""
     for multiples, weights in DIFFERENCES:
         points = np.tile(at, (len(multiples), 1))
         points[:, axis] += distance * np.array(multiples)
         if target.shapes.contains(points).all():
-            return np.array(weights) @ function(points) / distance
+            return points, np.array(weights)
     raise check.SimulationError("no gradient in the strike point: the body is too narrow there")
 
 

@@ -113,6 +113,8 @@ def _modes_needed(hit: "Response", body: int, tolerance: float, softer: float = 
     assert dip is not None
     own = np.zeros(len(h.omega), bool)
     own[hit.body_slice(body)] = True
+    if not modes.omega[-1]:
+        return 0.0  # a body that only moves rigidly: nothing tells how close its other modes are
     needed = 0.0
     for point, (i, _) in zip(dip.points, dip.touched):
         law = replace(hit.contacts[i], stiffness=softer * hit.contacts[i].stiffness)

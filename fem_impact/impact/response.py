@@ -15,8 +15,9 @@ from ..modes.modal import Modes, SampledShapes, at_rest
 from ..modes.stretching import stretch
 from . import assumption, datasets, force_spectrum, gradient, promise
 from .assumption import Assumption
-from .compiled import law, propagation, record
+from .compiled import law, layout, propagation, record
 from .contact import Contact
+from .free_motion import swing
 from .quantities import USUAL, words
 from .state import State
 from .stretched import Stretched
@@ -26,6 +27,7 @@ CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more 
 TOUCH = 1e-12  # [-] of the largest approach rate: bodies that touch and approach more slowly count as pressed
 SAME = 1e-2  # [-] two descriptions of one body may differ by this in mass and compliance
 PEAK_LOOKS = 16  # [-] samples per step in the search for the peak force; misses (pi/11/16)**2/8 before the parabola
+ENDED = 1e-9  # [-] of a run: nearer to its end, the motion is that of the end state; test_free_motion.py
 # [-] largest difference of descriptions up to which Ritz vectors tell a motion: as much as modes err that are found
 # as far as the force reaches
 MOVED = {"displacement": 1e-2, "velocity": 3e-2}
@@ -118,16 +120,16 @@ class History:
     @property
     def n_coefficients(self) -> int:
         """Number of coefficients of each step's force polynomial, per contact."""
-        return (self.steps.shape[1] - 3) // self.n_contacts - 4
+        return (self.steps.shape[1] - layout.HEAD) // self.n_contacts - layout.PUSH - 1
 
     def _column(self, first: int) -> np.ndarray:
-        width = 3 + self.n_coefficients
-        return self.steps[:, 3 + first : 3 + width * self.n_contacts : width]
+        width = layout.PUSH + self.n_coefficients
+        return self.steps[:, layout.HEAD + first : layout.HEAD + width * self.n_contacts : width]
 
     @cached_property
     def impulses(self) -> np.ndarray:
         """Impulse of every step and contact [N s], (n_steps, n_contacts)."""
-        mean = sum(self._column(3 + k) / (k + 1.0) for k in range(self.n_coefficients))
+        mean = sum(self._column(layout.PUSH + k) / (k + 1.0) for k in range(self.n_coefficients))
         return self.steps[:, 1:2] * mean
 
     @property
@@ -137,7 +139,7 @@ class History:
     @cached_property
     def pressed(self) -> np.ndarray:
         """True where a contact carries force in a step, (n_steps, n_contacts)."""
-        return self._column(2) > 0.0
+        return self._column(layout.CLOSED) > 0.0
 
     def force(self, steps: np.ndarray, contact: int, part: np.ndarray) -> np.ndarray:
         """Contact force [N] at fractions of steps, (n_steps, n_parts)."""
@@ -155,8 +157,8 @@ class History:
         """Contact force [N] and its rate [N/s] at any times, (n_times,) each; zero after the end."""
         if not len(self.steps):
             return np.zeros(len(times)), np.zeros(len(times))
-        rows = np.clip(np.searchsorted(self.steps[:, 0], times, side="right") - 1, 0, None)
-        part = np.clip((times - self.steps[rows, 0]) / self.steps[rows, 1], 0.0, 1.0)
+        rows = np.clip(np.searchsorted(self.steps[:, layout.START], times, side="right") - 1, 0, None)
+        part = np.clip((times - self.steps[rows, layout.START]) / self.steps[rows, layout.LENGTH], 0.0, 1.0)
         force, rate = self._force(rows, contact, part)
         acts = self.pressed[rows, contact] & (force > 0.0) & (times <= self.end_time)
         return np.where(acts, force, 0.0), np.where(acts, rate, 0.0)
@@ -164,9 +166,9 @@ class History:
     @cached_property
     def end_law(self) -> np.ndarray:
         """The law with what the contacts remember at the end."""
-        if self.law.shape[1] < law.WIDTH:
+        if self.law.shape[1] < layout.WIDTH:
             return self.law
-        found = np.column_stack([self.law[:, : law.MEMORY], self.now[5]])
+        found = np.column_stack([self.law[:, : layout.MEMORY], self.now[layout.REMEMBERED]])
         found.setflags(write=False)  # or numba would compile the kernels again for writable arrays
         return found
 
@@ -182,14 +184,29 @@ class History:
         return q, p
 
     def motion(self, times: np.ndarray) -> np.ndarray:
-        """Approach [m] of the modes at ascending times, (n_times, n_contacts), without the dip of those left out.
+        """Approach [m] of the modes at equally spaced times, (n_times, n_contacts), without the dip of those left out.
 
         Needs the end state, which only the modes of the run itself have.
         """
-        n = int(np.searchsorted(times, self.end_time))
+        n = int(np.searchsorted(times, (1.0 - ENDED) * self.end_time))
+        found = self.offset + np.vstack(
+            [self.states(times[:n])[0] @ self.shape.T, np.zeros((len(times) - n, self.n_contacts))]
+        )
+        after = times[n:] - self.end_time
+        if not len(after):
+            return found
         ended = replace(self, start_q=self.end_q, start_p=self.end_p, steps=self.steps[:0])
-        q = np.vstack([self.states(times[:n])[0], ended.states(times[n:] - self.end_time)[0]])
-        return self.offset + q @ self.shape.T
+        if self.stretched is not None:
+            found[n:] += ended.states(after)[0] @ self.shape.T
+            return found
+        rigid, t = self.omega == 0.0, after[:, None]
+        drift = self.end_q[rigid] + t * (self.end_p[rigid] + 0.5 * t * self.bias[rigid])
+        found[n:] += drift @ self.shape[:, rigid].T
+        q, p = (state[0, ~rigid] for state in ended.states(after[:1]))
+        bodies = self.omega[~rigid], self.zeta[~rigid], self.bias[~rigid]
+        for i, row in enumerate(self.shape[:, ~rigid]):
+            found[n:, i] += swing(*bodies, (q, p), after, row[None]) + row @ (bodies[2] / bodies[0] ** 2)
+        return found
 
     @cached_property
     def contacts(self) -> np.ndarray:
@@ -228,7 +245,7 @@ class History:
                 times.append((steps[rows, :1] + part * steps[rows, 1:2]).ravel())
                 forces.append(np.stack([within(rows, i, part) for i in contacts], axis=1))
             else:
-                times.append(steps[rows, 0])
+                times.append(steps[rows, layout.START])
                 forces.append(np.zeros((len(rows), self.n_contacts)))
         times.append(np.array([self.end_time]))
         forces.append(np.array([[within(np.array([len(steps) - 1]), i, np.ones(1))[0] for i in contacts]]))
@@ -477,6 +494,11 @@ class Response(Totals):
 
     def band_spectrum(self, max_frequency: float) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies [Hz] from zero, dense enough for the spectrum of this blow, and the spectrum there [N s]."""
+        frequencies = self._band(max_frequency)
+        return frequencies, self.spectrum(frequencies)
+
+    def _band(self, max_frequency: float) -> np.ndarray:
+        """Frequencies [Hz] from zero, dense enough for the spectrum of this blow."""
         limit = check.positive("max_frequency", max_frequency, "Hz")
         span = max((impact.end for impact in self.impacts), default=0.0)
         if span == 0.0:
@@ -484,8 +506,7 @@ class Response(Totals):
         if limit * span > force_spectrum.MOST_PERIODS:
             most = force_spectrum.MOST_PERIODS / span
             raise ValueError(f"max_frequency must be at most {most:.4g} Hz for a blow of {span:.4g} s")
-        frequencies = np.linspace(0.0, limit, int(np.clip(32.0 * limit * span, 512, 65536)))
-        return frequencies, self.spectrum(frequencies)
+        return np.linspace(0.0, limit, int(np.clip(32.0 * limit * span, 512, 65536)))
 
     @check.typed
     def gradient(self, quantity: Any, wrt: Any = None, *, sections: Mapping[str, Any] | None = None) -> Any:
@@ -614,7 +635,7 @@ class Response(Totals):
         found = [self.modal_state([time], body=body) for body in range(len(bodies))]
         forces = np.array([self.history.force_at(np.array([time]), i) for i in range(len(self.contacts))])[:, :, 0]
         forces[forces[:, 0] <= RELEASED * self.peak_force] = 0.0
-        remembers = any(law.yield_approach or law.hysteresis for law in self.contacts)
+        remembers = any(law.remembers for law in self.contacts)
         return State(
             time,
             bodies,
@@ -766,7 +787,7 @@ class Response(Totals):
         h = self.history
 
         start_contact = float(law.stored(h.offset + h.shape @ h.start_q, h.law))
-        end_contact = float(law.stored(h.now[0] - law.dents(h.end_law), h.end_law))
+        end_contact = float(law.stored(h.now[layout.APPROACH] - law.dents(h.end_law), h.end_law))
         start, end = h.energy(h.start_q, h.start_p), h.energy(h.end_q, h.end_p)
         work = float(h.work.sum())
         yielded = contact_loss = work - (end_contact - start_contact)

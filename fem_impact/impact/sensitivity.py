@@ -1,6 +1,8 @@
 """What small changes of a blow's numbers do to it, to first order, from the record of one run."""
 
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
@@ -8,19 +10,23 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
-from .compiled import record
+from .compiled import layout, record
 from .compiled.tangents import N_LAW, Blow, Change, Found, Pieces, follow, law_at
 
 if TYPE_CHECKING:
     from .response import History
 
 NODES = 3, 5  # [-] Gauss nodes per piece: for a force that is linear in each step, and for one of higher order
-# [-] fractions of the first step of a contact in which its force is no polynomial, and mirrored of the last: there the
-# slope of a power law goes as (exponent - 1) powers of time
-GRADED = (4.0**-4, 4.0**-3, 4.0**-2, 4.0**-1)
+# [-] of the median step in contact: where the first step of a contact, in which its force is no polynomial, is cut, and
+# mirrored the last: there the slope of a power law goes as (exponent - 1) powers of time
+GRADED = np.array([4.0**-4, 4.0**-3, 4.0**-2, 4.0**-1])
+WHOLLY = 0.9  # [-] of such a step: what is left beyond goes to the last of them
+NEAR = 4  # [-] steps from the start or end of a contact, per step that a piece may hold there
+FULL = 32  # [-] steps of a contact, above twice of which pieces are of two steps, and so on
 LOOKS, ROUNDS = 16, 2  # [-] samples per step in the search for the largest force; one step of Newton's method follows
+ENOUGH = 1024  # [-] samples of a blow in that search; of long ones a step needs only few
 NUDGE = 1e-5  # [-] relative change at which the curvature of a contact law is taken; leaves 1e-10
-SLOW, MORE = 0.3, 12  # [rad], [-] half the phase over a piece up to which its own nodes make a spectrum; else so many
+MORE = 2  # [-] Gauss nodes beyond those of the force, and three per radian of half the phase over a piece: err by 1e-9
 EDGE = 1e-9  # [-] of a step: what lies nearer to its ends is at them
 ROUNDING = 1e-14  # [-] of the duration: the same
 ALIKE = 1e-11  # [-] difference of lengths of pieces that rounding leaves
@@ -34,6 +40,24 @@ def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
     nodes = 0.5 * (np.polynomial.legendre.leggauss(count)[0] + 1.0)
     powers = np.linalg.inv(np.vander(nodes, increasing=True)).T
     return np.append(nodes, 1.0), np.ascontiguousarray(powers)
+
+
+@cache
+def shares(count: int) -> np.ndarray:
+    """Weights (count,) of these nodes, which sum to one."""
+    return np.asarray(0.5 * np.polynomial.legendre.leggauss(count)[1])
+
+
+@cache
+def moments_kept(count: int, steps: int) -> np.ndarray:
+    """Matrix (count * steps, count) from values at the nodes of some equal steps to those at the nodes of all together.
+
+    The polynomial through the latter has the moments of the former.
+    """
+    nodes, order = gauss(count)[0][:-1], np.arange(count)
+    places = ((np.arange(steps)[:, None] + nodes) / steps).ravel()
+    here, there = (np.polynomial.legendre.legvander(2.0 * x - 1.0, count - 1) for x in (nodes, places))
+    return np.asarray(np.tile(shares(count) / steps, steps)[:, None] * there @ (here * (2.0 * order + 1.0)).T)
 
 
 def no_change(history: "History", n: int) -> Change:
@@ -51,16 +75,16 @@ class Sensitivity:
     time: np.ndarray  # (n_pieces + 1,) [s] ends of the pieces
     pieces: Pieces
     found: Found
-    peak: int  # index in `time` of the largest force; -1 without contact
+    peak: float  # [s] when the force is largest, nearly; NaN if it is not wanted
 
     def __repr__(self) -> str:
         return check.brief(self)
 
     @classmethod
-    def of(cls, history: "History", change: Change, peak: bool = True) -> "Sensitivity":
+    def of(cls, history: "History", change: Change, peak: bool = True, together: int = 1) -> "Sensitivity":
         """Follow the record; raises SimulationError where it passed over contacts without locating them.
 
-        ``peak`` says whether the largest force is wanted.
+        ``peak`` says whether the largest force is wanted; up to ``together`` steps make one piece, see `together`.
         """
         if history.n_blind:
             raise SimulationError(
@@ -68,21 +92,18 @@ class Sensitivity:
                 "max_impacts, a shorter duration or no dt"
             )
         top = _peak(history) if peak else None
-        time, row, part = _cut(history, top)
-        nodes, powers = gauss(NODES[int(history.n_coefficients > 2)])
+        smooth = history.n_coefficients > 2
+        wanted = [when for each in history.impacts for when in (each.start, each.end)]
+        marked = [] if top is None else [top] if smooth else list(_step_at(history, top))
+        time, row, part, count = _cut(history, [*wanted, *marked], together)
+        wanted = [0.0, *wanted, *marked, time[-1]]
+        nodes, powers = gauss(NODES[int(smooth)])
         n, n_modes, s = len(change.offset), len(history.omega), len(powers)
-        wanted = [0.0, *(when for each in history.impacts for when in (each.start, each.end)), time[-1]]
-        wanted += [] if top is None else [top, *_step_at(history, top)]
         marks = np.unique([int(np.abs(time - when).argmin()) for when in wanted])
         mark = np.full(len(time), -1)
         mark[marks] = np.arange(len(marks))
-        length, closed, step = _alike(np.diff(time)), history.pressed[row, 0], history.steps[row, 1:2]
-        within = part[:, None] + nodes[:-1] * length[:, None] / step
-        force = np.zeros((len(length), s))
-        for c in history.steps[row, 6 : 6 + history.n_coefficients].T[::-1]:
-            force = force * within + c[:, None]
-        force[~closed] = 0.0
-        pieces = Pieces(length, closed, force, mark, nodes, powers)
+        length, closed = _alike(np.diff(time)), history.pressed[row, 0]
+        pieces = Pieces(length, closed, _recorded(history, row, part, count, length, nodes[:-1]), mark, nodes, powers)
         found = Found(
             np.zeros((len(time), 2)), np.zeros((len(marks), 5)), np.zeros((len(marks), 4, n)),
             np.zeros((len(marks), n_modes)), np.zeros((len(marks), n_modes)), np.zeros((len(length), s, n)),
@@ -93,8 +114,7 @@ class Sensitivity:
             float(history.offset[0]), history.law,
         )  # fmt: skip
         follow(blow, change, pieces, found)
-        at = -1 if top is None else int(np.abs(time - top).argmin())
-        return cls(history, change, time, pieces, found, at)
+        return cls(history, change, time, pieces, found, np.nan if top is None else top)
 
     @cached_property
     def deepest(self) -> float:
@@ -123,10 +143,12 @@ class Sensitivity:
             return still
         if near:
             return -dd / v
-        if k == len(self.time) - 1 and self.history.status == record.HORIZON:
+        if k == 0 or (k == len(self.time) - 1 and self.history.status == record.HORIZON):
             return still
-        loss = self.history.law[0, 2]
-        return -(self.change.law[:, 2] * v + loss * dv) / (loss * a)
+        loss = self.history.law[0, layout.LOSS]
+        if abs(d) < abs(1.0 + loss * v) * self.deepest:
+            return -dd / v
+        return -(self.change.law[:, layout.LOSS] * v + loss * dv) / (loss * a)
 
     @property
     def _start_terms(self) -> np.ndarray:
@@ -160,19 +182,42 @@ class Sensitivity:
         return np.einsum("jb,jbi->i", self.weights, self.found.force)
 
     def spectrum(self, frequencies: np.ndarray) -> np.ndarray:
-        """Change (n_frequencies, n) of the force's Fourier transform [N s]."""
+        """Change (n_frequencies, n) of the force's Fourier transform [N s], for few frequencies."""
+        time, force = self._impulses(float(np.abs(frequencies).max(initial=0.0)))
+        return np.exp(-2j * np.pi * frequencies[:, None] * time) @ force
+
+    def spectral_sum(self, weights: np.ndarray, step: float) -> np.ndarray:
+        """Change (n,) of the real part of a weighted sum of the transform at 0, step, 2 step, ... [Hz].
+
+        The sum over frequencies k = a K + b at each time is that over a of sums over b, a product of matrices.
+        """
+        time, force = self._impulses(step * len(weights))
+        few, many = _turns(len(weights), step, time)
+        table = np.zeros(len(few) ** 2, complex)
+        table[: len(weights)] = weights
+        return np.real((many * (table.reshape(len(few), -1) @ few)).sum(axis=0)) @ force
+
+    def even_spectrum(self, count: int, step: float) -> np.ndarray:
+        """Transform (count,) of the recorded force itself at 0, step, 2 step, ... [Hz], by the same products."""
+        time, force = self._impulses(step * count, self.pieces.force[:, :, None])
+        few, many = _turns(count, step, time)
+        return ((many * force[:, 0]) @ few.T).ravel()[:count]
+
+    def _impulses(self, highest: float, force: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Times (m,) [s] and changes of impulses there (m, n) with the same spectrum up to a frequency [Hz].
+
+        Or the impulses of another force (n_pieces, s, n) at the nodes.
+        """
         pieces = self.pieces
-        phase = np.pi * float(np.abs(frequencies).max(initial=0.0)) * pieces.length[pieces.closed].max(initial=0.0)
-        rule = len(pieces.powers) if phase < SLOW else MORE
+        phase = np.pi * highest * pieces.length[pieces.closed].max(initial=0.0)
+        rule = len(pieces.powers) + MORE + int(3.0 * phase)
         nodes = gauss(rule)[0][:-1]
-        weights = 0.5 * np.polynomial.legendre.leggauss(rule)[1]
         basis = np.vander(nodes, len(pieces.powers), increasing=True) @ pieces.powers.T  # (rule, s)
         length = pieces.length[pieces.closed, None]
         time = (self.time[:-1][pieces.closed, None] + nodes * length).ravel()
-        force = np.einsum("ab,jbi->jai", basis, self.found.force[pieces.closed])
-        force = (force * (weights * length)[:, :, None]).reshape(len(time), -1)  # [N s]
-        blocks = np.array_split(frequencies, max(1, len(frequencies) * len(time) // 2**20))
-        return np.vstack([np.exp(-2j * np.pi * block[:, None] * time) @ force for block in blocks])
+        at_nodes = (self.found.force if force is None else force)[pieces.closed]
+        values = np.einsum("ab,jbi->jai", basis, at_nodes) * (shares(rule) * length)[:, :, None]
+        return time, values.reshape(len(time), -1)
 
     @property
     def end_speeds(self) -> np.ndarray:
@@ -199,7 +244,7 @@ class Sensitivity:
     @property
     def peak_force(self) -> np.ndarray:
         """Change (n,) of the largest force [N]."""
-        if self.peak < 0:
+        if np.isnan(self.peak):
             return np.zeros(len(self.change.offset))
         return self._at_peak[1][3] + self._rate_change * self._late
 
@@ -211,30 +256,53 @@ class Sensitivity:
     @property
     def when_largest(self) -> float:
         """Time of the largest force [s]."""
-        return float(self.time[self.peak] + self._late)
+        return float(self.peak + self._late)
+
+    @property
+    def largest(self) -> float:
+        """Largest force [N]."""
+        d, v = self._at_peak[0][:2]
+        return float(law_at(float(d), float(v), self.history.law, np.zeros(N_LAW))[0])
 
     @cached_property
     def _at_peak(self) -> tuple[np.ndarray, np.ndarray]:
         """Approach and its first three rates (4,) at the peak; changes (4, n) of the first three, and of the force.
 
         A force that is linear in each step jumps between two, and the accelerations with it. There the approach is the
-        cubic through both ends of the step, as in the force that the peak was found in.
+        polynomial through both ends of the step: the quintic or, under a loss, whose rates ring, the cubic, as in the
+        force that the peak was found in.
         """
-        found, mark, h = self.found, self.pieces.mark, self.history
-        if h.n_coefficients > 2:
-            return found.base[mark[self.peak], :4], found.ends[mark[self.peak]]
-        start, end = _step_at(h, float(self.time[self.peak]))
-        ends = [int(mark[np.abs(self.time - when).argmin()]) for when in (start, end)]
-        length = end - start
-        x = (self.time[self.peak] - start) / length
-        powers = np.array([[1.0, x, x**2, x**3], [0.0, 1.0, 2.0 * x, 3.0 * x**2], [0, 0, 2.0, 6.0 * x], [0, 0, 0, 6.0]])
-        cubic = np.array([[1.0, 0, 0, 0], [0, length, 0, 0], [-3, -2 * length, 3, -length], [2, length, -2, length]])
-        rates = powers @ cubic / length ** np.arange(4.0)[:, None]
-        base = rates @ found.base[ends, :2].ravel()
-        changes = rates[:3] @ found.ends[ends, :2].reshape(4, -1)
+        if self.history.n_coefficients > 2:
+            at = self.pieces.mark[np.abs(self.time - self.peak).argmin()]
+            return self.found.base[at, :4], self.found.ends[at]
+        return self._through_ends(2 if self.history.law[0, layout.LOSS] else 3)
+
+    def _through_ends(self, n_rates: int) -> tuple[np.ndarray, np.ndarray]:
+        """The same at the peak by the polynomial with the approach and rates, so many in all, at the ends of a step."""
+        start, end = _step_at(self.history, self.peak)
+        ends = [int(self.pieces.mark[np.abs(self.time - when).argmin()]) for when in (start, end)]
+        length, powers = end - start, np.eye(2 * n_rates)
+        inside = (self.peak - start) / length
+        scale = length ** np.arange(4.0)[:, None]
+        at_ends = np.vstack([_rates(powers, where, n_rates) / scale[:n_rates] for where in (0.0, 1.0)])
+        rates = _rates(powers, inside, 4) / scale @ np.linalg.inv(at_ends)
+        base = rates @ self.found.base[ends, :n_rates].ravel()
+        changes = rates[:3] @ self.found.ends[ends, :n_rates].reshape(2 * n_rates, -1)
         slopes = np.zeros(N_LAW)
-        _, by_d, by_v = law_at(base[0], base[1], h.law, slopes)
+        _, by_d, by_v = law_at(base[0], base[1], self.history.law, slopes)
         return base, np.vstack([changes, by_d * changes[0] + by_v * changes[1] + self.change.law @ slopes])
+
+    @property
+    def peak_doubt(self) -> np.ndarray:
+        """How far the cubic and the quintic through the peak disagree on the change (n,) of its time [s].
+
+        Zero unless a lossy force rings within its steps.
+        """
+        if np.isnan(self.peak) or self.history.n_coefficients > 2 or not self.history.law[0, layout.LOSS]:
+            return np.zeros(len(self.change.offset))
+        other = replace(self)
+        other.__dict__["_at_peak"] = self._through_ends(3)
+        return np.asarray(np.abs(other.peak_time - self.peak_time))
 
     @cached_property
     def _late(self) -> float:
@@ -244,14 +312,18 @@ class Sensitivity:
     @cached_property
     def _bend(self) -> float:
         """Second rate of the force at its peak [N/s^2]; zero if the force is largest at an end of the blow."""
-        if self.peak <= 0 or self.peak == len(self.time) - 1:
+        if not EDGE < self.peak / self.time[-1] < 1.0 - EDGE:
             return 0.0
         return self._slope(self._at_peak[0][1:], np.zeros(N_LAW))
 
     @cached_property
     def _rate_change(self) -> np.ndarray:
         """Change (n,) of the rate of the force at its peak."""
-        return np.array([self._slope(each, law) for each, law in zip(self._at_peak[1][:3].T, self.change.law)])
+        none, changes, law = np.zeros(3), self._at_peak[1][:3], self.change.law
+        by_state = sum(self._slope(each, np.zeros(N_LAW)) * change for each, change in zip(np.eye(3), changes))
+        used = np.flatnonzero(law.any(axis=0))
+        by_law = [self._slope(none, each) for each in np.eye(N_LAW)[used]]
+        return np.asarray(by_state + law[:, used] @ np.array(by_law))
 
     def _slope(self, along: np.ndarray, dlaw: np.ndarray) -> float:
         """Slope of the force's rate at its peak along changes (3,) of the approach and its rates, and of the law.
@@ -277,6 +349,19 @@ class Sensitivity:
         return float(fastest[0]), float(fastest[1])
 
 
+def _rates(powers: np.ndarray, at: float, count: int) -> np.ndarray:
+    """Values and rates (count, n) at a place of n polynomials with coefficients (n_powers, n), ascending."""
+    derivatives = (np.polynomial.polynomial.polyder(powers, k) if k else powers for k in range(count))
+    return np.stack([np.polynomial.polynomial.polyval(at, each) for each in derivatives])
+
+
+def _turns(count: int, step: float, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Factors exp(-2 pi i f t) at b step and at a K step [Hz], a, b < K, (K, n_times) each, K * K not below count."""
+    size = int(np.ceil(np.sqrt(count)))
+    turn = -2j * np.pi * step * np.arange(size)[:, None] * time
+    return np.exp(turn), np.exp(size * turn)
+
+
 def _alike(length: np.ndarray) -> np.ndarray:
     """Lengths (n,) of pieces, those equal but for rounding made equal: pieces of one length share their tables."""
     order = np.argsort(length)
@@ -299,11 +384,12 @@ def _peak(history: "History") -> float | None:
     if not history.impacts:
         return None
     rows = np.flatnonzero(history.pressed[:, 0])
-    start, length = history.steps[rows, 0], history.steps[rows, 1]
-    part = np.arange(LOOKS + 1) / LOOKS
-    i, k = divmod(int(history.force(rows, 0, part).argmax()), LOOKS + 1)
+    start, length = history.steps[rows, layout.START], history.steps[rows, layout.LENGTH]
+    looks = int(np.clip(ENOUGH // len(rows), 4, LOOKS))
+    part = np.arange(looks + 1) / looks
+    i, k = divmod(int(history.force(rows, 0, part).argmax()), looks + 1)
     times = start[i] + np.array([-length[i - 1] if i else 0.0, 0.0, *(part[1:] * length[i]), 2.0 * length[i]])
-    low, high = (times[1 + k] - length[i] / LOOKS), (times[1 + k] + length[i] / LOOKS)
+    low, high = (times[1 + k] - length[i] / looks), (times[1 + k] + length[i] / looks)
     low, high = max(low, start[0]), min(high, start[-1] + length[-1])
 
     for _ in range(ROUNDS):
@@ -318,42 +404,98 @@ def _peak(history: "History") -> float | None:
 
 def _step_at(history: "History", time: float) -> tuple[float, float]:
     """Start and end [s] of the step that holds a time."""
-    i = int(np.clip(np.searchsorted(history.steps[:, 0], time, side="right") - 1, 0, len(history.steps) - 1))
-    ends = np.append(history.steps[:, 0], history.end_time)
+    i = int(np.clip(np.searchsorted(history.steps[:, layout.START], time, side="right") - 1, 0, len(history.steps) - 1))
+    ends = np.append(history.steps[:, layout.START], history.end_time)
     return float(ends[i]), float(ends[i + 1])
 
 
-def _cut(history: "History", peak: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Ends of all pieces [s], (n_pieces + 1,); the step each lies in, and where in it each begins [-]."""
+def together(history: "History") -> int:
+    """How many steps of equal length inside a contact may make one piece.
+
+    The changes are polynomials of higher order than the force of the record, and need fewer pieces. None are put
+    together where a step's force is of high order itself.
+    """
+    per_impact = history.pressed[:, 0].sum() / max(1, len(history.impacts))
+    return 1 if history.n_coefficients > 2 else int(np.clip(2 ** np.floor(np.log2(max(1.0, per_impact / FULL))), 1, 4))
+
+
+def _recorded(
+    history: "History", row: np.ndarray, part: np.ndarray, count: np.ndarray, length: np.ndarray, nodes: np.ndarray
+) -> np.ndarray:
+    """Recorded force at the nodes of all pieces, (n_pieces, s) [N].
+
+    That of several steps is the polynomial through the nodes with the same moments as theirs.
+    """
+    s = len(nodes)
+    force = np.zeros((len(row), s))
+    for n in np.unique(count):
+        own = np.flatnonzero((count == n) & history.pressed[row, 0])
+        steps = row[own, None] + np.arange(n)
+        share = length[own, None] / history.steps[row[own], 1:2] if n == 1 else np.ones((len(own), 1))
+        within = part[own, None, None] + share[:, :, None] * nodes  # (n_own, 1, s), the same for all steps of a piece
+        each = np.zeros((len(own), n, s))
+        for k in range(history.n_coefficients)[::-1]:
+            each = each * within + history.steps[steps, layout.HEAD + layout.PUSH + k][:, :, None]
+        force[own] = each.reshape(len(own), -1) @ moments_kept(s, int(n))
+    return force
+
+
+def _cut(
+    history: "History", times: Sequence[float], most: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Ends of all pieces [s], (n_pieces + 1,), the step each begins in, where in it [-], and of how many steps it is.
+
+    A piece begins at each of some times, and up to ``most`` steps make one.
+    """
     steps, pressed = history.steps, history.pressed[:, 0]
-    inside: list[set[float]] = [set() for _ in steps]
-
-    def cut(time: float) -> None:
-        i = int(np.clip(np.searchsorted(steps[:, 0], time, side="right") - 1, 0, len(steps) - 1))
-        part = (time - steps[i, 0]) / steps[i, 1]
-        inside[i].add(part)
-
-    graded = GRADED if float(history.law[0, 1]) != 1.0 else ()
-    for i in np.flatnonzero(pressed):
-        if i == 0 or not pressed[i - 1]:
-            inside[i].update(graded)
-        if i + 1 == len(steps) or not pressed[i + 1]:
-            inside[i].update(1.0 - part for part in graded)
-    for impact in history.impacts:
-        cut(impact.start)
-        cut(impact.end)
-    if peak is not None:
-        cut(peak)
-    time, row, part = [], [], []
-    for k, fractions in enumerate(inside):
-        least = EDGE + ROUNDING * history.end_time / steps[k, 1]
-        begins = [0.0]
+    if not len(steps):
+        return np.zeros(1), np.zeros(0, int), np.zeros(0), np.zeros(0, int)
+    inside: defaultdict[int, set[float]] = defaultdict(set)
+    places = np.clip(np.searchsorted(steps[:, layout.START], times, side="right") - 1, 0, len(steps) - 1)
+    for i, when in zip(places.tolist(), times):
+        inside[i].add(float((when - steps[i, layout.START]) / steps[i, layout.LENGTH]))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], pressed, [False]]).astype(int)))
+    if float(history.law[0, layout.EXPONENT]) != 1.0:
+        grades = GRADED * float(np.median(steps[pressed, layout.LENGTH])) if len(edges) else GRADED
+        for first, last in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist()):
+            inside[first].update(part for part in (grades / steps[first, layout.LENGTH]).tolist() if part < WHOLLY)
+            inside[last].update(1.0 - part for part in (grades / steps[last, layout.LENGTH]).tolist() if part < WHOLLY)
+    begins, rows = [np.zeros(len(steps))], [np.arange(len(steps))]
+    for k, fractions in inside.items():
+        least = EDGE + ROUNDING * history.end_time / steps[k, layout.LENGTH]
+        kept = [0.0]
         for fraction in sorted(fractions):
-            if begins[-1] + least < fraction < 1.0 - least:
-                begins.append(fraction)
-        for begin in begins:
-            time.append(steps[k, 0] + begin * steps[k, 1])
-            row.append(k)
-            part.append(begin)
-    time.append(history.end_time if len(steps) else 0.0)
-    return np.array(time), np.array(row, int), np.array(part)
+            if kept[-1] + least < fraction < 1.0 - least:
+                kept.append(fraction)
+        begins.append(np.array(kept[1:]))
+        rows.append(np.full(len(kept) - 1, k))
+    row, part = np.concatenate(rows), np.concatenate(begins)
+    order = np.lexsort((part, row))
+    row, part = row[order], part[order]
+    count = np.ones(len(row), int)
+    if most > 1:
+        row, part, count = _joined(history, row, part, edges, inside, most)
+    return np.append(steps[row, layout.START] + part * steps[row, layout.LENGTH], history.end_time), row, part, count
+
+
+def _joined(
+    history: "History", row: np.ndarray, part: np.ndarray, edges: np.ndarray, cut: Iterable[int], most: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pieces of one step or a part of it put together, except those of cut steps; what `_cut` returns of them.
+
+    The fewer, the nearer the start or end of a contact, where slopes of the force change fast.
+    """
+    length, number = history.steps[:, layout.LENGTH], np.arange(len(history.steps))
+    far = np.abs(number[:, None] - edges).min(axis=1, initial=len(number)) // NEAR
+    most_here = np.where(history.pressed[:, 0], np.minimum(most, far), 0)
+    most_here[list(cut)] = 0
+    new = np.append(True, np.abs(np.diff(length)) > ALIKE * length[1:])
+    kept, count = [0], [1]
+    for j in range(1, len(row)):
+        one, other = row[kept[-1]], row[j]
+        if count[-1] < min(most_here[one], most_here[other]) and not new[other]:
+            count[-1] += 1
+        else:
+            kept.append(j)
+            count.append(1)
+    return row[kept], part[kept], np.array(count)

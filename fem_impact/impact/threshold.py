@@ -1,5 +1,6 @@
 """The kinetic-energy criterion: the contact resonance above which a hammer cannot rebound after one impact."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,9 @@ from .accuracy import left_out_density
 from .spectra import half_sine_spectrum
 
 STEP = 1.01  # [-] ratio of neighbouring frequencies in the search: much finer than the lobes of the pulse's spectrum
+AT_ONCE = 64  # [-] of these frequencies tried together
+PIECE = 2.0  # [-] width in contact frequencies of each piece of the integral over the modes left out
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)  # [-] Gauss points of each piece
 HARDEST = np.log(1e70)  # [-] log of the highest contact frequency tried [rad/s]: above it, the threshold is infinite
 SETTLED = 40.0  # [-] above this many contact frequencies, cos**2 is replaced by its mean: changes the sum by 1e-7
 
@@ -32,7 +36,7 @@ def required_energy(modes: Modes, at: Any, contact_frequency: float) -> float:
     the last kept mode, the squared shapes per unit omega fall as omega**-s, with s = 0 on plates and 1/2 on beams.
     """
     omega_c = 2.0 * np.pi * check.positive("contact_frequency", contact_frequency, "Hz")
-    return _energy(*_participation(modes, at), omega_c)
+    return float(_energy(*_participation(modes, at), np.array([omega_c]))[0])
 
 
 def _participation(modes: Modes, at: Any) -> tuple[np.ndarray, np.ndarray, float, float]:
@@ -46,19 +50,18 @@ def _participation(modes: Modes, at: Any) -> tuple[np.ndarray, np.ndarray, float
     return modes.omega, squared, density, exponent
 
 
-def _energy(omega: np.ndarray, squared: np.ndarray, density: float, exponent: float, omega_c: float) -> float:
-    total = float(squared @ half_sine_spectrum(omega, omega_c) ** 2)
+def _energy(omega: np.ndarray, squared: np.ndarray, density: float, exponent: float, omega_c: np.ndarray) -> np.ndarray:
+    """`required_energy` (n,) [1/kg] of several contact frequencies (n,) [rad/s]."""
+    total = half_sine_spectrum(omega / omega_c[:, None], 1.0) ** 2 @ squared
     if density == 0.0:
         return total
     last = omega[-1] / omega_c
-    settled = max(SETTLED, last)
-    tail = 0.5 * settled ** (-3.0 - exponent) / (3.0 + exponent)
-    if last < settled:
-        pieces = np.append(np.arange(last, settled, 2.0), settled)
-        nodes, weights = np.polynomial.legendre.leggauss(12)
-        half = 0.5 * np.diff(pieces)[:, None]
-        x = pieces[:-1, None] + half * (nodes + 1.0)
-        tail += float(np.sum(half * weights * half_sine_spectrum(x, 1.0) ** 2 * x**-exponent))
+    settled = np.maximum(SETTLED, last)
+    edges = np.minimum(last[:, None] + PIECE * np.arange(SETTLED / PIECE + 1.0), settled[:, None])
+    half = 0.5 * np.diff(edges)[..., None]
+    x = edges[:, :-1, None] + half * (NODES + 1.0)  # (n, n_pieces, n_nodes)
+    tail = np.sum(half * WEIGHTS * half_sine_spectrum(x, 1.0) ** 2 * x**-exponent, axis=(1, 2))
+    tail += 0.5 * settled ** (-3.0 - exponent) / (3.0 + exponent)
     return total + density * omega_c ** (1.0 - exponent) * tail
 
 
@@ -95,26 +98,61 @@ def threshold_frequency(modes: Modes, at: Any, mass: float) -> float | None:
     >>> round(fi.threshold_frequency(plate, (0.45, 0.3), 0.1))  # Hz; a harder contact gives several impacts
     124
     """
-    mass = check.positive("mass", mass, "kg")
+    found = thresholds(modes, at, [check.positive("mass", mass, "kg")])[0]
+    return None if found == 0.0 else float(found)
+
+
+@check.typed
+def thresholds(modes: Modes, at: Any, masses: Any) -> np.ndarray:
+    """`threshold_frequency` of several hammers at once.
+
+    Parameters
+    ----------
+    modes : Modes
+    at : strike point, (dimension,) [m]
+    masses : array_like, shape (n,) [kg]
+
+    Returns
+    -------
+    frequencies : ndarray, shape (n,) [Hz]
+        0 where even the softest contact cannot rebound, infinite where every contact does.
+
+    Examples
+    --------
+    >>> plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
+    >>> fi.threshold.thresholds(plate, (0.45, 0.3), [0.01, 0.1]).round().tolist()  # Hz
+    [953.0, 124.0]
+    """
+    masses = check.array("masses", masses, (None,), "kg")
+    for mass in masses:
+        check.positive("masses", mass, "kg")
     omega, squared, density, exponent = _participation(modes, at)
-    if mass * squared[omega == 0.0].sum() >= 1.0:
-        return None
 
-    def excess(log_omega: float) -> float:
-        return mass * _energy(omega, squared, density, exponent, np.exp(log_omega)) - 1.0
+    def energy(log_omega: np.ndarray) -> np.ndarray:
+        return _energy(omega, squared, density, exponent, np.exp(log_omega))
 
-    if density == 0.0 and mass * squared.sum() <= 1.0:
-        return float("inf")
-    low = np.log(_harmless(omega, squared, density, exponent, mass))
-    while excess(low) > 0.0:
+    found = np.full(len(masses), np.inf)
+    found[masses * squared[omega == 0.0].sum() >= 1.0] = 0.0
+    todo = np.isinf(found) if density > 0.0 else np.isinf(found) & (masses * squared.sum() > 1.0)
+    if not todo.any():
+        return found
+    low = np.log(_harmless(omega, squared, density, exponent, masses[todo].max()))
+    while (masses[todo] * energy(np.array([low])) > 1.0).any():
         low -= 1.0
-    high = low
-    while excess(high) <= 0.0:
-        if high > HARDEST:
-            return float("inf")
-        # above omega[-1], all modes lie in the first lobe, so the energy only grows with the contact frequency
-        low, high = high, high + np.log(STEP if high < np.log(omega[-1]) else 2.0)
-    return float(np.exp(optimize.brentq(excess, low, high, xtol=1e-13)) / (2.0 * np.pi))
+    # above omega[-1], all modes lie in the first lobe, so the energy only grows with the contact frequency
+    beyond = max(low, np.log(omega[-1]))
+    tried = np.append(np.arange(low, beyond, np.log(STEP)), np.arange(beyond, HARDEST + np.log(2.0), np.log(2.0)))
+    for start in range(0, len(tried) - 1, AT_ONCE):
+        some = tried[start : start + AT_ONCE + 1]
+        reached = energy(some)
+        for i in np.flatnonzero(todo & (masses * reached.max() > 1.0)):
+            j = int(np.argmax(masses[i] * reached > 1.0))
+            excess = partial(lambda mass, one: mass * energy(np.array([one]))[0] - 1.0, masses[i])
+            found[i] = np.exp(optimize.brentq(excess, some[j - 1], some[j], xtol=1e-13)) / (2.0 * np.pi)
+            todo[i] = False
+        if not todo.any():
+            break
+    return found
 
 
 def _harmless(omega: np.ndarray, squared: np.ndarray, density: float, exponent: float, mass: float) -> float:

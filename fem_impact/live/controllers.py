@@ -44,7 +44,7 @@ class Score:
     live = False
 
     def __init__(self, strokes: Sequence[Stroke]) -> None:
-        self.strokes = sorted(strokes)
+        self.strokes: list[Stroke] = sorted(strokes)
         self._next = 0
 
     def due(self, begin: int, end: int) -> list[Stroke]:

@@ -20,8 +20,10 @@ class Feed:
     """All blocks of a performance, made beforehand: one side fills them, the other copies them, neither allocates."""
 
     def __init__(self, n_blocks: int, block: int) -> None:
-        self.blocks = np.zeros((n_blocks, block), np.float32)
-        self.written = self.played = self.missed = 0
+        self.blocks: np.ndarray = np.zeros((n_blocks, block), np.float32)
+        self.written: int = 0
+        self.played: int = 0
+        self.missed: int = 0
 
     def copy(self, out: np.ndarray) -> None:
         """Copy the next block to a device, or silence if it is not there: a missed deadline."""

@@ -9,7 +9,7 @@ from .._base import check
 from ..impact import collision
 from ..impact.collision import Touch
 from ..impact.compiled import live
-from ..impact.compiled.law import WIDTH
+from ..impact.compiled.layout import WIDTH
 from ..impact.compiled.propagation import N_LANE, N_TABLE, step_table
 from ..impact.contact import Contact
 from ..impact.striker import Striker
@@ -41,6 +41,16 @@ class Player:
     Each contact is resolved by scheme A4, in steps of `step` or less; the modes ring on by recursion. The sound is that
     of `fi.sound.synthesise`, the velocity of a point of the body.
     """
+
+    modes: Modes
+    contact: Contact
+    points: np.ndarray  # (n_points, dimension) [m] where the body can be struck
+    rate: int  # [Hz]
+    block: int  # frames
+    fastest: float  # [m/s]
+    striker: Striker  # with as many modes as the fastest stroke needs
+    step: float  # [s] longest step in contact
+    gain: float  # [s/m] of samples
 
     def __init__(
         self, modes: Modes, striker: Striker, contact: Contact, *, points: Any, fastest: float, listen: Any = None,

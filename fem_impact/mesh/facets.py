@@ -84,7 +84,9 @@ class Curves:
         return self.at(share)[0]
 
 
-def divided(ends, middles, tangents, curvatures, share: float):
+def divided(
+    ends: np.ndarray, middles: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray, share: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Cut facets in two at the chord parameter s = ``share``.
 
     Returns

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import shapely
@@ -74,12 +75,12 @@ Piece = Arc | Bezier
 Loop = tuple[Piece, ...]
 
 
-def segment(start, end, name: str = "") -> Bezier:
+def segment(start: Any, end: Any, name: str = "") -> Bezier:
     """Straight piece from ``start`` to ``end``, both (2,) [m]."""
     return Bezier(np.array([start, end], float), name)
 
 
-def circle(centre, radius: float, name: str = "") -> Loop:
+def circle(centre: Any, radius: float, name: str = "") -> Loop:
     """A full circle, anticlockwise."""
     return (Arc(np.array(centre, float), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, 2.0 * np.pi, name),)
 
@@ -197,7 +198,7 @@ def _turned(loop: Loop, span: float, anticlockwise: bool) -> Loop:
     return tuple(piece.reversed() for piece in reversed(loop))
 
 
-def straight_loop(name: str, corners, label: str) -> Loop:
+def straight_loop(name: str, corners: Any, label: str) -> Loop:
     """Closed polygon through corners (n, 2) [m]; in ``label``, ``{}`` becomes the number of the side's first corner."""
     points = check.array(name, corners, (None, 2), "m")
     if len(points) > 1 and np.array_equal(points[0], points[-1]):

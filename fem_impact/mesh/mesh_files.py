@@ -1,5 +1,6 @@
 """Read triangles and named edges from a file; repair what is safe to repair, refuse the rest with a reason."""
 
+from collections.abc import Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -24,7 +25,9 @@ PLANE = ("triangle", "triangle6", "quad")
 NODES = {"line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4}  # nodes per cell of the types read here
 
 
-def read(path: Any, unit: str | None) -> tuple[np.ndarray, np.ndarray, dict, dict, list[str]]:
+def read(path: Any, unit: str | None) -> tuple[
+    np.ndarray, np.ndarray, dict[tuple[int, int], np.ndarray], dict[str, set[tuple[int, int]]], list[str]
+]:  # fmt: skip
     """Read and repair a mesh file.
 
     Returns
@@ -317,7 +320,10 @@ def loops_of(rim: np.ndarray) -> list[list[int]]:
     return loops
 
 
-def write(path: Path, points, cells, facets, middles, curved, edges: dict[str, np.ndarray]) -> None:
+def write(
+    path: str | Path, points: np.ndarray, cells: np.ndarray, facets: np.ndarray, middles: np.ndarray,
+    curved: np.ndarray, edges: Mapping[str, np.ndarray],
+) -> None:  # fmt: skip
     """Write triangles and named edges as binary Gmsh 2.2; a curved rim makes all triangles quadratic.
 
     Parameters

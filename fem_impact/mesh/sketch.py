@@ -27,7 +27,7 @@ def body(
     ----------
     mesh : Mesh
     supports : mapping of edge name to "clamped", "hinged", "free" or an elastic support, optional
-    at : strike point, (dimension,) [m], optional
+    at : strike point, (dimension,) [m], or several, (n, dimension), optional
     points : observation points, (n_points, dimension) [m]
     title : str, description for screen readers
     """
@@ -52,8 +52,8 @@ def body(
         f'<circle cx="{a:.1f}" cy="{b:.1f}" r="5" fill="none" stroke="{INK}" stroke-width="1.6"/>'
         for a, b in map(place, points)
     )
-    if at is not None:
-        a, b = place(np.atleast_1d(at))
+    for struck in () if at is None else np.atleast_2d(at):
+        a, b = place(struck)
         drawn += (
             f'<circle cx="{a:.1f}" cy="{b:.1f}" r="6" fill="{STRIKE}"/>'
             f'<circle cx="{a:.1f}" cy="{b:.1f}" r="10" fill="none" stroke="{STRIKE}" stroke-width="1.5"/>'

@@ -65,7 +65,10 @@ def join(pairs: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> Non
     tangents[pairs[near, 1], 0] = mean
 
 
-def smooth_runs(place: np.ndarray) -> list[tuple]:
+Run = tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, float] | None]
+
+
+def smooth_runs(place: np.ndarray) -> list[Run]:
     """Split a closed loop of points (n, 2) at its corners into smooth runs.
 
     Returns

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from .._base.check import SimulationError
 from ..fe.assembly import THEORIES
 from ..fe.section import Beam, Plate
 from ..impact import collision
-from ..impact.assumption import Assumption
+from ..impact.assumption import Assumption, unexamined
 from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
@@ -75,15 +76,37 @@ def required(target: Target, hit: Response) -> tuple[Target, str] | None:
 
 
 def foresee(
-    simplified: Simplified, striker: Striker, contact: Contact, at: Any, speed: float
+    target: Target, body: Modes | Simplified, striker: Striker, contact: Contact, at: Any, **how: Any
 ) -> tuple[Assumption, ...]:
-    """What is known of every assumption before a blow, from one on a wall; effects are not."""
-    place, mass = np.atleast_1d(np.asarray(at, float)), 1.0
-    stiff = collision.shortened(striker, striker.modes.n_rigid)
-    bare = replace(contact, loss=0.0, gap=0.0)
-    hit = collision.strike(unyielding(place, mass), stiff, bare, at=place, speed=speed, tolerance=WALL)
-    hit = replace(hit, striker=striker, contacts=(contact,))
-    struck = replace(_struck(hit, simplified), foreseen=True)
+    """What is known of every assumption before a blow, from one on a wall; effects are not.
+
+    ``body`` is what is known of the target: modes, its first ones at least, or nothing but mesh and section. ``how``
+    are ``speed``, ``quantity`` and ``rings``: whether the damping of the target is part of the model.
+    """
+    speed, rings, mesh = how["speed"], how["rings"], None
+    if isinstance(body, Modes):
+        modes = replace(body, air=body.air or target.air is not None, stretches=target.stretching)
+        place = modes.point("at", at)
+        known, ideal = bending.known(modes), ""
+    else:
+        place = np.atleast_2d(np.asarray(at, float))
+        ratio, mesh = target.damping_ratio, body.mesh
+        damped = not rings or (ratio is not None and (callable(ratio) or bool(np.any(ratio))))
+        modes = replace(
+            unyielding(place[0], body.mass), damping_ratio=np.full(1, float(damped)), thick=target.thick,
+            air=target.air is not None, stretches=target.stretching,
+        )  # fmt: skip
+        known, ideal = bending.around(modes, body.section, mesh, body.supports), body.kind
+    stiff = replace(collision.shortened(striker, striker.modes.n_rigid), hand=None)
+    bare, wall = replace(contact, loss=0.0, gap=0.0), unyielding(np.zeros(1), 1.0)
+    try:
+        hit = collision.strike(wall, stiff, bare, at=np.zeros(1), speed=speed, tolerance=WALL)
+    except SimulationError:
+        return unexamined(how["quantity"], "the same blow on a wall cannot be computed", "strike")
+    hit = replace(hit, striker=striker, contacts=(contact,), quantities=how["quantity"])
+    own = bending.known(striker.modes) if striker.modes.dimension and (striker.modes.omega > 0.0).any() else None
+    clearance = _clearance(modes, known, mesh, place[0])
+    struck = Struck(hit, known, own, ideal, clearance, place, (striker.modes, modes))
     return tuple(replace(examiner(struck), effect={}) for examiner in EXAMINERS)
 
 
@@ -98,21 +121,28 @@ def _struck(hit: Response, simplified: Simplified | None) -> Struck:
     flexible = striker is not None and striker.dimension and (striker.omega > 0.0).any()
     known = bending.known(striker) if striker is not None and flexible else None
     mesh = None if simplified is None else simplified.mesh
-    return Struck(hit, target, known, ideal, _clearance(modes, mesh, hit.at))
+    return Struck(hit, target, known, ideal, _clearance(modes, target, mesh, hit.at))
 
 
-def _clearance(modes: Modes, mesh: Mesh | None, at: np.ndarray | None) -> float | None:
-    """Distance [m] from the strike point to the nearest edge of a plate; None if it is not known."""
+def _clearance(modes: Modes, known: bending.Known | None, mesh: Mesh | None, at: np.ndarray | None) -> float | None:
+    """Distance [m] from the strike point to the nearest edge of a plate, or end or side of a beam; None if not known.
+
+    A beam is struck on its centre line.
+    """
     shapes = bending.unwrapped(modes.shapes)[0]
-    if at is None:
+    if at is None or not modes.dimension:
         return None
     if isinstance(shapes, (FieldShapes, RitzShapes)):
         mesh = shapes.system.mesh
+    if modes.dimension == 1:
+        width = None if known is None else still_air.width_of(known)
+        line = mesh.points if mesh is not None else shapes.grid()[0] if known is not None else None
+        if width is None or line is None:
+            return None
+        return float(min(at[0] - line.min(), line.max() - at[0], 0.5 * width))
     if isinstance(shapes, RectangleShapes):
         return float(np.min([at, np.array([shapes.length, shapes.width]) - at]))
     if isinstance(shapes, DiskShapes):
         return shapes.radius - float(np.hypot(*at))
-    if mesh is None or mesh.dimension != 2:
-        return None
-    view = Surroundings.seen(mesh, at)
+    view = None if mesh is None else Surroundings.seen(mesh, at)
     return None if view is None else view.clearance

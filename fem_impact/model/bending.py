@@ -69,6 +69,7 @@ class Known:
     extent: float  # [m**2] area of a plate, [m] length of a beam
     held: float  # [-] share of its edge that supports hold
     perimeter: float  # [m] of a plate
+    sprung: bool = False  # whether an edge is elastic, so that it is not known what holds its plane
 
     @property
     def plate(self) -> Plate | None:
@@ -142,7 +143,8 @@ def around(modes: Modes, section: Plate | Beam | None, mesh: Mesh, supports: Any
     ends = mesh.points[mesh.facets]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     holds = np.array([kind in ("clamped", "hinged") for kind in kinds])
-    return Known(modes, section, mesh.area, float(length[holds].sum() / length.sum()), float(length.sum()))
+    sprung = not all(isinstance(kind, str) for kind in kinds)
+    return Known(modes, section, mesh.area, float(length[holds].sum() / length.sum()), float(length.sum()), sprung)
 
 
 def _held(ends: list) -> float:

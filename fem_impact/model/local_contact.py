@@ -14,10 +14,12 @@ import numpy as np
 
 from ..fe.section import Material
 from ..impact.assumption import Assumption
+from ..impact.compiled import layout
 from ..impact.contact import YIELDS, Contact, loss_number
 from ..impact.response import History
 from ..modes.modal import SampledShapes
 from .restrike import Struck, softer
+from .thinness import wavenumber
 
 SMALL = 0.5  # [-] contact radius over half the thickness, over a wavelength / (2 pi) or over the distance to an edge
 NEAREST = 1e-6  # [-] least distance to an edge over the thickness
@@ -75,10 +77,11 @@ def yielding(struck: Struck) -> Assumption:
         return Assumption("no yielding", value, 1.0, still, quantities, remedy, number)
     law = hit.history.law.copy()
     bare = law.copy()
-    stored = hit.peak_force * (hit.peak_force / law[0, 0]) ** (1.0 / law[0, 1]) / (law[0, 1] + 1.0)  # [J]
+    k, a = law[0, layout.STIFFNESS], law[0, layout.EXPONENT]
+    stored = hit.peak_force * (hit.peak_force / k) ** (1.0 / a) / (a + 1.0)  # [J]
     speed = abs(hit.speed) or np.sqrt(2.0 * stored / hit.bodies[0].mass)  # at rest, a constant force presses it
     bare[0, 2] += HARDLY / speed  # a lossy contact has no compliance in series: both blows are to lack it
-    law[0, 2] += loss_number(restitution(value ** (-2.5))) / speed  # pressure goes as speed**0.4 on a wall
+    law[0, layout.LOSS] += loss_number(restitution(value ** (-2.5))) / speed  # pressure goes as speed**0.4 on a wall
     effect = dict(struck.between({"law": bare}, {"law": law}))
     return Assumption("no yielding", value, 1.0, effect, quantities, remedy, number)
 
@@ -107,7 +110,7 @@ def small(struck: Struck) -> Assumption:
     """Whether the contact is small beside the thickness, the waves and the distance to an edge."""
     hit, quantities, body = struck.hit, struck.quantities, struck.target
     number = "contact radius over half the thickness"
-    if hit.bodies[-1].dimension == 0:
+    if struck.bodies[1].dimension == 0:
         return Assumption("local contact", None, None, dict.fromkeys(quantities, 0.0), quantities, "", number)
     round_body = _hertz(struck)
     if round_body is None or body is None or body.section is None or body.thickness is None:
@@ -126,12 +129,16 @@ def small(struck: Struck) -> Assumption:
         ratios[EDGE] = a / away
     history, integrals = hit.history, struck.bending
     changed = softer(history, compliance)
-    if integrals is not None and struck.energy.any():
+    waves = "contact radius times wavenumber"
+    if struck.foreseen:
+        foreseen = wavenumber(body, integrals, struck.omega)
+        ratios |= {} if foreseen is None else {waves: foreseen * a}
+    elif integrals is not None and struck.energy.any():
         x = np.maximum(integrals.wave * a, 1e-3)  # Hertz's pressure is smooth: it hardly drives shorter waves
         spread = 3.0 * (np.sin(x) - x * np.cos(x)) / x**3
         changed["shape"] = struck.of_target(history.shape[:, struck.mine] * spread, "shape")
         wave = float(np.sqrt(struck.energy @ integrals.wave**2 / struck.energy.sum()))
-        ratios["contact radius times wavenumber"] = wave * a
+        ratios[waves] = wave * a
     name = max(ratios, key=lambda each: ratios[each])
     remedy = "take a slower blow or a thicker body: Hertz's half space does not fit"
     if name == EDGE:

@@ -44,6 +44,7 @@ PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_st
 # after modes, striker and contact; a plan is for a body at rest
 ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
 TARGETS = ("rigid", "infinite", "vectors", "modal")
+RINGING = ("modal", "vectors")  # those of a target that rings
 DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow
 THICK_DOFS_AT_BLOW = 7500  # [-] the same of a thick plate
 MANY = 2  # [-] impacts up to which the first two meshes suffice; each multiplies the error that a mesh makes before it
@@ -62,7 +63,7 @@ class Blow:
     striker: Striker
     contact: Contact
     arguments: Mapping[str, Any]  # of `strike`: at, speed, tolerance, quantity and so on
-    points: tuple = ()  # points (dimension,) [m] of the target whose motion is wanted
+    points: tuple[Any, ...] = ()  # points (dimension,) [m] of the target whose motion is wanted
     moving: bool = False  # whether the target's motion is wanted, besides the quantities
     name: str = ""  # of the scene file, put in front of messages
 
@@ -124,12 +125,16 @@ class Plan:
     def assumptions(self) -> tuple[Assumption, ...]:
         """Is the model itself right, as far as that is known before the blow? As in `Response`, without effects.
 
-        They come from the same blow on a wall, which is the hardest; empty if a body is known by its modes only.
+        They come from the same blow on a wall, which is the hardest.
         """
-        values, simplified = _Asked.checked(self.blow, self.changes).values, _outside(self, "infinite")
-        if simplified is None:
-            return ()
-        return audit.foresee(simplified, self.blow.striker, self.blow.contact, values["at"], values["speed"])
+        asked, blow = _Asked.checked(self.blow, self.changes), self.blow
+        target = replace(blow.target, stretching=asked.values["stretching"])
+        striker = collision.shortened(blow.striker, self.n_striker_modes)
+        modes = target.modes if self.first is None else self.first
+        body = _outside(self, "infinite") if modes is None else target.finished(modes)
+        assert body is not None
+        how = {"speed": asked.values["speed"], "quantity": asked.quantities, "rings": self.target in RINGING}
+        return audit.foresee(target, body, striker, blow.contact, asked.values["at"], **how)
 
     @property
     def costly(self) -> bool:
@@ -180,9 +185,8 @@ class Plan:
         lines.append("Predicted errors:")
         errors = [*self.errors.items(), ("total", self.error)]
         lines += [f"  {line}" for line in markup.columns([(name, f"{error:.1e}") for name, error in errors])]
-        if self.assumptions:
-            head, *rest = assumption.lines(self.assumptions, self.tolerance)
-            lines += [f"Model: {head}", *(f"  {line}" for line in rest)]
+        head, *rest = assumption.lines(self.assumptions, self.tolerance)
+        lines += [f"Model: {head}", *(f"  {line}" for line in rest)]
         lines.append(f"Cost: {self.cost}")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")
@@ -207,7 +211,7 @@ class Run:
     @property
     def rings(self) -> bool:
         """Whether the motion of the target is known, not only the numbers of the blow."""
-        return self.plan.target in ("modal", "vectors")
+        return self.plan.target in RINGING
 
 
 @dataclass(frozen=True)
@@ -879,8 +883,9 @@ def strike(
     striker_force, target_force : float [N]
         Constant forces at the contact points, positive along the blow; for example the weight of a falling ball.
     stretching : bool
-        Whether deflections that are not small stretch a body held all round, and so stiffen it: von Karman's cubic
-        term, good up to deflections of about the thickness. Scheme A or A4; the motion after the blow stretches, too.
+        Whether deflections that are not small stretch a plate, or a beam held at both ends, and so stiffen it: von
+        Karman's cubic term, good up to deflections of about the thickness. Scheme A or A4; the motion after the blow
+        stretches, too.
     damping_ratio : float or function of frequency [Hz], optional
         Damping of a system, which has none of its own.
     strict : bool

@@ -1,5 +1,6 @@
 """Blows one after another on a body that goes on moving: rolls, flams, ruffs and ostinati."""
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -21,6 +22,7 @@ from ..impact.striker import Striker
 from ..modes.modal import Modes
 from . import audit, planner
 
+LOG = logging.getLogger(__name__)
 EACH = 0.5  # [-] of the tolerance for each blow by itself; the rest is for what it inherits from those before
 FEW_MODES = 0.1  # [-] of the tolerance at which the modes of a striker are chosen that meets others on the body
 MOST_BLOWS = 100_000  # [-] above a day of drumming; more are a mistake
@@ -351,6 +353,7 @@ class _Game:
                 return
 
     def _keep(self, hit: Response, who: tuple[int, ...]) -> None:
+        LOG.info("stroke %s at %.4g s: %d impacts", " and ".join(map(str, who)) or "none", self.now, hit.n_impacts)
         self.starts.append(self.now)
         self.hits.append(hit)
         self.who.append(who)
@@ -372,7 +375,7 @@ class _Game:
             stroke = self.played[stick.number]
             if _lift(stroke) <= self.now and not state.force[i].any():
                 continue
-            if stroke.contact.yield_approach or stroke.contact.hysteresis:
+            if stroke.contact.remembers:
                 raise ValueError(
                     f"strokes[{stick.number}] must have parted for good when the next blow or lift comes, at "
                     f"{self.now:.4g} s, because its contact yields or is felt, whose memory cannot be carried over"

@@ -9,6 +9,7 @@ import numpy as np
 
 from .._base.check import SimulationError
 from ..impact import accuracy, collision
+from ..impact.compiled import layout
 from ..impact.response import History, Response
 from ..modes.modal import Modes
 from .bending import Bending, Known, bending, known
@@ -26,7 +27,18 @@ class Struck:
     striker: Known | None
     ideal: str = ""  # "rigid" or "infinite" if the target was simplified so
     clearance: float | None = None  # [m] from the strike point to the nearest edge; None if it is not known
-    foreseen: bool = False  # whether the blow is only one on a wall, before the true one: nothing is struck again
+    place: np.ndarray | None = None  # (1, dimension) [m] strike point on the target
+    planned: tuple[Modes, Modes] | None = None  # striker and target before their blow: `hit` is one on a wall instead
+
+    @property
+    def foreseen(self) -> bool:
+        """Whether the blow is yet to come: nothing is struck again."""
+        return self.planned is not None
+
+    @property
+    def bodies(self) -> tuple[Modes, Modes]:
+        """Striker and target."""
+        return self.planned or (self.hit.bodies[0], self.hit.bodies[-1])
 
     @cached_property
     def bending(self) -> Bending | None:
@@ -142,5 +154,5 @@ def _change(name: str, band: float | None, one: Response, two: Response) -> floa
 def softer(history: History, compliance: float) -> dict[str, np.ndarray]:
     """The fields that change if the contact gets more compliance [m/N] in series."""
     law = history.law.copy()
-    law[:, 3] = np.maximum(0.0, law[:, 3] + compliance)
+    law[:, layout.COMPLIANCE] = np.maximum(0.0, law[:, layout.COMPLIANCE] + compliance)
     return {"law": law}

@@ -12,6 +12,8 @@ Cremer, Heckl and Petersson (2005), Structure-Borne Sound, ch. 6; Leppington, Br
 London A 382, 245-271; Wallace (1972), J. Acoust. Soc. Am. 51, 946-952.
 """
 
+from typing import Any
+
 import numpy as np
 
 from ..impact.assumption import Assumption
@@ -19,7 +21,7 @@ from ..modes.air import DENSITY, SPEED
 from ..modes.modal import Modes
 from .bending import Bending, Known, known
 from .restrike import Struck
-from .thinness import plane_wave
+from .thinness import plane_wave, wavenumber
 
 LIMIT = 0.02  # [-] mass of the air over that of the body at which frequencies drop by 1 %
 ROUNDED = 0.1  # [-] of k**2: k**2 - k_0**2 does not get smaller, as the waves of a finite plate are not straight
@@ -38,10 +40,12 @@ def of_target(struck: Struck) -> Assumption:
         remedy = "give material and section" if unknown else IN_AIR if plate else "the air around beams is not modelled"
         return Assumption("still air", value, LIMIT, effect, quantities, remedy, NUMBER, unknown)
 
-    if struck.hit.bodies[-1].air:
+    if struck.bodies[1].air:
         return Assumption("still air", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
-    if struck.hit.bodies[-1].dimension == 0 or struck.ideal == "rigid":
+    if struck.bodies[1].dimension == 0 or struck.ideal == "rigid":
         return told(None, dict.fromkeys(quantities, 0.0))
+    if struck.foreseen:
+        return told(*_ahead(struck, body))
     history, mine = struck.hit.history, struck.mine
     if struck.ideal:
         section = None if body is None else body.plate
@@ -72,6 +76,22 @@ def of_target(struck: Struck) -> Assumption:
     return told(value, effect, "the shapes heard" if effect.get("sound", 0.0) is None else "")
 
 
+def _ahead(struck: Struck, body: Known | None) -> tuple[float | None, dict, str]:
+    """What is known before the blow: the mass of the air along the waves of the contact's own frequency."""
+    wave = None if body is None else wavenumber(body, struck.bending, struck.omega)
+    if body is None or wave is None:
+        return None, {}, "the waves of the body"
+    if body.modes.dimension == 2:
+        return 2.0 * DENSITY / (body.per_extent * wave), {}, ""
+    width = width_of(body)
+    return (None, {}, "the width of the body") if width is None else (float(_along(body, width, wave)), {}, "")
+
+
+def _along(body: Known, width: float, wave: Any) -> Any:
+    """Mass of the air over that of a beam of a width [m] whose waves have some wavenumbers [rad/m]."""
+    return np.minimum(0.25 * np.pi * DENSITY * width**2, 2.0 * DENSITY * width / wave) / body.per_extent
+
+
 def loading(body: Known, integrals: Bending) -> tuple[np.ndarray, np.ndarray] | None:
     """Mass of the air over that of the body, and damping ratio by sound, (n_modes,) [-] each; None if not known.
 
@@ -82,10 +102,10 @@ def loading(body: Known, integrals: Bending) -> tuple[np.ndarray, np.ndarray] | 
     moving = (omega > 0.0) & (integrals.wave > 0.0)
     k, k0 = np.where(moving, integrals.wave, 1.0), np.where(moving, omega, c) / c
     if body.modes.dimension == 1:
-        width = _width(body)
+        width = width_of(body)
         if width is None:
             return None
-        mass = np.minimum(0.25 * np.pi * rho * width**2, 2.0 * rho * width / k) / per_extent
+        mass = _along(body, width, k)
         sound = 0.25 * np.pi * mass * (0.5 * k0 * width) ** 2
         return np.where(moving, mass, 0.0), np.where(moving, sound, 0.0)
     short = np.sqrt(np.maximum(k**2 - k0**2, ROUNDED * k**2))
@@ -102,7 +122,7 @@ def loading(body: Known, integrals: Bending) -> tuple[np.ndarray, np.ndarray] | 
     return np.where(moving, mass, 0.0), np.where(moving, sound, 0.0)
 
 
-def _width(body: Known) -> float | None:
+def width_of(body: Known) -> float | None:
     """Mean width [m] of a beam."""
     section = body.section
     if section is None or body.thickness is None:

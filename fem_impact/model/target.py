@@ -55,7 +55,7 @@ class Stages:
     """Wall time of each stage; ``watch`` may display the stages, and the log of the package tells them."""
 
     def __init__(self, watch: Watch | None = None) -> None:
-        self.watch = watch or (lambda name: nullcontext())
+        self.watch: Watch = watch or (lambda name: nullcontext())
         self.seconds: dict[str, float] = {}
 
     @contextmanager
@@ -77,8 +77,8 @@ class Target:
     mesh: Mesh | None = None  # None if only modes are known
     section: Plate | Beam | None = None
     supports: Mapping[str, Any] = field(default_factory=dict)
-    point_masses: tuple = ()
-    point_supports: tuple = ()
+    point_masses: tuple[Any, ...] = ()
+    point_supports: tuple[Any, ...] = ()
     scale: Mapping[str, float] = field(default_factory=dict)  # mass [kg], first_frequency [Hz] to scale to
     damping_ratio: Damping | None = None  # None keeps that of the modes
     source: str = "auto"  # "fe", "analytic" or "auto": closed formulas if there are any and no size is stated
@@ -86,7 +86,8 @@ class Target:
     system: System | None = None  # assembled by the user
     modes: Modes | None = None  # found by the user
     model: str = "stated"  # "auto" takes a thick theory, air and stretching where the tolerance requires them
-    air: str | None = None  # which sides face open air in a rigid wall, of AIR; None is a vacuum
+    air: str | None = None  # which sides face open air, of AIR; None is a vacuum
+    baffle: bool = True  # whether a plate fills a hole in a large rigid wall, as air and sound see it
     stretching: bool = False  # whether large deflections stretch and stiffen it
     blame: Blame = _nobody
 
@@ -125,10 +126,13 @@ class Target:
 
     @property
     def can_stretch(self) -> bool:
-        """Whether it is known how it stretches: material and section are stated, and supports hold its whole edge."""
+        """Whether it is known how it stretches: material and section are stated, and what holds it in its plane."""
         if self.mesh is None or self.section is None or self.scale:
             return False
-        return set(support_of_facets(self.mesh, dict(self.supports), support_words(self.theory))) <= set(HELD)
+        kinds = support_of_facets(self.mesh, dict(self.supports), support_words(self.theory))
+        if self.mesh.dimension == 2:
+            return all(isinstance(kind, str) for kind in kinds)
+        return set(kinds) <= set(HELD)
 
     @property
     def kind(self) -> str:
@@ -161,7 +165,7 @@ class Target:
     def surrounded(self, modes: Modes) -> Modes:
         """The modes as struck: scaled, damped and in the air around."""
         modes = self.finished(modes)
-        modes = modes if self.air is None else in_air(modes, sides=AIR[self.air])
+        modes = modes if self.air is None else in_air(modes, sides=AIR[self.air], baffled=self.baffle)
         return replace(modes, stretches=True) if self.stretching else modes
 
     @cached_property
@@ -294,6 +298,8 @@ class Target:
         section = self.section
         if not isinstance(section, Plate) or not section.tension or self.mesh is None:
             body = self.modes or self.mesh
+            if not low:  # a rigid body has no others
+                return 1.0
             return (high / low) ** (0.5 * (2 if body is None else body.dimension))
         middle = self.mesh.points[self.mesh.cells].mean(axis=1)
         bending, inertia = float(section.stiffness(middle)[:, 0, 0].mean()), float(section.inertia(middle).mean())

@@ -12,8 +12,9 @@ Mindlin (1951), J. Appl. Mech. 18, 31-38; Wang (1994), J. Vib. Acoust. 116, 536-
 
 import numpy as np
 
-from ..fe.section import SHEAR, Plate
+from ..fe.section import SHEAR, Beam, Plate
 from ..impact.assumption import Assumption
+from ..impact.compiled import layout
 from .bending import Bending, Known
 from .deflection import OTHER
 from .restrike import Struck, softer
@@ -21,6 +22,7 @@ from .restrike import Struck, softer
 LIMIT = 0.23  # [-] thickness times wavenumber at which a wave is 1 % too fast for nu = 0.3
 DENT = 2.0  # [-] thickness times wavenumber beyond which a force is local to the contact
 DOUBT = 0.2  # [-] drop of all frequencies by which a striker of unknown thickness is tried
+NEAR = 10  # [-] modes next to a frequency that tell its wavenumber: few of them swing as its waves do
 NUMBER = "thickness times wavenumber"
 THICKER = 'take a thick plate, theory = "mindlin", or a softer contact'
 SLENDER = 'take a thick beam, theory = "timoshenko", or a softer contact'
@@ -43,10 +45,12 @@ def of_target(struck: Struck) -> Assumption:
         remedy = OTHER if unknown == MORLEY else NO_SECTION if unknown else THICKER if plate else SLENDER
         return Assumption("thin target", value, LIMIT, effect, quantities, remedy, NUMBER, unknown)
 
-    if struck.hit.bodies[-1].dimension == 0 or struck.hit.bodies[-1].thick:
+    if struck.bodies[1].dimension == 0 or struck.bodies[1].thick:
         return Assumption("thin target", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
     if body is None or body.thickness is None:
         return told(None, dict.fromkeys(quantities), "the thickness of the body")
+    if struck.foreseen:
+        return told(*_ahead(body, wavenumber(body, struck.bending, struck.omega)))
     if struck.ideal:
         return told(*_simplified(struck, body))
     integrals, history = struck.bending, struck.hit.history
@@ -61,7 +65,7 @@ def of_target(struck: Struck) -> Assumption:
         "omega": struck.of_target(history.omega[struck.mine] * lowered(integrals.thick)),
         "shape": struck.of_target(history.shape[:, struck.mine] / np.sqrt(1.0 + integrals.rotary), "shape"),
     }
-    if body.plate is not None and history.law[0, 3] > 0.0:
+    if body.plate is not None and history.law[0, layout.COMPLIANCE] > 0.0:
         changed |= softer(history, _give(struck, body, body.plate, integrals))
     effect = struck.heard(struck.changes(**changed), lambda _, found: _heard(found))
     unknown = "the thickness of the body" if effect.get("sound", 0.0) is None else ""
@@ -88,11 +92,32 @@ def _give(struck: Struck, body: Known, plate: Plate, integrals: Bending) -> floa
     return _shear_give(plate, body.thickness, float(integrals.wave[-1]))
 
 
-def plane_wave(plate: Plate, omega: float) -> float:
-    """Wavenumber [rad/m] of a plate's bending waves, by the geometric mean of its stiffnesses if orthotropic."""
-    origin = np.zeros((1, 2))
-    D = plate.stiffness(origin)[0]
-    return float((plate.inertia(origin)[0] * omega**2 / np.sqrt(D[0, 0] * D[1, 1])) ** 0.25)
+def plane_wave(section: Plate | Beam, omega: float) -> float:
+    """Wavenumber [rad/m] of a body's bending waves, by the geometric mean of its stiffnesses if orthotropic."""
+    origin = np.zeros((1, 2 if isinstance(section, Plate) else 1))
+    D = section.stiffness(origin)
+    stiff = np.sqrt(D[0, 0, 0] * D[0, 1, 1]) if isinstance(section, Plate) else D.flat[0]
+    return float((section.inertia(origin)[0] * omega**2 / stiff) ** 0.25)
+
+
+def wavenumber(body: Known, integrals: Bending | None, omega: float) -> float | None:
+    """Wavenumber [rad/m] at a frequency [rad/s], of modes if there are any, else of the section; None if not known."""
+    if integrals is not None:
+        moving = np.flatnonzero((body.modes.omega > 0.0) & (integrals.wave > 0.0))
+        near = moving[np.argsort(np.abs(np.log(body.modes.omega[moving] / omega)))[:NEAR]]
+        if len(near):
+            return float(np.median(integrals.wave[near] * np.sqrt(omega / body.modes.omega[near])))
+    section = body.section
+    if section is None or any(callable(size) for size in vars(section).values()):
+        return None
+    return plane_wave(section, omega)
+
+
+def _ahead(body: Known, wave: float | None) -> tuple[float | None, dict[str, float | None], str]:
+    """What is known before the blow."""
+    if wave is None or body.thickness is None:
+        return None, {}, "the waves of this body, without its modes"
+    return body.thickness * wave, {}, ""
 
 
 def _simplified(struck: Struck, body: Known) -> tuple[float | None, dict[str, float | None], str]:
@@ -113,14 +138,17 @@ def _simplified(struck: Struck, body: Known) -> tuple[float | None, dict[str, fl
 
 def of_striker(struck: Struck) -> Assumption:
     """A flexible striker: its own section, or if that is not known a trial with lower frequencies."""
-    hit, quantities = struck.hit, struck.quantities
-    flexible = hit.bodies[0].omega > 0.0
-    if not hit.bodies[0].dimension or not flexible.any() or hit.bodies[0].thick:
+    hit, quantities, modes = struck.hit, struck.quantities, struck.bodies[0]
+    flexible = modes.omega > 0.0
+    if not modes.dimension or not flexible.any() or modes.thick:
         return Assumption("thin striker", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
     body, omega = struck.striker, hit.history.omega.copy()
     columns = hit.body_slice(0)
     integrals = struck.striker_bending
     if body is None or body.thickness is None or integrals is None or integrals.thick is None:
+        if struck.foreseen:
+            unknown = "the thickness of the striker"
+            return Assumption("thin striker", None, LIMIT, {}, quantities, NO_SLENDERNESS, NUMBER, unknown)
         omega[columns] *= 1.0 - DOUBT
         effect = struck.changes(omega=omega)
         if max(np.inf if x is None else x for x in effect.values()) <= hit.tolerance:
@@ -128,9 +156,12 @@ def of_striker(struck: Struck) -> Assumption:
         unknown = "the thickness of the striker, and the blow depends on its bending modes"
         effect = dict.fromkeys(quantities)
         return Assumption("thin striker", None, LIMIT, effect, quantities, NO_SLENDERNESS, NUMBER, unknown)
+    if struck.foreseen:
+        value, effect, unknown = _ahead(body, wavenumber(body, integrals, struck.omega))
+        return Assumption("thin striker", value, LIMIT, effect, quantities, SLENDER, NUMBER, unknown)
     omega[columns] *= lowered(integrals.thick)
     h = hit.history
     end = h.states(np.array([max((impact.end for impact in hit.impacts), default=0.0)]))
     energy = 0.5 * (end[1][0, columns] ** 2 + (h.omega[columns] * end[0][0, columns]) ** 2) * flexible
-    value = body.thickness * float(np.sqrt(energy @ integrals.wave**2 / (energy.sum() or 1.0)))
-    return Assumption("thin striker", value, LIMIT, dict(struck.changes(omega=omega)), quantities, SLENDER, NUMBER)
+    weighed = body.thickness * float(np.sqrt(energy @ integrals.wave**2 / (energy.sum() or 1.0)))
+    return Assumption("thin striker", weighed, LIMIT, dict(struck.changes(omega=omega)), quantities, SLENDER, NUMBER)

@@ -12,19 +12,21 @@ NUMBER = "damping ratio tried"
 def of_both(struck: Struck) -> Assumption:
     """The struck body, unless its damping is stated, and a flexible striker."""
     hit, quantities = struck.hit, struck.quantities
-    history = hit.history
-    zeta, unstated = history.zeta.copy(), []
-    for name, body in (("striker", 0), ("struck body", len(hit.bodies) - 1)):
-        columns = hit.body_slice(body)
-        flexible = history.omega[columns] > 0.0
-        bare = flexible.any() and not history.zeta[columns][flexible].any()
-        if bare and not (body and struck.ideal) and hit.bodies[body].dimension:
-            zeta[columns] = np.where(flexible, PLAUSIBLE, 0.0)
+    zeta, unstated = hit.history.zeta.copy(), []
+    for name, body, modes in zip(("striker", "struck body"), (0, len(hit.bodies) - 1), struck.bodies):
+        flexible = modes.omega > 0.0
+        simple = body and struck.ideal and not struck.foreseen
+        if modes.dimension and flexible.any() and not modes.damping_ratio[flexible].any() and not simple:
             unstated.append(name)
+            if not struck.foreseen:
+                zeta[hit.body_slice(body)] = np.where(flexible, PLAUSIBLE, 0.0)
     if not unstated:
         return Assumption("stated damping", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
+    remedy = f"state the damping ratio of the {' and of the '.join(unstated)}"
+    if struck.foreseen:
+        unknown = "what a damping that nobody stated would change"
+        return Assumption("stated damping", PLAUSIBLE, None, {}, quantities, remedy, NUMBER, unknown)
     effect = struck.changes(zeta=zeta)
     if "sound" in quantities:
         effect["sound"] = 1.0 if "struck body" in unstated else effect["sound"]  # it would ring for ever
-    remedy = f"state the damping ratio of the {' and of the '.join(unstated)}"
     return Assumption("stated damping", PLAUSIBLE, None, effect, quantities, remedy, NUMBER)

@@ -122,6 +122,20 @@ class Seen:
         Whether the user insists on this size.
     """
 
+    target: Target
+    at: np.ndarray  # (1, 2) [m], or of several points
+    size: float  # [m]
+    fixed: bool
+    stages: Stages
+    shift: float  # [rad/s] before scaling, see `Krylov`
+    count: int  # vectors
+    margin: float  # [-] over the cutoff, up to which Ritz pairs are kept
+    whole: Modes | None  # all Ritz pairs of the last `modes`
+    tried: list[float]  # [-] truncation errors of the blows so far
+    spent: bool  # whether more vectors no longer help
+    fine: Krylov
+    coarse: Krylov | None
+
     def __init__(
         self, target: Target, at: Any, resonance: float, tolerance: float, size: float, fixed: bool, stages: Stages
     ) -> None:
@@ -130,11 +144,9 @@ class Seen:
         self.shift = 2.0 * np.pi * resonance * SHIFT[0] * strict ** SHIFT[1] / target.stretch
         self.count = first_count(target, resonance, tolerance)
         self.margin = FOLDED[0] * strict ** FOLDED[1]
-        self.whole: Modes | None = None  # all Ritz pairs of the last `modes`
-        self.tried: list[float] = []  # [-] truncation errors of the blows so far
-        self.spent = False  # whether more vectors no longer help
+        self.whole, self.tried, self.spent = None, [], False
         self.fine = self._krylov(size)
-        self.coarse: Krylov | None = None
+        self.coarse = None
 
     def _stuck(self, truncation: float) -> bool:
         """Whether the last PATIENCE steps towards more vectors gained nothing."""

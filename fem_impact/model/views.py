@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..fe.assembly import System
 from ..modes.modal import Modes
 from ..modes.ritz import Krylov
 from .vectors import Seen
@@ -18,9 +19,12 @@ TOGETHER = 8  # [-] points that share a mesh: each adds elements that shrink tow
 class Krylovs(Krylov):
     """Vectors of the first point; `each` has those of all points, one after another."""
 
-    def __init__(self, system, points: np.ndarray, shift: float) -> None:
+    each: list[Krylov]
+    compliance: np.ndarray  # (n_points, n_points) in the frame, diagonal
+
+    def __init__(self, system: System, points: np.ndarray, shift: float) -> None:
         super().__init__(system, points[:1], shift)
-        self.each: list[Krylov] = [self, *(self.beside(point[None]) for point in points[1:])]
+        self.each = [self, *(self.beside(point[None]) for point in points[1:])]
         self.compliance = np.diag([float(one.compliance[0, 0]) for one in self.each])
 
 

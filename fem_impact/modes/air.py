@@ -45,8 +45,7 @@ NEIGHBOURS = 24  # [-] modes on either side that air may mix into a block
 NODES = 4  # [-] frequencies per block between which the integrals are interpolated
 SAME = 1e-9  # [-] relative difference of frequencies between which nothing is interpolated
 TURNS = 3  # [-] the frequencies of a block are chosen anew from its modes in air so many times
-NEAR = 6  # [-] cells within which the kernel between two cells is integrated, not taken at their centres
-GAUSS = 12  # [-] points per half width of a cell in that integral
+FAR = 100.0  # [-] cells from which 1 / R between two cells is taken at their centres: errs by 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +184,8 @@ class _Air:
         self.padded = next_fast_len(2 * nx - 1, True), next_fast_len(2 * ny - 1, True)
         steps = np.meshgrid(*(np.minimum(np.arange(n), n - np.arange(n)) for n in self.padded), indexing="ij")
         self.distance = size * np.hypot(*steps)  # (padded) [m]
-        self.inverse = _inverse_distance(steps[0], steps[1]) / size  # (padded) [1/m] mean of 1 / R between two cells
+        nearest = mean_inverse_distance(*(n // 2 + 1 for n in self.padded))
+        self.inverse = nearest[steps[0], steps[1]] / size  # (padded) [1/m] mean of 1 / R between two cells
 
     def added_mass(self, modes: slice, omega: float) -> np.ndarray:
         """Mass [-] that air adds between some modes at a frequency [rad/s]."""
@@ -266,16 +266,14 @@ def _strengths(samples: np.ndarray, spacing: float, across: int) -> np.ndarray:
     return samples.reshape(n, nx // across, across, ny // across, across).sum(axis=(2, 4)) * spacing**2
 
 
-def _inverse_distance(across: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """Mean of 1 / R between the points of two unit squares whose centres lie integer steps apart, same shape."""
-    distance = np.hypot(across, along)
-    result = np.divide(1.0, distance, out=np.zeros(distance.shape), where=distance > 0.0)
-    node, weight = np.polynomial.legendre.leggauss(GAUSS)
-    half = 0.5 * (node + 1.0)
-    offset = np.concatenate([half - 1.0, half])  # difference of two coordinates, distributed as 1 - |offset|
-    share = np.concatenate([weight, weight]) * 0.5 * (1.0 - np.abs(offset))
-    for i, j in zip(*np.nonzero((distance <= NEAR) & (distance > 0.0))):
-        apart = np.hypot(across[i, j] + offset[:, None], along[i, j] + offset)
-        result[i, j] = share @ (1.0 / apart) @ share
-    result[distance == 0.0] = 4.0 * (np.arcsinh(1.0) + (1.0 - np.sqrt(2.0)) / 3.0)
-    return result
+def mean_inverse_distance(nx: int, ny: int) -> np.ndarray:
+    """Mean of 1 / R between the points of two unit squares that lie 0, 1 ... steps apart, (nx, ny); exact nearby."""
+    x, y = np.meshgrid(np.arange(-1.0, nx + 1.0), np.arange(-1.0, ny + 1.0), indexing="ij")
+    x, y = np.abs(x), np.abs(y)
+    distance = np.hypot(x, y)
+    one = np.where(x > 0.0, x, 1.0), np.where(y > 0.0, y, 1.0)
+    whole = 0.5 * x * y * (y * np.arcsinh(x / one[1]) + x * np.arcsinh(y / one[0])) - distance**3 / 6.0
+    for axis in (0, 1):  # the fourth derivative by both coordinates, twice each, is 1 / R
+        whole = np.diff(whole, 2, axis=axis)
+    distance = distance[1:-1, 1:-1]
+    return np.where(distance > FAR, 1.0 / np.maximum(distance, 1.0), whole)

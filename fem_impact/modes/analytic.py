@@ -20,7 +20,7 @@ from .modal import BeamlikeShapes, Damping, Modes, Shapes, damping_ratios
 IMAGES = 6  # [-] image forces beyond each shorter side of a hinged plate; the n-th contributes exp(-2 pi n)
 NEAR_POLE = 1.0  # [-] distance x below which polylogarithms are summed as power series, which converge up to 2 pi
 POWERS = np.append(2, np.arange(3, 60, 2))  # [-] exponents of these series; all other coefficients are zero
-SERIES = (
+SERIES: np.ndarray = (
     (-1.0) ** POWERS * special.bernoulli(60)[POWERS - 1] / (POWERS - 1.0) / special.factorial(POWERS)
 )  # zeta(2-k)/k!
 POLYLOG_TERMS = 40  # [-] terms of the direct sum used beyond NEAR_POLE; the next one is about exp(-40)
@@ -183,11 +183,20 @@ class RectangleShapes(Shapes):
         return replace(self, numbers=self.numbers[:n_modes])
 
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        n = (48, 32)
-        x, y = np.meshgrid(np.linspace(0, self.length, n[0] + 1), np.linspace(0, self.width, n[1] + 1), indexing="ij")
-        node = np.arange(x.size).reshape(x.shape)
-        a, b, c, d = node[:-1, :-1].ravel(), node[1:, :-1].ravel(), node[1:, 1:].ravel(), node[:-1, 1:].ravel()
-        return np.column_stack([x.ravel(), y.ravel()]), np.vstack([np.c_[a, b, c], np.c_[a, c, d]])
+        return _grid(self.length, self.width)
+
+
+@lru_cache(maxsize=4)  # [-] rectangles; a gradient asks for one several times
+def _grid(length: float, width: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points [m] and triangles over a rectangle."""
+    n = (48, 32)
+    x, y = np.meshgrid(np.linspace(0, length, n[0] + 1), np.linspace(0, width, n[1] + 1), indexing="ij")
+    node = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = node[:-1, :-1].ravel(), node[1:, :-1].ravel(), node[1:, 1:].ravel(), node[:-1, 1:].ravel()
+    found = np.column_stack([x.ravel(), y.ravel()]), np.vstack([np.c_[a, b, c], np.c_[a, c, d]])
+    for each in found:
+        each.setflags(write=False)
+    return found
 
 
 def _inside(points: np.ndarray, sides: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Modes: the description of a structure that every later stage works on, whether computed or measured."""
 
+import logging
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -16,6 +17,8 @@ from ..fe.assembly import THICK, System
 from ..fe.eigenvalues import Flexibility
 from ..fe.section import Beam, Plate
 from . import universal_files, viewing
+
+LOG = logging.getLogger(__name__)
 
 HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 2 pi times it must stay in reach
 SHOWN = 10  # [-] modes listed in a notebook: a table without scrolling
@@ -696,6 +699,7 @@ def find_modes(
         )
     in_hertz = None if enclosed is None else enclosed / (2.0 * np.pi)
     notes = plausible.together(system.notes, damping_notes(damping, found.omega))
+    LOG.info("%d modes up to %.5g Hz", len(found.omega), found.omega[-1] / (2.0 * np.pi))
     return Modes(
         found.omega,
         damping,

@@ -85,6 +85,17 @@ class Krylov:
         s in (K + s**2 M)**-1 M; about twice the highest angular frequency that matters.
     """
 
+    system: System
+    shift: float  # s**2 in the frame
+    points: np.ndarray  # (n_points, dimension) [m]
+    loads: np.ndarray  # (n_dofs, n_points)
+    width: int  # number of points
+    vectors: np.ndarray  # (room, n_dofs) mass-orthonormal rows
+    projected: np.ndarray  # (room, room) of (K + s**2 M)**-1 M
+    count: int  # of vectors made
+    full: bool  # whether there are no more
+    compliance: np.ndarray  # (n_points, n_points) in the frame
+
     def __init__(self, system: System, points: np.ndarray, shift: float) -> None:
         self.system = system
         self.shift = (shift / system.frame.rate) ** 2  # s**2 in the frame
@@ -152,9 +163,11 @@ class Krylov:
     def _make_room(self, count: int) -> None:
         """Take memory for so many vectors, and for more to come: it is not used until they do."""
         if count > len(self.vectors):
-            more = int(ROOM * count) - len(self.vectors)
-            self.vectors = np.concatenate([self.vectors, np.empty((more, self.system.n_dofs))])
-            self.projected = np.pad(self.projected, (0, more))
+            room = int(ROOM * count)
+            vectors = np.empty((room, self.system.n_dofs))
+            vectors[: self.count] = self.vectors[: self.count]
+            self.projected = np.pad(self.projected, (0, room - len(self.projected)))
+            self.vectors = vectors
 
     def _cleared(self, new: np.ndarray) -> np.ndarray:
         """New vectors without the parts along earlier ones that rounding brought back; clears the latest block alike.

@@ -1,7 +1,8 @@
-"""Stiffening by stretching: a body held all round gets longer as it bends, and so stiffer.
+"""Stiffening by stretching: a bent plate, or a beam between held ends, gets longer as it bends, and so stiffer.
 
-Of a plate it is von Karman's cubic term: the plane between edges that cannot slip stretches by
-``1/2 grad w grad w`` and settles where its energy is least (`membrane`), a quartic of the modes. Of a beam the tension
+Of a plate it is von Karman's cubic term: the plane stretches by ``1/2 grad w grad w`` and settles where its energy is
+least (`membrane`), a quartic of the modes. Hinged and clamped edges cannot slip; free ones may move in the plane, too,
+and a plate that is free all round stretches where its bent surface cannot be unrolled. Of a beam the tension
 is ``N = E A s / (2 L)`` with ``s = int w'**2``, and the energy ``N s / 4``; if it is not uniform, L / (E A) becomes an
 integral.
 
@@ -35,7 +36,8 @@ HELD = "clamped", "hinged", SOFT  # supports that hold an edge in the plane, too
 MOST = 40  # [-] modes that stretch
 COARSEST = 0.25  # [-] triangles of a plate known by formulas over its shorter side: 1e-4 too stiff in its first mode
 NODES = 40  # [-] Gauss points along a radius or a beam, and so many more for each mode
-CANNOT = "stretching=True is known for plates and beams with their section, held along the whole edge"
+CANNOT = "stretching=True is known for plates, held or free along their edges, and beams held at both ends"
+ELASTIC = "its edge is elastic, which does not say how its plane is held"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,21 +55,24 @@ class Stretching:
 
 
 def stretch(modes: Modes) -> Stretching:
-    """How the modes of a plate or beam with edges that cannot slip stretch it; raise ValueError for other bodies."""
-    section = modes.section
-    if section is None or not modes.dimension or modes.n_rigid:
-        why = "its section is not known" if section is None else "it can move rigidly"
-        raise ValueError(f"{CANNOT}, but {'a mass has none' if not modes.dimension else why}; leave it out")
+    """How the modes of a plate, or of a beam between held ends, stretch it; raise ValueError for other bodies."""
+    section, rigid = modes.section, modes.n_rigid
+    if section is None or not modes.dimension:
+        why = "its section is not known" if modes.dimension else "a mass has none"
+        raise ValueError(f"{CANNOT}, but {why}; leave it out")
     base, amplitude, mix = _unwrapped(modes.shapes)
     if isinstance(section, Plate):
-        n = min(MOST, modes.n_modes)
+        n = min(MOST + rigid, modes.n_modes)
+        if n == rigid:
+            raise ValueError(f"{CANNOT}, but it has no mode that bends; leave it out")
         sheet, steep = _sheet(base if mix is not None else base.take(n), section)
 
         def every(cells: np.ndarray, x: np.ndarray) -> np.ndarray:
             slope = amplitude * steep(cells, x)
-            return slope if mix is None else slope @ mix[:, :n]
+            return (slope if mix is None else slope @ mix[:, :n])[..., rigid:]
 
-        return Stretching(np.sqrt(2.0) * membrane.forms(sheet, every, modes.omega[:n]))
+        found = np.sqrt(2.0) * membrane.forms(sheet, every, modes.omega[rigid:n])
+        return Stretching(np.pad(found, ((0, 0), (rigid, 0), (rigid, 0))))  # the plane follows a plate that tilts
     gram, soft = _tension(base, section)
     gram = amplitude**2 * (gram if mix is None else mix.T @ gram @ mix)
     return Stretching((gram / np.sqrt(2.0 * soft))[None])
@@ -84,10 +89,12 @@ def _unwrapped(shapes: Shapes) -> tuple[Shapes, float, np.ndarray | None]:
 
 
 def _checked(system: System) -> None:
-    """Raise ValueError unless the edge of a body of elements is held in its plane, and its slopes are known."""
-    loose = set(support_of_facets(system.mesh, dict(system.supports), support_words(system.theory))) - set(HELD)
-    if loose:
-        raise ValueError(f"{CANNOT}, but an edge is free or elastic; hold it, or leave stretching out")
+    """Raise ValueError unless it is known what holds the plane of a body of elements, and its slopes are known."""
+    kinds = support_of_facets(system.mesh, dict(system.supports), support_words(system.theory))
+    if not all(isinstance(kind, str) for kind in kinds):
+        raise ValueError(f"{CANNOT}, but {ELASTIC}; hold it, or leave stretching out")
+    if system.mesh.dimension == 1 and not set(kinds) <= set(HELD):
+        raise ValueError(f"{CANNOT}, but an end is free; hold it, or leave stretching out")
     if system.element == "morley":
         raise ValueError("stretching=True is unknown for element 'morley'; take 'argyris', or leave stretching out")
 
@@ -113,7 +120,7 @@ def _sheet(shapes: Shapes, section: Plate) -> tuple[membrane.Sheet, membrane.Ste
         mesh, steep = meshes.disk(shapes.radius, size=size), partial(_disk, shapes)
     else:
         raise ValueError(f"{CANNOT}, but its shapes are known at points only; leave it out")
-    system = assemble(mesh, section, {"boundary": "clamped"})
+    system = assemble(mesh, section, {} if getattr(shapes, "edge", "") == "free" else {"boundary": "clamped"})
     frame = system.frame
     return membrane.Sheet.of(system), lambda _, x: steep(frame.centre + frame.length * x)
 
@@ -135,7 +142,7 @@ def _vectors(shapes: FieldShapes | RitzShapes) -> np.ndarray:
     """The shapes in the unknowns of their system, (n_dofs, n)."""
     if isinstance(shapes, FieldShapes):
         return shapes.vectors
-    return (shapes.basis.T @ shapes.turn)[:, : shapes.kept]
+    return np.hstack([shapes.system.rigid, shapes.basis.T @ shapes.turn])[:, : shapes.kept]
 
 
 def _rectangle(shapes: RectangleShapes, points: np.ndarray) -> np.ndarray:

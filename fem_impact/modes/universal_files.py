@@ -11,7 +11,8 @@ NORMAL_MODE, DISPLACEMENT, STRUCTURAL, REAL = 2, 8, 1, 2  # codes of data set 55
 CELL_CODE = {2: 11, 3: 91, 4: 94}  # nodes of a cell -> rod, thin shell triangle, thin shell quadrilateral
 WANTED = (15, 55, 2411)  # data sets to read: nodes, shapes, nodes in double precision
 LINES, SHELLS = (11, 21, 22), range(41, 97)  # codes of elements: rods and beams, plane and shell elements
-CORNERS = {3: (0, 1, 2), 4: (0, 1, 2, 3), 6: (0, 2, 4), 8: (0, 2, 4, 6)}  # nodes of a shell element -> its corners
+# nodes of a shell element -> its corners
+CORNERS: dict[int, tuple[int, ...]] = {3: (0, 1, 2), 4: (0, 1, 2, 3), 6: (0, 2, 4), 8: (0, 2, 4, 6)}
 PHASE = 0.3  # [-] largest imaginary over largest real part, at the best phase, of a complex shape taken as real
 DIRECTIONS = {"x": "r1", "y": "r2", "z": "r3"}
 
@@ -20,7 +21,10 @@ def _pyuff() -> Any:
     return check.extra("pyuff", "uff", "a universal file")
 
 
-def write(path: Any, frequencies, damping_ratio, shapes, points, cells) -> None:
+def write(
+    path: Any, frequencies: np.ndarray, damping_ratio: np.ndarray, shapes: np.ndarray, points: np.ndarray,
+    cells: np.ndarray,
+) -> None:  # fmt: skip
     """Write nodes (data sets 15 and 2411), cells (2412) and one data set 55 for each mode; numbers keep six digits.
 
     Parameters

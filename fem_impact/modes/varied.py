@@ -21,7 +21,8 @@ class ModesChange:
     shape: np.ndarray  # (n_modes,) [kg**-0.5] at the point
     compliance: float  # [m/N] of the whole body at the point
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)

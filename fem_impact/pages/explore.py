@@ -1,22 +1,31 @@
 """Serves a page, on this machine only, whose sliders and clicks change the blow."""
 
+import gc
+import json
 import logging
 import socket
-import sys
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from typing import Any
 
 from .._base import check
 from ..model.planner import Watch
 from ..scenes.scene import Scene
-from .explore_model import Bench, blow, quick
-from .explore_view import Page
+from . import report
+from .explore_desk import Desk
+from .explore_model import Bench
+from .explore_session import Session
+from .explore_view import page
+from .explore_worker import Worker
 
-SWITCH = 1e-3  # [s] for which a map or a sound computed beside the page may keep it waiting; Python's own is 5e-3
 LOCAL = "127.0.0.1"
 LARGEST_REQUEST = 64 * 1024  # [byte] of a request or a message: a slider's value takes a few hundred
 LARGEST_HEADER = 16 * 1024  # [byte] of a request: browsers send one or two thousand
+POLICY = {  # what the page may load and where it may send: nothing but its own parts, pictures and sounds made here
+    "default-src": "'none'", "script-src": "'self'", "style-src": "'self'", "connect-src": "'self'",
+    "img-src": "data:", "media-src": "data:", "base-uri": "'none'", "form-action": "'none'",
+    "frame-ancestors": "'none'",
+}  # fmt: skip
 
 
 @check.typed
@@ -42,50 +51,80 @@ def serve(
     OSError
         If the port is in use.
     """
-    for module in ("bokeh.server.tornado", "jinja2"):
+    for module in ("tornado", "jinja2"):
         check.extra(module, "web", "exploring")
     from tornado.ioloop import IOLoop
 
     if not 0 <= port < 65536:
         raise ValueError(f"port must lie between 0 and 65535, got {port}")
-    for name in ("tornado.access", "bokeh.server.views.ws"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # do not report refused requests on the terminal
-    with (watch or nullcontext)("modes"):
-        bench = Bench.of(scene)
-        blow(bench.case(bench.start))  # compile the kernels before the page opens
-        quick(bench.case(bench.start))
-    sys.setswitchinterval(SWITCH)
-    server, address = _server(bench, port)
-    server.start()
-    if ready is not None:
-        ready(address)
+    logging.getLogger("tornado.access").setLevel(logging.CRITICAL)  # do not report refused requests on the terminal
+    workers: list[Worker] = []
     try:
-        IOLoop.current().start()
+        with (watch or nullcontext)("modes"):
+            desk = Desk(Bench.of(scene))
+            workers += [Worker(desk), Worker(desk)]  # one judges blows while the other draws a map or a sound
+            desk.answer(desk.bench.start)  # compile the kernels before the page opens
+        gc.collect()
+        gc.freeze()  # the modes outlive every answer, and looking through them takes longer than one
+        server, address = _server(desk, workers, port)
+        if ready is not None:
+            ready(address)
+        try:
+            IOLoop.current().start()
+        finally:
+            server.stop()
     finally:
-        server.stop(wait=False)
+        gc.unfreeze()
+        for worker in workers:
+            worker.stop()
 
 
-def _server(bench: Bench, port: int) -> tuple[Any, str]:
-    """A Bokeh server on the loopback address that refuses requests for any other host name."""
-    from bokeh.application import Application
-    from bokeh.application.handlers.function import FunctionHandler
-    from bokeh.server.server import BaseServer
-    from bokeh.server.tornado import BokehTornado
+def _server(desk: Desk, workers: list[Worker], port: int) -> tuple[Any, str]:
+    """A server on the loopback address that refuses requests for any other host name."""
     from tornado.httpserver import HTTPServer
-    from tornado.ioloop import IOLoop
     from tornado.routing import Router
-    from tornado.web import RequestHandler
+    from tornado.web import Application, RequestHandler
+    from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
     listening = socket.create_server((LOCAL, port))
     listening.setblocking(False)
     port = listening.getsockname()[1]
     hosts = {f"{name}:{port}" for name in (LOCAL, "localhost")}
-    application = Application(FunctionHandler(lambda document: Page(document, bench).show()))
-    tornado = BokehTornado(
-        {"/": application},
-        extra_websocket_origins=sorted(hosts),
-        websocket_max_message_size_bytes=LARGEST_REQUEST,
-    )
+    kinds = {"/": "text/html", "/explore.css": "text/css", "/explore.js": "text/javascript"}
+    texts = {path: (report.WEB / path[1:]).read_text(encoding="utf-8") for path in list(kinds)[1:]}
+    texts["/"] = page(desk.bench)
+
+    class Text(RequestHandler):
+        """One of the three files of the page."""
+
+        def get(self) -> None:
+            self.set_header("Content-Type", f"{kinds[self.request.path]}; charset=utf-8")
+            self.set_header("Content-Security-Policy", "; ".join(map(" ".join, POLICY.items())))
+            self.set_header("Cache-Control", "no-store")
+            self.finish(texts[self.request.path])
+
+    class Talk(WebSocketHandler):
+        """The connection that an open page keeps."""
+
+        def check_origin(self, origin: str) -> bool:
+            return origin.lower() in {f"http://{host}" for host in hosts}
+
+        def open(self, *_: str, **__: str) -> None:
+            self.set_nodelay(True)
+            self.session = Session(desk, workers[0], workers[1], self._say)
+
+        def on_message(self, message: str | bytes) -> None:
+            try:
+                self.session.take(json.loads(message))
+            except ValueError as error:  # no page of ours sends this
+                self.close(1003, str(error)[:120])
+
+        def on_close(self) -> None:
+            self.session.close()
+
+        def _say(self, message: dict[str, Any]) -> None:
+            with suppress(WebSocketClosedError):
+                self.write_message(json.dumps(message))
 
     class Refused(RequestHandler):
         """Refuses other host names: with one of its own, a foreign site could make the browser read this page."""
@@ -94,12 +133,16 @@ def _server(bench: Bench, port: int) -> tuple[Any, str]:
             self.set_status(403)
             self.finish("This page is served to 127.0.0.1 and localhost only.\n")
 
+    application = Application(
+        [*((path, Text) for path in kinds), ("/talk", Talk)], websocket_max_message_size=LARGEST_REQUEST
+    )
+
     class Guard(Router):
         def find_handler(self, request: Any, **kwargs: Any) -> Any:
             if request.headers.get("Host", "").lower() in hosts:
-                return tornado.find_handler(request, **kwargs)
-            return tornado.get_handler_delegate(request, Refused)
+                return application.find_handler(request, **kwargs)
+            return application.get_handler_delegate(request, Refused)
 
     http = HTTPServer(Guard(), max_body_size=LARGEST_REQUEST, max_header_size=LARGEST_HEADER)
     http.add_socket(listening)
-    return BaseServer(IOLoop.current(), tornado, http), f"http://{LOCAL}:{port}/"
+    return http, f"http://{LOCAL}:{port}/"

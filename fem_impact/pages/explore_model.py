@@ -1,6 +1,5 @@
 """Strikes one scene with other hammers, contacts and strike points, fast enough to follow a slider."""
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -35,7 +34,6 @@ SHARES = (
     0.25,
     0.0,
 )  # [-] of the sliders' logarithmic way to the hardest blow that vectors are made for
-CELLS = {False: 24, True: 10}  # [-] along each axis of the map, without and with loss, where blows take longer
 SPANS = {  # [-] slider end over the scene's value
     "thickness": 2.0, "mass": 20.0, "stiffness": 1000.0, "speed": 10.0, "bending": 20.0
 }  # fmt: skip
@@ -54,19 +52,8 @@ class Settings:
     bending: float | None  # [Hz] first bending mode of a stick; None for other strikers
     at: tuple[float, ...]  # [m]
     damping: float = 0.0  # [-] damping ratio of the struck body
-    loss: float = 0.0  # [s/m] of the contact
+    loss: float | None = 0.0  # [s/m] of the contact; None for one that yields or is felt
     thickness: float = 1.0  # [-] of the struck body, over the scene's
-
-
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """The number of impacts of each hammer and contact at one strike point, and the threshold."""
-
-    mass: np.ndarray  # (n,) [kg]
-    stiffness: np.ndarray  # (n,) [-] as in `Settings`
-    n_impacts: np.ndarray  # (n, n) [stiffness, mass]; -1 if the blow failed
-    threshold: np.ndarray  # (n,) [Hz] contact resonance above which the body stops it (kinetic-energy criterion)
-    limit: np.ndarray  # (n,) [-] stiffness that gives this resonance; NaN if there is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +99,7 @@ class Bench:
             bending,
             tuple(self.base.at.tolist()),
             float(np.median(self.base.modes.damping_ratio)),
-            law.loss,
+            None if law.remembers else law.loss,
         )
 
     def range(self, name: str) -> tuple[float, float]:
@@ -122,18 +109,18 @@ class Bench:
         if name == "damping":
             return 0.0, max(MOST_DAMPING, 2.0 * self.start.damping)
         if name == "loss":
-            return 0.0, max(1.0 / self.start.speed, 2.0 * self.start.loss)
+            return 0.0, max(1.0 / self.start.speed, 2.0 * (self.start.loss or 0.0))
         value = getattr(self.start, name)
         return value / SPANS[name], value * SPANS[name]
 
     def law(self, settings: Settings) -> Contact:
-        """The contact law for these settings."""
+        """The contact law for these settings; of two layers, stiffness and exponent are the soft one's."""
         start, law = self.start, self.base.contact
         mass = self.base.striker.felt_mass
-        wanted = accuracy.contact_duration(law, mass, start.speed)
+        wanted = accuracy.contact_duration(Contact(law.stiffness, law.exponent), mass, start.speed)
         unit = accuracy.contact_duration(Contact(1.0, settings.exponent), mass, start.speed)
         same = (unit / wanted) ** (settings.exponent + 1.0)  # contact time ~ stiffness**(-1 / (exponent + 1))
-        return replace(law, stiffness=settings.stiffness * same, exponent=settings.exponent, loss=settings.loss)
+        return replace(law, stiffness=settings.stiffness * same, exponent=settings.exponent, loss=settings.loss or 0.0)
 
     def case(self, settings: Settings, rest: float | None = None, seen: Modes | None = None) -> grid.Case:
         """The arguments of `strike`; raises ValueError if the strike point is not on the body.
@@ -195,26 +182,9 @@ class Bench:
                 return None if views is None else next(iter(views.values()))
         return None
 
-    def residual(self, settings: Settings) -> float:
-        """The residual compliance [m/N] at the strike point."""
-        return float(self.base.modes.residual_compliance([settings.at])[0, 0])
-
-    def picture(self, settings: Settings, seen: Modes | None = None) -> Picture:
-        """The map at these settings, over every mass and stiffness that the sliders reach; ``seen`` as in `case`."""
-        case = self.case(settings, seen=seen)
-        count = CELLS[case.contact.loss > 0.0]
-        mass, stiffness = (np.geomspace(*self.range(name), count) for name in ("mass", "stiffness"))
-        over = {"stiffness": stiffness * case.contact.stiffness / settings.stiffness, "mass": mass}
-        table = grid.sweep(
-            case.modes, case.striker, case.contact, at=case.at, speed=case.speed, over=over, tolerance=MAP_TOLERANCE,
-            workers=1,
-        )  # fmt: skip
-        there = [self.case(replace(settings, mass=float(value), stiffness=1.0), seen=seen) for value in mass]
-        found = np.array([limit_of(one) for one in there])
-        ratio = found / np.array([one.resonance for one in there])
-        ratio[~((ratio > 0.0) & (ratio < math.inf))] = math.nan
-        # contact resonance ~ stiffness**(1 / (exponent + 1))
-        return Picture(mass, stiffness, np.asarray(table.n_impacts), found, ratio ** (settings.exponent + 1.0))
+    def residual(self, at: tuple[float, ...]) -> float:
+        """The residual compliance [m/N] at a strike point."""
+        return float(self.base.modes.residual_compliance([at])[0, 0])
 
     def saved(self, settings: Settings) -> dict[str, Any]:
         """The tables of a scene file with these settings."""
@@ -252,13 +222,13 @@ def blow(case: grid.Case) -> Response:
     return audited(hit)
 
 
-def quick(case: grid.Case) -> Response:
+def quick(case: grid.Case, most: int = QUICK_IMPACTS) -> Response:
     """The same in a few milliseconds, whatever the case: in coarse steps, with few impacts and no mesh error."""
     law, mass = case.contact, case.striker.felt_mass
     wall = float(wall_time(acting_stiffness(law.numbers, 1.0 / mass, case.speed), law.exponent, 1.0 / mass, case.speed))
     return collision.strike(
         replace(case.modes, poorer={}), case.striker, law, at=case.at, speed=case.speed, tolerance=MAP_TOLERANCE,
-        scheme="A4", dt=wall / QUICK_STEPS, max_impacts=QUICK_IMPACTS,
+        scheme="A4", dt=wall / QUICK_STEPS, max_impacts=most,
     )  # fmt: skip
 
 

@@ -21,9 +21,12 @@ from ..impact.assumption import SILENT, Assumption
 from ..impact.quantities import NAMES as QUANTITY_NAMES
 from ..impact.response import Response
 from ..mesh.mesh_files import boundary
+from ..model.playing import Strokes
+from ..scenes import hearing, sequence
 from ..scenes.scene import Run, Scene, load_scene, scene_of
 from ..scenes.schema import PATHS, fault, read_bytes
-from ..scenes.sentences import place, power, si, tidy, words
+from ..scenes.sentences import arriving, body, contact, place, power, si, tidy, words
+from ..scenes.sequence import Played
 from ..show import export, sampling, sound
 from ..show.figures import SPECTRUM_BAND
 
@@ -36,6 +39,9 @@ DIGITS = 6  # [-] of the numbers in the plots; the downloads have full precision
 QUIET = -20.0  # [dB] re full scale: a quieter sound is offered again, amplified
 DISTANCE = 1.0  # [m] from the plate to the default listener
 PLAYED = 3.0  # [s] longest sound, to keep the page small
+MOST_PLAYED = 12.0  # [s] the same for a sequence
+LISTED = 40  # [-] blows of a sequence whose errors are listed
+BOUND = {"low": "estimate from below", "high": "estimate from above"}
 MOST_POINTS = 4  # [-] largest number of observation points with a sound player
 WEB = Path(__file__).parent / "web"
 
@@ -77,16 +83,17 @@ def _tools() -> list[Any]:
 
 
 @check.typed
-def write(path: str | Path, scene: Scene, run: Run) -> None:
-    """Write the page of a strike.
+def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
+    """Write the page of a strike or of a sequence of strokes.
 
     Parameters
     ----------
     path : str or Path
         The HTML file to write.
     scene : Scene
-    run : Run
-        From `Scene.run` with ``motion=True``: the page shows the motion of the body.
+    run : Run or Played
+        From `Scene.run` with ``motion=True``, as the page shows the motion of the body; of strokes from
+        `Scene.run_strokes`.
 
     Raises
     ------
@@ -94,23 +101,17 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
         If the extra ``web`` is not installed, or ``run`` has no modes.
     """
     _, plotly = _tools()
-    response = run.response
-    if not run.rings:
+    if isinstance(run, Run) and not run.rings:
         raise ValueError("run must have modes, because a report shows motion; strike with motion=True")
+    response, told = run.response, _of_blow(scene, run) if isinstance(run, Run) else _of_strokes(scene, run)
     page = template("report.html").render(
+        told,
         title=scene.title or scene.path.stem,
-        words=(*words(scene, response), *(f"Note: {note}" for note in run.notes)),
         picture=scene.picture(),
         observed=bool(scene.watched),
         tiles=_tiles(response),
         response=response,
         verdict=tidy(response.verdict),
-        budget=_budget(response),
-        model=tidy(response.model_verdict[0]).capitalize(),
-        assumptions=[_assumption(each) for each in response.assumptions],
-        modelled=_modelled(response, run),
-        reasons=map(tidy, run.plan.reasons),
-        energies=_shares(response),
         sounds=_sounds(scene, response),
         files=_downloads(scene, run),
         versions=export.versions(),
@@ -127,6 +128,58 @@ def write(path: str | Path, scene: Scene, run: Run) -> None:
         temporary.write_text(page, encoding="utf-8")
 
 
+def _of_blow(scene: Scene, run: Run) -> dict[str, Any]:
+    """What the page tells of a single blow only."""
+    response = run.response
+    return {
+        "words": (*words(scene, response), *(f"Note: {note}" for note in run.notes)),
+        "strokes": (), "outcome": response.outcome, "error": response.error.total,
+        "energy_error": response.energy_error,
+        "budget": _budget(response),
+        "model": tidy(response.model_verdict[0]).capitalize(),
+        "assumptions": [_assumption(each) for each in response.assumptions],
+        "modelled": _modelled(run, len(response.history.steps), response.scheme),
+        "reasons": map(tidy, run.plan.reasons),
+        "energies": _shares(response.energies, {"target": "struck body"}),
+    }  # fmt: skip
+
+
+def _of_strokes(scene: Scene, run: Played) -> dict[str, Any]:
+    """What the page tells of a sequence only."""
+    found = run.response
+    kinds = [scene.alone(i).striker.kind for i in sequence.played_order(scene)]
+    each = [[impact.impulse for impact in found.impacts if impact.contact == i] for i in range(len(kinds))]
+    strokes = [
+        {
+            "striker": arriving(kind, stroke.striker), "when": si(stroke.when, "s"), "at": place(stroke.at),
+            "speed": si(stroke.speed, "m/s"), "n_impacts": len(touches), "impulse": si(sum(touches), "N s"),
+        }
+        for kind, stroke, touches in zip(kinds, found.strokes, each)
+    ]  # fmt: skip
+    scale = max(found.tolerance, found.error)
+    budget = [
+        (" and ".join(map(str, who)), f"from {si(start, 's')}", hit.error.total, hit.error.total / scale)
+        for start, hit, who in zip(found.starts.tolist(), found.hits, found.strikers)
+        if who
+    ]
+    hardest = max(range(len(found.hits)), key=lambda i: found.hits[i].peak_force)
+    own, which = found.hits[hardest], " and ".join(map(str, found.strikers[hardest]))
+    laws = dict.fromkeys(contact(stroke.contact) for stroke in found.strokes)
+    played = f"It is struck {len(strokes)} times in {si(found.strokes[-1].when - found.strokes[0].when, 's')}."
+    energies = {name: found.energies[name] for name in ("target", "dissipated", "taken away")}
+    return {
+        "words": (body(scene, found.target), played, *laws, *(f"Note: {note}" for note in found.notes)),
+        "strokes": strokes, "outcome": found.hits[-1].outcome, "error": found.error,
+        "energy_error": max(hit.energy_error for hit in found.hits),
+        "budget": budget[:LISTED],
+        "model": f"The hardest, stroke {which}: {tidy(own.model_verdict[0])}",
+        "assumptions": [_assumption(each) for each in own.assumptions],
+        "modelled": _modelled(run, sum(len(hit.history.steps) for hit in found.hits), found.hits[0].scheme),
+        "reasons": [tidy(line) for line in run.plan.reasons],
+        "energies": _shares(energies, {"target": "struck body", "taken away": "strikers took away"}),
+    }  # fmt: skip
+
+
 def template(name: str) -> Any:
     """A template of the folder ``web``; it escapes all text."""
     import jinja2
@@ -136,23 +189,28 @@ def template(name: str) -> Any:
     ).get_template(name)
 
 
-def _command(scene: Scene, response: Response) -> str:
+def _command(scene: Scene, response: Response | Strokes) -> str:
     """The command that reproduces the blow; for a result, the report command."""
     path = shlex.quote(str(scene.path))
     if scene.path.suffix.lower() == ".json":
         return f"fem-impact report {path}"
     path = shlex.quote(str(scene.path.resolve()))
-    return f"fem-impact strike {path} --target modal --tolerance {response.tolerance:g}"
+    modal = " --target modal" if isinstance(response, Response) else ""
+    return f"fem-impact strike {path}{modal} --tolerance {response.tolerance:g}"
 
 
-def _tiles(response: Response) -> list[tuple[str, str]]:
-    total = power(response.error.total) if response.error.resolvable else "not resolvable"
+def _tiles(response: Response | Strokes) -> list[tuple[str, str]]:
+    if isinstance(response, Strokes):
+        total, own = power(response.error), ("strokes", str(len(response.strokes)))
+    else:
+        total = power(response.error.total) if response.error.resolvable else "not resolvable"
+        own = "restitution", f"{response.restitution:.4f}"
     return [
         ("impacts", str(response.n_impacts)),
         ("peak force", si(response.peak_force, "N")),
         ("time in contact", si(response.contact_time, "s")),
         ("impulse", si(response.impulse, "N s")),
-        ("restitution", f"{response.restitution:.4f}"),
+        own,
         ("estimated error" if response.tolerance_met else "estimated error, above tolerance", total),
     ]
 
@@ -189,28 +247,31 @@ def _share(size: float) -> str:
     return f"{100.0 * size:.2g} %" if size >= 1e-3 else power(float(f"{size:.0e}"))
 
 
-def _modelled(response: Response, run: Run) -> list[tuple[str, str]]:
-    modes, took = response.target, sum(run.seconds.values())
+def _modelled(run: Run | Played, n_steps: int, scheme: str) -> list[tuple[str, str]]:
+    modes, took = run.response.target, sum(run.seconds.values())
     return [
         ("modes of the struck body", f"{modes.n_modes}, up to {si(modes.frequencies[-1], 'Hz')}"),
-        ("time steps", f"{len(response.history.steps)}, scheme {response.scheme}"),
+        ("time steps", f"{n_steps}, scheme {scheme}"),
         ("computing time", f"{si(took, 's', 3)}: " + ", ".join(f"{k} {si(x, 's', 3)}" for k, x in run.seconds.items())),
     ]
 
 
-def _shares(response: Response) -> list[dict[str, Any]]:
-    energies = response.energies
+def _shares(energies: Mapping[str, float], called: Mapping[str, str]) -> list[dict[str, Any]]:
     total = sum(max(value, 0.0) for value in energies.values()) or 1.0
-    called = {"target": "struck body"}
     return [
-        {"name": called.get(name, name), "key": name, "joule": joule, "part": max(joule, 0.0) / total}
+        {
+            "name": called.get(name, name),
+            "key": name.replace("taken away", "striker"),
+            "joule": joule,
+            "part": max(joule, 0.0) / total,
+        }
         for name, joule in energies.items()
     ]
 
 
-def _force_picture(response: Response) -> str:
+def _force_picture(response: Response | Strokes) -> str:
     said = f"Contact force over time: {response.n_impacts} impacts, peak {si(response.peak_force, 'N')}"
-    shown = response.time <= sampling.end_of(response)
+    shown = response.time <= _end(response)
     return markup.curve(response.time[shown], response.force[shown], label="force", unit="N", title=said)
 
 
@@ -223,17 +284,27 @@ class Player:
     uri: str
 
 
-def _sounds(scene: Scene, response: Response) -> list[Player]:
+def _end(response: Response | Strokes) -> float:
+    """When the pictures of a blow or a sequence end [s]."""
+    if isinstance(response, Response):
+        return sampling.end_of(response)
+    last = response.impacts[-1].end if response.impacts else float(response.time[-1])
+    return last + (sampling.AFTER - 1.0) * (last - float(response.starts[0]))
+
+
+def _sounds(scene: Scene, response: Response | Strokes) -> list[Player]:
     """The sound at each observation point and, for a plate, at each listener (default: `DISTANCE` from the plate)."""
     heard = [
         (f"Motion at {place(point)}", sound.synthesise(response, point, duration=_duration(response)))
         for point in scene.points[:MOST_POINTS]
     ]
-    if response.target.dimension == 2:
+    if response.target.dimension == 2 or scene.listeners:
         for listener in scene.listeners[:MOST_POINTS] or [[*np.asarray(response.at).tolist(), DISTANCE]]:
             where = f" to {place(listener)}" if scene.listeners else f", {DISTANCE:g} m in front of the strike point"
-            pressure = sound.radiate(response, listener, duration=_duration(response))
-            heard.append((f"Sound radiated{where}", pressure))
+            sounds = hearing.radiated(scene, response, listener, _duration(response))
+            for bound, pressure in zip(hearing.BOUNDS[len(sounds)], sounds):
+                told = f" without a baffle, {BOUND[bound]}; {hearing.said(sounds)}" if bound else ""
+                heard.append((f"Sound radiated{where}{told}", pressure))
     players = []
     for name, samples in heard:
         level = samples.peak_level
@@ -247,10 +318,11 @@ def _sounds(scene: Scene, response: Response) -> list[Player]:
     return players
 
 
-def _duration(response: Response) -> float:
+def _duration(response: Response | Strokes) -> float:
     decay = response.target.damping_ratio * response.target.omega
     slowest = float(decay[response.target.omega > 0.0].min(initial=np.inf))
-    return float(np.clip(sound.DECAY / slowest, sound.SHORTEST, PLAYED)) if slowest > 0.0 else PLAYED
+    rings = float(np.clip(sound.DECAY / slowest, sound.SHORTEST, PLAYED)) if slowest > 0.0 else PLAYED
+    return rings if isinstance(response, Response) else min(rings + float(np.ptp(response.starts)), MOST_PLAYED)
 
 
 def audio(samples: np.ndarray, rate: int) -> str:
@@ -260,12 +332,13 @@ def audio(samples: np.ndarray, rate: int) -> str:
     return _uri("audio/wav", file.getvalue())
 
 
-def _downloads(scene: Scene, run: Run) -> list[dict[str, str]]:
+def _downloads(scene: Scene, run: Run | Played) -> list[dict[str, str]]:
     response, modes = run.response, run.response.target
     frequencies = _frequencies(response)
     spectrum = response.spectrum(frequencies)
-    data = export.run_data(run, scene.data(tolerance=response.tolerance))
-    tables = {
+    tables = scene.data(tolerance=response.tolerance)
+    data = export.run_data(run, tables) if isinstance(run, Run) else sequence.numbers(run.response, tables, run.seconds)
+    columns = {
         "force.csv": {"time [s]": response.time, "force [N]": response.force},
         "spectrum.csv": {
             "frequency [Hz]": frequencies, "real [N s]": spectrum.real, "imaginary [N s]": spectrum.imag
@@ -273,7 +346,7 @@ def _downloads(scene: Scene, run: Run) -> list[dict[str, str]]:
         "modes.csv": {"frequency [Hz]": modes.frequencies, "damping ratio [-]": modes.damping_ratio},
     }  # fmt: skip
     texts = {"response.json": ("application/json", json.dumps(data, indent=2, allow_nan=False))}
-    texts |= {name: ("text/csv", export.csv_text(**columns)) for name, columns in tables.items()}
+    texts |= {name: ("text/csv", export.csv_text(**columns)) for name, columns in columns.items()}
     return [
         {"name": name, "size": si(len(text.encode()), "B", 3), "uri": _uri(kind, text.encode())}
         for name, (kind, text) in texts.items()
@@ -289,17 +362,26 @@ def _script_text(data: Mapping[str, Any]) -> str:
     return json.dumps(export.plain(data), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
-def _plots(response: Response) -> dict[str, Any]:
+def _plots(response: Response | Strokes) -> dict[str, Any]:
     """The data that the page's script draws: histories, spectrum, energies, and shapes as packed integers."""
-    modes = response.target
-    end = sampling.end_of(response)
+    modes, end = response.target, _end(response)
     shown = response.time <= end
     frequencies = _frequencies(response)
-    times = np.linspace(0.0, end, ENERGY_TIMES)
-    energy = [response.modal_energy(times, body=body) for body in (0, -1)]
     moving = (modes.omega > 0.0) & (modes.frequencies < 2.0 * frequencies[-1])
-    last = response.impacts[-1].end if response.impacts else 0.0
-    return {
+    own: dict[str, Any] = {}
+    if isinstance(response, Response):
+        last, times = response.impacts[-1].end if response.impacts else 0.0, np.linspace(0.0, end, ENERGY_TIMES)
+        rings = response.modal_energy([last])
+        energy = [response.modal_energy(times, body=body) for body in (0, -1)]
+        own["energy"] = {
+            "x": _short(times),
+            "striker": _short(energy[0].sum(axis=1)),
+            "body": _short(energy[1].sum(axis=1)),
+            "rest": _short(energy[0][0].sum() - energy[0].sum(axis=1) - energy[1].sum(axis=1)),
+        }
+    else:
+        rings = response.hits[-1].modal_energy([response.hits[-1].history.end_time])
+    return own | {
         "force": {"x": _short(response.time[shown]), "y": _short(response.force[shown])},
         "impacts": [[impact.start, impact.end] for impact in response.impacts],
         "spectrum": {"x": _short(frequencies), "y": _short(np.abs(response.spectrum(frequencies)))},
@@ -308,47 +390,44 @@ def _plots(response: Response) -> dict[str, Any]:
             "x": _short(frequencies),
             "y": _short(np.abs(spectra.mobility(modes, response.at, response.at, frequencies))),
         },
-        "energy": {
-            "x": _short(times),
-            "striker": _short(energy[0].sum(axis=1)),
-            "body": _short(energy[1].sum(axis=1)),
-            "rest": _short(energy[0][0].sum() - energy[0].sum(axis=1) - energy[1].sum(axis=1)),
-        },
         "modal": {
             "x": _short(modes.frequencies[moving]),
-            "y": _short(response.modal_energy([last])[0, moving]),
+            "y": _short(rings[0, moving]),
         },
         "view": _view(response, end),
     }
 
 
-def _frequencies(response: Response) -> np.ndarray:
+def _frequencies(response: Response | Strokes) -> np.ndarray:
     shortest = min((impact.duration for impact in response.impacts), default=1.0)
     return np.geomspace(SPECTRUM_BAND[0], max(SPECTRUM_BAND[1], LOBES / shortest), SPECTRUM_POINTS)
 
 
-def _view(response: Response, end: float) -> dict[str, Any]:
+def _view(response: Response | Strokes, end: float) -> dict[str, Any]:
     """The body as a surface, its motion over time and its first mode shapes, for the 3-D views."""
     modes = response.target
     points, cells, surface = sampling.surface(modes)
     rows = modes.shapes.at(points)  # (n_points, n_modes), evaluated once: finding the elements is the slow part
-    times = np.linspace(0.0, end, FRAMES)
+    times = np.linspace(0.0 if isinstance(response, Response) else float(response.time[0]), end, FRAMES)
     wave = response.modal_state(times)[0] @ rows.T  # (n_times, n_points)
     assert response.at is not None
-    struck = response.displacement(response.at[None], times)
     count = min(SHAPES, modes.n_modes)
     shapes = rows[:, :count].T / np.maximum(np.abs(rows[:, :count]).max(axis=0), 1e-300)[:, None]
     edge = surface[boundary(cells)]  # (n_sides, 2, 2)
     columns = {
-        "x": surface[:, 0], "y": surface[:, 1], "times": times, "surface": struck[:, 0],
-        "gap": sampling.gap(response, times), "frequencies": modes.frequencies[:count],
+        "x": surface[:, 0], "y": surface[:, 1], "times": times, "frequencies": modes.frequencies[:count],
         "damping": modes.damping_ratio[:count],
     }  # fmt: skip
+    first = int(np.abs(wave).max(axis=1).argmax())
+    if isinstance(response, Response):  # several strikers would hide the wave
+        first = sampling.telling(response, times)
+        columns["surface"] = response.displacement(response.at[None], times)[:, 0]
+        columns["gap"] = sampling.gap(response, times)
     return {name: _short(values) for name, values in columns.items()} | {
         "cells": cells.T.tolist(),
         "rim": [[x for a, b in edge[:, :, i].tolist() for x in (a, b, None)] for i in (0, 1)],
         "at": [float(response.at[0]), float(response.at[1]) if modes.dimension == 2 else 0.0],
-        "first": sampling.telling(response, times),
+        "first": first,
         "wave": _packed(wave),
         "shapes": _packed(shapes),
     }

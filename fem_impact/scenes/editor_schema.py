@@ -9,7 +9,7 @@ from ..fe.section import KINDS, SOFT, Elastic
 from .schema import MAKERS, NESTED, PATHS, REPEATED, REQUIRED, SUPPLIED
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # what taplo and VS Code read
-TYPES = {float: "number", int: "integer", str: "string", bool: "boolean"}  # all others may be anything
+TYPES: dict[type, str] = {float: "number", int: "integer", str: "string", bool: "boolean"}  # all others may be anything
 
 
 def schema() -> dict[str, Any]:

@@ -1,5 +1,9 @@
 """Writes what a scene lets hear: the motion of every observed point and the pressure at every listener."""
 
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +13,28 @@ from ..show import export, sound
 from .scene import Scene
 
 EARS = 2  # [-] listeners whose sounds make one stereo file
+BOUNDS: dict[int, tuple[str, ...]] = {1: ("",), 2: ("low", "high")}  # number of sounds of a listener: what they are
+
+
+def radiated(
+    scene: Scene, response: Response | Strokes, listener: Any, duration: float | None = None
+) -> tuple[sound.Sound, ...]:
+    """The sound at a listener: of a plate in a wall one, in free air an estimate from below and one from above."""
+    if scene.baffled:
+        return (sound.radiate(response, listener, duration=duration),)
+    if response.target.dimension == 2:
+        return sound.radiate_free(response, listener, duration=duration)
+    width, height = scene.girth
+    return sound.radiate_bar(response, listener, width=width, height=height, duration=duration)
+
+
+def said(heard: tuple[sound.Sound, ...]) -> str:
+    """The peak level at a listener in words, with its reference; of two sounds the levels between which it lies."""
+    low, high = sorted((heard[0], heard[-1]), key=lambda each: each.level)
+    if len(heard) == 1 or high.level == -math.inf:
+        return high.said
+    least = "silence" if low.level == -math.inf else low.said.partition(" dB")[0]
+    return f"bounded: between {least} and {high.said}"
 
 
 def write(
@@ -17,31 +43,40 @@ def write(
     """Write strike.wav, strike_2.wav ... of the points, radiated.wav ... of the listeners, and stereo.wav of two.
 
     Returns the file, place and levels of each; each is scaled as in `export.write_wav`. In stereo the first listener is
-    the left channel, and both channels have one scale and one start.
+    the left channel, and both channels have one scale and one start. Without a baffle there are two files of each
+    listener, radiated_low.wav and radiated_high.wav, with one scale and a ``bound``.
     """
     wanted: dict[str, Any] = {"duration": duration, "normalise": normalise}
     found = []
     for i, point in enumerate(scene.points):
         heard = export.write_wav(folder / _name("strike", i), response, at=point, **wanted)
-        found.append({"file": _name("strike", i), "at": point, **_levels(heard)})
-    ears = [sound.radiate(response, listener, duration=duration) for listener in scene.listeners]
-    for i, (listener, heard) in enumerate(zip(scene.listeners, ears)):
-        written = export.write_sound(folder / _name("radiated", i), _scaled(heard, normalise))
-        found.append({"file": _name("radiated", i), "listener": listener, **_levels(written)})
+        found.append({"file": _name("strike", i), "at": point, **_levels((heard,), heard)})
+    ears = [radiated(scene, response, listener, duration) for listener in scene.listeners]
+    for i, (listener, sounds) in enumerate(zip(scene.listeners, ears)):
+        found += _written(folder, partial(_name, "radiated", i), sounds, normalise, listener=listener)
     if len(ears) == EARS:
-        both = export.write_sound(folder / "stereo.wav", _scaled(sound.together(ears), normalise))
-        found.append({"file": "stereo.wav", "listeners": scene.listeners, **_levels(both)})
+        both = tuple(sound.together(each) for each in zip(*ears))
+        found += _written(folder, partial(_name, "stereo", 0), both, normalise, listeners=scene.listeners)
     return found
 
 
-def _name(kind: str, i: int) -> str:
-    return f"{kind}.wav" if i == 0 else f"{kind}_{i + 1}.wav"
+def _written(
+    folder: Path, named: Callable[[str], str], sounds: tuple[sound.Sound, ...], normalise: bool, **place: Any
+) -> list[dict[str, Any]]:
+    """Write the sounds at one place, or the bounds of one, on the scale of the last; what to tell of each."""
+    last = sounds[-1].normalised() if normalise else sounds[-1].audible()
+    found = []
+    for bound, each in zip(BOUNDS[len(sounds)], sounds):
+        scaled = replace(each, samples=each.samples * (each.full_scale / last.full_scale), full_scale=last.full_scale)
+        written = export.write_sound(folder / named(bound), scaled)
+        found.append({"file": named(bound), **place, **({"bound": bound} if bound else {}), **_levels(sounds, written)})
+    return found
 
 
-def _scaled(heard: sound.Sound, normalise: bool) -> sound.Sound:
-    return heard.normalised() if normalise else heard.audible()
+def _name(kind: str, i: int, bound: str = "") -> str:
+    return "_".join([kind, *([str(i + 1)] if i else []), *([bound] if bound else [])]) + ".wav"
 
 
-def _levels(heard: sound.Sound) -> dict[str, Any]:
+def _levels(sounds: tuple[sound.Sound, ...], heard: sound.Sound) -> dict[str, Any]:
     levels = {"full_scale": heard.full_scale, "unit": heard.unit, "peak_level": heard.peak_level, "level": heard.level}
-    return {**levels, "stated": heard.said, "reference": sound.REFERENCE[heard.unit][0]}
+    return {**levels, "stated": said(sounds), "reference": sound.REFERENCE[heard.unit][0]}

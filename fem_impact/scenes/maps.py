@@ -16,8 +16,9 @@ from ..fe import plausible
 from ..impact import threshold
 from ..model.target import Stages
 from ..show import figures, plots
-from ..sweeps import bodies, grid, hammers
-from ..sweeps.cells import ALIASES, AXES, Case
+from ..sweeps import bodies, grid, hammers, solving
+from ..sweeps.borders import PREFIX, read_borders, without_borders
+from ..sweeps.cells import ALIASES, AXES, LAW, Case, Range, laid_out, logarithmic
 from .scene import Scene
 from .schema import MAKERS, Part
 
@@ -58,9 +59,9 @@ def map_scene(
     tolerance : float [-], optional
         Replaces the tolerance of the scene.
     **wanted
-        ``workers``, ``client``, ``store``, ``watch``, ``max_cells`` and ``tell`` of `sweep`; and ``stage``, called with
-        the name of each stage before the blows, which returns a context manager. Beside a store, a file keeps what was
-        found of the body.
+        ``workers``, ``client``, ``store``, ``watch``, ``max_cells``, ``tell``, ``borders``, ``cells`` and ``refine`` of
+        `sweep`; and ``stage``, called with the name of each stage before the blows, which returns a context manager.
+        Beside a store, a file keeps what was found of the body.
 
     Returns
     -------
@@ -81,17 +82,28 @@ def map_scene(
         raise ValueError(
             f'{scene.path}: [map] is missing; add it and name the axes, as in over = {{ "striker.mass" = [0.01, 0.1] }}'
         )
+    law = scene.make_contact()
     quick = {name: values for name, values in over.items() if ALIASES.get(name, name) in AXES}
-    slow = {name: list(values) for name, values in over.items() if name not in quick}
-    for name in slow:
+    slow = {name: values for name, values in over.items() if name not in quick}
+    for name, values in slow.items():
         _check_key(scene, name)
+        if isinstance(values, Range) or (isinstance(values, Mapping) and "count" not in values):
+            raise ValueError(f"{scene.path}: [map] over: {name} needs a count, because each value needs another body")
+    over, ours = laid_out(over, law, alone=_stretches(scene), cells=wanted.pop("cells", None))
+    slow, quick = {name: list(over[name]) for name in slow}, {name: over[name] for name in quick}
     if not quick:
         quick = {"strike.speed": [scene.blow.values["speed"]]}
-    law = scene.make_contact()
+    if slow:
+        for name in ("borders", "refine"):
+            if wanted.get(name):
+                raise ValueError(f"{name}: not for axes that need another body, got {', '.join(slow)}")
+        wanted, ours = {**wanted, "borders": False}, False
+    tell = wanted.pop("tell", None)
     grid.admit(
-        math.prod(len(values) for values in over.values()), len(grid.LAYERS), wanted.pop("max_cells", grid.MOST_CELLS),
+        math.prod(len(values) for values in over.values()), len(solving.LAYERS),
+        wanted.pop("max_cells", grid.MOST_CELLS),
         quick=not law.lossy and not law.hard_stiffness and law.exponent >= 1.0 and not SLOW & set(over),
-        tell=wanted.pop("tell", None),
+        tell=tell,
     )  # fmt: skip
     pieces = []
     store = wanted.pop("store", None)
@@ -100,7 +112,7 @@ def map_scene(
         for name, value in zip(slow, chosen):
             changed = changed_scene(changed, name, value)
         own = store if store is None or not slow else Path(store).with_name(f"{Path(store).name}-{number}")
-        pieces.append(_quick_map(changed, quick, band, limit, {**wanted, "store": own, "max_cells": check.REACH}))
+        pieces.append(_quick_map(changed, quick, band, limit, {**wanted, "store": own, "ours": ours, "tell": tell}))
     result = _joined(pieces, slow)
     result.attrs["scene"] = json.dumps(
         {**scene.data(), "map": {name: list(map(_plain, v)) for name, v in over.items()}}
@@ -108,6 +120,11 @@ def map_scene(
     result.attrs["notes"] = "\n".join(plausible.together(*(piece.attrs["notes"].splitlines() for piece in pieces)))
     result.attrs["title"] = scene.title or str(scene.path.name)
     return result
+
+
+def _stretches(scene: Scene) -> bool:
+    """Whether the struck body stretches, so that each cell is computed alone."""
+    return bool(scene.target is not None and scene.target.values.get("stretching"))
 
 
 def changed_scene(scene: Scene, key: str, value: Any) -> Scene:
@@ -152,7 +169,7 @@ def with_theory(table: xarray.Dataset, case: Case, axes: Mapping[str, np.ndarray
     """Add ``contact_resonance`` and ``threshold`` [Hz] to a map, each along the axes it depends on."""
     striker = ("mass", "striker_frequency")
     for name, find, needs, meaning in (
-        ("contact_resonance", lambda cell: cell.resonance, ("stiffness", "exponent", "speed"),
+        ("contact_resonance", lambda cell: cell.resonance, (*(set(LAW) - {"loss", "gap"}), "speed"),
          "one over twice the contact time on a rigid wall"),
         ("threshold", _threshold, ("at", "target_mass", "target_frequency"),
          "contact resonance above which the struck body stops the striker"),
@@ -228,6 +245,8 @@ def draw(
         "y": _axis(table, values.dims[0]),
         "colour": plots.Axis(label, _unit(values), log=bool(log), limits=limits),
         "contours": _contours(table, values),
+        "borders": _borders(table, values),
+        "shades": _shades(table, values),
         "marks": marks,
         "title": str(table.attrs.get("title", "")),
     }
@@ -247,6 +266,21 @@ def _contours(table: xarray.Dataset, values: xarray.DataArray) -> list[Any]:
     return found
 
 
+def _borders(table: xarray.Dataset, values: xarray.DataArray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """The borders of a map as curves over the picture: values along x and y."""
+    if values.dims != table.n_impacts.dims or "borders" not in table.attrs:
+        return []
+    heavy = [1e3 if name in table.coords and _unit(table[name]) == "g" else 1.0 for name in values.dims]
+    return [(heavy[1] * border.points[:, 1], heavy[0] * border.points[:, 0]) for border in read_borders(table)]
+
+
+def _shades(table: xarray.Dataset, values: xarray.DataArray) -> list[tuple[Any, str, str]]:
+    """Cells to paint over: those whose number of impacts is in doubt."""
+    if "doubtful" not in table or values.name != "n_impacts" or not bool(table.doubtful.any()):
+        return []
+    return [(table.doubtful, plots.PURPLE, "number in doubt")]
+
+
 def _axis(table: xarray.Dataset, name: Any) -> plots.Axis:
     """How to draw an axis: logarithmic if its values are evenly spaced in the logarithm."""
     if name not in table.coords:  # points of a plate have two coordinates each
@@ -255,9 +289,7 @@ def _axis(table: xarray.Dataset, name: Any) -> plots.Axis:
         return plots.Axis("strike point [m]", names=tuple(names or map(str, range(table.sizes[name]))))
     place = table[name]
     values = np.asarray(place, float)
-    steps = np.diff(np.log(values)) if (values > 0.0).all() else np.zeros(0)
-    log = len(steps) > 1 and np.allclose(steps, steps[0], rtol=1e-3)
-    return plots.Axis(str(place.attrs.get("long_name", name)), _unit(place), log=bool(log))
+    return plots.Axis(str(place.attrs.get("long_name", name)), _unit(place), log=logarithmic(values))
 
 
 def _in_grams(values: xarray.DataArray) -> xarray.DataArray:
@@ -285,7 +317,7 @@ def can_write(form: str, folder: Path | None = None) -> str:
 
 
 def write(folder: Path, table: xarray.Dataset, form: str = "nc", picture: str = "png") -> list[str]:
-    """Write map.nc or map.zarr, map.csv and, for a map with two axes, a picture of each layer; return the names.
+    """Write map.nc or map.zarr, map.csv, borders.csv and, for two axes, a picture of each layer; return the names.
 
     A map of more than MOST_ROWS cells gets no CSV file: it would be slow to write and useless.
     """
@@ -297,7 +329,12 @@ def write(folder: Path, table: xarray.Dataset, form: str = "nc", picture: str = 
         table.to_zarr(folder / names[0], zarr_format=2)  # version 3 has no standard for text yet
     if table.n_impacts.size <= MOST_ROWS:
         names.append("map.csv")
-        table.to_dataframe().to_csv(folder / "map.csv")
+        without_borders(table).to_dataframe().to_csv(folder / "map.csv")
+    if PREFIX in table.sizes:
+        names.append("borders.csv")
+        table[[name for name in table.data_vars if table[name].dims == (PREFIX,)]].to_dataframe().to_csv(
+            folder / "borders.csv", index=False
+        )
     if len(table.n_impacts.dims) == 2:
         for layer in PICTURED:
             if layer in table and bool((table.n_impacts >= 0).any()):

@@ -12,7 +12,7 @@ import numpy as np
 
 from .._base import check, markup
 from ..fe.assembly import THICK, System, clamped, support_of_facets, support_words
-from ..fe.section import Beam, Material, Plate
+from ..fe.section import Beam, Material, Plate, evaluate
 from ..fe.springs import check_posts
 from ..impact import collision, promise
 from ..impact.contact import Contact
@@ -42,6 +42,7 @@ from .schema import (
     target_values,
 )  # fmt: skip
 
+SECTIONS = 200  # [-] places along a beam where its largest width is looked for
 NOTHING = Part()  # stands for a missing table
 
 
@@ -93,6 +94,41 @@ class Scene:
             As from `fi.strokes`.
         """
         return sequence.play(self, watch, strict, **changes)
+
+    @check.typed
+    def plan_strokes(self, *, watch: Watch | None = None, **changes: Any) -> sequence.SequencePlan:
+        """Decide how to model the strokes of the scene, without playing them.
+
+        Parameters
+        ----------
+        watch : callable, optional
+            As in `plan`.
+        **changes
+            As in `play`.
+
+        Returns
+        -------
+        SequencePlan
+            With the `Plan` of every stroke as if it struck the body at rest; what a stroke inherits from those before
+            is known after `play` only.
+        """
+        return sequence.plan(self, watch, **changes)
+
+    @check.typed
+    def run_strokes(
+        self,
+        watch: Watch | None = None,
+        *,
+        before: Callable[[Plan], object] | None = None,
+        strict: bool = False,
+        **changes: Any,
+    ) -> sequence.Played:
+        """Play the strokes of the scene as `play` does, and keep the plan and the time of every stage.
+
+        ``watch`` and ``before`` as in `run`, ``before`` with the plan of the body; ``strict`` and ``changes`` as in
+        `play`. `report.write` makes a page of it.
+        """
+        return sequence.run(self, watch, before=before, strict=strict, **changes)
 
     def modes(self, count: int | None = None, *, keep: Path | None = None) -> Modes:
         """Modes of the struck body: the first ``count``, or as many as the blow needs to meet its tolerance.
@@ -183,9 +219,23 @@ class Scene:
 
     @property
     def listeners(self) -> list[Any]:
-        """Positions of the listeners to the sound of the plate, (n_listeners, 3) [m]; empty if [observe] has none."""
+        """Positions of the listeners to the sound radiated, (n_listeners, 3) [m]; empty if [observe] has none."""
         told = {} if self.observe is None else self.observe.values
         return [told["listener"]] if "listener" in told else list(told.get("listeners", []))
+
+    @property
+    def baffled(self) -> bool:
+        """Whether the body fills a hole in a large rigid wall: plates do unless the scene says otherwise."""
+        return self.mesh.kind != "line" and target_values(**self.target.values)["baffle"]
+
+    @property
+    def girth(self) -> tuple[float, float]:
+        """Largest width and height [m] of a beam, as the air around it sees them."""
+        section, points = self.make_section("beam"), self.body().points
+        x = np.linspace(points.min(axis=0), points.max(axis=0), SECTIONS)
+        assert isinstance(section, Beam)
+        width, height = (float(evaluate(name, getattr(section, name), x, "m").max()) for name in ("width", "height"))
+        return width, height
 
     @property
     def watched(self) -> list[Any]:
@@ -228,11 +278,13 @@ class Scene:
 
     def picture(self) -> str:
         """The target with its supports, strike point and observed points, as SVG."""
-        at = np.atleast_1d(np.asarray(self.blow.values["at"], float))
+        blows = [self.alone(i).blow for i in range(len(self.stroke))] or [self.blow]
+        places = dict.fromkeys(tuple(np.atleast_1d(np.asarray(blow.values["at"], float)).tolist()) for blow in blows)
+        at = " and ".join(f"({', '.join(f'{x:.4g}' for x in place)})" for place in places)
         points = [np.atleast_1d(np.asarray(point, float)) for point in self.watched]
-        title = f"Outline of the struck body, struck at ({', '.join(f'{x:.4g}' for x in at)}) m"
+        title = f"Outline of the struck body, struck at {at} m"
         title += f", observed at {len(points)} point{'s' * (len(points) > 1)}" if points else ""
-        return sketch.body(self.body(), supports=self.held, at=at, points=points, title=title)
+        return sketch.body(self.body(), supports=self.held, at=list(places), points=points, title=title)
 
     def _repr_html_(self) -> str:
         """For notebooks: the picture and the contents of each table."""
@@ -284,7 +336,9 @@ class Scene:
         """Raise ValueError if this is a sequence, whose strokes are played together."""
         if self.stroke:
             raise self.fault(
-                f"[[{REPEATED}]] must be left out here: this needs a single blow; play strokes with strike"
+                f"[[{REPEATED}]] must be left out here: this needs a single blow; without these tables the scene "
+                "strikes once, as [strike] says, and from Python scene.alone(0) is its first stroke (the commands "
+                "strike, plan and report take strokes)"
             )
 
     def _staged(self, stages: Stages) -> Blow:
@@ -492,9 +546,19 @@ def _check_whole(scene: Scene) -> None:
         if part is not None:
             scene._make(table, part)
     if scene.listeners and scene.mesh.kind == "line":
-        raise fault(scene.path, "[observe] listener must be left out for a beam: only plates radiate sound here")
+        if scene.section is None:
+            raise fault(scene.path, "[observe] listener of a beam needs [material] and [section], for its width")
+        width, height = scene.girth
+        if height > width:
+            raise fault(
+                scene.path,
+                f"[observe] listener must be left out for a beam higher than wide, here {height:g} and {width:g} m: "
+                "its sound is not known",
+            )
     if scene.section is not None:
         scene.make_section(scene.section.kind)
+    if target.get("baffle") is True and scene.mesh.kind == "line":
+        raise fault(scene.path, "[target] baffle must be left out for a beam, which is in free air")
     if scene.contact.kind == "between" and (scene.striker.kind != "sphere" or scene.section is None):
         raise fault(scene.path, "[contact] kind 'between' needs a striker of kind 'sphere' and a [section]")
     scene.make_striker()

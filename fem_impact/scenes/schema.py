@@ -4,15 +4,13 @@ import inspect
 import json
 import math
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
-
-import numpy as np
 
 from .. import mesh
 from .._base import check
@@ -25,6 +23,7 @@ from ..model.target import AIR, MODELS
 from ..modes.analytic import closed_form
 from ..modes.modal import find_modes
 from ..show import sound
+from ..sweeps.cells import along
 from .fields import over_frequency, varying
 
 LARGEST_FILE = 1_000_000  # [byte] a scene is written by hand, so a larger file is a mistake
@@ -90,22 +89,24 @@ def _held(maker: Any) -> Callable[..., Striker]:
 
 def target_values(
     *,
-    mass=None,
-    first_frequency=None,
-    nu=0.3,
-    damping_ratio=0.0,
-    point_masses=(),
-    point_supports=(),
-    source="auto",
-    theory=None,
-    air=None,
-    stretching=False,
-    model="stated",
+    mass: float | None = None,
+    first_frequency: float | None = None,
+    nu: float = 0.3,
+    damping_ratio: Any = 0.0,
+    point_masses: Sequence[Mapping[str, Any]] = (),
+    point_supports: Sequence[Mapping[str, Any]] = (),
+    source: str = "auto",
+    theory: str | None = None,
+    air: str | None = None,
+    baffle: bool = True,
+    stretching: bool = False,
+    model: str = "stated",
 ) -> dict[str, Any]:
     """Check the table [target].
 
     It has mass and first frequency to scale to, nu without a material, damping, what is attached at points, the
-    source of modes, the theory, the sides in air, whether it stretches and whether these three are chosen.
+    source of modes, the theory, the sides in air, whether a rigid wall surrounds it, whether it stretches and whether
+    theory, air and stretching are chosen.
     """
     check.between("nu", nu, LOWEST_NU, 0.5)
     scale = {"mass": (mass, "kg"), "first_frequency": (first_frequency, "Hz")}
@@ -120,6 +121,7 @@ def target_values(
         "model": check.one_of("model", model, MODELS),
         "stretching": check.flag("stretching", stretching),
         "air": None if air is None else check.one_of("air", air, list(AIR)),
+        "baffle": check.flag("baffle", baffle),
         "theory": None if theory is None else check.one_of("theory", theory, [*THEORIES[2], *THEORIES[1]]),
     }
 
@@ -182,28 +184,12 @@ def map_values(*, over: Any, max_frequency: Any = None) -> dict[str, Any]:
     if not isinstance(over, dict) or not over:
         raise ValueError(f'over must be a table of axes such as "striker.mass" = [0.05, 0.1], got {check.shown(over)}')
     band = None if max_frequency is None else check.positive("max_frequency", max_frequency, "Hz")
-    return {"over": {name: _along(name, values) for name, values in over.items()}, "max_frequency": band}
-
-
-def _along(name: str, values: Any) -> np.ndarray:
-    """Values along an axis: a list, or a range {from, to, count, scale}."""
-    if isinstance(values, list):
-        return np.array(values)
-    if not isinstance(values, dict) or not {"from", "to", "count"} <= set(values) <= {"from", "to", "count", "scale"}:
-        raise ValueError(
-            f"{name} must be a list or {{ from, to, count, scale = 'linear' or 'log' }}, got {check.shown(values)}"
-        )
-    low, high = check.number(f"{name}.from", values["from"]), check.number(f"{name}.to", values["to"])
-    count = check.count(f"{name}.count", values["count"], high=MOST_VALUES)
-    if check.one_of(f"{name}.scale", values.get("scale", "linear"), ("linear", "log")) == "linear":
-        return np.linspace(low, high, count)
-    return np.geomspace(check.positive(f"{name}.from", low), check.positive(f"{name}.to", high), count)
+    return {"over": {name: along(name, values) for name, values in over.items()}, "max_frequency": band}
 
 
 MOST_LISTENERS = 100  # [-] each costs a sound
 BAR_MODES = 96  # [-] modes of a bar that strikes; each blow keeps as many of them as it needs
 LOWEST_NU = -0.99  # [-] closer to -1, the rigidity of a plate is beyond all numbers
-MOST_VALUES = 10**6  # [-] most values along one axis of a map
 SOURCES = ("auto", "fe", "analytic")
 # Functions that build each part of a scene; their arguments are the keys of its table.
 # The first entry is the key that selects the function, '' if there is only one.

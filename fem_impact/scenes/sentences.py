@@ -9,6 +9,8 @@ import numpy as np
 from ..impact import accuracy, threshold
 from ..impact.contact import Contact
 from ..impact.response import Response
+from ..impact.striker import Striker
+from ..modes.modal import Modes
 from .scene import Scene
 
 PREFIX = "fpnµm kMGT"
@@ -60,7 +62,15 @@ def place(point: Any) -> str:
 
 def words(scene: Scene, response: Response) -> list[str]:
     """Describe the scene in a few sentences."""
-    modes, striker, law = response.target, response.striker, response.contacts[0]
+    striker, law = response.striker, response.contacts[0]
+    assert striker is not None
+    arrives = arriving(scene.striker.kind, striker)
+    blow = f"It is struck at {place(response.at)} by {arrives}, moving at {si(response.speed, 'm/s')}."
+    return [body(scene, response.target), blow, contact(law), _single_or_multiple(response, law)]
+
+
+def body(scene: Scene, modes: Modes) -> str:
+    """The struck body in a sentence."""
     low, high = (f(modes.shapes.grid()[0], axis=0) for f in (np.min, np.max))
     extent = " × ".join(si(x, "m") for x in high - low)
     kind = {1: "beam", 2: "plate"}[modes.dimension]
@@ -75,37 +85,44 @@ def words(scene: Scene, response: Response) -> list[str]:
         edges = ", ".join(f"{how} at the edge “{name}”" for name, how in held.items())
     ratio = modes.damping_ratio[modes.omega > 0.0]
     damping = "without damping" if not ratio.any() else f"damped by {100 * ratio[0]:.3g} % of critical"
-    body = (
+    return (
         f"A {kind} of {extent}, {si(modes.mass, 'kg')}, {edges}; its first flexible mode is at "
         f"{si(flexible[0], 'Hz')}, {damping}."
     )
-    assert striker is not None
+
+
+def arriving(kind: str, striker: Striker) -> str:
+    """A striker of a kind, as in the scene, in words."""
     arrives = {
         "stick": f"a stick of {si(striker.mass, 'kg')}, hinged at its far end",
         "sphere": f"a ball of {si(striker.mass, 'kg')}",
         "rigid": f"a rigid mass of {si(striker.mass, 'kg')}",
         "hammer": f"a hammer of {si(striker.mass, 'kg')} in two parts",
         "bar": f"a flexible bar of {si(striker.mass, 'kg')}",
-    }[scene.striker.kind]
-    if scene.striker.kind == "stick":
+    }[kind]
+    if kind == "stick":
         bending = striker.modes.frequencies[striker.modes.omega > 0.0][0]
         arrives += f" (effective mass {si(striker.felt_mass, 'kg')} at the tip; first bending mode {si(bending, 'Hz')})"
     if striker.hand is not None:
         arrives += f", held by a hand in which it swings at {si(striker.hand_frequency, 'Hz')}"
-    blow = f"It is struck at {place(response.at)} by {arrives}, moving at {si(response.speed, 'm/s')}."
+    return arrives
+
+
+def contact(law: Contact) -> str:
+    """A contact law in a few sentences."""
     raised = "" if law.exponent == 1.0 else f"{law.exponent:g}".translate(RAISED)
     stiffness = si(law.stiffness, "N/m") + raised
-    contact = f"The contact is a spring that only pushes, with a force of {stiffness} × indentation{raised}"
-    contact += f", with loss {law.loss:.3g} s/m." if law.loss else "."
+    told = f"The contact is a spring that only pushes, with a force of {stiffness} × indentation{raised}"
+    told += f", with loss {law.loss:.3g} s/m." if law.loss else "."
     if law.hard_stiffness:
-        contact += f" Beyond {si(law.depth, 'm')} it meets a hard layer."
+        told += f" Beyond {si(law.depth, 'm')} it meets a hard layer."
     if law.yield_approach:
-        contact += f" Beyond {si(law.yield_approach, 'm')} it yields and keeps a dent."
+        told += f" Beyond {si(law.yield_approach, 'm')} it yields and keeps a dent."
     if law.hysteresis:
-        contact += (
+        told += (
             f" It is felt: held pressed, it loses {law.hysteresis:.0%} of its force in some {si(law.relaxation, 's')}."
         )
-    return [body, blow, contact, _single_or_multiple(response, law)]
+    return told
 
 
 def _single_or_multiple(response: Response, law: Contact) -> str:

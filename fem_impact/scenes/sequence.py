@@ -1,15 +1,15 @@
 """A scene of several strokes: rolls, flams and two sticks at once, played on one body and told as one."""
 
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .._base import check
-from ..impact import collision
-from ..model import planner, playing
+from .._base import check, markup
+from ..impact import assumption, collision, quantities
+from ..model import cost, planner, playing
+from ..model.planner import Plan
 from ..model.playing import Strokes
 from ..model.target import Stages, Watch
-from ..modes.modal import Modes
 from ..show import export
 from .schema import REPEATED
 
@@ -24,15 +24,153 @@ SCALARS = (
 )  # fmt: skip
 
 
+@dataclass(frozen=True, eq=False)
+class SequencePlan:
+    """How a sequence will be modelled, why and at what cost; `print` it. `Scene.plan_strokes` makes it."""
+
+    tolerance: float  # [-] for every stroke with what it inherits from those before
+    strokes: tuple[Mapping[str, Any], ...]  # in order of time: when [s], at [m], speed [m/s]
+    # of every stroke as if it struck the body at rest, to EACH of the tolerance; strokes alike share one
+    plans: tuple[Plan, ...]
+
+    def __repr__(self) -> str:
+        return check.brief(self)
+
+    @property
+    def needed(self) -> int:
+        """Number of the most demanding stroke: the body has the modes that this one needs."""
+        return max(range(len(self.plans)), key=lambda i: self.plans[i].max_frequency or 0.0)
+
+    @property
+    def body(self) -> Plan:
+        """The plan of the most demanding stroke, which sets the modes of the body, with the cost of all strokes."""
+        own = self.plans[self.needed]
+        others = [plan for i, plan in enumerate(self.plans) if i != self.needed]
+        blows = (cost.strikes(each.duration / each.dt, own.n_modes + each.n_striker_modes) for each in others)
+        return replace(own, seconds=own.seconds + sum(blow.seconds for blow in blows))
+
+    @property
+    def meets(self) -> bool:
+        """Whether the predicted error of every stroke is at most its share of the tolerance."""
+        return all(plan.meets for plan in self.plans)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Sentences: how the tolerance is shared, what is kept of the body, and why."""
+        body, count, kept = self.body, len(self.plans), "met" if self.meets else "MISSED"
+        shared = (
+            f"tolerance {self.tolerance:g} of {quantities.words(body.quantities)} will be {kept} by {count} strokes: "
+            f"each to {body.tolerance:g} by itself, and the rest for what it inherits from those before"
+        )
+        return shared, f"the body has the modes that stroke {self.needed} needs, the most demanding", *body.reasons
+
+    def data(self) -> dict[str, Any]:
+        """All decisions and predictions by name, in SI units; ``plan`` of a stroke is its number in ``plans``."""
+        single = list({id(plan): plan for plan in self.plans}.values())
+        numbers = [next(i for i, plan in enumerate(single) if plan is mine) for mine in self.plans]
+        return {
+            "tolerance": self.tolerance, "meets": self.meets, "needed": self.needed, "seconds": self.body.seconds,
+            "memory": self.body.memory,
+            "strokes": [{**stroke, "plan": number} for stroke, number in zip(self.strokes, numbers)],
+            "plans": [plan.data() for plan in single],
+        }  # fmt: skip
+
+    def __str__(self) -> str:
+        body, count = self.body, len(self.plans)
+        shared, *reasons = self.reasons
+        rows = [
+            (
+                i,
+                f"{stroke['when']:.4g} s",
+                f"{stroke['speed']:.4g} m/s",
+                f"{plan.error:.1e}",
+                f"{plan.max_frequency:.4g} Hz",
+            )
+            for i, (stroke, plan) in enumerate(zip(self.strokes, self.plans))
+        ]
+        table = markup.columns(
+            rows[: playing.LISTED], ("stroke", "when", "speed", "predicted error", "modes needed to")
+        )
+        more = [f"... and {count - playing.LISTED} more"] if count > playing.LISTED else []
+        lines = [
+            shared,
+            *(f"  {line}" for line in (*table, *more, *reasons)),
+        ]
+        if body.assumptions:
+            head, *rest = assumption.lines(body.assumptions, self.tolerance)
+            lines += [f"Model of stroke {self.needed}: {head}", *(f"  {line}" for line in rest)]
+        return "\n".join([*lines, f"Cost: {body.cost}", *(f"Note: {note}" for note in body.notes)])
+
+
+class Played(NamedTuple):
+    """A sequence as it was played."""
+
+    plan: SequencePlan
+    response: Strokes
+    seconds: dict[str, float]  # [s] wall time of each stage, by its name
+
+
+def run(
+    scene: "Scene",
+    watch: Watch | None = None,
+    *,
+    before: Callable[[Plan], object] | None = None,
+    strict: bool = False,
+    **changes: Any,
+) -> Played:
+    """As `Scene.play`, with the plan, which ``before`` sees before it is carried out, and the time of every stage."""
+    stages = Stages(watch)
+    planned = plan(scene, watch, **changes)
+    if before is not None:
+        before(planned.body)
+    found = _carried_out(scene, planned, stages, strict, changes)
+    return Played(planned, found, dict(stages.seconds))
+
+
+def plan(scene: "Scene", watch: Watch | None = None, **changes: Any) -> SequencePlan:
+    """As `Scene.plan_strokes`."""
+    if not scene.stroke:
+        raise scene.fault(f"[[{REPEATED}]] is missing: plan_strokes plans strokes, plan a single blow")
+    wrong = [name for name in changes if name not in TAKEN]
+    if wrong:
+        raise ValueError(f"{wrong[0]} must be left out for a scene with strokes; it takes {', '.join(TAKEN)}")
+    wanted = {name: changes[name] for name in (*OF_SEQUENCE[:2], *OF_BODY) if changes.get(name) is not None}
+    tolerance = check.tolerance(wanted.get("tolerance", scene.blow.values.get("tolerance", collision.TOLERANCE)))
+    wanted |= {"target": "modal", "tolerance": playing.EACH * tolerance}
+    order = played_order(scene)
+    parts, alone = [scene.stroke[i] for i in order], [scene.alone(i) for i in order]
+    keys: list[str] = []
+    fastest: dict[str, Scene] = {}
+    for part, single in zip(parts, alone):
+        blow = single.blow.values
+        keys.append(repr([part.values.get("striker"), part.values.get("contact"), blow["at"]]))
+        other = fastest.get(keys[-1], single)
+        fastest[keys[-1]] = single if blow["speed"] >= other.blow.values["speed"] else other
+    plans = {key: single.plan(watch=watch, **wanted) for key, single in fastest.items()}
+    told = tuple(
+        {"when": part.values["when"], "at": single.blow.values["at"], "speed": single.blow.values["speed"]}
+        for part, single in zip(parts, alone)
+    )
+    return SequencePlan(tolerance, told, tuple(plans[key] for key in keys))
+
+
+def played_order(scene: "Scene") -> list[int]:
+    """Which table of the scene each stroke is, in order of time."""
+    return sorted(range(len(scene.stroke)), key=lambda i: scene.stroke[i].values["when"])
+
+
 def play(scene: "Scene", watch: Watch | None = None, strict: bool = False, **changes: Any) -> Strokes:
     """As `Scene.play`."""
     if not scene.stroke:
         raise scene.fault(f"[[{REPEATED}]] is missing: Scene.play plays strokes, Scene.strike a single blow")
-    wrong = [name for name in changes if name not in TAKEN]
-    if wrong:
-        raise ValueError(f"{wrong[0]} must be left out for a scene with strokes; it takes {', '.join(TAKEN)}")
-    stages = Stages(watch)
-    modes = modes_for(scene, stages, **changes)
+    return run(scene, watch, strict=strict, **changes).response
+
+
+def _carried_out(
+    scene: "Scene", planned: SequencePlan, stages: Stages, strict: bool, changes: Mapping[str, Any]
+) -> Strokes:
+    """Play the strokes of a scene as planned; ``changes`` are those of the plan."""
+    modes = planner.struck(planned.body, stages)
     told = {name: scene.blow.values[name] for name in OF_SEQUENCE if name in scene.blow.values}
     told |= {name: value for name, value in changes.items() if name in OF_SEQUENCE and value is not None}
     strokes: list[tuple[Any, ...]] = []
@@ -44,21 +182,6 @@ def play(scene: "Scene", watch: Watch | None = None, strict: bool = False, **cha
     with stages("strike"):
         found = playing.strokes(modes, strokes, strict=strict, **told)
     return replace(found, notes=tuple(dict.fromkeys((*modes.notes, *found.notes))))
-
-
-def modes_for(scene: "Scene", stages: Stages, **changes: Any) -> Modes:
-    """The modes of the body that its most demanding stroke needs, planned as if each struck it at rest."""
-    wanted = {name: changes[name] for name in (*OF_SEQUENCE[:2], *OF_BODY) if changes.get(name) is not None}
-    tolerance = wanted.get("tolerance", scene.blow.values.get("tolerance", collision.TOLERANCE))
-    wanted |= {"target": "modal", "tolerance": playing.EACH * check.tolerance(tolerance)}
-    fastest: dict[str, int] = {}
-    for i, part in enumerate(scene.stroke):
-        blow = scene.alone(i).blow.values
-        key = repr([part.values.get("striker"), part.values.get("contact"), blow["at"]])
-        j = fastest.get(key, i)
-        fastest[key] = i if blow["speed"] >= scene.alone(j).blow.values["speed"] else j
-    plans = [scene.alone(i).plan(watch=stages.watch, **wanted) for i in fastest.values()]
-    return planner.struck(max(plans, key=lambda plan: plan.max_frequency or 0.0), stages)
 
 
 def numbers(found: Strokes, scene: Mapping[str, Any], seconds: Mapping[str, float]) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from ..model.planner import Blow
 from ..model.target import CLOSE, FIRST_FLEXIBLE, Target
 from ..modes.modal import Damping, Modes
 from ..show import export, figures
-from ..sweeps import bodies, cloud, grid
+from ..sweeps import bodies, cloud, grid, solving
 from ..sweeps.cells import ALIASES, AXES, LAW, REACH, Case
 from ..sweeps.cloud import Cloud
 from ..sweeps.inputs import Input, crossed, drawn, mixing, read, shares
@@ -383,7 +383,7 @@ class _Asked:
                     tolerance=self.tolerance, alone=self.blow.arguments.get("residual", True),
                 )  # fmt: skip
                 try:
-                    one, two = (grid.numbers_of(grid.struck_alone(alone, case), None) for case in (mine, other))
+                    one, two = (solving.numbers_of(solving.struck_alone(alone, case), None) for case in (mine, other))
                 except check.SimulationError:
                     worst = math.inf
                     continue
@@ -465,7 +465,7 @@ def _checked(exact: Cloud, numbers: np.ndarray, workers: int | None) -> Checks:
     apart: dict[str, float] = {}
     others = 0
     for i, hit in hits.items():
-        row = grid.numbers_of(hit, exact.band)
+        row = solving.numbers_of(hit, exact.band)
         if row[0] != numbers[0, i]:
             others += 1
             continue
@@ -482,7 +482,7 @@ def _checked(exact: Cloud, numbers: np.ndarray, workers: int | None) -> Checks:
 def _apart(one: np.ndarray, two: np.ndarray) -> dict[str, float]:
     """Differences of two blows: of the restitution absolute, of the others relative to the first."""
     found = {}
-    for i, name in enumerate(grid.LAYERS):
+    for i, name in enumerate(solving.LAYERS):
         if name in ("n_impacts", "error") or i >= len(one):
             continue
         whole = 1.0 if name == "restitution" else abs(one[i])
@@ -506,7 +506,7 @@ def _table(
         unit = AXES.get(ALIASES.get(each.name, each.name), ("",))[0].replace("exponent", f"{base.contact.exponent:g}")
         data[each.name] = ("blow", column, {"units": unit or "1", "distribution": each.said})
     for name, row in zip(layers, numbers):
-        unit, meaning = grid.LAYERS[name]
+        unit, meaning = solving.LAYERS[name]
         about: dict[str, Any] = {"units": unit or "1", "long_name": meaning}
         if name == "centroid":
             about["max_frequency"] = band

@@ -35,7 +35,8 @@ class Painter:
 
     def __init__(self) -> None:
         self.task: tuple[Path, Response, str] | None = None
-        self.stack = ExitStack()
+        self.stack: ExitStack = ExitStack()
+        self.process: subprocess.Popen[bytes]
 
     def __enter__(self) -> "Painter":
         environment = {

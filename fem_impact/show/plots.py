@@ -25,11 +25,13 @@ from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, styled
 BLACK, GREY = "#222222", "#777777"
 PALETTE = "cividis"  # perceptually uniform, also for colour-blind readers
 FINER = 8  # [-] each pixel is split into this many parts to draw contours
+FINEST = 400  # [-] parts along an axis at most, or one for each pixel
 PALETTE_OF_POINTS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY)
+BORDER = VERMILION  # between numbers of impacts: seen on all colours of the palette
 MOST_NAMES = 5  # [-] most names along an axis: more would overlap
 FEW = 10  # [-] a range of fewer whole numbers gets one colour per number
-HALO = withStroke(linewidth=2.2, foreground=BLACK)  # keeps white lines visible on bright colours
-RIM = withStroke(linewidth=4.0, foreground="white")  # keeps circles visible on dark colours
+HALO: withStroke = withStroke(linewidth=2.2, foreground=BLACK)  # keeps white lines visible on bright colours
+RIM: withStroke = withStroke(linewidth=4.0, foreground="white")  # keeps circles visible on dark colours
 __all__ = ["BLACK", "BLUE", "GREEN", "GREY", "ORANGE", "PURPLE", "SKY", "VERMILION", "Axis", "Curve", "Mark"]
 
 
@@ -130,6 +132,7 @@ def colour_map(
     contours: Sequence[tuple[Any, Sequence[float], str, str]] = (),
     marks: Sequence[Mark] = (),
     shades: Sequence[tuple[Any, str, str]] = (),
+    borders: Sequence[tuple[np.ndarray, np.ndarray]] = (),
 ) -> Figure:
     """Draw a scalar over a grid of two parameters, one pixel per case.
 
@@ -140,6 +143,7 @@ def colour_map(
     contours : sequence of (values on the same grid, levels, unit, name); unit '' draws lines without numbers
     marks : sequence of Mark
     shades : sequence of (mask on the same grid, colour, name), painted over the colours
+    borders : sequence of (x, y), between numbers of impacts
 
     Returns
     -------
@@ -169,6 +173,10 @@ def colour_map(
             shown = np.ma.masked_equal(np.asarray(mask, float), 0.0)
             axes.pcolormesh(*edges, shown, cmap=ListedColormap([paint]), vmin=0.0, vmax=1.0, rasterized=True)
             handles.append(Patch(facecolor=paint, edgecolor=GREY, label=name))
+        if borders:
+            paths = [np.column_stack(line) for line in borders]
+            axes.add_collection(LineCollection(paths, colors=BORDER, linewidths=0.8, label="borders"))
+            handles.append(Line2D([], [], color=BORDER, lw=0.8, label="the number of impacts changes"))
         for (data, levels, unit, name), (paint, style) in zip(contours, _LINES):
             finer = _finer(along_x, along_y, np.asarray(data, float))
             lines = axes.contour(*finer, levels=levels, colors=paint, linewidths=1.0, linestyles=style)
@@ -208,7 +216,10 @@ def _finer(x: np.ndarray, y: np.ndarray, data: np.ndarray) -> tuple[np.ndarray, 
     if min(x.min(), y.min(), np.nanmin(data)) <= 0.0 or min(data.shape) < 2:
         return x, y, data
     read = RegularGridInterpolator((np.log(y), np.log(x)), np.log(data))
-    x, y = (np.interp(np.arange(0, len(v) - 1 + 1e-9, 1 / FINER), np.arange(len(v)), np.log(v)) for v in (x, y))
+    parts = [max(1, min(FINER, FINEST // len(v))) for v in (x, y)]
+    x, y = (
+        np.interp(np.arange(0, len(v) - 1 + 1e-9, 1 / n), np.arange(len(v)), np.log(v)) for v, n in zip((x, y), parts)
+    )
     return np.exp(x), np.exp(y), np.exp(read(tuple(np.meshgrid(y, x, indexing="ij"))))
 
 

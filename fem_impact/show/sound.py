@@ -9,8 +9,11 @@ import numpy as np
 from scipy.io import wavfile
 
 from .._base import check, markup
+from ..impact import free_motion
+from ..impact.compiled import layout
 from ..impact.response import Response
 from ..model.playing import Strokes
+from ..modes import free_air
 from ..modes.air import DENSITY, SPEED
 from . import sampling
 
@@ -26,10 +29,8 @@ DECAY = np.log(1e3)  # [-] by default the sound ends when its slowest mode has l
 FADE = 0.3  # [s] of a file or player at its end
 NEAREST = 1e-6  # [m] least distance of a listener from the plate
 BLOCK = 4096  # [-] samples computed at a time as the first waves arrive: limits the memory, does not change the result
-RING = 128, 128  # [-] samples in a block, and blocks computed at a time: does not change the result
 COMPACT = 0.5  # [-] half the width of a bar times the wavenumber, up to which a piece of it is a dipole; test_sound.py
 SQUARE = 1.51  # [-] mass of air that a square section drags, over that of a flat strip of its width
-CRITICAL = 1e-6  # [-] damping ratios closer to 1 become 1 plus this: at 1 the two roots coincide; test_sound.py
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +177,7 @@ def synthesise(
     modes = response.target
     point: Any = modes.point("at", response.at if at is None else at)
     rate, heard = _audible(response, rate)
-    times = response.time[0] + np.arange(_length(response, heard, duration, rate)) / rate
+    times = _times(response, heard, duration, rate)
     shape = modes.shape_at(point)[0]  # (n_modes,)
     velocity = np.concatenate([_velocity(hit, heard, shape, part) for hit, _, part in _parts(response, times)])
     return _scaled(velocity, rate, FULL_SCALE, "m/s", normalise)
@@ -254,13 +255,13 @@ def radiate(
     if modes.dimension != 2:
         raise ValueError(f"response must be that of a plate, got one of dimension {modes.dimension}; use radiate_bar")
     place = beside(listener)
-    density, speed = (check.positive("air", x) for x in check.array("air", air, (2,)))
+    density, speed = _air(air)
     rate, heard = _audible(response, rate)
     points, cells = sampling.grid(modes)
     weights = density / (2.0 * np.pi) * np.sign(place[2]) * _areas(points, cells)
     way = np.sqrt(((points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)  # (n_points,) [m]
     shapes = modes.shapes.at(points)[:, heard] * (weights / way)[:, None]  # (n_points, n_heard)
-    times = response.time[0] + np.arange(_length(response, heard, duration, rate)) / rate
+    times = _times(response, heard, duration, rate)
     pressure = _pressure(response, times, heard, {2: shapes}, way / speed, 1.0 / rate)
     return _scaled(pressure, rate, LOUDEST, "Pa", normalise)
 
@@ -323,7 +324,7 @@ def radiate_bar(
     width = check.positive("width", width, "m")
     if check.positive("height", height, "m") > width:
         raise ValueError(f"height must be at most the width, {width:g} m, got {height:g} m")
-    density, speed = (check.positive("air", x) for x in check.array("air", air, (2,)))
+    density, speed = _air(air)
     rate, heard = _audible(response, rate)
     heard &= modes.omega * 0.5 * width <= COMPACT * speed
     x = np.sort(modes.shapes.grid()[0][:, 0])
@@ -333,7 +334,7 @@ def radiate_bar(
         raise ValueError(f"listener must be farther than half the width from the bar, got {way.min():g} m")
     share = np.gradient(x) * np.where((x == x[0]) | (x == x[-1]), 0.5, 1.0) * place[2] / (4.0 * np.pi * way**2)
     shapes = modes.shapes.at(x[:, None])[:, heard] * share[:, None]
-    times = response.time[0] + np.arange(_length(response, heard, duration, rate)) / rate
+    times = _times(response, heard, duration, rate)
     orders = {3: shapes / speed, 2: shapes / way[:, None]}
     pressure = _pressure(response, times, heard, orders, way / speed, 1.0 / rate)  # of 1 kg/m
     flat = density * np.pi * width**2 / 4.0  # [kg/m]
@@ -342,12 +343,78 @@ def radiate_bar(
     return low, high
 
 
+@check.typed
+def radiate_free(
+    response: Response | Strokes,
+    listener: Any,
+    *,
+    duration: float | None = None,
+    rate: int = RATE,
+    air: tuple[float, float] = (DENSITY, SPEED),
+) -> tuple[Sound, Sound]:
+    """Sound pressure of a plate in free air, without a baffle: an estimate from below and one from above.
+
+    Parameters
+    ----------
+    response : Response or Strokes of a plate of any outline
+    listener : array_like, shape (3,) [m]
+        Position; the third coordinate is the distance from the plate's plane, positive on the side it moves to.
+    duration, rate : as in `synthesise`
+    air : density [kg/m^3] and speed of sound [m/s]
+
+    Returns
+    -------
+    low, high : Sound
+        For equal motion the pressure of each mode lies between them. Where a mode is hardly heard, beside its lobes,
+        it may be silent in ``low``.
+
+    Notes
+    -----
+    The plate is a sheet of dipoles, whose strength is the jump of the pressure across it. Every mode has that at its
+    own frequency, between the jumps of a plate that is too small and one that is too large by up to a cell of a
+    lattice (`modes.free_air`), for any wavelength. In time it follows the mode's acceleration with its part in phase
+    and the velocity with the rest, which is exact as the mode rings. Left out are rigid motions, modes after about the
+    800th, and those whose sound has a wavelength below a sixteenth of the side of a square as large as the plate.
+
+    Unlike a rigid disk, whose low sound in free air is far below that in a wall, a plate of many lobes may be louder
+    without the wall: `radiate` bounds neither from above nor from below.
+
+    References
+    ----------
+    Pierce, Acoustics (1989), chapters 4 and 5.
+
+    Examples
+    --------
+    >>> drum = fi.analytic.disk(0.15, edge="clamped", mass=0.3, first_frequency=120.0, n_modes=6, damping_ratio=0.01)
+    >>> hit = fi.strike(drum, fi.Striker.rigid(0.03), fi.Contact.linear(1e5), at=(0.04, 0.0), speed=1.0, tolerance=1e-2)
+    >>> low, high = fi.sound.radiate_free(hit, (0.0, 0.0, 1.0), duration=0.1)
+    >>> high.level < fi.sound.radiate(hit, (0.0, 0.0, 1.0), duration=0.1).level - 3.0  # dB
+    True
+    """
+    modes = response.target
+    if modes.dimension != 2 or not modes.continuous:
+        raise ValueError(
+            "response must be that of a plate whose shapes are known everywhere; use radiate_bar for a beam"
+        )
+    place = beside(listener)
+    density, speed = _air(air)
+    rate, heard = _audible(response, rate)
+    heard &= free_air.reach(modes, speed) <= free_air.ACROSS[-1]
+    field, doubt = free_air.fields(modes, heard, place, speed, speed / (OVERSAMPLING * rate))
+    times = _times(response, heard, duration, rate)
+    own, less, more = (
+        density / LOUDEST * _pressure(response, times, heard, orders, way / speed, 1.0 / rate)
+        for orders, way in (field, *doubt)
+    )
+    return Sound(own - less, rate, LOUDEST, "Pa"), Sound(own + more, rate, LOUDEST, "Pa")
+
+
 def _pressure(
     response: Response | Strokes, times: np.ndarray, heard: np.ndarray, orders: Mapping[int, np.ndarray],
     delay: np.ndarray, sample: float,
 ) -> np.ndarray:  # fmt: skip
     """Sum (n_times,) over points of delayed motion; ``orders``: order of derivative -> weights (n_points, n_heard)."""
-    roots = _roots(response, heard)
+    roots = free_motion.roots(response.target.omega[heard], response.target.damping_ratio[heard])
     delayed = {
         order: np.stack([np.einsum("km,km->m", shapes, np.exp(-np.outer(delay, r))) for r in roots])
         for order, shapes in orders.items()
@@ -380,14 +447,20 @@ def _audible(response: Response | Strokes, rate: int) -> tuple[int, np.ndarray]:
     return rate, (response.target.omega > 0.0) & (response.target.omega < np.pi * rate)
 
 
-def _length(response: Response | Strokes, heard: np.ndarray, duration: float | None, rate: int) -> int:
-    """Number of samples in a duration [s]; without one, chosen from the decay after the last stroke."""
+def _air(air: Any) -> tuple[float, float]:
+    """Density [kg/m^3] and speed of sound [m/s], checked."""
+    density, speed = (check.positive("air", x) for x in check.array("air", air, (2,)))
+    return density, speed
+
+
+def _times(response: Response | Strokes, heard: np.ndarray, duration: float | None, rate: int) -> np.ndarray:
+    """Times [s] of all samples in a duration [s]; without one, chosen from the decay after the last stroke."""
     if duration is None:
         slowest = float((response.target.damping_ratio * response.target.omega)[heard].min(initial=np.inf))
         duration = float(np.clip(DECAY / slowest, SHORTEST, LONGEST)) if slowest > 0.0 else LONGEST
         duration += 0.0 if isinstance(response, Response) else float(response.starts[-1] - response.starts[0])
     duration = check.between("duration", check.positive("duration", duration, "s"), 0.0, MOST_SAMPLES / rate, "s")
-    return max(1, round(duration * rate))
+    return response.time[0] + np.arange(max(1, round(duration * rate))) / rate
 
 
 def _scaled(signal: np.ndarray, rate: int, full_scale: float, unit: str, normalise: bool) -> Sound:
@@ -395,59 +468,25 @@ def _scaled(signal: np.ndarray, rate: int, full_scale: float, unit: str, normali
     return sound.normalised() if normalise else sound
 
 
-def _roots(response: Response | Strokes, heard: np.ndarray) -> np.ndarray:
-    """Both roots [1/s] of ``s**2 + 2 zeta omega s + omega**2`` for each audible mode, (2, n_heard)."""
-    omega, zeta = response.target.omega[heard], response.target.damping_ratio[heard]
-    zeta = np.where(np.abs(zeta - 1.0) < CRITICAL, 1.0 + CRITICAL, zeta)
-    split = omega * np.sqrt(zeta**2 - 1.0 + 0j)
-    return np.stack([-zeta * omega + split, -zeta * omega - split])
-
-
 def _flights(response: Response, times: np.ndarray) -> list[tuple[int, int]]:
     """First sample of every long free flight and of what follows it; the last flight begins when the blow is over."""
     history = response.history
     busy = np.flatnonzero(history.pressed.any(axis=1))
-    first = np.searchsorted(times, np.append(0.0, (history.steps[:, 0] + history.steps[:, 1])[busy]))
-    after = np.append(np.searchsorted(times, history.steps[busy, 0]), len(times))
-    long = after - first >= RING[0]
+    ends = history.steps[:, layout.START] + history.steps[:, layout.LENGTH]
+    first = np.searchsorted(times, np.append(0.0, ends[busy]))
+    after = np.append(np.searchsorted(times, history.steps[busy, layout.START]), len(times))
+    long = after - first >= free_motion.BLOCK[0]
     long[-1] = after[-1] > first[-1]
     return list(zip(first[long].tolist(), after[long].tolist()))
 
 
-def _ring(response: Response, times: np.ndarray, state: tuple, heard: np.ndarray, weights: np.ndarray, order: int):
-    """Weighted sum of the modes' time derivatives at equally spaced times of one free flight, (n_times,).
-
-    About its rest a mode moves as ``a exp(r t) + b exp(s t)``, or twice the real part of one of the two. An exponential
-    of a sample's time is one of the start of its block times one of the time since: the sum over the modes is a matrix
-    product. ``state`` is (q, p) of the modes heard at the first time; weights are (1, n_heard), or (2, n_heard) with
-    one for each root; ``order`` is that of the derivative.
-    """
-    roots, (q, p) = _roots(response, heard), state
-    bias = response.constant_forces
-    q = q - bias[heard] / response.target.omega[heard] ** 2
-    first = (p - roots[1] * q) / (roots[0] - roots[1])
-    parts = np.stack([first, q - first]) * weights * roots**order  # (2, n_heard)
-    swings = roots[0].imag != 0.0
-    parts = np.concatenate([np.where(swings, 2.0, 1.0) * parts[0], parts[1, ~swings]])
-    roots = np.concatenate([roots[0], roots[1, ~swings]])
-    block, n_blocks = RING
-    step = (times[-1] - times[0]) / max(1, len(times) - 1)
-    table = np.hstack(_powers(roots, step * np.arange(block))).T  # (2 n_roots, block)
-    real, imag = _powers(roots, step * block * np.arange(n_blocks))  # (n_blocks, n_roots)
-    found = []
-    for begin in range(0, len(times), block * n_blocks):
-        size, turn = _powers(roots, np.array([step * begin]))
-        now = parts * (size[0] + 1j * turn[0])
-        rows = slice(-(-(len(times) - begin) // block))
-        x, y, c, s = now.real, now.imag, real[rows], imag[rows]
-        found.append((np.hstack([x * c - y * s, -x * s - y * c]) @ table).ravel())
-    return np.concatenate(found)[: len(times)]
-
-
-def _powers(roots: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Real and imaginary part of exp(roots times), (n_times, n_roots) each; faster than the complex exponential."""
-    size, angle = np.exp(np.outer(times, roots.real)), np.outer(times, roots.imag)
-    return size * np.cos(angle), size * np.sin(angle)
+def _ring(
+    response: Response, times: np.ndarray, state: tuple, heard: np.ndarray, weights: np.ndarray, order: int
+) -> np.ndarray:
+    """`free_motion.swing` of the modes heard, (n_times,)."""
+    modes = response.target
+    bias = response.constant_forces[heard]
+    return free_motion.swing(modes.omega[heard], modes.damping_ratio[heard], bias, state, times, weights, order)
 
 
 def _areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """The cells of a map: one blow, and the parameters along which a map may vary it."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
@@ -33,8 +34,75 @@ AXES = {  # name: unit, what it is, its name in a scene file
 }
 LAW = [field.name for field in fields(Contact)]  # the axes that change the contact
 ALIASES = {alias: name for name, (_, _, alias) in AXES.items()}
+ALONE = {"hard_stiffness", "yield_approach", "hysteresis"}  # axes of contacts whose cells are computed alone
 FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  # each value needs new kernels
+SIDE = {True: 400, False: 100}  # [-] values along an axis that has no count, if cells are computed together or alone
+MOST_VALUES = 10**6  # [-] most values along one axis of a map
+EVEN = 1e-3  # [-] relative difference of steps that count as equal
 REACH = 1e30  # [SI] speeds, masses and frequencies lie between 1/REACH and REACH: beyond, the kernels never finish
+
+
+@dataclass(frozen=True)
+class Range:
+    """An axis whose number of values is not given."""
+
+    low: float
+    high: float
+    log: bool
+
+    def values(self, count: int) -> np.ndarray:
+        """Evenly spaced values, (count,)."""
+        return (np.geomspace if self.log else np.linspace)(self.low, self.high, count)
+
+
+def along(name: str, values: Any) -> Any:
+    """Values along an axis from a list, or from a range {from, to, count, scale}; a `Range` if that has no count."""
+    if isinstance(values, list):
+        return np.array(values)
+    if not isinstance(values, Mapping) or not {"from", "to"} <= set(values) <= {"from", "to", "count", "scale"}:
+        raise ValueError(
+            f"{name} must be a list or {{ from, to, count, scale = 'linear' or 'log' }}, got {check.shown(values)}"
+        )
+    low, high = check.number(f"{name}.from", values["from"]), check.number(f"{name}.to", values["to"])
+    log = check.one_of(f"{name}.scale", values.get("scale", "linear"), ("linear", "log")) == "log"
+    if log:
+        check.positive(f"{name}.from", low), check.positive(f"{name}.to", high)
+    found = Range(low, high, log)
+    if "count" in values:
+        return found.values(check.count(f"{name}.count", values["count"], high=MOST_VALUES))
+    if not low < high:
+        raise ValueError(f"{name}.to must be above {name}.from, got {high:g} and {low:g}")
+    return found
+
+
+def laid_out(
+    over: Mapping[str, Any], contact: Contact, *, alone: bool = False, cells: int | None = None
+) -> tuple[dict[str, Any], bool]:
+    """The values along all axes of a map, and whether any of them are ours.
+
+    Parameters
+    ----------
+    over : mapping of axis name to values, range or `Range`
+    contact : Contact
+    alone : bool
+        Whether all cells are computed alone, whatever the contact.
+    cells : int, optional
+        Values along an axis that is a range without a count; by default those of SIDE for a map of two such axes, and
+        as many cells in all whatever the axes.
+    """
+    found = {name: along(name, values) if isinstance(values, Mapping) else values for name, values in over.items()}
+    free = [name for name, values in found.items() if isinstance(values, Range)]
+    if not free:
+        return found, False
+    names = {ALIASES.get(name, name): values for name, values in found.items()}
+    powers = names.get("exponent", [contact.exponent])
+    least = powers.low if isinstance(powers, Range) else check.array("over['exponent']", powers, (None,)).min()
+    alone = alone or least < 1.0 or bool(contact.hard_stiffness or contact.remembers)
+    side = SIDE[not (alone or ALONE & set(names))]
+    given = math.prod(len(np.atleast_1d(values)) for values in found.values() if not isinstance(values, Range))
+    most = int((side**2 / given) ** (1.0 / len(free)))
+    count = max(2, min(side, most)) if cells is None else check.count("cells", cells, low=2, high=MOST_VALUES)
+    return {name: values.values(count) if name in free else values for name, values in found.items()}, True
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,3 +212,9 @@ def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
                     check.positive(name, value, AXES[name][0], reach=REACH)
             base.changed(name, axes[name][0])  # raises if the body cannot change this way, whatever the value
     return axes
+
+
+def logarithmic(values: np.ndarray) -> bool:
+    """Whether values along an axis (n,) are evenly spaced in the logarithm."""
+    steps = np.diff(np.log(values)) if (values > 0.0).all() else np.zeros(0)
+    return len(steps) > 1 and bool(np.allclose(steps, steps[0], rtol=EVEN))

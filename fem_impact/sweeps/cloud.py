@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..impact.response import Response
-from . import batches, grid
+from . import batches, solving
 from .cells import FAMILY_AXES, Case
 from .store import Texts
 
@@ -43,7 +43,7 @@ class Cloud:
     @property
     def layers(self) -> list[str]:
         """Names of the numbers computed of each blow."""
-        return [name for name in grid.LAYERS if name != "centroid" or self.band is not None]
+        return [name for name in solving.LAYERS if name != "centroid" or self.band is not None]
 
     @property
     def lossy(self) -> bool:
@@ -56,11 +56,11 @@ class Cloud:
 
     def blow(self, index: int) -> Response:
         """One blow by the modal engine."""
-        return grid.struck_alone(self, self.case(index))
+        return solving.struck_alone(self, self.case(index))
 
     def scene(self) -> dict[str, Any]:
         """The blow that all cases share, as plain numbers."""
-        return grid.plain(self.base)
+        return solving.plain(self.base)
 
     def sampled(self) -> "Cloud":
         """The same cloud with each body reduced to its contact points: small enough to send to a cluster."""
@@ -158,7 +158,7 @@ def _levelled(values: np.ndarray, number: int) -> np.ndarray:
 
 def solve_all(cloud: Cloud, workers: int | None, client: Any, store: Any, watch: Any) -> tuple[np.ndarray, Texts]:
     """Compute all blows: numbers (n_layers, n_cases), and the error texts of those that failed."""
-    return grid.solve_all(cloud, solve, workers, client, store, watch)
+    return solving.solve_all(cloud, solve, workers, client, store, watch)
 
 
 def solve(cloud: Cloud, start: int, stop: int, *, workers: int | None = None) -> tuple[np.ndarray, Texts]:
@@ -171,7 +171,7 @@ def solve(cloud: Cloud, start: int, stop: int, *, workers: int | None = None) ->
         name: np.array(cloud.axes[name][some]) if name in cloud.axes else np.full(stop - start, value)
         for name, value in shared.items()
     }
-    quick = grid.together(column) & (not base.modes.stretches)
+    quick = solving.together(column) & (not base.modes.stretches)
     kinds, one = cloud.families
     ratio, kind = cloud.ratio[some], kinds[some]
     bands = _bands(ratio, cloud.band)
@@ -195,7 +195,7 @@ def solve(cloud: Cloud, start: int, stop: int, *, workers: int | None = None) ->
         for row, name in enumerate(names):
             numbers[row, cells] = getattr(found, name) * r ** powers.get(name, 0.0)
         quick[cells] = found.done & ~(np.isnan(found.centroid) & (cloud.band is not None))
-    return numbers, grid.alone(cloud, start, np.flatnonzero(~quick), numbers, workers)
+    return numbers, solving.alone(cloud, start, np.flatnonzero(~quick), numbers, workers)
 
 
 def _bands(ratio: np.ndarray, band: float | None) -> np.ndarray:

@@ -1,13 +1,12 @@
 """Maps: one blow for every combination of parameters, returned as an xarray Dataset."""
 
 import json
-import logging
 import math
 import os
+import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,33 +22,22 @@ from ..impact.collision import RESOLVABLE, strike
 from ..impact.contact import Contact, wall_time
 from ..impact.response import Response
 from ..impact.striker import Striker
-from ..model.audit import audited
 from ..model.planner import COSTLY
 from ..model.target import Target
 from ..modes.modal import Damping, Modes
-from . import batches, bodies
-from .cells import AXES, FAMILY_AXES, REACH, Case, checked_axes
-from .store import LARGEST_BLOCK, Texts, block_size, by_cluster, by_store
+from . import batches, bodies, cloud, refined
+from .borders import add_borders, find_borders, why_none
+from .cells import AXES, FAMILY_AXES, REACH, Case, checked_axes, laid_out
+from .solving import LAYERS, alone, plain, solve_all, struck_alone, together
+from .store import Texts, Watch, not_free
 
-LOG = logging.getLogger(__name__)
 TOLERANCE = 1e-3  # [-] default error limit of a map
-LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
-    "n_impacts": ("", "number of separate contacts"),
-    "contact_time": ("s", "total time in contact"),
-    "restitution": ("", "minus the speed after the blow over the speed before, at the contact point"),
-    "impulse": ("N s", "total impulse of the contact force"),
-    "peak_force": ("N", "largest contact force"),
-    "error": ("", "estimated time-step error: absolute for restitution, relative for the others"),
-    "centroid": ("Hz", "mean frequency, weighted by the magnitude of the force spectrum"),
-}
-
-
 DOUBTED = {True: 10_000, False: 100}  # [-] cells struck again for the error of vectors, in a batch or alone
 MOST_CELLS = 10**8  # [-] default limit of a map: half an hour to two hours of work, 8 GB
 SECONDS = {True: 1e-5, False: 2e-3}  # [s] per blow, in a batch or alone: the slower plates of studies/map_speed.py
+DENSE = 1.0  # [s] a map of our cells that takes less is computed in all of them
 MOST_MIDDLES = 4  # [-] axes whose middle is examined, too: 81 blows
 LEAST_MODEL_ERROR = 1e-12  # [-] smaller ones are rounding
-Watch = Callable[[int, int], Any]
 Tell = Callable[[str], Any]
 
 
@@ -66,6 +54,7 @@ class Grid:
     audit: bool = False  # whether the model's own error is wanted
     max_impacts: int | None = None  # what follows does not matter where cells are computed alone
     kernels: batches.Kernels = field(default_factory=dict)  # computed so far
+    chosen: np.ndarray | None = None  # (n_cases,) cells to compute, numbered with the last axis fastest; all by default
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -73,7 +62,11 @@ class Grid:
 
     @property
     def n_cases(self) -> int:
-        return math.prod(self.shape)
+        return math.prod(self.shape) if self.chosen is None else len(self.chosen)
+
+    def cells(self, start: int, stop: int) -> np.ndarray:
+        """Numbers of some of the cells to compute, (n_cells,)."""
+        return np.arange(start, stop) if self.chosen is None else self.chosen[start:stop]
 
     @property
     def lossy(self) -> bool:
@@ -94,9 +87,9 @@ class Grid:
         return [name for name in LAYERS if name != "centroid" or self.band is not None] + list(self.extra)
 
     def case(self, index: int) -> Case:
-        """The blow of one cell; the last axis varies fastest."""
-        case = self.base
-        for (name, values), i in zip(self.axes.items(), np.unravel_index(index, self.shape)):
+        """The blow of one cell."""
+        case, cell = self.base, self.cells(index, index + 1)[0]
+        for (name, values), i in zip(self.axes.items(), np.unravel_index(cell, self.shape)):
             case = case.changed(name, values[i])
         return case
 
@@ -184,8 +177,8 @@ class Grid:
         return np.exp(logs), ", ".join(unknown)
 
     def scene(self) -> dict[str, Any]:
-        """The blow that all cells share, as plain numbers."""
-        return plain(self.base)
+        """The blow that all cells share, as plain numbers, and which cells these are if not all."""
+        return plain(self.base) | ({} if self.chosen is None else {"cells": self.chosen.tolist()})
 
     def sampled(self) -> "Grid":
         """The same grid with each body reduced to its contact points: small enough to send to a cluster."""
@@ -225,6 +218,9 @@ def sweep(
     max_cells: float = MOST_CELLS,
     tell: Tell | None = None,
     audit: bool = False,
+    borders: bool | None = None,
+    cells: int | None = None,
+    refine: bool | None = None,
 ) -> xarray.Dataset:
     """Strike once for every combination of parameters.
 
@@ -235,7 +231,9 @@ def sweep(
         its cells need: Ritz vectors started from each strike point if it is a plate, otherwise modes.
     over : mapping of axis name to values
         Names are those of `AXES` (``mass`` is the striker's) or those of a scene file (``striker.mass``). Values of
-        ``at`` are points, shape (n_points, dimension) [m]; all others are one-dimensional, in SI units.
+        ``at`` are points, shape (n_points, dimension) [m]; all others are one-dimensional, in SI units, or ranges as in
+        a scene file: ``{"from": 0.01, "to": 0.2, "scale": "log", "count": 20}``. A range without a count gets as many
+        values as a picture shows, see ``cells``.
     tolerance : float [-]
         Error limit of every cell, as in `strike`.
     max_frequency : float [Hz], optional
@@ -261,10 +259,21 @@ def sweep(
     max_cells : float
         A map with more cells is refused before it starts.
     tell : callable, optional
-        Called once before the start, with a sentence on the cost, if the map will take more than 10 s or 2 GB.
+        Called before the start, with a sentence on the cost, if the map will take more than 10 s or 2 GB; and with what
+        was predicted if that decides how many cells are computed.
     audit : bool
         Whether to add ``model_error``, as in `Response`: examined at the ends and the middle of every axis, and
         interpolated. What is not known there is named in its attributes.
+    borders : bool, optional
+        Whether to locate where the number of impacts changes, in a map with two axes: see `read_borders`. By default
+        only if the map has a range without a count.
+    cells : int, optional
+        Number of values along an axis that is a range without a count: 400 by default, or 100 if each cell must be
+        struck alone; fewer if further axes would make more cells than two such axes have.
+    refine : bool, optional
+        Whether to compute only cells where the answer changes and to interpolate the others to within the tolerance,
+        in a map with two axes. By default only if a range has no count and all cells would take more than about a
+        second, predicted from the first few.
 
     Returns
     -------
@@ -272,6 +281,12 @@ def sweep(
         One dimension per axis, in the order given; variables as in `LAYERS` with their units; ``truncation``, the
         expected error of modes left out, or of having no more vectors and no finer mesh; ``tolerance_met``; and
         ``failure``, the error text of a cell that failed (its numbers are then NaN and its n_impacts is -1).
+        With borders, also ``doubtful``, cells whose number of impacts depends on the tolerance, on the body's
+        description, or was refused; and along the dimension ``border`` the curves themselves, which `read_borders`
+        returns: points in the units of the axes, ``border_impacts``, ``border_curve`` and ``border_error``.
+        ``attrs["borders"]`` sums them up. With cells left to this function, ``attrs["cells"]`` says how many were
+        computed, and ``interpolated`` which were not; ``error`` counts the error of interpolation, but for that of the
+        centroid, which its attribute ``interpolation_error`` bounds.
         ``attrs["scene"]`` holds the blow all cells share, as JSON; ``attrs["notes"]`` what was assumed, one note per
         line.
 
@@ -289,7 +304,12 @@ def sweep(
     [[1, 1, 4], [1, 2, 4]]
     """
     tolerance = check.tolerance(tolerance)
+    layers = _checked_layers(layers)
     striker.let_go("a map")
+    ours = False
+    if isinstance(over, Mapping):
+        alone_ = bool(layers) or (isinstance(modes, Modes) and modes.stretches)
+        over, ours = laid_out(over, contact, alone=alone_, cells=cells)
     if isinstance(modes, Modes):
         modes = modes if damping_ratio is None else modes.damped(damping_ratio)
         speed = check.positive("speed", speed, "m/s", reach=REACH)
@@ -300,10 +320,21 @@ def sweep(
             Target.of(modes, damping_ratio), striker, contact, at=at, speed=speed, over=over, tolerance=tolerance,
             alone=residual and not layers, keep=kept_beside(store),
         )  # fmt: skip
+    max_cells = check.number("max_cells", max_cells)
+    n_cells = math.prod(map(len, axes.values()))
+    admit(n_cells, len(LAYERS) + len(layers), max_cells, quick=not layers, tell=tell)
     return run(
         base, axes, tolerance=tolerance, max_frequency=max_frequency, layers=layers, residual=residual, workers=workers,
-        client=client, store=store, watch=watch, max_cells=max_cells, tell=tell, audit=audit,
+        client=client, store=store, watch=watch, tell=tell, audit=audit, borders=borders, refine=refine, ours=ours,
     )  # fmt: skip
+
+
+def _checked_layers(layers: Any) -> dict[str, Callable[[Response], float]]:
+    """Additional layers of a map, which may be None."""
+    found = {} if layers is None else layers
+    if not isinstance(found, Mapping) or not all(isinstance(name, str) and callable(found[name]) for name in found):
+        raise ValueError(f"layers must map names to functions of a Response, got {check.shown(layers)}")
+    return dict(found)
 
 
 def kept_beside(store: str | Path | None) -> Path | None:
@@ -323,27 +354,106 @@ def run(
     client: Any = None,
     store: str | Path | None = None,
     watch: Watch | None = None,
-    max_cells: float = MOST_CELLS,
     tell: Tell | None = None,
     audit: bool = False,
+    borders: bool | None = None,
+    refine: bool | None = None,
+    ours: bool = False,
 ) -> xarray.Dataset:
-    """The map of a blow over axes that are checked; arguments as in `sweep`."""
+    """The map of a blow over axes that are checked; as `sweep`; ``ours`` if the cells of an axis were chosen here."""
     band = None if max_frequency is None else check.positive("max_frequency", max_frequency, "Hz")
     workers = None if workers is None else check.count("workers", workers)
-    max_cells = check.number("max_cells", max_cells)
-    layers = {} if layers is None else layers
-    if not isinstance(layers, Mapping) or not all(isinstance(name, str) and callable(layers[name]) for name in layers):
-        raise ValueError(f"layers must map names to functions of a Response, got {check.shown(layers)}")
-    grid = Grid(base, axes, tolerance, residual, band, dict(layers), bool(audit))
-    admit(grid.n_cases, len(grid.layers), max_cells, quick=not grid.extra, tell=tell)
+    layers = _checked_layers(layers)
+    grid = Grid(base, axes, tolerance, residual, band, layers, bool(audit))
     fewer = grid.without_speed()
-    numbers, texts = solve_all(fewer or grid, solve, workers, client, store, watch)
+    for name, asked, of in (("borders", borders, grid), ("refine", refine, fewer or grid)):
+        if asked and why_none(of):
+            raise ValueError(f"{name}: {why_none(of)}")
+    if refine and layers:
+        raise ValueError("layers of one's own are not interpolated: refine is not for them")
+    way = Way(workers, client, None if store is None else Path(store), watch)
+    drawn = ours and not layers and not why_none(fewer or grid)
+    computed = way.refined(fewer or grid, refine, tell) if refine or (drawn and refine is None) else None
+    numbers, texts = way.solved(fewer or grid) if computed is None else (computed.numbers, computed.texts)
     failures = np.full((fewer or grid).n_cases, "", dtype=f"<U{max(map(len, texts.values()), default=1)}")
     failures[list(texts)] = list(texts.values())
     doubt = described(fewer or grid, numbers, workers)
     if fewer is not None:
         numbers, failures = _with_speed(grid, fewer, numbers, failures)
-    return _dataset(grid, numbers, failures, np.broadcast_to(doubt, grid.shape))
+    doubt = np.broadcast_to(doubt, grid.shape)
+    table = _dataset(grid, numbers, failures, doubt)
+    gap = 1.0 / max(1, min(grid.shape) - 1)
+    if ours:
+        table.attrs["cells"] = f"all {grid.n_cases} cells computed"
+    if computed is not None:
+        _tell_interpolated(table, computed.computed)
+        gap = refined.widest_gap(grid.shape)
+    if borders or (borders is None and ours and not why_none(grid)):
+        found = find_borders(grid, np.asarray(table.n_impacts), way.solved)
+        found.doubtful[doubt >= 1.0] = True
+        add_borders(table, found, gap)
+    return table
+
+
+def _tell_interpolated(table: xarray.Dataset, computed: np.ndarray) -> None:
+    """Say in a map which cells (n, n) were computed."""
+    n, share = int(computed.sum()), computed.mean()
+    table.attrs["cells"] = f"{n} of {computed.size} cells computed ({share:.0%}), the others interpolated between them"
+    meaning = "whether the cell was interpolated between others, to within the tolerance"
+    for name, weight in refined.ROUGH.items():
+        if name in table:
+            table[name].attrs["interpolation_error"] = refined.SHARE * table.attrs["tolerance"] / weight
+    table["interpolated"] = (table.n_impacts.dims, ~computed, {"units": "1", "long_name": meaning})
+
+
+@dataclass(frozen=True)
+class Way:
+    """Where blows are computed, where they are kept, and who is told."""
+
+    workers: int | None
+    client: Any
+    store: Path | None
+    watch: Watch | None
+
+    def solved(self, blows: Grid | cloud.Cloud, turn: str = "") -> tuple[np.ndarray, Texts]:
+        """Compute all cells of a grid or a cloud; those of a round with a name are kept in a folder of the store."""
+        work = solve if isinstance(blows, Grid) else cloud.solve
+        place = self.store / turn if self.store is not None and turn else self.store
+        return solve_all(blows, work, self.workers, self.client, place, None if turn else self.watch)
+
+    def refined(self, grid: Grid, refine: bool | None, tell: Tell | None) -> refined.Refined | None:
+        """Compute a map where its answer changes; None if all cells are predicted to be quick, unless ``refine``."""
+        whole = self.store is not None and (self.store / "zarr.json").exists()
+        if whole and not refine:
+            return None
+        going_on = self.store is not None and (self.store / "round-1").exists()
+        if self.store is not None and not going_on and self.store.exists() and any(self.store.iterdir()):
+            raise not_free(self.store)
+        first = replace(grid, chosen=np.unique(refined.first_blocks(grid.shape).cells(grid.shape[1])))
+        here = replace(self, store=None, watch=None)
+        here.solved(replace(grid, chosen=first.cells(0, 1)))  # compiles
+        began = time.process_time()
+        start = here.solved(first)
+        seconds = (time.process_time() - began) / first.n_cases * grid.n_cases / (self.workers or os.cpu_count() or 1)
+        if not refine and not going_on and self.client is None:
+            some = seconds > DENSE
+            if tell is not None:
+                cost = f"all {grid.n_cases} cells are expected to take {seconds:.2g} s"
+                tell(
+                    f"{cost}: only those where the answer changes are computed" if some else f"{cost}: all are computed"
+                )
+            if not some:
+                return None
+
+        def compute(cells: np.ndarray, turn: str) -> tuple[np.ndarray, Texts]:
+            """Cells of one round; those of the first are known."""
+            return start if turn == "round-0" else self.solved(replace(grid, chosen=cells), turn)
+
+        def settled(done: int) -> None:
+            if self.watch is not None:
+                self.watch(done, grid.n_cases)
+
+        return refined.refine((grid.shape[0], grid.shape[1]), grid.layers, grid.tolerance, compute, settled)
 
 
 def described(grid: Grid, numbers: np.ndarray, workers: int | None = None) -> np.ndarray:
@@ -398,27 +508,6 @@ def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, 
         tell(cost)
 
 
-def solve_all(
-    grid: Any, solve: Callable[..., Any], workers: int | None, client: Any, store: Any, watch: Watch | None
-) -> tuple[np.ndarray, Texts]:
-    """Compute all cells of a grid or a cloud, block by block, on a cluster or in threads of this process."""
-    LOG.info("%d blows at the tolerance %g", grid.n_cases, grid.tolerance)
-    if client is not None:
-        return by_cluster(grid, client, store, partial(solve, workers=1), watch)
-    if store is not None:
-        return by_store(grid, store, partial(solve, workers=workers), watch)
-    numbers = np.empty((len(grid.layers), grid.n_cases))
-    texts: Texts = {}
-    size = block_size(grid.n_cases) if grid.lossy or grid.extra else LARGEST_BLOCK  # slow cells are counted more often
-    for start in range(0, grid.n_cases, size):
-        stop = min(start + size, grid.n_cases)
-        numbers[:, start:stop], new = solve(grid, start, stop, workers=workers)
-        texts |= new
-        if watch is not None:
-            watch(stop, grid.n_cases)
-    return numbers, texts
-
-
 def _with_speed(grid: Grid, fewer: Grid, numbers: np.ndarray, failures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Blows at all speeds from those at one speed: impulse and peak force scale with it, all else is unchanged."""
     along = list(grid.axes).index("speed")
@@ -443,7 +532,7 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
     """
     names = grid.layers
     numbers = np.full((len(names), stop - start), np.nan)
-    place = dict(zip(grid.axes, np.unravel_index(np.arange(start, stop), grid.shape)))
+    place = dict(zip(grid.axes, np.unravel_index(grid.cells(start, stop), grid.shape)))
     law = grid.base.contact
     base = {"target_mass": grid.base.modes.mass, "mass": grid.base.striker.mass, "speed": grid.base.speed, **vars(law)}
     column = {
@@ -475,55 +564,6 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
             numbers[row, cells] = getattr(found, name)
         quick[cells] = found.done & ~(np.isnan(found.centroid) & (grid.band is not None))
     return numbers, alone(grid, start, np.flatnonzero(~quick), numbers, workers)
-
-
-def together(column: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Which blows (n_cells,) can be followed together, by their parameters, (n_cells,) each."""
-    quick = (column["exponent"] >= 1.0) & (column["gap"] >= 0.0)
-    for name in ("hard_stiffness", "yield_approach", "hysteresis"):
-        quick &= column[name] == 0.0
-    return quick
-
-
-def alone(grid: Any, start: int, cells: np.ndarray, numbers: np.ndarray, workers: int | None) -> Texts:
-    """Strike cells of a block one by one; fill ``numbers`` (n_layers, n_cells) and return the error texts."""
-    texts = {}
-    with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
-        rows = [pool.submit(_row, grid, start + int(i)) for i in cells]
-        try:
-            for i, row in zip(cells, rows):
-                numbers[:, i], text = row.result()
-                if text:
-                    texts[start + int(i)] = text
-        finally:
-            pool.shutdown(cancel_futures=True)
-    return texts
-
-
-def struck_alone(grid: Any, case: Case) -> Response:
-    """A blow of a grid or a cloud by the modal engine."""
-    hit = strike(
-        case.modes, case.striker, case.contact,
-        at=case.at, speed=case.speed, tolerance=grid.tolerance, residual=grid.residual, max_impacts=grid.max_impacts,
-    )  # fmt: skip
-    return audited(hit)
-
-
-def _row(grid: Any, index: int) -> tuple[np.ndarray, str]:
-    """The layers of one cell from the modal engine, and its error text ('' if it succeeded)."""
-    try:
-        return numbers_of(grid.blow(index), grid.band, grid.extra), ""
-    except SimulationError as error:
-        return np.full(len(grid.layers), np.nan), str(error)
-
-
-def numbers_of(
-    hit: Response, band: float | None, extra: Mapping[str, Callable[[Response], float]] | None = None
-) -> np.ndarray:
-    """The layers (n_layers,) of one blow."""
-    row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force, hit.error.step]
-    row += [hit.spectral_centroid(band)] if band is not None else []
-    return np.array(row + [function(hit) for function in (extra or {}).values()], float)
 
 
 def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray, doubt: np.ndarray) -> xarray.Dataset:
@@ -563,26 +603,3 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray, doubt: np.nd
     notes = plausible.together(grid.base.modes.notes, grid.base.striker.notes)
     about = {"title": "Map of blows", "scene": json.dumps(grid.scene()), "notes": "\n".join(notes)}
     return xarray.Dataset(data, places, about | {"tolerance": grid.tolerance, "residual": int(grid.residual)})
-
-
-def plain(case: Case) -> dict[str, Any]:
-    """A blow as plain numbers."""
-    return {
-        "target": _plain(case.modes, case.at),
-        "striker": _plain(case.striker.modes, case.striker.at),
-        "contact": dict(vars(case.contact)),
-        "speed": case.speed,
-    }
-
-
-def _plain(modes: Modes, at: np.ndarray) -> dict[str, Any]:
-    """A body and its contact point as plain numbers."""
-    place = at[None]
-    return {
-        "mass": modes.mass,
-        "frequencies": modes.frequencies.tolist(),
-        "damping_ratios": modes.damping_ratio.tolist(),
-        "at": at.tolist(),
-        "shape": modes.shape_at(place)[0].tolist(),
-        "residual_compliance": float(modes.residual_compliance(place)[0, 0]),
-    }

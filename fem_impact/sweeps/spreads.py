@@ -10,8 +10,8 @@ import xarray
 from scipy import stats
 
 from .._base import check, markup
-from .grid import LAYERS
 from .inputs import Input
+from .solving import LAYERS
 
 CONFIDENCE = 0.9  # [-] of every interval
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)  # [-] quantiles told

@@ -43,7 +43,8 @@ class Store:
         with _intact(path):
             self.group: Any = zarr.open_group(str(path), mode="r")
             attributes: Any = self.group.attrs
-            self.n_cases, self.block = int(attributes["n_cases"]), int(attributes["block"])
+            self.n_cases: int = int(attributes["n_cases"])
+            self.block: int = int(attributes["block"])
             fresh = _made(zarr, {}, self.n_layers, self.n_cases, self.block)
             for name in fresh:
                 if self.group[name].metadata.to_dict() != fresh[name].metadata.to_dict():
@@ -63,7 +64,7 @@ class Store:
         mark = fingerprint(grid)
         if path.exists() and any(path.iterdir()):
             if not (path / "zarr.json").exists():
-                raise ValueError(f"store must be a new folder or the store of this map, got {path}; name a new folder")
+                raise not_free(path)
             store = cls(path)
             if store.group.attrs.get("fingerprint") != mark:
                 raise ValueError(
@@ -235,6 +236,11 @@ def _intact(path: Path) -> Iterator[None]:
         yield
     except Exception as error:  # zarr and its codecs raise many kinds of error
         raise _damaged(path, str(error)) from None
+
+
+def not_free(path: Path) -> ValueError:
+    """Error about a store that holds something else."""
+    return ValueError(f"store must be a new folder or the store of this map, got {path}; name a new folder")
 
 
 def _damaged(path: Path, reason: str) -> ValueError:

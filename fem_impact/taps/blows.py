@@ -12,7 +12,7 @@ import numpy as np
 from .._base import check
 from .._base.check import SimulationError
 from ..impact.collision import rest_mode
-from ..impact.compiled import record
+from ..impact.compiled import layout, record
 from ..impact.compiled.energy import run_energy
 from ..impact.contact import Contact
 from ..impact.response import History
@@ -136,7 +136,7 @@ def pair(striker: Body, target: Body, contact: Contact) -> Pair:
         if body.rest <= 0.0:
             continue
         if not contact.rated:
-            law[0, 3] += body.rest
+            law[0, layout.COMPLIANCE] += body.rest
             continue
         above, damping = rest_mode(body.dimension, body.omega[-1], body.zeta[-1], True)
         omega, zeta = np.append(omega, above), np.append(zeta, damping)
@@ -202,7 +202,7 @@ def records(
 
 def _force(history: History, times: np.ndarray) -> np.ndarray:
     """Contact force [N] at ascending times (n_times,) from zero to the end of the run."""
-    begun, lengths = history.steps[:, 0], history.steps[:, 1]
+    begun, lengths = history.steps[:, layout.START], history.steps[:, layout.LENGTH]
     if not len(begun):
         return np.zeros(len(times))
     rows = np.searchsorted(begun, times, side="right") - 1

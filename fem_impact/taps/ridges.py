@@ -28,7 +28,8 @@ class Way:
     spread: float  # growth of coordinate j for which the sum of squares rises by one, by curvature
     jacobian: np.ndarray  # (n_residuals, n_coordinates less j and the needless) near by
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def _gone(self, last: float) -> float:
         here = self.x[self.j]
@@ -65,7 +66,10 @@ class Way:
         return replace(self, x=x, slope=slope, factors=factors)
 
 
-def way(problem: Problem, x: np.ndarray, j: int, bounds: tuple, noise: float, ridge: float, stopped=None) -> Way:
+def way(
+    problem: Problem, x: np.ndarray, j: int, bounds: tuple[np.ndarray, np.ndarray], noise: float, ridge: float,
+    stopped: np.ndarray | None = None,
+) -> Way:  # fmt: skip
     """The way from ``x`` by the derivatives there; by factors if a rise by one takes coordinate j beyond ``ridge``."""
     stopped = np.zeros(len(x), bool) if stopped is None else stopped
     jacobian = problem.jacobian(x)

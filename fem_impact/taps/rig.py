@@ -12,7 +12,8 @@ from . import arguments
 from .records import RATES, Taps
 from .triggers import LONGEST
 
-FILTERS = {  # end of the pass band and begin of the stop band, each over the sampling rate
+# end of the pass band and begin of the stop band, each over the sampling rate
+FILTERS: dict[str, tuple[float, float] | None] = {
     # linear-phase filters of delta-sigma converters; data sheets state 0.45 and 0.55 to 0.58 (TI SLAS666B, SBASAU5)
     "delta-sigma": (0.453, 0.547),
     # analysers with a band of rate / 2.56: what folds back must stay outside the band

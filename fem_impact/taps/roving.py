@@ -62,7 +62,8 @@ class Roving:
     duration: float  # [s] of a record
     notes: tuple[str, ...] = ()
 
-    __repr__ = check.brief
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)

@@ -373,7 +373,7 @@ def pulse_length(taps: Any) -> float:
     return float(np.median(0.5 * np.pi * taps.impulse / taps.peak))
 
 
-def starts(problem: Problem, length: float, momentum: np.ndarray, rng: np.random.Generator) -> list:
+def starts(problem: Problem, length: float, momentum: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]:
     """Starting points in order of their sums of squares, of `SCREENED` that fill the ranges evenly; neighbours last.
 
     Parameters

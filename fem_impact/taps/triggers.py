@@ -1,5 +1,8 @@
 """Find taps in a record of the force: where they begin, how many pulses they have, what is wrong; and cut them out."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from scipy.interpolate import interp1d
 
@@ -110,7 +113,10 @@ def ceiling(rows: list[np.ndarray]) -> float:
     return top if count >= CLIPPED and any((each[1:] & each[:-1]).any() for each in reached) else np.inf
 
 
-def cut(segments, rate, name, *, trigger, before, length, together):
+def cut(
+    segments: Sequence[tuple[np.ndarray, Any]], rate: float, name: str, *, trigger: float | None,
+    before: float | None, length: float | None, together: float | None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str], list[str]]:  # fmt: skip
     """Records of equal length around every tap: force, responses, whether the force is cut off, labels and notes."""
     pause = max(1, round(check.positive("together", together, "s") * rate))
     rests = [level_of_rest(row, max(1, round(REST * rate))) for row, _ in segments]

@@ -41,6 +41,14 @@ def unit_of(name: str) -> str:
     return "m/s" if name.startswith("speed") else UNITS.get(name.rpartition(".")[2], "s" if name == TIME else "")
 
 
+def bounds(label: str, limits: Any, unit: str = "") -> tuple[float, float]:
+    """Both ends of a range (low, high), low below high."""
+    low, high = check.array(label, limits, (2,), unit).tolist()
+    if not low < high:
+        raise ValueError(f"{label} must be a range (low, high), got ({low:g}, {high:g})")
+    return low, high
+
+
 @dataclass(frozen=True)
 class Unknown:
     """A number to be found between two bounds; by its logarithm if both are positive."""
@@ -50,9 +58,7 @@ class Unknown:
     high: float
 
     def __post_init__(self) -> None:
-        low, high = check.array(f"unknown[{self.name!r}]", (self.low, self.high), (2,), unit_of(self.name)).tolist()
-        if not low < high:
-            raise ValueError(f"unknown[{self.name!r}] must be a range (low, high), got ({low:g}, {high:g})")
+        low, high = bounds(f"unknown[{self.name!r}]", (self.low, self.high), unit_of(self.name))
         check.settle(self, low=low, high=high)
 
     @property

@@ -35,6 +35,7 @@ def test_goals_hold_for_each_blow_or_for_one():
         ([("impulse", 1.0)], "wanted must be a dict of names"),
         ({"impuls": 1.0}, "wanted must be one of .*'impuls'"),
         ({"impulse": (2.0, 1.0)}, r"wanted\['impulse'\] must be a range \(low, high\), got \(2, 1\)"),
+        ({"contact_time": -1.0}, r"wanted\['contact_time'\] must not be negative, got -1; nothing could meet it"),
         ({"impulse": (None, None)}, "must be a number or a range .* None leaves an end open"),
         ({"impulse": np.nan}, r"wanted\['impulse'\]"),
         ({"impulse=5": 1.0}, "impulse has no frequency, write 'impulse'"),

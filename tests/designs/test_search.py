@@ -117,6 +117,8 @@ def test_errors_name_what_is_wrong():
         fi.design(bar, {"mode1.frequency": 440.0}, {"height": (5e-3, 40e-3)}, least="width")
     with pytest.raises(ValueError, match=r"start\['height'\] must lie between 0.005 and 0.04"):
         fi.design(bar, {"mode1.frequency": 440.0}, {"height": (5e-3, 40e-3)}, start={"height": 1.0})
+    with pytest.raises(ValueError, match=r"free\['height'\] must be a range \(low, high\), got \(0.04, 0.005\)"):
+        fi.design(bar, {"mode1.frequency": 440.0}, {"height": (40e-3, 5e-3)})
     with pytest.raises(ValueError, match="a quantity of a blow needs striker, contact, at and speed"):
         fi.design(bar, {"impulse": 1.0}, {"height": (5e-3, 40e-3)})
     with pytest.raises(ValueError, match="mode 3 needs more modes, the body has 0 flexible ones"):

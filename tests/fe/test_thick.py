@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from test_studies import study
-from thick_plates import block, navier, ritz, spread_compliance
+from thick_plates import block, by_rotations, navier, ritz, spread_compliance
 
 import fem_impact as fi
-from fem_impact.fe import refinement
+from fem_impact.fe import refinement, thick
 from fem_impact.fe.assembly import reassemble
 
 UNIT = fi.Material(E=1.0, nu=0.3, rho=1.0)
@@ -43,6 +43,46 @@ def test_hinged_polygons_follow_wangs_relation_from_our_own_thin_frequencies(nam
         assert (thin.omega > 1.02 * found.omega).all()
 
 
+@pytest.mark.slow
+def test_hinged_random_quadrilaterals_follow_wangs_relation():
+    rng = np.random.default_rng(6)
+    turn = 0.5 * np.pi * (np.arange(4) + rng.uniform(-0.25, 0.25, 4))
+    corners = rng.uniform(0.85, 1.0, (4, 1)) * np.column_stack([np.cos(turn), np.sin(turn)])
+    mesh, held = fi.mesh.polygon(corners), {"boundary": "hinged"}
+    thin = fi.find_modes(fi.assemble(mesh, fi.Plate(UNIT, 0.1), held), n_modes=4, tolerance=1e-5)
+    found = modes_of(mesh, 0.1, held, 4, tolerance=1e-5)
+    assert_allclose(found.omega, elements().hinged_polygon(thin.omega, 0.1), rtol=1e-5)  # 5e-7
+
+
+@pytest.mark.slow
+def test_a_hinged_l_shape_follows_wangs_relation_where_it_holds():
+    """Modes 2, 3 and 4 are at rest at the re-entrant corner; of the others another element tells the truth."""
+    h, mesh = 0.2, fi.mesh.polygon(elements().L_SHAPE, size=0.2)
+    system = fi.assemble(mesh, fi.Plate(UNIT, h), {"boundary": "hinged"}, theory="mindlin")
+    assert system.space.turned.any()  # around the corner, where shear strains as unknowns made the matrix singular
+    found = refinement._pairs(system, 5, None)[1]
+    wang = elements().hinged_polygon(elements().L_MEMBRANE * elements().thin_rate(h), h)
+    assert_allclose(found[1:4], wang[1:4], rtol=1e-5)  # 6e-7
+    assert found[0] > 1.1 * wang[0] and found[4] > 1.02 * wang[4]
+    assert_allclose(found, by_rotations(mesh, h, 5, elements().matrices), rtol=1e-5)  # 7e-7
+
+
+@pytest.mark.parametrize("supports", [
+    {"left": "clamped", "bottom": "hinged", "right": fi.Elastic(0.05, rotation=0.01)}, {},
+])  # fmt: skip
+def test_nodes_may_hold_rotations_instead_of_shear_strains(supports, monkeypatch):
+    """The same functions: none of them, many or all turned give the same frequencies to rounding."""
+    found, mesh = [], fi.mesh.rectangle(1.0, 1.0, size=0.5)
+    for small in (0.0, 2.0, 1e9):  # the size of a triangle over the thickness: from none to all
+        monkeypatch.setattr(thick, "SMALL", small)
+        system = fi.assemble(mesh, fi.Plate(UNIT, lambda p: 0.2 + 0.1 * p[:, 0]), supports, theory="mindlin")
+        found.append((system.space.turned.mean(), refinement._pairs(system, 8, None)[1]))
+    shares, omega = zip(*found)
+    assert shares[0] == 0.0 and 0.0 < shares[1] < 1.0 and shares[2] == 1.0
+    for other in omega[1:]:
+        assert_allclose(other, omega[0], rtol=1e-12)  # 1e-14
+
+
 @pytest.mark.parametrize("h", [0.2, pytest.param(0.05, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("edge", ["clamped", "hinged", "soft hinged", "free"])
 def test_disks_follow_their_characteristic_equations(edge, h):
@@ -74,6 +114,23 @@ def test_squares_agree_with_a_ritz_solution(sides):
     held = dict(zip(("left", "right", "bottom", "top"), sides))
     found = modes_of(fi.mesh.rectangle(1.0, 1.0), 0.2, held, 6)
     assert_allclose(found.omega, ritz(0.2, 0.3, sides, 14, 6), rtol=2e-5)  # 1e-5 at free edges next to clamped ones
+
+
+LIEW = {  # support and thickness of the unit square: omega / pi**2 sqrt(rho h / D), all digits printed
+    ("hinged", 0.1): [1.9317], ("hinged", 0.2): [1.7679],
+    ("clamped", 0.1): [3.2954, 6.2858, 6.2858, 8.8098, 10.3788, 10.4778],
+    ("clamped", 0.2): [2.6875, 4.6907, 4.6907, 6.2985, 7.1767, 7.2759],
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("edge", "h"), LIEW)
+def test_squares_have_the_digits_of_liews_tables(edge, h):
+    """Liew, Xiang and Kitipornchai (1993), Int. J. Solids Struct. 30, 3357-3379: nu = 0.3, shear factor 5/6."""
+    printed = np.array(LIEW[edge, h])
+    system = fi.assemble(fi.mesh.rectangle(1.0, 1.0), fi.Plate(UNIT, h), {"boundary": edge}, theory="mindlin")
+    found = refinement._pairs(system, len(printed), None)[1]
+    assert_allclose(found / elements().thin_rate(h) / np.pi**2, printed, atol=6e-5)  # half a digit, and 1e-5 of each
 
 
 @pytest.mark.parametrize("ratio", [1e-3, 1e-4, 1e-5])
@@ -136,6 +193,7 @@ def test_the_grain_turns_with_its_angle():
     assert_allclose(found[0].omega, found[1].omega, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_tapered_strip_with_springs_and_a_mass_is_a_timoshenko_beam():
     """Without Poisson's contraction a strip bends like a beam; both have shear coefficient 5/6 then."""
     plain, width = fi.Material(E=70e9, nu=0.0, rho=2700.0), 0.05
@@ -188,6 +246,7 @@ def test_points_on_a_support_do_not_move():
     assert modes.shapes.compliance(np.array([[0.0, 0.2]]))[0, 0] == pytest.approx(0.0, abs=1e-20)
 
 
+@pytest.mark.slow
 def test_a_point_mass_adds_its_mass():
     plate, mesh = fi.Plate(ALUMINIUM, 0.03), fi.mesh.rectangle(0.5, 0.4)
     bare = fi.assemble(mesh, plate, {"left": "clamped"}, theory="mindlin")

@@ -7,9 +7,11 @@ from test_studies import study
 
 import fem_impact as fi
 
+grazing = study("gradient_grazing")
 claims = study("gradient_claims")  # random blows and what is told of them, on which both are judged
 STEP, BAND, QUANTITIES = claims.STEP, claims.BAND, claims.QUANTITIES
 random_numbers, strike = claims.random_numbers, claims.strike
+GRAZING = 1.20025666  # [-] times the target's mass of the first family of `gradient_grazing`: where its impact is lost
 
 
 def told(hit, frequencies):
@@ -144,6 +146,24 @@ def test_errors_of_slopes_are_of_the_size_they_say(tolerance):
         assert found.error.max() <= 50.0 * tolerance * scale, name
 
 
+def test_gradients_of_layers_are_differences_of_blows():
+    """A soft layer over a hard one, pressed beyond its depth."""
+    numbers = {"stiffness": 1e5, "exponent": 1.3, "depth": 2e-4, "hard_stiffness": 1e8, "hard_exponent": 1.5}
+
+    def blow(**changed):
+        both = numbers | changed
+        law = fi.Contact.layers(both.pop("stiffness"), both.pop("exponent"), **both)
+        return ball(law, mass=0.01, tolerance=1e-9)
+
+    found = blow().gradient(("contact_time", "peak_force"))
+    for name, value in numbers.items():
+        sides = [blow(**{name: value * (1.0 + side * 1e-4)}) for side in (-1.0, 1.0)]
+        for quantity, slopes in found.items():
+            change = (getattr(sides[1], quantity) - getattr(sides[0], quantity)) / 2e-4
+            # differences of second order of blows told to 1e-9
+            assert_allclose(slopes[f"contact.{name}"] * value, change, atol=2e-5 * slopes.value, err_msg=name)
+
+
 def test_energy_left_in_modes_adds_up():
     numbers = random_numbers(np.random.default_rng(4)) | {"contact.loss": 0.0, "target.damping_ratio": 0.0}
     numbers["striker.first_frequency"] = 1e6  # does not bend: all energy is the striker's motion, or in the plate
@@ -176,23 +196,28 @@ def test_body_numbers_are_those_of_a_rebuilt_body():
             assert_allclose(found[full] * value, change, rtol=1e-5, err_msg=f"{quantity} in {name}")
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("family", grazing.FAMILIES, ids=lambda family: family.quantity)
+def test_gradients_are_right_on_both_sides_until_they_are_refused(family):
+    """A second impact comes and goes, two impacts press equally hard: next to the value, both sides are refused."""
+    value = family.value(1e-7)
+    for distance in (-1e-2, -1e-5, 1e-5, 1e-2):
+        found = grazing.look(family, value, distance)
+        if abs(distance) < 1e-4:
+            assert found.why.startswith("no gradient next to a grazing contact" if family.seed == 3 else
+                                        "no gradient of the largest force: two maxima")  # fmt: skip
+        else:
+            # differences of fourth order over a twentieth of the distance: 1e-5 of a slope that goes as its root
+            assert found.off < 1e-5, distance
+            assert found.error < 1e-5 * max(1.0, abs(found.slope))
+
+
 def test_a_grazing_contact_has_no_gradient():
-    """Two blows of one family, whose second impact comes and goes: next to the border, both sides are refused."""
-    numbers = random_numbers(np.random.default_rng(3))
-    numbers |= {"contact.loss": 0.0, "contact.exponent": 1.5}
-
-    def count(mass):
-        return strike(numbers | {"target.mass": float(mass)}, 1e-8).n_impacts
-
-    low, high = numbers["target.mass"], numbers["target.mass"] * 30.0
-    few = count(high)
-    assert count(low) != few
-    while high - low > 1e-7 * high:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if count(middle) == few else (middle, high)
-    for mass in (low, high):
+    """An impact a hair deep, a push a hair short of a second one: where the bisection of `gradient_grazing` ends."""
+    family = grazing.FAMILIES[0]
+    for factor in (GRAZING * (1.0 - 1e-5), GRAZING * (1.0 + 1e-5)):
         with pytest.raises(fi.SimulationError, match="no gradient next to a grazing contact"):
-            strike(numbers | {"target.mass": float(mass)}, 1e-8).gradient("contact_time")
+            family.strike(factor).gradient("contact_time")
 
 
 def test_what_has_no_gradient_says_why():

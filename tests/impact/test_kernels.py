@@ -294,6 +294,7 @@ def test_damping_never_gives_energy(zeta, scheme):
         last = r.after
 
 
+@pytest.mark.slow
 def test_modal_damping_takes_what_its_integral_says():
     """One mode, one step at a time: E0 - E = integral of 2 zeta omega q'^2, by quadrature of the exact motion."""
     omega, zeta, u, k = np.array([0.0, 3000.0]), np.array([0.0, 0.2]), np.array([[10.0, -4.0]]), 1e5

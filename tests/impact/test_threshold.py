@@ -56,3 +56,17 @@ def test_hammer_mass_must_be_positive():
     modes = analytic.beam(1.0, mass=0.2, first_frequency=100.0, n_modes=10)
     with pytest.raises(ValueError, match="mass must be positive, got -1 kg"):
         threshold.threshold_frequency(modes, 0.5, -1.0)
+
+
+def test_several_hammers_at_once_are_those_alone():
+    plate = analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=40)
+    free = analytic.beam(1.0, ends=("free", "free"), mass=0.1, first_frequency=100.0, n_modes=20)
+    for modes, at in ((plate, (0.45, 0.3)), (free, 0.1)):
+        masses = np.geomspace(1e-4, 10.0, 7)
+        alone = [threshold.threshold_frequency(modes, at, mass) for mass in masses]
+        together = threshold.thresholds(modes, at, masses)
+        # the root is the same, bracketed from another start: to the 1e-13 of its search and rounding
+        assert_allclose(together, [0.0 if one is None else one for one in alone], rtol=1e-11)
+    assert (together == 0.0).any() and (together > 0.0).any()
+    with pytest.raises(ValueError, match="masses must be positive, got -1 kg"):
+        threshold.thresholds(plate, (0.45, 0.3), [0.1, -1.0])

@@ -242,7 +242,7 @@ def test_a_clamped_rectangle_gives_what_mixed_elements_say():
 
 
 @pytest.mark.slow
-@pytest.mark.thin(2)
+@pytest.mark.thin(4)
 @pytest.mark.xdist_group("static many")
 @pytest.mark.parametrize("name", MIXED)
 def test_a_polygon_gives_what_mixed_elements_say(name, all_cases):

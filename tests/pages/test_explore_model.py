@@ -1,5 +1,6 @@
 """Blows that follow a hand are the blows of `strike`, and the map under them is true."""
 
+import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from test_cli import TEXT
 import fem_impact as fi
 from fem_impact.impact import accuracy, force_spectrum
 from fem_impact.pages import explore_model
+from fem_impact.scenes.scene import scene_of
 from fem_impact.scenes.schema import written
 
 
@@ -33,29 +35,32 @@ def test_exponent_leaves_the_contact_time_on_a_wall(stand):
     np.testing.assert_allclose(durations, durations[0], rtol=1e-12)  # a closed form, met to rounding
 
 
-def test_map_counts_as_single_blows_do(stand):
-    picture = stand.picture(stand.start)
-    rng = np.random.default_rng(3)
-    cells = [(int(i), int(j)) for i, j in rng.integers(0, len(picture.mass), (12, 2))]
-    counts = [
-        explore_model.blow(
-            stand.case(replace(stand.start, mass=picture.mass[j], stiffness=picture.stiffness[i]))
-        ).n_impacts
-        for i, j in cells
-    ]
-    assert sum(counts[k] == picture.n_impacts[cell] for k, cell in enumerate(cells)) >= 11  # one may graze: 1e-2 here
-    assert (picture.n_impacts == 1).any() and (picture.n_impacts > 1).any()
+LOSING = {
+    "layers": ("exponent = 1.2\ndepth = 2e-4\nhard_stiffness = 1e7", 0.0),
+    "felt": ("exponent = 1.5\nhysteresis = 0.4\nrelaxation = 1e-3", None),
+    "elastic_plastic": ("yield_approach = 1e-4", None),
+}
 
 
-def test_limit_is_where_the_contact_resonates_at_the_threshold(stand):
-    picture = stand.picture(replace(stand.start, exponent=2.0))
-    there = replace(stand.start, exponent=2.0, mass=picture.mass[5], stiffness=picture.limit[5])
-    assert stand.case(there).resonance == pytest.approx(picture.threshold[5], rel=1e-9)
+@pytest.mark.parametrize("kind", LOSING)
+def test_contacts_that_lose_start_as_the_scene_has_them(stand, kind):
+    text, loss = LOSING[kind]
+    tables = stand.scene.data() | {"contact": tomllib.loads(f'kind = "{kind}"\nstiffness = 5e5\n{text}')}
+    bench = replace(stand, scene=scene_of(tables, stand.scene.path, folder=stand.scene.path.parent))
+    bench = replace(bench, base=replace(stand.base, contact=bench.scene.make_contact()))
+    law = bench.scene.make_contact()
+    np.testing.assert_allclose(bench.law(bench.start).numbers, law.numbers, rtol=1e-12)  # rounding of a power
+    assert bench.start.loss == loss  # no slider for a contact that cannot have a loss factor
+    twice = bench.law(replace(bench.start, stiffness=2.0))
+    assert twice.stiffness == pytest.approx(2.0 * law.stiffness) and replace(twice, stiffness=law.stiffness) == law
+    path = stand.scene.path
+    saved = scene_of(bench.saved(bench.start), path, folder=path.parent).make_contact()
+    np.testing.assert_allclose(saved.numbers, law.numbers, rtol=1e-12)
 
 
 def test_guessed_compliance_gives_the_same_blow_where_it_is_right(stand):
     exact = explore_model.blow(stand.case(stand.start))
-    guessed = explore_model.blow(stand.case(stand.start, stand.residual(stand.start)))
+    guessed = explore_model.blow(stand.case(stand.start, stand.residual(stand.start.at)))
     assert guessed.impulse == pytest.approx(exact.impulse, rel=1e-9)  # the same numbers by another way
     assert explore_model.blow(stand.case(stand.start, 0.0)).impulse != exact.impulse
 

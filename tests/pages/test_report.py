@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 from conftest import Page
-from scenes import SMALL
+from scenes import BAR, SMALL
 from test_cli import TEXT
 
 import fem_impact as fi
@@ -153,6 +153,41 @@ def test_beams_and_balls_have_a_page_too(tmp_path):
     report.write(tmp_path / "bar.html", scene, scene.run(target="modal"))
     page = (tmp_path / "bar.html").read_text(encoding="utf-8")
     assert "A beam of 350" in page and "by a ball of 32.88" in page
+
+
+STROKES = "[[stroke]]\nwhen = 0.03\n[[stroke]]\nwhen = 0.0\nat = [0.2, 0.1]\nspeed = 0.5\n"
+
+
+def test_a_sequence_has_a_page_with_every_stroke(tmp_path, capsys):
+    path = tmp_path / "flam.toml"
+    path.write_text(SMALL.replace("Small", "Flam") + STROKES)
+    assert cli.main(["report", str(path), "--out", str(tmp_path / "r.html")]) in (0, 3)
+    assert "2 strokes" in capsys.readouterr().out
+    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "Report of a sequence" in text and "It is struck 2 times in 30" in text and 'plot-energy" role' not in text
+    assert "struck at (0.1395, 0.09) and (0.2, 0.1) m" in text
+    data = json.loads(download(text, "response.json"))
+    assert [each["when"] for each in data["strokes"]] == [0.0, 0.03]
+
+
+@pytest.mark.slow
+def test_the_result_of_a_sequence_gives_the_same_strokes(tmp_path):
+    path = tmp_path / "flam.toml"
+    path.write_text(SMALL + STROKES)
+    again = report.read(path)
+    assert cli.main(["strike", str(path), "--out", str(tmp_path / "out"), "--duration", "0.01"]) in (0, 3)
+    assert report.read(tmp_path / "out").data()["stroke"] == again.data()["stroke"]
+
+
+def test_listeners_in_free_air_get_a_player_for_each_bound(tmp_path):
+    (tmp_path / "bar.toml").write_text(BAR + "[observe]\nlistener = [0.2, 0.1, 0.5]\n")
+    scene = fi.load_scene(tmp_path / "bar.toml")
+    players = report._sounds(scene, scene.run(target="modal").response)
+    told = {player.name.partition("; ")[2] for player in players} - {""}
+    assert len(told) == 1 and re.fullmatch(r"bounded: between [\d.]+ and [\d.]+ dB re 20 µPa", told.pop())
+    names = [player.name.partition(";")[0] for player in players if "bounded" in player.name]
+    place = "Sound radiated to (0.2, 0.1, 0.5)\N{NO-BREAK SPACE}m without a baffle"
+    assert list(dict.fromkeys(names)) == [f"{place}, estimate from below", f"{place}, estimate from above"]
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scenes import SMALL
+from scenes import BAR, SMALL
 from scipy.io import wavfile
 
+from fem_impact import cli
 from fem_impact.scenes import hearing, scene
 from fem_impact.show import sound
 
@@ -39,6 +40,71 @@ def test_every_point_and_listener_has_a_file_and_two_listeners_stereo(tmp_path, 
     assert first[1] - first[0] > 0.5 / 343.0 * 48000  # and arrives later, by at least half a metre's way
     if normalise:
         assert_allclose(np.abs(wavfile.read(tmp_path / "stereo.wav")[1]).max(), 1.0, rtol=1e-6)
+
+
+FREE = SMALL.replace("[target]", "[target]\nbaffle = false").replace("tolerance = 1e-2", "tolerance = 0.1")
+TWO = "[observe]\nlisteners = [[0.1, 0.15, 0.3], [0.3, 0.05, 0.5]]\n"
+
+
+@pytest.mark.parametrize("text", [FREE, BAR], ids=["plate", "bar"])
+def test_in_free_air_a_listener_gets_both_bounds_and_never_one_number(tmp_path, capsys, text):
+    path = tmp_path / "scene.toml"
+    path.write_text(text + TWO)
+    told = scene.load_scene(path)
+    hit = told.run(target="modal", n_modes=4).response
+    found = hearing.write(tmp_path, told, hit, duration=0.05)
+    names = [f"{name}_{bound}.wav" for name in ("radiated", "radiated_2", "stereo") for bound in ("low", "high")]
+    assert [each["file"] for each in found] == ["strike.wav", *names]
+    place = told.listeners[1]
+    if text is BAR:  # at its widest
+        sounds = sound.radiate_bar(hit, place, width=0.05, height=0.02, duration=0.05)
+    else:
+        sounds = sound.radiate_free(hit, place, duration=0.05)
+    assert not told.baffled
+    for each, wanted in zip(found[3:5], sounds):
+        read = wavfile.read(tmp_path / each["file"])[1]
+        assert_allclose(read[:1000] * each["full_scale"], wanted.samples[:1000] * wanted.full_scale, rtol=0, atol=1e-5)
+        levels = " and ".join(f"{level.level:.1f}" for level in sounds)
+        assert each["stated"] == f"bounded: between {levels} dB re 20 µPa" and each["listener"] == place
+    assert [each.get("bound") for each in found] == [None, *["low", "high"] * 3]
+    assert found[3]["full_scale"] == found[4]["full_scale"]
+    cli._say_sounds(found)
+    lines = capsys.readouterr().out.replace("\n    ", " ").splitlines()
+    assert (
+        len(lines) == 4
+        and f"Listener: {found[4]['stated']}; 1.0 in radiated_2_low.wav and radiated_2_high.wav" in lines[2]
+    )
+
+
+def test_the_air_around_a_plate_sees_no_wall_either(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(FREE.replace("baffle = false", 'baffle = false\nair = "both sides"'))
+    assert any(
+        "half the mass that it would with a rigid wall" in note for note in scene.load_scene(path).modes(2).notes
+    )
+
+
+def test_silence_is_said():
+    quiet, tone = (sound.Sound(value * np.ones(10), 48000, 1.0, "Pa") for value in (0.0, 0.2))
+    assert hearing.said((quiet, tone)) == "bounded: between silence and 80.0 dB re 20 µPa"
+    assert hearing.said((tone,)) == "80.0 dB re 20 µPa" and "inf" in hearing.said((quiet, quiet))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (BAR.replace("height = 0.02", "height = 0.06"), "listener must be left out for a beam higher than wide, here"),
+        (BAR.replace("[target]", "[target]\nbaffle = true"), r"\[target\] baffle must be left out for a beam"),
+        (BAR.partition("[material]")[0] + "[target]\nmass = 0.2\nfirst_frequency = 200.0" + BAR.partition("0.005")[2],
+         r"listener of a beam needs \[material\] and \[section\], for its width"),
+        (FREE.replace("false", "0"), r"\[target\] baffle must be True or False"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_heard_is_refused_when_the_scene_is_read(tmp_path, text, said):
+    path = tmp_path / "scene.toml"
+    path.write_text(text + TWO)
+    with pytest.raises(ValueError, match=said):
+        scene.load_scene(path)
 
 
 def test_sounds_of_several_kinds_are_not_put_together():

@@ -2,6 +2,7 @@
 
 import json
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from fem_impact.fe import refinement
 from fem_impact.modes import ritz
 from fem_impact.scenes import maps
 from fem_impact.scenes.scene import scene_of
+from fem_impact.scenes.schema import Part
 from fem_impact.show import plots
 from fem_impact.sweeps import grid
 
@@ -52,6 +54,26 @@ def test_theory_stands_beside_the_blows(table):
     assert json.loads(table.attrs["scene"])["map"]["striker.mass"] == [0.02, 0.1]
 
 
+LOSING = {  # the law, and values of one of its numbers
+    "layers": ({"stiffness": 1e5, "exponent": 1.2, "depth": 2e-4, "hard_stiffness": 1e7}, "depth", [1e-4, 1e-3]),
+    "felt": ({"stiffness": 2e6, "exponent": 1.5, "hysteresis": 0.4, "relaxation": 1e-3}, "hysteresis", [0.1, 0.8]),
+    "elastic_plastic": ({"stiffness": 2e6, "yield_approach": 1e-4}, "yield_approach", [5e-5, 1e-3]),
+}
+
+
+@pytest.mark.parametrize("kind", LOSING)
+def test_contacts_that_lose_are_mapped(scene, kind):
+    law, key, values = LOSING[kind]
+    losing = replace(scene, contact=Part(kind, law))
+    table = maps.map_scene(losing, over={f"contact.{key}": values, "strike.speed": [1.0]})
+    cell = table.isel({key: 1, "speed": 0})
+    hit = maps.changed_scene(losing, f"contact.{key}", values[1]).strike()
+    assert int(cell.n_impacts) == hit.n_impacts
+    assert_allclose(float(cell.restitution), hit.restitution, atol=2e-3)  # 1e-3 each
+    assert set(table.contact_resonance.dims) == {key, "speed"}  # it depends on every number of the law
+    assert abs(float(table.contact_resonance[0, 0] / table.contact_resonance[1, 0]) - 1.0) > 0.05
+
+
 def test_any_number_of_a_scene_is_an_axis(scene):
     over = {"target.damping_ratio": [0.0, 0.01], "mesh.width": [1.0, 0.8], "strike.speed": [1.0, 2.0]}
     table = maps.map_scene(scene, over=over)
@@ -70,6 +92,59 @@ def test_files_say_what_the_map_holds(table, tmp_path):
         assert read.attrs["scene"] == table.attrs["scene"]
     assert len((tmp_path / "map.csv").read_text().splitlines()) == 7
     assert (tmp_path / "restitution.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_borders_are_drawn_and_written(scene, tmp_path):
+    over = {"contact.stiffness": [2e4, 1e5, 4e5], "striker.mass": [0.02, 0.06, 0.1]}
+    table = maps.map_scene(scene, over=over, borders=True)
+    curves = fi.read_borders(table)
+    assert "borders.csv" in maps.write(tmp_path, table)
+    rows = [line.split(",") for line in (tmp_path / "borders.csv").read_text().splitlines()]
+    assert len(rows) == 1 + sum(len(border.points) for border in curves)
+    drawn = maps.draw(table.assign(doubtful=table.n_impacts == 2), "n_impacts")
+    lines = next(part for part in drawn.axes[0].collections if part.get_label() == "borders")
+    first = curves[0].points[0]
+    assert_allclose(lines.get_paths()[0].vertices[0], [1e3 * first[1], first[0]], rtol=1e-12)  # masses in grams
+    assert [text.get_text() for text in drawn.legends[0].get_texts()][:2] == [
+        "number in doubt",
+        "the number of impacts changes",
+    ]
+    assert len((tmp_path / "map.csv").read_text().splitlines()) == 10
+
+
+@pytest.mark.slow
+def test_a_scene_that_gives_no_counts_is_a_picture(tmp_path, capsys):
+    text = (SCENES / "drumstick_map.toml").read_text().replace(", count = 20", "").replace("max_frequency", "# no band")
+    (tmp_path / "ranges.toml").write_text(text)
+    arguments = [
+        "map",
+        str(tmp_path / "ranges.toml"),
+        "--cells",
+        "12",
+        "--out",
+        str(tmp_path / "out"),
+        "--workers",
+        "1",
+    ]
+    assert cli.main(arguments) == 0
+    told = capsys.readouterr()
+    assert "144 blows over stiffness (12), mass (12)" in told.out
+    assert "Cells: all 144 cells computed" in told.out
+    assert "between numbers of impacts, located to" in " ".join(told.out.split())
+    assert "all 144 cells are expected to take" in " ".join(told.err.split())
+    with xarray.open_dataset(tmp_path / "out" / "map.nc", engine="scipy") as read:
+        assert len(fi.read_borders(read)) > 0 and len(json.loads(read.attrs["scene"])["map"]["striker.mass"]) == 12
+
+
+def test_another_body_for_each_value_needs_a_count(scene):
+    over = {"mesh.width": {"from": 0.8, "to": 1.0}, "striker.mass": {"from": 0.05, "to": 0.1}}
+    with pytest.raises(ValueError, match=r"mesh\.width needs a count, because each value needs another body"):
+        maps.map_scene(scene, over=over)
+    over["mesh.width"]["count"] = 2
+    table = maps.map_scene(scene, over=over, cells=3)
+    assert dict(table.sizes) == {"mesh.width": 2, "mass": 3}
+    with pytest.raises(ValueError, match=r"borders: not for axes that need another body, got mesh\.width"):
+        maps.map_scene(scene, over=over, cells=3, borders=True)
 
 
 def test_pictures_name_points_and_whole_numbers(scene):

@@ -9,6 +9,8 @@ from scenes import SMALL
 
 import fem_impact as fi
 from fem_impact import cli
+from fem_impact.model import planner
+from fem_impact.model.target import Stages
 from fem_impact.scenes import maps, scene
 
 TABLES = (
@@ -68,12 +70,41 @@ def test_the_prompt_plays_a_scene_and_writes_one_sound_of_all(path, tmp_path, ca
     assert "--verify must be left out for a scene with strokes" in capsys.readouterr().err
 
 
+def test_a_plan_of_strokes_is_of_all_and_the_body_has_the_modes_that_the_hardest_needs(path, capsys):
+    told = scene.load_scene(path)
+    planned = told.plan_strokes(tolerance=2e-2)
+    assert [each["when"] for each in planned.strokes] == [0.0, 0.03] and planned.needed == 1  # in order of time
+    own = [told.alone(i).plan(target="modal", tolerance=1e-2) for i in (1, 0)]  # half the tolerance for each
+    assert [plan.max_frequency for plan in planned.plans] == [plan.max_frequency for plan in own]
+    assert planned.body.max_frequency == max(plan.max_frequency for plan in own)
+    assert planned.body.seconds > own[1].seconds and planned.meets == all(plan.meets for plan in own)
+    assert told.play(tolerance=2e-2).target.n_modes == planner.struck(planned.body, Stages()).n_modes
+    assert cli.main(["plan", str(path), "--tolerance", "2e-2"]) == 0
+    said = capsys.readouterr().out.replace("\n    ", " ")
+    assert "will be met by 2 strokes: each to 0.01 by itself" in said and f"{planned.body.cost}" in said
+    assert cli.main(["plan", str(path), "--tolerance", "2e-2", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert [each["plan"] for each in data["strokes"]] == [0, 1] and len(data["plans"]) == 2 and data["needed"] == 1
+
+
+def test_strokes_alike_share_the_plan_of_the_fastest(path):
+    path.write_text(SMALL + "".join(f"[[stroke]]\nwhen = {i}\nspeed = {1 + i % 3}\n" for i in range(25)))
+    planned = scene.load_scene(path).plan_strokes()
+    assert len({id(plan) for plan in planned.plans}) == 1 and len(planned.data()["plans"]) == 1
+    assert planned.plans[0].changes["tolerance"] == 5e-3 and "... and 5 more" in str(planned)
+    assert planned.plans[0].blow.arguments["speed"] == 3
+
+
 def test_what_needs_a_single_blow_says_so(path):
     told = scene.load_scene(path)
+    path.write_text(SMALL)
+    with pytest.raises(ValueError, match=r"\[\[stroke\]\] is missing: plan_strokes plans strokes, plan a single blow"):
+        scene.load_scene(path).plan_strokes()
     for call in (told.strike, told.plan, lambda: maps.map_scene(told, over={"striker.mass": [0.1]}),
                  lambda: fi.spread(told, {"striker.mass": "lognormal(0.03, 0.1)"})):  # fmt: skip
-        with pytest.raises(ValueError, match=r"\[\[stroke\]\] must be left out here: this needs a single blow"):
+        with pytest.raises(ValueError, match=r"\[\[stroke\]\] must be left out here.* from Python scene.alone\(0\)"):
             call()
+    assert told.alone(0).plan().meets  # what the text proposes
     with pytest.raises(ValueError, match="max_impacts must be left out for a scene with strokes; it takes tolerance"):
         told.play(max_impacts=1)
 

@@ -11,7 +11,7 @@ from scipy import stats
 import fem_impact as fi
 from fem_impact import cli
 from fem_impact.scenes import uncertainty
-from fem_impact.sweeps import cloud, grid
+from fem_impact.sweeps import cloud, solving
 
 MASS, STIFFNESS = 0.1, 1e5
 WALL = fi.Modes.rigid(1e12)  # so heavy that it does not move: 1e-13 of the striker's speed
@@ -335,4 +335,4 @@ def test_the_prompt_complains_in_one_line_and_writes_nothing(scene, tmp_path, ca
 
 
 def test_the_numbers_checked_are_those_of_the_layers():
-    assert set(uncertainty._apart(np.ones(7), np.ones(7))) == set(grid.LAYERS) - {"n_impacts", "error"}
+    assert set(uncertainty._apart(np.ones(7), np.ones(7))) == set(solving.LAYERS) - {"n_impacts", "error"}

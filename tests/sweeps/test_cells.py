@@ -1,11 +1,14 @@
 """One cell of a map: what each axis replaces, on bodies that are seen from each strike point."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.modes.modal import SampledShapes
+from fem_impact.sweeps import cells
 from fem_impact.sweeps.cells import Case, sampled
 
 HERE, THERE = (0.3, 0.2), (0.7, 0.45)
@@ -53,3 +56,38 @@ def test_reduced_bodies_give_the_same_blow_and_keep_what_is_poorer():
     small = sampled(seen, np.array([(0.1, 0.1)]))
     assert small.poorer["truncation"].n_modes == seen.poorer["truncation"].n_modes == 21  # seven tenths
     assert isinstance(small.poorer["truncation"].shapes, SampledShapes)
+
+
+RANGE = {"from": 1.0, "to": 100.0, "scale": "log"}
+
+
+def test_axes_without_a_count_are_as_fine_as_a_picture():
+    spring, felt = fi.Contact.linear(1e5), fi.Contact.felt(2e6, 1.5, hysteresis=0.2, relaxation=1e-3)
+    both = {"mass": RANGE, "stiffness": {"from": 2.0, "to": 3.0}}
+
+    def sizes(over, law=spring, **wanted):
+        found, ours = cells.laid_out(over, law, **wanted)
+        return [len(values) for values in found.values()], ours
+
+    assert sizes(both) == ([400, 400], True)
+    assert sizes(both, felt) == sizes(both, alone=True) == ([100, 100], True)
+    assert sizes({**both, "exponent": [0.9]}) == ([100, 100, 1], True)
+    assert sizes(both, cells=30) == ([30, 30], True)
+    assert sizes({**both, "speed": [1.0, 2.0]}) == ([282, 282, 2], True)  # 400 x 400 cells in all
+    assert sizes({"mass": RANGE, "speed": [1.0, 2.0]}) == ([400, 2], True)
+    assert sizes({"mass": [0.1], "speed": {**RANGE, "count": 7}}) == ([1, 7], False)
+    assert_allclose(cells.laid_out({"mass": RANGE}, spring, cells=3)[0]["mass"], [1.0, 10.0, 100.0])
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"from": 1.0}, "mass must be a list or { from, to, count, scale"),
+        ({"from": 2.0, "to": 1.0}, "mass.to must be above mass.from, got 1 and 2"),
+        ({"from": -1.0, "to": 1.0, "scale": "log"}, "mass.from must be positive"),
+        ({"from": 0.0, "to": 1.0, "scale": "cube"}, "mass.scale must be one of"),
+    ],
+)
+def test_ranges_of_no_sense_are_told(values, message):
+    with pytest.raises(ValueError, match=re.escape(message) if "{" in message else message):
+        cells.laid_out({"mass": values}, fi.Contact.linear(1e5))

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.sweeps import cloud, grid
+from fem_impact.sweeps import cloud, solving
 from fem_impact.sweeps.cells import Case
 from fem_impact.sweeps.cloud import Cloud
 
@@ -40,7 +40,7 @@ def test_blows_on_bodies_of_other_frequencies_are_those_struck_alone(striker, lo
     numbers, texts = cloud.solve_all(blows, 1, None, None, None)
     assert texts == {}
     for i in range(blows.n_cases):
-        row = grid.numbers_of(blows.blow(i), band)
+        row = solving.numbers_of(blows.blow(i), band)
         assert numbers[0, i] == row[0]
         assert_allclose(numbers[2, i], row[2], atol=2e-4)  # restitution: either run is off by at most 1e-4
         assert_allclose(numbers[[1, 3, 4], i], row[[1, 3, 4]], rtol=2e-4)
@@ -51,7 +51,7 @@ def test_blows_that_cannot_be_followed_together_are_struck_alone():
     law = fi.Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e7, hard_exponent=1.5)
     blows = Cloud(base(fi.Striker.rigid(0.05), law), {"speed": np.array([0.5, 1.0])}, 1e-2, True, None)
     numbers, _ = cloud.solve_all(blows, 1, None, None, None)
-    assert_allclose(numbers.T, [grid.numbers_of(blows.blow(i), None) for i in range(2)], rtol=1e-12)
+    assert_allclose(numbers.T, [solving.numbers_of(blows.blow(i), None) for i in range(2)], rtol=1e-12)
 
 
 def test_a_cloud_of_sampled_bodies_gives_the_same_numbers():

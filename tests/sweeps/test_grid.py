@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.impact import collision
-from fem_impact.sweeps import grid
+from fem_impact.sweeps import grid, solving
 
 AT = (0.465, 0.3)
 
@@ -147,19 +147,6 @@ def test_speed_only_scales_the_forces_of_linear_springs():
     assert_allclose(table.impulse.sel(speed=0.5) * 6.0, direct.impulse, rtol=1e-12)
 
 
-def test_a_cell_that_fails_says_why_and_the_others_go_on(monkeypatch):
-    def fail(modes, striker, contact, **wanted):
-        if contact.exponent < 0.8:
-            raise fi.SimulationError("the motion may be chaotic")
-        return fi.strike(modes, striker, contact, **wanted)
-
-    monkeypatch.setattr(grid, "strike", fail)
-    table = fi.sweep(plate(), stick(), fi.Contact.linear(1e5), at=AT, speed=1.0, over={"exponent": [0.9, 0.7]})
-    assert table.failure.values.tolist() == ["", "the motion may be chaotic"]
-    assert table.n_impacts.values.tolist() == [1, -1]
-    assert np.isnan(table.restitution.values).tolist() == [False, True]
-
-
 def test_layers_of_ones_own():
     layers = {"kept": lambda hit: hit.energies["striker"]}
     table = fi.sweep(
@@ -179,7 +166,7 @@ def test_bodies_known_at_their_points_only_give_the_same():
     cells = grid.Grid(bodies, {"mass": np.array([0.05, 0.1])}, 1e-3, True, None, {})
     whole, few = grid.solve(cells, 0, 2)[0], grid.solve(cells.sampled(), 0, 2)[0]
     assert_allclose(few, whole, rtol=1e-9)  # the same numbers but for rounding in the compliance
-    one, two = (grid.numbers_of(each.blow(1), None) for each in (cells.sampled(), cells))
+    one, two = (solving.numbers_of(each.blow(1), None) for each in (cells.sampled(), cells))
     assert_allclose(one, two, rtol=1e-9)
 
 

@@ -72,6 +72,7 @@ def test_modes_are_paired_by_shape_although_their_order_changed(body):
         fi.matched([1.0, 2.0, 3.0], [1.0, 2.0])
 
 
+@pytest.mark.slow
 def test_universal_files_keep_taps_and_functions(body, tmp_path):
     pytest.importorskip("pyuff")
     taps = fi.Taps.from_arrays(

@@ -36,11 +36,8 @@ from .flight import (
 )
 from .law import (
     FELT,
-    KIND,
-    MEMORY,
     NEAR,
     PLASTIC,
-    WIDTH,
     at,
     corner_approach,
     harden,
@@ -52,9 +49,32 @@ from .law import (
     special_of,
     spring_of,
 )
+from .layout import (
+    A11,
+    A12,
+    A21,
+    A22,
+    APPROACH,
+    CLOSED,
+    COMPLIANCE,
+    HEAD,
+    KIND,
+    LENGTH,
+    MEMORY,
+    PUSH,
+    RATE,
+    RELAXATION,
+    SHARE,
+    SIZE,
+    START,
+    WIDTH,
+)
 from .propagation import N_LANE, mode_moments
 from .record import EXHAUSTED, FAILED, FINISHED, HORIZON, IMPACTS, SETTLED, resized, total_energy
 from .schemes import solve_linear
+
+PUSHED = 4  # row after those of free motion: displacement by a constant force
+MOVED, SPED = 0, 1  # rows of what force polynomials do: to the approach and to its rate
 
 
 @inner(allocates=True)
@@ -74,8 +94,8 @@ def collocation_table(omega, zeta, shape, h, nodes, powers, out_free, out_end, o
         for b in range(s):
             for i in range(m):
                 for j in range(m):
-                    out_inner[0, a, b, i, j] = 0.0
-                    out_inner[1, a, b, i, j] = 0.0
+                    out_inner[MOVED, a, b, i, j] = 0.0
+                    out_inner[SPED, a, b, i, j] = 0.0
     for n in range(omega.size):
         silent = True
         for i in range(m):
@@ -85,11 +105,11 @@ def collocation_table(omega, zeta, shape, h, nodes, powers, out_free, out_end, o
             c = nodes[a]
             t = c * h
             a11, a12, a22 = mode_moments(omega[n], zeta[n], t, moments, work)
-            out_free[a, 0, n] = a11
-            out_free[a, 1, n] = a12
-            out_free[a, 2, n] = -omega[n] * omega[n] * a12
-            out_free[a, 3, n] = a22
-            out_free[a, 4, n] = t * t * moments[1]
+            out_free[a, A11, n] = a11
+            out_free[a, A12, n] = a12
+            out_free[a, A21, n] = -omega[n] * omega[n] * a12
+            out_free[a, A22, n] = a22
+            out_free[a, PUSHED, n] = t * t * moments[1]
             for b in range(s):
                 x = 0.0
                 v = 0.0
@@ -107,8 +127,8 @@ def collocation_table(omega, zeta, shape, h, nodes, powers, out_free, out_end, o
                     for i in range(m):
                         for j in range(m):
                             uu = shape[i, n] * shape[j, n]
-                            out_inner[0, a, b, i, j] += uu * x
-                            out_inner[1, a, b, i, j] += uu * v
+                            out_inner[MOVED, a, b, i, j] += uu * x
+                            out_inner[SPED, a, b, i, j] += uu * v
 
 
 @inner(fastmath=LOOSE)
@@ -121,8 +141,8 @@ def free_approach(shape, offset, bias, free, q, p, out_d, out_v):
             v = 0.0
             for n in range(n_modes):
                 u = shape[i, n]
-                d += u * (free[a, 0, n] * q[n] + free[a, 1, n] * p[n] + free[a, 4, n] * bias[n])
-                v += u * (free[a, 2, n] * q[n] + free[a, 3, n] * p[n] + free[a, 1, n] * bias[n])
+                d += u * (free[a, A11, n] * q[n] + free[a, A12, n] * p[n] + free[a, PUSHED, n] * bias[n])
+                v += u * (free[a, A21, n] * q[n] + free[a, A22, n] * p[n] + free[a, A12, n] * bias[n])
             out_d[a, i] = offset[i] + d
             out_v[a, i] = v
 
@@ -140,7 +160,7 @@ def sides(law, now, out_beyond):
     for i in range(now.shape[1]):
         spring = spring_of(law, i)
         bend = corner_approach(spring)
-        d, rate = now[0, i], now[4, i]
+        d, rate = now[APPROACH, i], now[RATE, i]
         if spring.kind == PLASTIC:
             out_beyond[i] = d >= (1.0 - NEAR) * bend and rate > 0.0
         else:
@@ -164,7 +184,7 @@ def turned_over(law, now, y, rate, after, h, pressed, beyond):
 def weight_of(inner, mobility, h, i):
     """What turns a misfit of contact i's force at a step's end into a speed [s/kg]."""
     s = inner.shape[1]
-    return min(mobility[i] * h, inner[1, s - 1, s - 1, i, i] * 4.0 + 1e-3 * mobility[i] * h)
+    return min(mobility[i] * h, inner[SPED, s - 1, s - 1, i, i] * 4.0 + 1e-3 * mobility[i] * h)
 
 
 @inner()
@@ -172,7 +192,7 @@ def lag_table(law, i, nodes, powers, h, out_lag):
     """What felt i remembers at nodes and end per ``x**a`` at a node, (s + 1, s), then what is left of before."""
     s = nodes.size - 1
     for a in range(s + 1):
-        x = nodes[a] * h / law[i, 6]
+        x = nodes[a] * h / law[i, RELAXATION]
         j0, j1, j2, j3, j4 = lags(x)
         weights = j0, j1, j2, j3, j4
         out_lag[a, s] = 1.0 - j0
@@ -225,9 +245,9 @@ def solve_collocation(inner, law, pressed, beyond, lag, free_d, free_v, matrix, 
                 for b in range(s):
                     for c in range(count):
                         j = active[c]
-                        d -= inner[0, a, b, i, j] * out_f[b, j]
-                        v -= inner[1, a, b, i, j] * out_f[b, j]
-                x = d - law[i, 3] * out_f[a, i]
+                        d -= inner[MOVED, a, b, i, j] * out_f[b, j]
+                        v -= inner[SPED, a, b, i, j] * out_f[b, j]
+                x = d - law[i, COMPLIANCE] * out_f[a, i]
                 f, fx, fv = smooth_force(x, v, side_of(law, i, beyond))
                 out_x[a, i] = x
                 row = a * count + r
@@ -235,8 +255,8 @@ def solve_collocation(inner, law, pressed, beyond, lag, free_d, free_v, matrix, 
                 for b in range(s):
                     for c in range(count):
                         j = active[c]
-                        matrix[row, b * count + c] = fx * inner[0, a, b, i, j] + fv * inner[1, a, b, i, j]
-                matrix[row, row] += 1.0 + fx * law[i, 3]
+                        matrix[row, b * count + c] = fx * inner[MOVED, a, b, i, j] + fv * inner[SPED, a, b, i, j]
+                matrix[row, row] += 1.0 + fx * law[i, COMPLIANCE]
                 scale = max(scale, abs(out_f[a, i]), abs(f))
         for r in range(count):
             i = active[r]
@@ -251,7 +271,7 @@ def solve_collocation(inner, law, pressed, beyond, lag, free_d, free_v, matrix, 
                     share = lag[i, a, e] * fx * spring.hard / spring.stiffness
                     for b in range(s):
                         for c in range(count):
-                            matrix[row, b * count + c] -= share * inner[0, e, b, i, active[c]]
+                            matrix[row, b * count + c] -= share * inner[MOVED, e, b, i, active[c]]
         if not scale < 1e300:
             return False
         if not solve_linear(matrix, vector, s * count):
@@ -275,8 +295,8 @@ def collocation_end(shape, offset, bias, free, last, f, q, p, out_q, out_p, out_
     m, n_modes = shape.shape
     s = f.shape[0]
     for n in range(n_modes):
-        out_q[n] = free[s, 0, n] * q[n] + free[s, 1, n] * p[n] + free[s, 4, n] * bias[n]
-        out_p[n] = free[s, 2, n] * q[n] + free[s, 3, n] * p[n] + free[s, 1, n] * bias[n]
+        out_q[n] = free[s, A11, n] * q[n] + free[s, A12, n] * p[n] + free[s, PUSHED, n] * bias[n]
+        out_p[n] = free[s, A21, n] * q[n] + free[s, A22, n] * p[n] + free[s, A12, n] * bias[n]
     for i in range(m):
         for b in range(s):
             force = f[b, i]
@@ -314,7 +334,7 @@ def collocate(
             if pressed[i] and law[i, MEMORY] >= 0.0:
                 lag_table(law, i, nodes, powers, h, lag[i])
             else:
-                out_after[i] = -abs(law[i, MEMORY]) * np.exp(-(1.0 - law[i, 5]) * h / law[i, 6])
+                out_after[i] = -abs(law[i, MEMORY]) * np.exp(-(1.0 - law[i, SHARE]) * h / law[i, RELAXATION])
     if not solve_collocation(inner, law, pressed, beyond, lag, free_d, free_v, matrix, vector, f, x):
         return np.inf
     collocation_end(shape, offset, bias, free, last, f, q, p, out_q, out_p, out_y, out_rate)
@@ -324,7 +344,7 @@ def collocate(
             return np.inf
         if pressed[i]:
             spring = side_of(law, i, beyond)
-            f0, _, _ = smooth_force(max(0.0, at(now[0, i], spring).compression), now[4, i], spring)
+            f0, _, _ = smooth_force(max(0.0, at(now[APPROACH, i], spring).compression), now[RATE, i], spring)
             f1, _, _ = smooth_force(max(0.0, at(out_y[i], spring).compression), out_rate[i], spring)
             if spring.kind == FELT:
                 out_after[i] = memory_at(lag[i], s, x, f, i, spring)
@@ -395,8 +415,8 @@ def run_collocation(
     flown = np.zeros(GLIDES + 1)
     done = np.zeros(m)
     coefficients = np.empty(s)
-    stride = 3 + s
-    steps = np.zeros((64, 3 + (stride + 1) * m))
+    stride = PUSH + s
+    steps = np.zeros((64, HEAD + (stride + 1) * m))
     n_steps = ZERO
     n_released = 0
     n_tries = 0
@@ -442,10 +462,10 @@ def run_collocation(
             continue
         if special and fresh:
             for i in range(m):
-                meet(law, i, now[0, i], now[4, i])
-                deeper = harden(law, i, now[0, i])
+                meet(law, i, now[APPROACH, i], now[RATE, i])
+                deeper = harden(law, i, now[APPROACH, i])
                 offset[i] -= deeper
-                now[0, i] -= deeper
+                now[APPROACH, i] -= deeper
             sides(law, now, beyond)
             fresh = False
         n_tries += 1
@@ -478,14 +498,14 @@ def run_collocation(
             shorter = 1
         else:
             for i in range(m):
-                d0 = now[0, i]
+                d0 = now[APPROACH, i]
                 if pressed[i] and y[i] <= 0.0 and d0 == 0.0:
-                    if now[4, i] > still and level < LEVELS - 2:
+                    if now[RATE, i] > still and level < LEVELS - 2:
                         shorter = 1
                     else:
                         pressed[i] = False
                         again = True
-                elif not pressed[i] and d0 == 0.0 and now[4, i] >= -still and y[i] > depth:
+                elif not pressed[i] and d0 == 0.0 and now[RATE, i] >= -still and y[i] > depth:
                     pressed[i] = True
                     again = True
                 elif dipped(now, pressed, y, rate, h, i) and (pressed[i] or level < LEVELS - 2):
@@ -543,7 +563,7 @@ def run_collocation(
                     root = nearer(law, corner, which, h, y[corner], rate[corner], after[corner], bracket)
                 if root == 0.0:
                     break
-            again = misfit == np.inf or (event == CROSSING and not abs(y[target]) <= 1e-9 * bracket[2])
+            again = misfit == np.inf or (event == CROSSING and not abs(y[target]) <= 1e-9 * bracket[SIZE])
             if again:
                 level += 1
                 break
@@ -562,22 +582,22 @@ def run_collocation(
             continue
         n_tries = 0
         steps[n_steps] = 0.0
-        steps[n_steps, 0] = time
-        steps[n_steps, 1] = h
+        steps[n_steps, START] = time
+        steps[n_steps, LENGTH] = h
         for i in range(m):
             remember(law, i, steps[n_steps], stride, m, now)
             if pressed[i]:
-                steps[n_steps, 5 + stride * i] = 1.0
+                steps[n_steps, HEAD + CLOSED + stride * i] = 1.0
                 for k in range(s):
                     coefficients[k] = 0.0
                     for b in range(s):
                         coefficients[k] += powers[b, k] * f[b, i]
-                    steps[n_steps, 6 + stride * i + k] = coefficients[k]
+                    steps[n_steps, HEAD + PUSH + stride * i + k] = coefficients[k]
             for a in range(s):
                 v = free_v[a, i]
                 for b in range(s):
                     for j in range(m):
-                        v -= inner[1, a, b, i, j] * f[b, j]
+                        v -= inner[SPED, a, b, i, j] * f[b, j]
                 weight = 0.0
                 for k in range(s):
                     weight += powers[a, k] / (k + 1.0)

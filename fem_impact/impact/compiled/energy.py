@@ -29,7 +29,41 @@ from .events import (
     strayed,
 )
 from .flight import GLIDES, find_onset
-from .law import FELT, KIND, MEMORY, at, harden, meet, special_of, spring_of
+from .law import FELT, at, harden, meet, special_of, spring_of
+from .layout import (
+    A11,
+    A12,
+    A21,
+    A22,
+    APPROACH,
+    BLIND,
+    CLOSED,
+    COMPRESSION,
+    ENERGY,
+    FORCE,
+    FREE_END,
+    FREE_MEAN,
+    FREE_RATE,
+    HEAD,
+    KIND,
+    LENGTH,
+    M1,
+    M2,
+    M3,
+    MEMORY,
+    OWN_END,
+    OWN_END_RAMP,
+    OWN_MEAN,
+    OWN_MEAN_RAMP,
+    OWN_RATE,
+    OWN_RATE_RAMP,
+    PUSH,
+    RATE,
+    RELAXATION,
+    SHARE,
+    SIZE,
+    START,
+)
 from .propagation import N_LANE, any_of, commit, lane_table
 from .record import EXHAUSTED, FAILED, FINISHED, HORIZON, IMPACTS, SETTLED, resized, total_energy
 from .schemes import Free, Own, linear_guess, point_of, remembers, solve_constants, solve_ramp, solve_ramps
@@ -49,16 +83,16 @@ def contact_sums(shape, lanes, h, out_sums):
             s6 = 0.0
             for n in range(n_modes):
                 uu = shape[i, n] * shape[j, n]
-                s1 += uu * lanes[1, n]
-                s4 += uu * lanes[4, n]
-                s5 += uu * lanes[5, n]
-                s6 += uu * lanes[6, n]
-            out_sums[0, i, j] = h * s4
-            out_sums[1, i, j] = h * (s5 - 0.5 * s4)
-            out_sums[2, i, j] = h * s5
-            out_sums[3, i, j] = h * s6
-            out_sums[4, i, j] = s1
-            out_sums[5, i, j] = s4 - 0.5 * s1
+                s1 += uu * lanes[A12, n]
+                s4 += uu * lanes[M1, n]
+                s5 += uu * lanes[M2, n]
+                s6 += uu * lanes[M3, n]
+            out_sums[OWN_END, i, j] = h * s4
+            out_sums[OWN_END_RAMP, i, j] = h * (s5 - 0.5 * s4)
+            out_sums[OWN_MEAN, i, j] = h * s5
+            out_sums[OWN_MEAN_RAMP, i, j] = h * s6
+            out_sums[OWN_RATE, i, j] = s1
+            out_sums[OWN_RATE_RAMP, i, j] = s4 - 0.5 * s1
             for r in range(6):
                 out_sums[r, j, i] = out_sums[r, i, j]
 
@@ -73,8 +107,8 @@ def predict(shape, tables, slot, h, twice, offset, bias, q, p, out_q, out_p, out
     lanes = tables[slot]
     part = 1.0 / h
     for n in range(n_modes):
-        out_q[n] = lanes[0, n] * q[n] + lanes[1, n] * p[n] + h * lanes[4, n] * bias[n]
-        out_p[n] = lanes[2, n] * q[n] + lanes[3, n] * p[n] + lanes[1, n] * bias[n]
+        out_q[n] = lanes[A11, n] * q[n] + lanes[A12, n] * p[n] + h * lanes[M1, n] * bias[n]
+        out_p[n] = lanes[A21, n] * q[n] + lanes[A22, n] * p[n] + lanes[A12, n] * bias[n]
     for i in range(n_contacts):
         end = 0.0
         mean = 0.0
@@ -83,11 +117,11 @@ def predict(shape, tables, slot, h, twice, offset, bias, q, p, out_q, out_p, out
             u = shape[i, n]
             end += u * out_q[n]
             rate += u * out_p[n]
-            drift = lanes[4, n] * (p[n] + twice[n] * q[n]) + h * lanes[5, n] * bias[n]
-            mean += u * (part * lanes[1, n] * q[n] + drift)
-        out_end[0, i] = offset[i] + end
-        out_end[1, i] = offset[i] + mean
-        out_end[2, i] = rate
+            drift = lanes[M1, n] * (p[n] + twice[n] * q[n]) + h * lanes[M2, n] * bias[n]
+            mean += u * (part * lanes[A12, n] * q[n] + drift)
+        out_end[FREE_END, i] = offset[i] + end
+        out_end[FREE_MEAN, i] = offset[i] + mean
+        out_end[FREE_RATE, i] = rate
 
 
 @inner(arrays=arrays.advance, fastmath=LOOSE)
@@ -102,24 +136,24 @@ def advance(shape, tables, slot, h, twice, offset, bias, force, slope, q, p, fre
     rate = 0.0
     for n in range(q.size):
         u = shape[0, n]
-        a12 = lanes[1, n]
-        first = lanes[4, n]
-        second = lanes[5, n]
+        a12 = lanes[A12, n]
+        first = lanes[M1, n]
+        second = lanes[M2, n]
         x = free_q[n] - u * h * (f * first + s * second)
         v = free_p[n] - u * (f * a12 + s * first)
         q[n] = x
         p[n] = v
         g = bias[n]
-        new_x = lanes[0, n] * x + a12 * v + h * first * g
-        new_v = lanes[2, n] * x + lanes[3, n] * v + a12 * g
+        new_x = lanes[A11, n] * x + a12 * v + h * first * g
+        new_v = lanes[A21, n] * x + lanes[A22, n] * v + a12 * g
         free_q[n] = new_x
         free_p[n] = new_v
         end += u * new_x
         rate += u * new_v
         mean += u * (part * a12 * x + first * (v + twice[n] * x) + h * second * g)
-    out_end[0, 0] = offset[0] + end
-    out_end[1, 0] = offset[0] + mean
-    out_end[2, 0] = rate
+    out_end[FREE_END, 0] = offset[0] + end
+    out_end[FREE_MEAN, 0] = offset[0] + mean
+    out_end[FREE_RATE, 0] = rate
 
 
 @inner()
@@ -127,17 +161,20 @@ def solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate):
     """Solve one step of length h from its prediction; 0 where a contact pushes by A (asked for or fallen to)."""
     m = y.size
     sums = all_sums[slot]
-    if m == 1 and ramp and (now[0, 0] > 0.0 or end[0, 0] > 0.0):
+    if m == 1 and ramp and (now[APPROACH, 0] > 0.0 or end[FREE_END, 0] > 0.0):
         start, spring = point_of(now, 0), spring_of(law, 0)
-        own = Own(sums[0, 0, 0], sums[1, 0, 0], sums[2, 0, 0], sums[3, 0, 0], sums[4, 0, 0], sums[5, 0, 0])
-        free = Free(end[0, 0], end[1, 0], end[2, 0])
+        own = Own(
+            sums[OWN_END, 0, 0], sums[OWN_END_RAMP, 0, 0], sums[OWN_MEAN, 0, 0],
+            sums[OWN_MEAN_RAMP, 0, 0], sums[OWN_RATE, 0, 0], sums[OWN_RATE_RAMP, 0, 0],
+        )  # fmt: skip
+        free = Free(end[FREE_END, 0], end[FREE_MEAN, 0], end[FREE_RATE, 0])
         guess = linear_guess(start, free, own, spring)
-        settled, point, f[0], s[0] = solve_ramp(guess, h, start, now[4, 0], free, own, spring)
+        settled, point, f[0], s[0] = solve_ramp(guess, h, start, now[RATE, 0], free, own, spring)
         if settled:
             y[0] = point.approach
             rate[0] = free.rate - own.rate * f[0] - own.rate_ramp * s[0]
             return 1
-    solve_constants(h, now, law, end[0], sums, work, y, f)
+    solve_constants(h, now, law, end[FREE_END], sums, work, y, f)
     pressed = False
     for i in range(m):
         s[i] = 0.0
@@ -149,7 +186,7 @@ def solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate):
         for i in range(m):
             keep[i] = y[i]
             keep[m + i] = f[i]
-        if solve_ramps(h, now, law, end[0], end[1], end[2], sums, work, y, f, s):
+        if solve_ramps(h, now, law, end[FREE_END], end[FREE_MEAN], end[FREE_RATE], sums, work, y, f, s):
             fine = 1
         else:
             for i in range(m):
@@ -157,9 +194,9 @@ def solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate):
                 f[i] = keep[m + i]
                 s[i] = 0.0
     for i in range(m):
-        v = end[2, i]
+        v = end[FREE_RATE, i]
         for j in range(m):
-            v -= sums[4, i, j] * f[j] + sums[5, i, j] * s[j]
+            v -= sums[OWN_RATE, i, j] * f[j] + sums[OWN_RATE_RAMP, i, j] * s[j]
         rate[i] = v
     return fine
 
@@ -171,28 +208,29 @@ def keep_in_mind(h, law, now, y, f, s, rate, ramped, out_after):
         out_after[i] = law[i, MEMORY]
         if law[i, KIND] == FELT:
             if law[i, MEMORY] < 0.0:
-                out_after[i] *= np.exp(-(1.0 - law[i, 5]) * h / law[i, 6])
+                out_after[i] *= np.exp(-(1.0 - law[i, SHARE]) * h / law[i, RELAXATION])
             else:
                 spring = spring_of(law, i)
                 smooth = ramped and (f[i] != 0.0 or s[i] != 0.0)
-                out_after[i] = remembers(h, point_of(now, i), at(y[i], spring), now[4, i], rate[i], smooth, spring)
+                out_after[i] = remembers(h, point_of(now, i), at(y[i], spring), now[RATE, i], rate[i], smooth, spring)
 
 
 @inner()
 def record(row, law, time, h, blind, sums, now, pressed, end, y, f, s, done):
     """Write a step of the energy-exact schemes to a row of the steps, and add up its work."""
-    row[0] = time
-    row[1] = h
-    row[2] = 1.0 if blind else 0.0
+    row[START] = time
+    row[LENGTH] = h
+    row[BLIND] = 1.0 if blind else 0.0
     for i in range(y.size):
         remember(law, i, row, 5, y.size, now)
-        row[5 + 5 * i] = 1.0 if f[i] > 0.0 or pressed[i] else 0.0
-        row[6 + 5 * i] = f[i] - 0.5 * s[i]
-        row[7 + 5 * i] = s[i]
-        mean = end[1, i]
+        first = HEAD + 5 * i
+        row[first + CLOSED] = 1.0 if f[i] > 0.0 or pressed[i] else 0.0
+        row[first + PUSH] = f[i] - 0.5 * s[i]
+        row[first + PUSH + 1] = s[i]
+        mean = end[FREE_MEAN, i]
         for j in range(y.size):
-            mean -= sums[2, i, j] * f[j] + sums[3, i, j] * s[j]
-        done[i] += f[i] * (y[i] - now[0, i]) + s[i] * (0.5 * (now[0, i] + y[i]) - mean)
+            mean -= sums[OWN_MEAN, i, j] * f[j] + sums[OWN_MEAN_RAMP, i, j] * s[j]
+        done[i] += f[i] * (y[i] - now[APPROACH, i]) + s[i] * (0.5 * (now[APPROACH, i] + y[i]) - mean)
 
 
 @outer()
@@ -239,7 +277,7 @@ def run_energy(
     flights = np.empty((GLIDES + 1, N_LANE, n_modes))
     flown = np.zeros(GLIDES + 1)
     done = np.zeros(m)
-    steps = np.zeros((64, 3 + 6 * m))
+    steps = np.zeros((64, HEAD + 6 * m))
     n_steps = ZERO
     n_fallback = 0
     n_blind = 0
@@ -309,16 +347,16 @@ def run_energy(
         ready = -1
         for i in range(m):
             if special and fresh:
-                meet(law, i, now[0, i], now[4, i])
-                deeper = harden(law, i, now[0, i])
+                meet(law, i, now[APPROACH, i], now[RATE, i])
+                deeper = harden(law, i, now[APPROACH, i])
                 offset[i] -= deeper
-                now[0, i] -= deeper
-                end[0, i] -= deeper
-                end[1, i] -= deeper
-            point = at(now[0, i], spring_of(law, i))
-            now[1, i] = point.compression
-            now[2, i] = point.force
-            now[3, i] = point.energy
+                now[APPROACH, i] -= deeper
+                end[FREE_END, i] -= deeper
+                end[FREE_MEAN, i] -= deeper
+            point = at(now[APPROACH, i], spring_of(law, i))
+            now[COMPRESSION, i] = point.compression
+            now[FORCE, i] = point.force
+            now[ENERGY, i] = point.energy
         fresh = False
         fine = solve_step(ramp, h, all_sums, slot, law, now, end, work, y, f, s, rate)
         if special:
@@ -327,15 +365,15 @@ def run_energy(
         if not blind:
             shorter = 0
             for i in range(m):
-                if pressed[i] and y[i] <= 0.0 and now[0, i] == 0.0:
-                    if now[4, i] > still:
+                if pressed[i] and y[i] <= 0.0 and now[APPROACH, i] == 0.0:
+                    if now[RATE, i] > still:
                         shorter = max(shorter, 3 if level == 0 else 1)
                 elif dipped(now, pressed, y, rate, h, i):
                     shorter = max(shorter, 1)
                 if (
                     special
                     and pressed[i]
-                    and strayed(law, now, y, rate, after, h, i, 1.0 if now[4, i] > 0.0 else -1.0) == 2
+                    and strayed(law, now, y, rate, after, h, i, 1.0 if now[RATE, i] > 0.0 else -1.0) == 2
                 ):
                     shorter = max(shorter, 1)
             if shorter > 0:
@@ -372,7 +410,7 @@ def run_energy(
                     guess = nearer(law, corner, which, h, y[corner], rate[corner], after[corner], bracket)
                 if guess == 0.0:
                     break
-            if event == CROSSING and not abs(y[target]) <= 1e-9 * bracket[2]:
+            if event == CROSSING and not abs(y[target]) <= 1e-9 * bracket[SIZE]:
                 blind = True
                 if h >= 1e-3 * base:
                     target = -1

@@ -13,21 +13,28 @@ import numpy as np
 
 from .build import inner
 from .flight import approach
-from .law import (
-    FELT,
+from .law import FELT, LAYERS, NEAR, PLASTIC, POWER, corner_approach, dent, harden, parting, rest_of, spring_of
+from .layout import (
+    APPROACH,
+    EXPONENT,
+    HEAD,
+    HIGH,
     KIND,
-    LAYERS,
+    LENGTH,
+    LOSS,
+    LOW,
     MEMORY,
-    NEAR,
-    PLASTIC,
-    POWER,
+    MISSED,
+    RATE,
+    RELAXATION,
+    REMEMBERED,
+    SHARE,
+    SIZE,
+    SLOPE,
+    SPEED,
+    START,
+    TRIED,
     WIDTH,
-    corner_approach,
-    dent,
-    harden,
-    parting,
-    rest_of,
-    spring_of,
 )
 
 LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
@@ -85,8 +92,8 @@ def first_crossing(now, pressed, y, rate, h, depth, still):
     target = -1
     at = h
     for i in range(y.size):
-        if crossed(pressed[i], now[0, i], now[4, i], y[i], depth, still):
-            root = hermite_root(now[0, i], now[4, i], y[i], rate[i], h)
+        if crossed(pressed[i], now[APPROACH, i], now[RATE, i], y[i], depth, still):
+            root = hermite_root(now[APPROACH, i], now[RATE, i], y[i], rate[i], h)
             if root <= at:
                 at = root
                 target = i
@@ -96,8 +103,8 @@ def first_crossing(now, pressed, y, rate, h, depth, still):
 @inner()
 def dipped(now, pressed, y, rate, h, i):
     """Whether contact i opened and closed again, or the other way round, within a step, by its cubic."""
-    d0 = now[0, i]
-    v0 = now[4, i]
+    d0 = now[APPROACH, i]
+    v0 = now[RATE, i]
     side = 1.0 if pressed[i] else -1.0
     if side * v0 < 0.0 < side * rate[i] and (y[i] > 0.0 if pressed[i] else y[i] <= 0.0):
         low = lowest(side * d0, side * v0, side * y[i], side * rate[i], h)
@@ -115,45 +122,44 @@ def narrow(now, pressed, y, rate, h, depth, still, target, bracket):
     polynomial changes too.
     """
     for i in range(y.size):
-        slack = max(depth, LOCATED * (abs(now[0, i]) + abs(y[i])))  # or contacts that open together take turns for ever
-        if i != target and crossed(pressed[i], now[0, i], now[4, i], y[i], slack, still):
+        slack = max(
+            depth, LOCATED * (abs(now[APPROACH, i]) + abs(y[i]))
+        )  # or contacts that open together take turns for ever
+        if i != target and crossed(pressed[i], now[APPROACH, i], now[RATE, i], y[i], slack, still):
             enclose(now, y, rate, h, i, bracket)
-            guess = hermite_root(now[0, i], now[4, i], y[i], rate[i], h)
+            guess = hermite_root(now[APPROACH, i], now[RATE, i], y[i], rate[i], h)
             return i, guess if guess < h else 0.5 * h
     miss = y[target]
-    if abs(miss) <= LOCATED * bracket[2] or bracket[1] - bracket[0] <= 4e-16 * bracket[1]:
+    if abs(miss) <= LOCATED * bracket[SIZE] or bracket[HIGH] - bracket[LOW] <= 4e-16 * bracket[HIGH]:
         return target, 0.0
     if (miss > 0.0) != pressed[target]:
-        bracket[1] = h
+        bracket[HIGH] = h
     else:
-        bracket[0] = h
+        bracket[LOW] = h
     v = rate[target]
-    turn = (6.0 * (now[0, target] - miss) / h + 2.0 * now[4, target] + 4.0 * v) / h
-    if bracket[3] != h:
-        v += (miss - bracket[4]) / (h - bracket[3]) - 0.5 * (rate[target] + bracket[5])
-    bracket[3] = h
-    bracket[4] = miss
-    bracket[5] = rate[target]
-    guess = bracket[0]
+    turn = (6.0 * (now[APPROACH, target] - miss) / h + 2.0 * now[RATE, target] + 4.0 * v) / h
+    if bracket[TRIED] != h:
+        v += (miss - bracket[MISSED]) / (h - bracket[TRIED]) - 0.5 * (rate[target] + bracket[SLOPE])
+    bracket[TRIED] = h
+    bracket[MISSED] = miss
+    bracket[SLOPE] = rate[target]
+    guess = bracket[LOW]
     if v != 0.0:
         wait = -miss / v
         guess = h + wait - 0.5 * turn * wait * wait / v
     if abs(guess - h) <= 4e-16 * h:
         return target, 0.0
-    if not bracket[0] < guess < bracket[1]:
-        guess = 0.5 * (bracket[0] + bracket[1])
+    if not bracket[LOW] < guess < bracket[HIGH]:
+        guess = 0.5 * (bracket[LOW] + bracket[HIGH])
     return target, guess
 
 
 @inner()
 def enclose(now, y, rate, h, target, bracket):
     """Set the bracket of `narrow` to a whole step."""
-    bracket[0] = 0.0
-    bracket[1] = h
-    bracket[2] = abs(now[0, target]) + abs(y[target])
-    bracket[3] = h
-    bracket[4] = y[target]
-    bracket[5] = rate[target]
+    bracket[LOW] = 0.0
+    bracket[SIZE] = abs(now[APPROACH, target]) + abs(y[target])
+    last_try(h, y[target], rate[target], bracket)
 
 
 @inner()
@@ -185,10 +191,19 @@ def corner_value(law, i, which, d, v, memory):
     0 it lets go or pushes again by its rate, 1 the bend, 2 the turn, 3 it parts from its felt or meets it.
     """
     if which == 0:
-        return 1.0 + law[i, 2] * v
+        return 1.0 + law[i, LOSS] * v
     if which == 3:
         return parting(law, i, d, memory)
     return -v if which == 2 else d - corner_approach(spring_of(law, i))
+
+
+@inner()
+def last_try(length, value, slope, out_bracket):
+    """The upper end of a bracket, with what `narrow` and `nearer` ask of it."""
+    out_bracket[HIGH] = length
+    out_bracket[TRIED] = length
+    out_bracket[MISSED] = value
+    out_bracket[SLOPE] = slope
 
 
 @inner()
@@ -202,8 +217,8 @@ def first_corner(now, law, y, rate, after, h, lossy, out_bracket):
     kind = 0
     at = h
     for i in range(y.size):
-        d0, v0, d1, v1 = now[0, i], now[4, i], y[i], rate[i]
-        loss = law[i, 2]
+        d0, v0, d1, v1 = now[APPROACH, i], now[RATE, i], y[i], rate[i]
+        loss = law[i, LOSS]
         if lossy and loss > 0.0 and d0 > 0.0:
             start = 1.0 + loss * v0
             end = 1.0 + loss * v1
@@ -211,14 +226,14 @@ def first_corner(now, law, y, rate, after, h, lossy, out_bracket):
                 root = h * letting_go(loss, d0, v0, d1, v1, h)
                 if 0.0 < root < at:
                     at, target, kind = root, i, 0
-                    out_bracket[1], out_bracket[3], out_bracket[4], out_bracket[5] = h, h, end, start
+                    last_try(h, end, start, out_bracket)
         if law.shape[1] < WIDTH or law[i, KIND] == POWER:
             continue
         if law[i, KIND] == FELT:
             apart = law[i, MEMORY] < 0.0
             start = parting(law, i, d0, law[i, MEMORY])
             end = parting(law, i, d1, after[i])
-            least = NEAR * law[i, 5] * abs(after[i])
+            least = NEAR * law[i, SHARE] * abs(after[i])
             if least > 0.0 and (end > least if apart else end < -least):
                 start = min(start, -least) if apart else max(start, least)
                 root = h * start / (start - end)
@@ -227,7 +242,7 @@ def first_corner(now, law, y, rate, after, h, lossy, out_bracket):
                         return i, AGAIN, h
                 elif root < at:
                     at, target, kind = root, i, 3
-                    out_bracket[1], out_bracket[3], out_bracket[4], out_bracket[5] = h, h, end, start
+                    last_try(h, end, start, out_bracket)
             continue
         bend = corner_approach(spring_of(law, i))
         near = NEAR * bend
@@ -239,32 +254,45 @@ def first_corner(now, law, y, rate, after, h, lossy, out_bracket):
         if law[i, KIND] == PLASTIC and d0 >= bend - near:
             if v1 < 0.0 < v0 and high > bend + near and 0.0 < late < at:
                 at, target, kind = late, i, 2
-                out_bracket[1], out_bracket[3], out_bracket[4], out_bracket[5] = h, h, -v1, -v0
+                last_try(h, -v1, -v0, out_bracket)
         elif d0 < bend - near and high > bend + near:
             root = hermite_root(d0 - bend, v0, d1 - bend, v1, h) if d1 > bend else -1.0
             if root <= 0.0 or root > late:
                 root = late * (bend - d0) / (high - d0)
             if root < at:
                 at, target, kind = root, i, 1
-                out_bracket[1], out_bracket[3], out_bracket[4], out_bracket[5] = late, late, high - bend, d0 - bend
+                out_bracket[HIGH], out_bracket[TRIED], out_bracket[MISSED], out_bracket[SLOPE] = (
+                    late,
+                    late,
+                    high - bend,
+                    d0 - bend,
+                )
         elif law[i, KIND] != PLASTIC and d0 > bend + near and d1 < bend - near:
             root = hermite_root(d0 - bend, v0, d1 - bend, v1, h)
             if root < at:
                 at, target, kind = root, i, 1
-                out_bracket[1], out_bracket[3], out_bracket[4], out_bracket[5] = h, h, d1 - bend, d0 - bend
-    out_bracket[0] = 0.0
+                out_bracket[HIGH], out_bracket[TRIED], out_bracket[MISSED], out_bracket[SLOPE] = (
+                    h,
+                    h,
+                    d1 - bend,
+                    d0 - bend,
+                )
+    out_bracket[LOW] = 0.0
     return target, kind, at
 
 
 @inner()
 def dipped_felt(law, now, y, rate, after, h, i):
     """Whether a body left its felt and met it again within a step, by the cubic of what makes it push."""
-    share, time, z0, z1 = law[i, 5], law[i, 6], law[i, MEMORY], after[i]
-    if z0 < 0.0 or y[i] <= 0.0 or now[0, i] <= 0.0:
+    share, time, z0, z1 = law[i, SHARE], law[i, RELAXATION], law[i, MEMORY], after[i]
+    if z0 < 0.0 or y[i] <= 0.0 or now[APPROACH, i] <= 0.0:
         return False
-    g0, g1 = parting(law, i, now[0, i], z0), parting(law, i, y[i], z1)
-    r0 = law[i, 1] * (g0 + share * z0) / now[0, i] * now[4, i] - share * (g0 + (share - 1.0) * z0) / time
-    r1 = law[i, 1] * (g1 + share * z1) / y[i] * rate[i] - share * (g1 + (share - 1.0) * z1) / time
+    g0, g1 = parting(law, i, now[APPROACH, i], z0), parting(law, i, y[i], z1)
+    r0 = (
+        law[i, EXPONENT] * (g0 + share * z0) / now[APPROACH, i] * now[RATE, i]
+        - share * (g0 + (share - 1.0) * z0) / time
+    )
+    r1 = law[i, EXPONENT] * (g1 + share * z1) / y[i] * rate[i] - share * (g1 + (share - 1.0) * z1) / time
     return r0 < 0.0 < r1 and g0 > 0.0 and g1 > 0.0 and lowest(g0, r0, g1, r1, h) < -DIPPED * max(g0, g1)
 
 
@@ -281,7 +309,7 @@ def strayed(law, now, y, rate, after, h, i, side):
     spring = spring_of(law, i)
     bend = corner_approach(spring)
     near = NEAR * bend
-    d0, v0, d1, v1 = side * (now[0, i] - bend), side * now[4, i], side * (y[i] - bend), side * rate[i]
+    d0, v0, d1, v1 = side * (now[APPROACH, i] - bend), side * now[RATE, i], side * (y[i] - bend), side * rate[i]
     yields = spring.kind == PLASTIC and side > 0.0
     if bend == np.inf or abs(d0) > near or (d1 >= -near and not (yields and v1 < 0.0)):
         return 0
@@ -304,17 +332,17 @@ def nearer(law, i, which, h, d, v, memory, bracket):
     if which == 1:
         good = 0.1 * NEAR * corner_approach(spring_of(law, i))
     elif which == 3:
-        good = 0.1 * NEAR * law[i, 5] * abs(memory)
+        good = 0.1 * NEAR * law[i, SHARE] * abs(memory)
     elif which == 2:
-        good = TURNED * (abs(bracket[4]) + abs(bracket[5]))
-    if abs(miss) <= good or bracket[1] - bracket[0] <= 1e-9 * bracket[1]:
+        good = TURNED * (abs(bracket[MISSED]) + abs(bracket[SLOPE]))
+    if abs(miss) <= good or bracket[HIGH] - bracket[LOW] <= 1e-9 * bracket[HIGH]:
         return 0.0
-    bracket[0 if miss * bracket[5] > 0.0 else 1] = h
-    guess = h - miss * (h - bracket[3]) / (miss - bracket[4]) if miss != bracket[4] else 0.0
-    bracket[3] = h
-    bracket[4] = miss
-    if not bracket[0] < guess < bracket[1]:
-        guess = 0.5 * (bracket[0] + bracket[1])
+    bracket[LOW if miss * bracket[SLOPE] > 0.0 else HIGH] = h
+    guess = h - miss * (h - bracket[TRIED]) / (miss - bracket[MISSED]) if miss != bracket[MISSED] else 0.0
+    bracket[TRIED] = h
+    bracket[MISSED] = miss
+    if not bracket[LOW] < guess < bracket[HIGH]:
+        guess = 0.5 * (bracket[LOW] + bracket[HIGH])
     return guess
 
 
@@ -324,14 +352,14 @@ def settle(law, now, pressed, y, rate, target, depth, still):
     opened = 0
     for i in range(y.size):
         was = pressed[i]
-        slack = max(depth, LOCATED * abs(now[0, i])) if target >= 0 else depth  # contacts may open together
-        now[0, i] = y[i]
-        now[4, i] = rate[i]
+        slack = max(depth, LOCATED * abs(now[APPROACH, i])) if target >= 0 else depth  # contacts may open together
+        now[APPROACH, i] = y[i]
+        now[RATE, i] = rate[i]
         if i == target:
-            now[0, i] = 0.0
+            now[APPROACH, i] = 0.0
             pressed[i] = not was
         elif abs(y[i]) <= slack:
-            now[0, i] = 0.0
+            now[APPROACH, i] = 0.0
             pressed[i] = rate[i] > still or (was and rate[i] >= -still)
         else:
             pressed[i] = y[i] > 0.0
@@ -344,17 +372,17 @@ def settle(law, now, pressed, y, rate, target, depth, still):
 def begin(shape, offset, q, p, now, pressed):
     """Approach and rate of every contact at the start, and whether it is pressed."""
     for i in range(offset.size):
-        now[0, i], now[4, i] = approach(shape, offset, i, q, p)
-        pressed[i] = now[0, i] > 0.0 or (now[0, i] == 0.0 and now[4, i] > 0.0)
+        now[APPROACH, i], now[RATE, i] = approach(shape, offset, i, q, p)
+        pressed[i] = now[APPROACH, i] > 0.0 or (now[APPROACH, i] == 0.0 and now[RATE, i] > 0.0)
 
 
 @inner()
 def remember(law, i, row, stride, n_contacts, now):
     """Write approach, rate and memory of contact i to a row of the steps; the approach counts from no dent."""
     memory = law[i, MEMORY] if law.shape[1] == WIDTH else 0.0
-    row[3 + stride * i] = now[0, i] + dent(law, i, memory)
-    row[4 + stride * i] = now[4, i]
-    row[3 + stride * n_contacts + i] = memory
+    row[HEAD + stride * i] = now[APPROACH, i] + dent(law, i, memory)
+    row[HEAD + SPEED + stride * i] = now[RATE, i]
+    row[HEAD + stride * n_contacts + i] = memory
 
 
 @inner()
@@ -363,22 +391,22 @@ def remembered(law, now):
     if law.shape[1] == WIDTH:
         for i in range(now.shape[1]):
             low = dent(law, i, law[i, MEMORY])  # as long as the last step: what it pressed deeper is not yet counted
-            harden(law, i, now[0, i])
-            now[5, i] = law[i, MEMORY]
-            now[0, i] += low
+            harden(law, i, now[APPROACH, i])
+            now[REMEMBERED, i] = law[i, MEMORY]
+            now[APPROACH, i] += low
 
 
 @inner()
 def land(shape, offset, law, time, elapsed, first, found, row, stride, now, pressed, q, p):
     """Write a free flight to a row of the steps and take over the contacts' state at its end."""
     row[:] = 0.0
-    row[0] = time
-    row[1] = elapsed
+    row[START] = time
+    row[LENGTH] = elapsed
     for i in range(offset.size):
         remember(law, i, row, stride, offset.size, now)
-        now[0, i], now[4, i] = approach(shape, offset, i, q, p)
-        now[0, i] = min(0.0, now[0, i])
+        now[APPROACH, i], now[RATE, i] = approach(shape, offset, i, q, p)
+        now[APPROACH, i] = min(0.0, now[APPROACH, i])
         rest_of(law, i, elapsed)
     if found == 0:
-        now[0, first] = 0.0
+        now[APPROACH, first] = 0.0
         pressed[first] = True

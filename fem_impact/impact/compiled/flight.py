@@ -11,6 +11,7 @@ import numpy as np
 
 from . import arrays
 from .build import LOOSE, inner
+from .layout import FASTEST, HARDEST, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE
 from .propagation import any_of, glide, lane_table, restore
 
 PATIENT = 4  # [-] looks of a flight that make do with the table of a step up to four times shorter than allowed
@@ -31,10 +32,11 @@ def approach(shape, offset, i, q, p):
 
 
 @inner(fastmath=LOOSE)
-def motion_bounds(shape, omega, zeta, bias, i, q, p):
+def motion_bounds(shape, offset, omega, zeta, bias, i, q, p, out_bounds):
     """Rigid part and bounds of the flexible part of contact i's approach, valid for all later free time.
 
-    Returns rigid position, rate and acceleration; then the largest flexible displacement, rate and acceleration.
+    Row i of out_bounds (n_contacts, 6) receives rigid position, rate and acceleration, then the largest flexible
+    displacement, rate and acceleration, as named in `layout`.
     With a bias force a flexible mode swings about its static rest, hence the shift by bias/omega**2.
     """
     position = 0.0
@@ -57,7 +59,12 @@ def motion_bounds(shape, omega, zeta, bias, i, q, p):
             reach += size
             fastest += w * size
             hardest += w * w * size * (1.0 + 2.0 * zeta[n])
-    return position, rate, acceleration, reach, fastest, hardest
+    out_bounds[i, RIGID] = position + offset[i]
+    out_bounds[i, RIGID_RATE] = rate
+    out_bounds[i, RIGID_ACCELERATION] = acceleration
+    out_bounds[i, REACH] = reach
+    out_bounds[i, FASTEST] = fastest
+    out_bounds[i, HARDEST] = hardest
 
 
 @inner()
@@ -99,18 +106,12 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
         leading = 0.0
         for i in range(m):
             if look % 64 == 0:
-                r0, r1, r2, reach, fastest, hardest = motion_bounds(shape, omega, zeta, bias, i, q, p)
-                bounds[i, 0] = r0 + offset[i]
-                bounds[i, 1] = r1
-                bounds[i, 2] = r2
-                bounds[i, 3] = reach
-                bounds[i, 4] = fastest
-                bounds[i, 5] = hardest
-            r0 = bounds[i, 0]
-            r1 = bounds[i, 1]
-            r2 = bounds[i, 2]
-            reach = bounds[i, 3]
-            hardest = bounds[i, 5]
+                motion_bounds(shape, offset, omega, zeta, bias, i, q, p, bounds)
+            r0 = bounds[i, RIGID]
+            r1 = bounds[i, RIGID_RATE]
+            r2 = bounds[i, RIGID_ACCELERATION]
+            reach = bounds[i, REACH]
+            hardest = bounds[i, HARDEST]
             if r1 <= still and r2 <= 0.0 and r0 + reach <= depth:
                 continue
             final = False
@@ -121,7 +122,7 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
             if -d <= 4e-16 * scale and (v > still or (driven and (v > 0.0 or (v == 0.0 and elapsed + r2 > 0.0)))):
                 return elapsed, i, 0
             bound = quadratic_wait(d, v, hardest + max(r2, 0.0))
-            bound = max(bound, quadratic_wait(d, max(0.0, r1 + bounds[i, 4]), max(r2, 0.0)))
+            bound = max(bound, quadratic_wait(d, max(0.0, r1 + bounds[i, FASTEST]), max(r2, 0.0)))
             if r2 <= 0.0 and r0 + reach <= 0.0:
                 bound = max(bound, quadratic_wait(r0 + reach, max(0.0, r1), 0.0))
             if bound < wait:
@@ -144,7 +145,7 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
                 if slow > SLOW_LOOKS:
                     return elapsed, first, 3
             power_of_two = int(np.floor(np.log2(wait / base))) + GLIDES // 2
-            if not close and bounds[first, 5] != 0.0 and 2 <= power_of_two < GLIDES:
+            if not close and bounds[first, HARDEST] != 0.0 and 2 <= power_of_two < GLIDES:
                 slot = power_of_two
                 if look < PATIENT and known[slot] == 0.0:
                     slot -= 1 if known[slot - 1] != 0.0 else (2 if known[slot - 2] != 0.0 else 0)
@@ -157,6 +158,6 @@ def find_onset(omega, zeta, shape, offset, bias, limit, base, shortest, depth, s
             return limit, -1, 2
         elapsed += wait
         for i in range(m):
-            bounds[i, 0] += wait * (bounds[i, 1] + 0.5 * bounds[i, 2] * wait)
-            bounds[i, 1] += wait * bounds[i, 2]
+            bounds[i, RIGID] += wait * (bounds[i, RIGID_RATE] + 0.5 * bounds[i, RIGID_ACCELERATION] * wait)
+            bounds[i, RIGID_RATE] += wait * bounds[i, RIGID_ACCELERATION]
     return elapsed, -1, 4

@@ -25,9 +25,23 @@ from typing import NamedTuple
 import numpy as np
 
 from .build import inner, outer
+from .layout import (
+    COMPLIANCE,
+    DEPTH,
+    EXPONENT,
+    FIRST_YIELD,
+    HARD,
+    HARD_EXPONENT,
+    KIND,
+    LOSS,
+    MEMORY,
+    RELAXATION,
+    SHARE,
+    STIFFNESS,
+    WIDTH,
+)
 
 POWER, LAYERS, PLASTIC, FELT = 0.0, 1.0, 2.0, 3.0  # [-] kinds of law
-KIND, MEMORY, WIDTH = 4, 8, 9  # columns of a law; a law of 4 columns is a power law
 NEAR = 1e-9  # [-] of a corner's approach: nearer than this counts as at the corner
 
 
@@ -69,7 +83,7 @@ def spring_of(law, i):
     Felt from which the body has parted carries a minus before its memory: a spring without stiffness.
     """
     if law.shape[1] < WIDTH or law[i, KIND] == POWER:
-        return simple(law[i, 0], law[i, 1], law[i, 2], law[i, 3])
+        return simple(law[i, STIFFNESS], law[i, EXPONENT], law[i, LOSS], law[i, COMPLIANCE])
     return spring_with(law, i, law[i, MEMORY])
 
 
@@ -81,7 +95,7 @@ def special_of(law):
     for i in range(law.shape[0]):
         if law.shape[1] == WIDTH and law[i, KIND] != POWER:
             special = True
-        if law[i, 2] > 0.0:
+        if law[i, LOSS] > 0.0:
             cornered = True
     return special, special or cornered
 
@@ -89,16 +103,16 @@ def special_of(law):
 @inner()
 def spring_with(law, i, memory):
     """The same if it remembers another number."""
-    k, a, loss, c = law[i, 0], law[i, 1], law[i, 2], law[i, 3]
+    k, a, loss, c = law[i, STIFFNESS], law[i, EXPONENT], law[i, LOSS], law[i, COMPLIANCE]
     if law.shape[1] < WIDTH or law[i, KIND] == POWER:
         return simple(k, a, loss, c)
     if law[i, KIND] == FELT:
         if memory < 0.0:
             return simple(0.0, a, 0.0, c)
-        return Spring(k, a, loss, c, FELT, np.inf, k * law[i, 5], 1.0, law[i, 6], memory)
+        return Spring(k, a, loss, c, FELT, np.inf, k * law[i, SHARE], 1.0, law[i, RELAXATION], memory)
     if law[i, KIND] == LAYERS:
-        return Spring(k, a, loss, c, LAYERS, law[i, 5], law[i, 6], law[i, 7], 0.0, 0.0)
-    first = law[i, 5]
+        return Spring(k, a, loss, c, LAYERS, law[i, DEPTH], law[i, HARD], law[i, HARD_EXPONENT], 0.0, 0.0)
+    first = law[i, FIRST_YIELD]
     steep = a * k * power(first, a - 1.0)
     deepest = max(memory, first)
     if deepest == first:
@@ -111,9 +125,9 @@ def spring_with(law, i, memory):
 @inner()
 def dent(law, i, memory):
     """How far the surface of contact i is lower than at first [m], from what it remembers."""
-    if law.shape[1] < WIDTH or law[i, KIND] != PLASTIC or memory <= law[i, 5]:
+    if law.shape[1] < WIDTH or law[i, KIND] != PLASTIC or memory <= law[i, FIRST_YIELD]:
         return 0.0
-    a, first = law[i, 1], law[i, 5]
+    a, first = law[i, EXPONENT], law[i, FIRST_YIELD]
     return memory - power(first / memory, a - 1.0) * (a * memory - (a - 1.0) * first)
 
 
@@ -392,7 +406,7 @@ def held(approach, law, i):
     z = abs(law[i, MEMORY])
     spring = spring_with(law, i, z)
     x = max(0.0, approach)
-    left = (law[i, 5] * z) ** (1.0 / spring.exponent) if z > 0.0 else 0.0
+    left = (law[i, SHARE] * z) ** (1.0 / spring.exponent) if z > 0.0 else 0.0
     x = max(x, left)
     return at(x, spring).energy + memory_energy(x, z, spring)
 
@@ -401,14 +415,14 @@ def held(approach, law, i):
 def rest_of(law, i, time):
     """Let the memory of felt fade for a time without force."""
     if law.shape[1] == WIDTH and law[i, KIND] == FELT:
-        law[i, MEMORY] = -abs(law[i, MEMORY]) * np.exp(-(1.0 - law[i, 5]) * time / law[i, 6])
+        law[i, MEMORY] = -abs(law[i, MEMORY]) * np.exp(-(1.0 - law[i, SHARE]) * time / law[i, RELAXATION])
 
 
 @inner()
 def parting(law, i, approach, memory):
     """``x**a - share z`` of felt: positive where it pushes."""
-    g = power(approach, law[i, 1]) if approach > 0.0 else 0.0
-    return g - law[i, 5] * abs(memory)
+    g = power(approach, law[i, EXPONENT]) if approach > 0.0 else 0.0
+    return g - law[i, SHARE] * abs(memory)
 
 
 @inner()
@@ -419,9 +433,11 @@ def meet(law, i, approach, rate):
     z = abs(law[i, MEMORY])
     over = parting(law, i, approach, z)
     rises = over > 0.0
-    if abs(over) <= NEAR * law[i, 5] * z:
-        grows = law[i, 1] * power(approach, law[i, 1]) / approach * rate if approach > 0.0 else 0.0
-        rises = grows >= -(1.0 - law[i, 5]) * law[i, 5] * z / law[i, 6]  # how the felt recovers on its own
+    if abs(over) <= NEAR * law[i, SHARE] * z:
+        grows = law[i, EXPONENT] * power(approach, law[i, EXPONENT]) / approach * rate if approach > 0.0 else 0.0
+        rises = (
+            grows >= -(1.0 - law[i, SHARE]) * law[i, SHARE] * z / law[i, RELAXATION]
+        )  # how the felt recovers on its own
     law[i, MEMORY] = z if rises else -z
 
 
@@ -448,7 +464,7 @@ def yielded(law):
     """Energy that yielding took from all contacts so far [J]: what it cost to press them, less what comes back."""
     total = 0.0
     for i in range(law.shape[0]):
-        if law.shape[1] == WIDTH and law[i, KIND] == PLASTIC and law[i, MEMORY] > law[i, 5]:
+        if law.shape[1] == WIDTH and law[i, KIND] == PLASTIC and law[i, MEMORY] > law[i, FIRST_YIELD]:
             deepest = law[i, MEMORY]
             whole = pushed(deepest, spring_with(law, i, 0.0))[1]
             total += whole - pushed(deepest - dent(law, i, deepest), spring_of(law, i))[1]

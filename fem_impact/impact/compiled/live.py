@@ -11,15 +11,33 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .build import LOOSE, inner, outer
+from .build import inner, outer
 from .energy import contact_sums, keep_in_mind, predict, solve_step
 from .events import dipped
 from .flight import approach, motion_bounds, quadratic_wait
-from .law import MEMORY, at, harden, meet, rest_of, special_of, spring_of
-from .propagation import commit, glide, restore
+from .law import at, harden, meet, rest_of, special_of, spring_of
+from .layout import (
+    APPROACH,
+    COMPRESSION,
+    ENERGY,
+    FASTEST,
+    FORCE,
+    FREE_END,
+    FREE_MEAN,
+    FREE_RATE,
+    HARDEST,
+    MEMORY,
+    RATE,
+    REACH,
+    RIGID,
+    RIGID_ACCELERATION,
+    RIGID_RATE,
+)
+from .propagation import commit, glide, product, restore
 
 FULL = 1 << 20  # [-] ticks of a frame: the shortest step is one, 2e-11 s at 48 kHz
 LEVELS = 21  # [-] lengths of steps, from a frame to a tick
+N_ON, N_LOOKS, FRAME, FORCED = range(4)  # places of `State.place`
 LOOKS = 64  # [-] looks of a flight after which its bounds are drawn anew, as they loosen
 FAINT = 1e-140  # [-] of sqrt(J): a mode with less is at rest, before its numbers get slow to calculate with
 SWEEP = 1024  # [-] frames after which modes are looked at for that
@@ -96,7 +114,7 @@ def take_off(pads, state, i):
         state.q[n] = 0.0
         state.p[n] = 0.0
         state.bias[n] = 0.0
-    m = state.place[0] - 1
+    m = state.place[N_ON] - 1
     for k in range(i, m):
         for n in range(state.q.size):
             state.rows[k, n] = state.rows[k + 1, n]
@@ -115,8 +133,8 @@ def take_off(pads, state, i):
 @inner()
 def renewed(state, m):
     """Note that there are other sticks on the body than before, m now."""
-    state.place[0] = m
-    state.place[3] = 1
+    state.place[N_ON] = m
+    state.place[FORCED] = 1
     for level in range(LEVELS):
         state.known[level] = 0
 
@@ -130,14 +148,14 @@ def put_on(body, pads, limits, state, pad, speed):
     n_own = pads.motion.size
     n_sticks = state.slot.size
     base = n_sticks * n_own
-    if state.place[0] == n_sticks:
+    if state.place[N_ON] == n_sticks:
         gone = 0
         for i in range(n_sticks - 1, -1, -1):
             if not state.pressed[i]:
                 gone = i
         take_off(pads, state, gone)
         state.counted[STOLEN] += 1
-    m = state.place[0]
+    m = state.place[N_ON]
     if m == 0:
         for n in range(base, state.q.size):
             if body.omega[n] == 0.0:
@@ -165,51 +183,42 @@ def put_on(body, pads, limits, state, pad, speed):
     state.offset[m] = pads.offsets[pad]
     state.slot[m] = slot
     state.pad[m] = pad
-    state.until[m] = state.place[2] + limits.lasts
-    _, state.now[4, m] = approach(state.rows, state.offset, m, state.q, state.p)
-    state.now[0, m] = state.offset[m]
-    state.pressed[m] = state.offset[m] >= 0.0 and state.now[4, m] > 0.0
+    state.until[m] = state.place[FRAME] + limits.lasts
+    _, state.now[RATE, m] = approach(state.rows, state.offset, m, state.q, state.p)
+    state.now[APPROACH, m] = state.offset[m]
+    state.pressed[m] = state.offset[m] >= 0.0 and state.now[RATE, m] > 0.0
     state.counted[STRUCK] += 1
     renewed(state, m + 1)
-
-
-@inner(fastmath=LOOSE)
-def heard(listen, p):
-    """What is heard of a state."""
-    total = 0.0
-    for n in range(p.size):
-        total += listen[n] * p[n]
-    return total
 
 
 @inner()
 def flight(body, pads, limits, state, level):
     """Level of a step, no longer than the given, in which surely nothing touches; -1 if a stick left for good."""
-    m = state.place[0]
-    if state.place[3] == 1 or state.place[1] >= LOOKS:
-        state.place[1] = 0
-        state.place[3] = 0
+    m = state.place[N_ON]
+    if state.place[FORCED] == 1 or state.place[N_LOOKS] >= LOOKS:
+        state.place[N_LOOKS] = 0
+        state.place[FORCED] = 0
         for i in range(m - 1, -1, -1):
-            r0, r1, r2, reach, fastest, hardest = motion_bounds(
-                state.rows, body.omega, body.zeta, state.bias, i, state.q, state.p
+            motion_bounds(
+                state.rows, state.offset, body.omega, body.zeta, state.bias, i, state.q, state.p, state.bounds
             )
-            r0 += state.offset[i]
-            if r1 <= limits.still and r2 <= 0.0 and r0 + reach <= limits.depth:
+            rigid, rate = state.bounds[i, RIGID], state.bounds[i, RIGID_RATE]
+            receding = rate <= limits.still and state.bounds[i, RIGID_ACCELERATION] <= 0.0
+            if receding and rigid + state.bounds[i, REACH] <= limits.depth:
                 take_off(pads, state, i)
                 return -1
-            state.bounds[i, 0] = r0
-            state.bounds[i, 1] = r1
-            state.bounds[i, 2] = r2
-            state.bounds[i, 3] = reach
-            state.bounds[i, 4] = fastest
-            state.bounds[i, 5] = hardest
-    state.place[1] += 1
+    state.place[N_LOOKS] += 1
     wait = np.inf
     for i in range(m):
-        d = min(state.now[0, i], 0.0)
-        r0, r1, r2, reach = state.bounds[i, 0], state.bounds[i, 1], state.bounds[i, 2], state.bounds[i, 3]
-        bound = quadratic_wait(d, state.now[4, i], state.bounds[i, 5] + max(r2, 0.0))
-        bound = max(bound, quadratic_wait(d, max(0.0, r1 + state.bounds[i, 4]), max(r2, 0.0)))
+        d = min(state.now[APPROACH, i], 0.0)
+        r0, r1, r2, reach = (
+            state.bounds[i, RIGID],
+            state.bounds[i, RIGID_RATE],
+            state.bounds[i, RIGID_ACCELERATION],
+            state.bounds[i, REACH],
+        )
+        bound = quadratic_wait(d, state.now[RATE, i], state.bounds[i, HARDEST] + max(r2, 0.0))
+        bound = max(bound, quadratic_wait(d, max(0.0, r1 + state.bounds[i, FASTEST]), max(r2, 0.0)))
         if r2 <= 0.0 and r0 + reach <= 0.0:
             bound = max(bound, quadratic_wait(r0 + reach, max(0.0, r1), 0.0))
         wait = min(wait, bound)
@@ -222,27 +231,27 @@ def flight(body, pads, limits, state, level):
 def glided(limits, state, h, end):
     """Take over a step in which nothing touched."""
     restore(state.free_q, state.free_p, state.q, state.p)
-    for i in range(state.place[0]):
-        state.now[0, i] = end[0, i]
-        state.now[4, i] = end[2, i]
-        state.bounds[i, 0] += h * (state.bounds[i, 1] + 0.5 * state.bounds[i, 2] * h)
-        state.bounds[i, 1] += h * state.bounds[i, 2]
+    for i in range(state.place[N_ON]):
+        state.now[APPROACH, i] = end[FREE_END, i]
+        state.now[RATE, i] = end[FREE_RATE, i]
+        state.bounds[i, RIGID] += h * (state.bounds[i, RIGID_RATE] + 0.5 * state.bounds[i, RIGID_ACCELERATION] * h)
+        state.bounds[i, RIGID_RATE] += h * state.bounds[i, RIGID_ACCELERATION]
         rest_of(state.law, i, h)
 
 
 @inner()
 def noted(state, time, h, force):
     """Write a step of the contacts that push to the trace."""
-    for i in range(state.place[0]):
+    for i in range(state.place[N_ON]):
         if force[i] > 0.0 and state.counted[TRACED] < state.trace.shape[0]:
             row = state.trace[state.counted[TRACED]]
             spring = spring_of(state.law, i)
-            pushes = at(state.now[0, i], spring).force * (1.0 + spring.loss * state.now[4, i])
+            pushes = at(state.now[APPROACH, i], spring).force * (1.0 + spring.loss * state.now[RATE, i])
             row[0] = time
             row[1] = h
             row[2] = state.pad[i]
             row[3] = force[i]
-            row[4] = state.now[0, i]
+            row[4] = state.now[APPROACH, i]
             row[5] = max(0.0, pushes - spring.hard * spring.memory)  # of felt, what it remembers
             state.counted[TRACED] += 1
 
@@ -250,7 +259,7 @@ def noted(state, time, h, force):
 @inner()
 def step(body, limits, state, level, time):
     """Go ahead by a step of at most that level; its level."""
-    m = state.place[0]
+    m = state.place[N_ON]
     rows, end = state.rows[:m], state.end[:, :m]
     y, f, s = state.found[0, :m], state.found[1, :m], state.found[2, :m]
     rate, after, pressed = state.found[3, :m], state.found[4, :m], state.pressed[:m]
@@ -268,7 +277,7 @@ def step(body, limits, state, level, time):
         if not touching:
             meets = False
             for i in range(m):
-                meets = meets or end[0, i] > 0.0
+                meets = meets or end[FREE_END, i] > 0.0
             if not meets:
                 glided(limits, state, h, end)
                 return level
@@ -280,16 +289,16 @@ def step(body, limits, state, level, time):
             state.known[level] = 1
         for i in range(m):
             if special and fresh:
-                meet(state.law, i, state.now[0, i], state.now[4, i])
-                deeper = harden(state.law, i, state.now[0, i])
+                meet(state.law, i, state.now[APPROACH, i], state.now[RATE, i])
+                deeper = harden(state.law, i, state.now[APPROACH, i])
                 state.offset[i] -= deeper
-                state.now[0, i] -= deeper
-                end[0, i] -= deeper
-                end[1, i] -= deeper
-            point = at(state.now[0, i], spring_of(state.law, i))
-            state.now[1, i] = point.compression
-            state.now[2, i] = point.force
-            state.now[3, i] = point.energy
+                state.now[APPROACH, i] -= deeper
+                end[FREE_END, i] -= deeper
+                end[FREE_MEAN, i] -= deeper
+            point = at(state.now[APPROACH, i], spring_of(state.law, i))
+            state.now[COMPRESSION, i] = point.compression
+            state.now[FORCE, i] = point.force
+            state.now[ENERGY, i] = point.energy
         fresh = False
         fine = solve_step(1, h, state.sums, level, state.law, state.now, end, state.work, y, f, s, rate)
         if special:
@@ -306,14 +315,14 @@ def step(body, limits, state, level, time):
         level += 1
     commit(rows, body.tables[level], h, f, s, state.free_q, state.free_p, state.q, state.p)
     for i in range(m):
-        state.now[0, i] = y[i]
-        state.now[4, i] = rate[i]
+        state.now[APPROACH, i] = y[i]
+        state.now[RATE, i] = rate[i]
         if special:
             state.law[i, MEMORY] = after[i]
         if pressed[i] and y[i] <= 0.0:
             state.counted[TOUCHED] += 1
         pressed[i] = y[i] > 0.0
-    state.place[3] = 1
+    state.place[FORCED] = 1
     state.counted[STEPS] += 1
     noted(state, time + h, h, f)
     return level
@@ -330,7 +339,7 @@ def tidied(body, pads, state):
             state.q[n] = 0.0
             state.p[n] = 0.0
     if lost:
-        while state.place[0] > 0:
+        while state.place[N_ON] > 0:
             take_off(pads, state, 0)
         for n in range(state.q.size):
             state.q[n] = 0.0
@@ -350,25 +359,25 @@ def play(body, pads, limits, state, when, pad, speed, n_events, gain, out):
         while event < n_events and when[event] <= k:
             put_on(body, pads, limits, state, pad[event], speed[event])
             event += 1
-        out[k] = gain * heard(body.listen, state.p)
-        for i in range(state.place[0] - 1, -1, -1):
-            if state.place[2] >= state.until[i] and not state.pressed[i]:
+        out[k] = gain * product(body.listen, state.p)
+        for i in range(state.place[N_ON] - 1, -1, -1):
+            if state.place[FRAME] >= state.until[i] and not state.pressed[i]:
                 take_off(pads, state, i)
         tick = 0
         while tick < FULL:
             level = 0
             while FULL >> level > FULL - tick:
                 level += 1
-            if state.place[0] == 0:
+            if state.place[N_ON] == 0:
                 glide(body.tables[level], limits.period * 0.5**level, state.bias, state.q, state.p)
                 tick += FULL >> level
                 continue
             touching = False
-            for i in range(state.place[0]):
+            for i in range(state.place[N_ON]):
                 touching = touching or state.pressed[i]
             level = max(level, limits.contact) if touching else flight(body, pads, limits, state, level)
             if level >= 0:
-                tick += FULL >> step(body, limits, state, level, (state.place[2] + tick / FULL) * limits.period)
-        state.place[2] += 1
-        if state.place[2] % SWEEP == 0:
+                tick += FULL >> step(body, limits, state, level, (state.place[FRAME] + tick / FULL) * limits.period)
+        state.place[FRAME] += 1
+        if state.place[FRAME] % SWEEP == 0:
             tidied(body, pads, state)

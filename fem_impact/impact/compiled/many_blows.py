@@ -10,6 +10,7 @@ import numpy as np
 
 from .build import LOOSE, ONE, ZERO, inner, outer
 from .law import Point, at, simple
+from .layout import COMPLIANCE, EXPONENT, LOSS, STIFFNESS
 from .propagation import restore
 from .schemes import Free, Own, solve_constant, solve_ramp
 
@@ -415,7 +416,7 @@ def run(
     segments = np.zeros((n_steps + 1, 2), np.int64)
     contacts = np.zeros((n_steps + 1, 2))
     for cell in cells:
-        k, a, c, loss = law[0, cell], law[1, cell], law[2, cell], law[3, cell]
+        k, a, c, loss = law[STIFFNESS, cell], law[EXPONENT, cell], law[LOSS, cell], law[COMPLIANCE, cell]
         spring = simple(k, a, loss, c)
         share, mine = shares[0, cell], shares[1, cell]
         known = min(32, n_steps)

@@ -15,6 +15,7 @@ import numpy as np
 from . import arrays
 from .arrays import ANGLE_LIMIT, LIGHT, SERIES_END
 from .build import LOOSE, WHOLE, inner, outer
+from .layout import A11, A12, A21, A22, HEAD, LENGTH, M1, M2, M3, PUSH, START
 from .one_mode import mode_matrix, mode_moments
 
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
@@ -106,34 +107,34 @@ def free_table(omega, zeta, h, out_free, out_double):
     if n_single > 0:
         for n in range(n_modes):
             angle[n] = min(angle[n], ANGLE_LIMIT)
-    waves(angle, out_free[1], out_free[0])
+    waves(angle, out_free[A12], out_free[A11])
     if n_damped == 0:
         for n in range(n_modes):
             y = angle[n]
-            c = out_free[0, n]
-            out_free[1, n] = h * (out_free[1, n] / y if y > 0.0 else 1.0)
-            out_free[3, n] = c
+            c = out_free[A11, n]
+            out_free[A12, n] = h * (out_free[A12, n] / y if y > 0.0 else 1.0)
+            out_free[A22, n] = c
     else:
-        decays(out_double, out_free[3])
+        decays(out_double, out_free[A22])
         for n in range(n_modes):
             y = angle[n]
-            decay = out_free[3, n]
+            decay = out_free[A22, n]
             x = out_double[n]
-            s = decay * (out_free[1, n] / y if y > 0.0 else 1.0)
-            c = decay * out_free[0, n]
-            out_free[0, n] = c + x * s
-            out_free[1, n] = h * s
-            out_free[3, n] = c - x * s
+            s = decay * (out_free[A12, n] / y if y > 0.0 else 1.0)
+            c = decay * out_free[A11, n]
+            out_free[A11, n] = c + x * s
+            out_free[A12, n] = h * s
+            out_free[A22, n] = c - x * s
             out_double[n] = 2.0 * x
     if n_single > 0:
         for n in range(n_modes):
             if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT:
                 a11, a12, a22, _, _, _ = mode_matrix(omega[n], zeta[n], h)
-                out_free[0, n] = a11
-                out_free[1, n] = a12
-                out_free[3, n] = a22
+                out_free[A11, n] = a11
+                out_free[A12, n] = a12
+                out_free[A22, n] = a22
     for n in range(n_modes):
-        out_free[2, n] = -omega[n] * omega[n] * out_free[1, n]
+        out_free[A21, n] = -omega[n] * omega[n] * out_free[A12, n]
     return n_single, n_damped
 
 
@@ -160,7 +161,7 @@ def near_moments(omega, h, double, n_damped, out_moments):
             odd = 1.0 - t2 * (1.0 / 110.0) * odd
             odd = 1.0 - t2 * (1.0 / 72.0) * odd
             odd = 1.0 - t2 * (1.0 / 42.0) * odd
-            out_moments[5, n] = (1.0 / 6.0) * (1.0 - t2 * (1.0 / 20.0) * odd)
+            out_moments[M2, n] = (1.0 / 6.0) * (1.0 - t2 * (1.0 / 20.0) * odd)
             even = 1.0 - t2 * (1.0 / 756.0)
             even = 1.0 - t2 * (1.0 / 650.0) * even
             even = 1.0 - t2 * (1.0 / 552.0) * even
@@ -172,22 +173,22 @@ def near_moments(omega, h, double, n_damped, out_moments):
             even = 1.0 - t2 * (1.0 / 132.0) * even
             even = 1.0 - t2 * (1.0 / 90.0) * even
             even = 1.0 - t2 * (1.0 / 56.0) * even
-            out_moments[6, n] = (1.0 / 24.0) * (1.0 - t2 * (1.0 / 30.0) * even)
+            out_moments[M3, n] = (1.0 / 24.0) * (1.0 - t2 * (1.0 / 30.0) * even)
         return
     now = np.empty(n_modes)
     last = np.empty(n_modes)
     for n in range(n_modes):
         now[n] = 1.0
         last[n] = 0.0
-        out_moments[5, n] = 0.0
-        out_moments[6, n] = 0.0
+        out_moments[M2, n] = 0.0
+        out_moments[M3, n] = 0.0
     factor = 1.0 / 6.0
     for j in range(1, 30):
         after = factor / (j + 3.0)
         for n in range(n_modes):
             value = now[n]
-            out_moments[5, n] += value * factor
-            out_moments[6, n] += value * after
+            out_moments[M2, n] += value * factor
+            out_moments[M3, n] += value * after
             now[n] = -min(double[n], 2.0 * SERIES_END) * value - square[n] * last[n]
             last[n] = value
         factor = after
@@ -207,7 +208,7 @@ def lane_table(omega, zeta, h, whole, out_lanes):
     n_single, n_damped = free_table(omega, zeta, h, out_lanes, double)
     if not whole:
         for n in range(n_modes):
-            out_lanes[4, n] = 0.0
+            out_lanes[M1, n] = 0.0
         return
     near_moments(omega, h, double, n_damped, out_lanes)
     part = 1.0 / h
@@ -215,25 +216,25 @@ def lane_table(omega, zeta, h, whole, out_lanes):
         th = omega[n] * h
         near = th < SERIES_END
         inverse = 1.0 / (1.0 if near else th * th)
-        first = out_lanes[1, n] * part
-        m1 = (1.0 - double[n] * first - out_lanes[3, n]) * inverse
+        first = out_lanes[A12, n] * part
+        m1 = (1.0 - double[n] * first - out_lanes[A22, n]) * inverse
         m2 = (1.0 - double[n] * m1 - first) * inverse
         m3 = (0.5 - double[n] * m2 - m1) * inverse
-        m2 = out_lanes[5, n] if near else m2
-        m3 = out_lanes[6, n] if near else m3
+        m2 = out_lanes[M2, n] if near else m2
+        m3 = out_lanes[M3, n] if near else m3
         m1 = 0.5 - double[n] * m2 - th * th * m3 if near else m1
-        out_lanes[4, n] = h * m1
-        out_lanes[5, n] = h * m2
-        out_lanes[6, n] = h * (m3 - 0.5 * m2)
+        out_lanes[M1, n] = h * m1
+        out_lanes[M2, n] = h * m2
+        out_lanes[M3, n] = h * (m3 - 0.5 * m2)
     if n_single > 0:
         work = np.empty((2, 3))
         m = np.empty(4)
         for n in range(n_modes):
             if zeta[n] > LIGHT or omega[n] * h >= ANGLE_LIMIT:
                 mode_moments(omega[n], zeta[n], h, m, work)
-                out_lanes[4, n] = h * m[1]
-                out_lanes[5, n] = h * m[2]
-                out_lanes[6, n] = h * (m[3] - 0.5 * m[2])
+                out_lanes[M1, n] = h * m[1]
+                out_lanes[M2, n] = h * m[2]
+                out_lanes[M3, n] = h * (m[3] - 0.5 * m[2])
 
 
 @outer()
@@ -248,14 +249,14 @@ def step_table(omega, zeta, h, out_table):
     for n in range(omega.size):
         for k in range(4):
             out_table[k, n] = lanes[k, n]
-        out_table[4, n] = h * lanes[4, n]
-        out_table[5, n] = lanes[1, n]
-        out_table[6, n] = h * (lanes[5, n] - 0.5 * lanes[4, n])
-        out_table[7, n] = lanes[4, n] - 0.5 * lanes[1, n]
-        out_table[8, n] = lanes[1, n] / h + 2.0 * zeta[n] * omega[n] * lanes[4, n]
-        out_table[9, n] = lanes[4, n]
-        out_table[10, n] = h * lanes[5, n]
-        out_table[11, n] = h * lanes[6, n]
+        out_table[4, n] = h * lanes[M1, n]
+        out_table[5, n] = lanes[A12, n]
+        out_table[6, n] = h * (lanes[M2, n] - 0.5 * lanes[M1, n])
+        out_table[7, n] = lanes[M1, n] - 0.5 * lanes[A12, n]
+        out_table[8, n] = lanes[A12, n] / h + 2.0 * zeta[n] * omega[n] * lanes[M1, n]
+        out_table[9, n] = lanes[M1, n]
+        out_table[10, n] = h * lanes[M2, n]
+        out_table[11, n] = h * lanes[M3, n]
 
 
 @inner()
@@ -265,6 +266,15 @@ def any_of(values):
     for n in range(values.size):
         found = found or values[n] != 0
     return found
+
+
+@inner(fastmath=LOOSE)
+def product(one, two):
+    """Sum of the products of two rows (n,)."""
+    total = 0.0
+    for n in range(one.size):
+        total += one[n] * two[n]
+    return total
 
 
 @inner(arrays=arrays.restore)
@@ -281,8 +291,8 @@ def glide(lanes, h, bias, q, p):
     for n in range(q.size):
         q0 = q[n]
         p0 = p[n]
-        q[n] = lanes[0, n] * q0 + lanes[1, n] * p0 + h * lanes[4, n] * bias[n]
-        p[n] = lanes[2, n] * q0 + lanes[3, n] * p0 + lanes[1, n] * bias[n]
+        q[n] = lanes[A11, n] * q0 + lanes[A12, n] * p0 + h * lanes[M1, n] * bias[n]
+        p[n] = lanes[A21, n] * q0 + lanes[A22, n] * p0 + lanes[A12, n] * bias[n]
 
 
 @inner(arrays=arrays.commit, fastmath=LOOSE)
@@ -298,8 +308,8 @@ def commit(shape, lanes, h, force, slope, free_q, free_p, out_q, out_p):
         if force[i] != 0.0 or s != 0.0:
             for n in range(n_modes):
                 u = shape[i, n]
-                out_q[n] -= u * h * (f * lanes[4, n] + s * lanes[5, n])
-                out_p[n] -= u * (f * lanes[1, n] + s * lanes[4, n])
+                out_q[n] -= u * h * (f * lanes[M1, n] + s * lanes[M2, n])
+                out_p[n] -= u * (f * lanes[A12, n] + s * lanes[M1, n])
 
 
 @inner(allocates=True)
@@ -309,14 +319,14 @@ def push(omega, zeta, shape, bias, row, n_coefficients, length, q, p, out_q, out
     if length <= 0.0:
         return
     m = shape.shape[0]
-    stride = 3 + n_coefficients
+    stride = PUSH + n_coefficients
     weights = np.zeros((max(n_coefficients, 2), m))
     active = False
     for i in range(m):
         scale = 1.0
         for k in range(n_coefficients):
-            weights[k, i] = row[6 + stride * i + k] * scale
-            scale *= (k + 1.0) * length / row[1]
+            weights[k, i] = row[HEAD + PUSH + stride * i + k] * scale
+            scale *= (k + 1.0) * length / row[LENGTH]
             if weights[k, i] != 0.0:
                 active = True
     if n_coefficients > 2 and active:
@@ -351,16 +361,16 @@ def replay(omega, zeta, shape, bias, start_q, start_p, steps, n_coefficients, ti
     q = start_q.copy()
     p = start_p.copy()
     flight = np.zeros(steps.shape[1])
-    flight[1] = 1.0
+    flight[LENGTH] = 1.0
     begin = 0.0
     k = 0
     for j in range(n_steps + 1):
         row = flight if j == n_steps else steps[j]
-        ends = np.inf if j == n_steps else begin + row[1]
+        ends = np.inf if j == n_steps else begin + row[LENGTH]
         while k < times.size and times[k] < ends:
             push(omega, zeta, shape, bias, row, n_coefficients, times[k] - begin, q, p, out_q[k], out_p[k])
             k += 1
         if k >= times.size or j == n_steps:
             return
-        push(omega, zeta, shape, bias, row, n_coefficients, row[1], q, p, q, p)
-        begin = steps[j + 1, 0] if j + 1 < n_steps else begin + row[1]
+        push(omega, zeta, shape, bias, row, n_coefficients, row[LENGTH], q, p, q, p)
+        begin = steps[j + 1, START] if j + 1 < n_steps else begin + row[LENGTH]

@@ -11,7 +11,8 @@ import numpy as np
 
 from .build import ZERO, inner, outer
 from .events import hermite_root, letting_go, lowest
-from .law import FELT, KIND, WIDTH, at, dent, growth, soaked, spring_with, steepness, stored
+from .law import FELT, at, dent, growth, soaked, spring_with, steepness, stored
+from .layout import APPROACH, CLOSED, HEAD, KIND, LENGTH, LOSS, PUSH, RATE, SPEED, START, WIDTH
 
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = 0, 1, 2, 3, 4, 5  # why a run ended
 
@@ -32,25 +33,25 @@ def total_energy(omega, bias, law, q, p, now):
     total = 0.0
     for n in range(q.size):
         total += 0.5 * (p[n] * p[n] + (omega[n] * q[n]) ** 2) - bias[n] * q[n]
-    return total + stored(now[0], law)
+    return total + stored(now[APPROACH], law)
 
 
 @inner()
 def memory_of(steps, law, n_coefficients, row, i):
     """What contact i remembers in a step."""
-    return steps[row, 3 + (3 + n_coefficients) * law.shape[0] + i]
+    return steps[row, HEAD + (PUSH + n_coefficients) * law.shape[0] + i]
 
 
 @inner()
 def ends_of(steps, now, law, n_coefficients, row, i):
     """Approach from the dent and its rate at both ends of a step."""
-    first = 3 + (3 + n_coefficients) * i
+    first = HEAD + (PUSH + n_coefficients) * i
     last = row + 1 == steps.shape[0]
     low = dent(law, i, memory_of(steps, law, n_coefficients, row, i))
     d0 = steps[row, first] - low
-    v0 = steps[row, first + 1]
-    d1 = (now[0, i] if last else steps[row + 1, first]) - low
-    v1 = now[4, i] if last else steps[row + 1, first + 1]
+    v0 = steps[row, first + SPEED]
+    d1 = (now[APPROACH, i] if last else steps[row + 1, first]) - low
+    v1 = now[RATE, i] if last else steps[row + 1, first + SPEED]
     return d0, v0, d1, v1
 
 
@@ -63,14 +64,14 @@ def force_within(steps, now, law, n_coefficients, row, i, part):
 @inner()
 def force_and_rate(steps, now, law, n_coefficients, row, i, part):
     """That force and its rate [N/s]; never negative."""
-    first = 3 + (3 + n_coefficients) * i
-    h = steps[row, 1]
+    first = HEAD + (PUSH + n_coefficients) * i
+    h = steps[row, LENGTH]
     if n_coefficients > 2:
         value = 0.0
         slope = 0.0
         for k in range(n_coefficients - 1, -1, -1):
             slope = slope * part + value
-            value = value * part + steps[row, first + 3 + k]
+            value = value * part + steps[row, first + PUSH + k]
         return max(value, 0.0), slope / h if value > 0.0 else 0.0
     d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
     a = 2.0 * (d0 - d1) + h * (v0 + v1)
@@ -110,10 +111,10 @@ def pushing(steps, now, law, n_coefficients, row, i):
 
     A lossy contact stops pushing while the bodies still overlap, when they part as fast as 1 / loss.
     """
-    first = 3 + (3 + n_coefficients) * i
-    if steps[row, first + 2] == 0.0:
+    first = HEAD + (PUSH + n_coefficients) * i
+    if steps[row, first + CLOSED] == 0.0:
         return 0.0, 0.0
-    h = steps[row, 1]
+    h = steps[row, LENGTH]
     d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
     lower = 0.0
     upper = 1.0
@@ -123,10 +124,10 @@ def pushing(steps, now, law, n_coefficients, row, i):
         upper = hermite_root(d0, v0, d1, v1, h) / h
     if law.shape[1] == WIDTH and law[i, KIND] == FELT:  # steps end where the body parts from the felt or meets it
         for k in range(n_coefficients):
-            if steps[row, first + 3 + k] != 0.0:
+            if steps[row, first + PUSH + k] != 0.0:
                 return lower, upper
         return 0.0, 0.0
-    loss = law[i, 2]
+    loss = law[i, LOSS]
     start = 1.0 + loss * v0
     end = 1.0 + loss * v1
     if start <= 0.0 and end <= 0.0:
@@ -150,7 +151,7 @@ def nearest_turn(steps, now, law, n_coefficients):
             d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
             if (v0 < 0.0 < v1) or (v1 < 0.0 < v0):
                 side = 1.0 if v0 < 0.0 else -1.0
-                turn = side * lowest(side * d0, side * v0, side * d1, side * v1, steps[row, 1])
+                turn = side * lowest(side * d0, side * v0, side * d1, side * v1, steps[row, LENGTH])
                 nearest = min(nearest, abs(turn))
                 farthest = max(farthest, turn)
     return nearest / farthest if farthest > 0.0 else np.inf
@@ -165,11 +166,11 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
     """
     n_steps = steps.shape[0]
     m = law.shape[0]
-    width = 3 + n_coefficients
+    width = PUSH + n_coefficients
     result = np.empty((8, 5))
     count = ZERO
     for i in range(m):
-        first = 3 + width * i
+        first = HEAD + width * i
         row: Any = ZERO
         while row < n_steps:
             lower, upper = pushing(steps, now, law, n_coefficients, row, i)
@@ -179,7 +180,7 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
             if count == result.shape[0]:
                 result = resized(result, count, 2 * count)
             begin = row
-            start = steps[row, 0] + lower * steps[row, 1]
+            start = steps[row, START] + lower * steps[row, LENGTH]
             end = start
             impulse = 0.0
             peak = 0.0
@@ -187,13 +188,13 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
             peak_part = 0.0
             while upper > lower:
                 for k in range(n_coefficients):
-                    impulse += steps[row, 1] * steps[row, first + 3 + k] / (k + 1.0)
+                    impulse += steps[row, LENGTH] * steps[row, first + PUSH + k] / (k + 1.0)
                 for look in range(n_coefficients):
                     f = force_within(steps, now, law, n_coefficients, row, i, look / n_coefficients)
                     if f > peak:
                         peak = f
                         peak_row = row
-                end = steps[row, 0] + upper * steps[row, 1]
+                end = steps[row, START] + upper * steps[row, LENGTH]
                 row += 1
                 if upper < 1.0 or row == n_steps:
                     break
@@ -209,9 +210,9 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
                         peak_row = near
                         peak_part = look / looks
             if steps[begin, first] == 0.0:
-                while begin > 0 and steps[begin - 1, first] == 0.0 and abs(steps[begin - 1, first + 1]) <= touch:
+                while begin > 0 and steps[begin - 1, first] == 0.0 and abs(steps[begin - 1, first + SPEED]) <= touch:
                     begin -= 1
-                    start = steps[begin, 0]
+                    start = steps[begin, START]
             spread = 1.0 / looks
             for _ in range(4):
                 middle = min(max(peak_part, spread), 1.0 - spread)

@@ -33,6 +33,20 @@ from .law import (
     spring_of,
     steepness,
 )
+from .layout import (
+    APPROACH,
+    COMPRESSION,
+    ENERGY,
+    FORCE,
+    LOSS,
+    OWN_END,
+    OWN_END_RAMP,
+    OWN_MEAN,
+    OWN_MEAN_RAMP,
+    OWN_RATE,
+    OWN_RATE_RAMP,
+    RATE,
+)
 
 SOLVES = 30  # [-] iterations of the equation of a step at most
 ROUNDED = 1e-14  # [-] of the elastic energies: rounding of what a step of felt loses
@@ -61,7 +75,7 @@ class Own(NamedTuple):
 @inner()
 def point_of(now, i):
     """Where contact i stands: ``now`` (6, n_contacts) holds approach, compression, force, energy and rate."""
-    return Point(now[0, i], now[1, i], now[2, i], now[3, i])
+    return Point(now[APPROACH, i], now[COMPRESSION, i], now[FORCE, i], now[ENERGY, i])
 
 
 @inner()
@@ -360,13 +374,13 @@ def sweep_constants(h, now, law, e, sums, out_y, out_f):
         rest = e[i]
         for j in range(m):
             if j != i:
-                rest -= sums[0, i, j] * out_f[j]
+                rest -= sums[OWN_END, i, j] * out_f[j]
         old = out_f[i]
         spring = spring_of(law, i)
         if spring.kind == FELT:
-            end, out_f[i] = solve_felt(point_of(now, i), rest, sums[0, i, i], h, spring)
+            end, out_f[i] = solve_felt(point_of(now, i), rest, sums[OWN_END, i, i], h, spring)
         else:
-            end, out_f[i] = solve_constant(point_of(now, i), rest, sums[0, i, i], law[i, 2] / h, spring)
+            end, out_f[i] = solve_constant(point_of(now, i), rest, sums[OWN_END, i, i], law[i, LOSS] / h, spring)
         out_y[i] = end.approach
         if out_f[i] != old:
             change = max(change, abs(out_f[i] - old) / max(abs(out_f[i]), abs(old)))
@@ -396,7 +410,7 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
         for i in range(m):
             y = e[i]
             for j in range(m):
-                y -= sums[0, i, j] * out_f[j]
+                y -= sums[OWN_END, i, j] * out_f[j]
             force, slope[i] = mean_force(h, y, now, law, i)
             step[i] = force - out_f[i]
             if step[i] != 0.0:
@@ -406,7 +420,7 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
         best = min(best, worst)
         for i in range(m):
             for j in range(m):
-                matrix[i, j] = slope[i] * sums[0, i, j]
+                matrix[i, j] = slope[i] * sums[OWN_END, i, j]
             matrix[i, i] += 1.0
         if not solve_linear(matrix, step, m):
             break
@@ -420,8 +434,8 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
                 y = e[i]
                 lift = 0.0
                 for j in range(m):
-                    y -= sums[0, i, j] * (out_f[j] + (t if look > 0 else 0.0) * step[j])
-                    lift += sums[0, i, j] * step[j]
+                    y -= sums[OWN_END, i, j] * (out_f[j] + (t if look > 0 else 0.0) * step[j])
+                    lift += sums[OWN_END, i, j] * step[j]
                 force, _ = mean_force(h, y, now, law, i)
                 rise += lift * (out_f[i] + (t if look > 0 else 0.0) * step[i] - force)
             if look == 0:
@@ -451,12 +465,12 @@ def ramp_forces(h, y, now, law, e, ea, vf, sums, work, out_f, out_s, out_r):
         spring = spring_of(law, i)
         start, end = point_of(now, i), at(y[i], spring)
         g, d = slopes(start, end, spring)
-        add, tilt, held_back, part = lossy_terms(h, start, end, now[4, i], vf[i], spring)
+        add, tilt, held_back, part = lossy_terms(h, start, end, now[RATE, i], vf[i], spring)
         for j in range(m):
-            matrix[i, j] = d * sums[2, i, j] + held_back * sums[4, i, j]
-            matrix[i, m + j] = d * sums[3, i, j] + held_back * sums[5, i, j]
-            matrix[m + i, j] = part * sums[4, i, j]
-            matrix[m + i, m + j] = part * sums[5, i, j]
+            matrix[i, j] = d * sums[OWN_MEAN, i, j] + held_back * sums[OWN_RATE, i, j]
+            matrix[i, m + j] = d * sums[OWN_MEAN_RAMP, i, j] + held_back * sums[OWN_RATE_RAMP, i, j]
+            matrix[m + i, j] = part * sums[OWN_RATE, i, j]
+            matrix[m + i, m + j] = part * sums[OWN_RATE_RAMP, i, j]
         matrix[i, i] += 1.0
         matrix[m + i, m + i] += 1.0
         vector[i] = g + d * (ea[i] - 0.5 * (start.approach + y[i])) + add
@@ -469,7 +483,7 @@ def ramp_forces(h, y, now, law, e, ea, vf, sums, work, out_f, out_s, out_r):
     for i in range(m):
         r = y[i] - e[i]
         for j in range(m):
-            r += sums[0, i, j] * out_f[j] + sums[1, i, j] * out_s[j]
+            r += sums[OWN_END, i, j] * out_f[j] + sums[OWN_END_RAMP, i, j] * out_s[j]
         out_r[i] = r
     return True
 
@@ -496,7 +510,7 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
         for j in range(m):
             for i in range(m):
                 y2[i] = out_y[i]
-            shift = 1e-7 * max(abs(out_y[j]), 1e-3 * abs(now[0, j]))
+            shift = 1e-7 * max(abs(out_y[j]), 1e-3 * abs(now[APPROACH, j]))
             y2[j] += shift
             shift = y2[j] - out_y[j]
             if not shift > 0.0:
@@ -512,7 +526,7 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
             out_y[i] -= r[i]
             if not abs(r[i]) < 1e300:
                 return False
-            if abs(r[i]) > 4e-15 * max(abs(out_y[i]), 1e-2 * abs(now[0, i])):
+            if abs(r[i]) > 4e-15 * max(abs(out_y[i]), 1e-2 * abs(now[APPROACH, i])):
                 settled = False
     if not settled:
         return False
@@ -524,10 +538,10 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
         mean = ea[i]
         v1 = vf[i]
         for j in range(m):
-            mean -= sums[2, i, j] * out_f[j] + sums[3, i, j] * out_s[j]
-            v1 -= sums[4, i, j] * out_f[j] + sums[5, i, j] * out_s[j]
-        memory = remembers(h, start, end, now[4, i], v1, True, spring) if spring.kind == FELT else 0.0
-        work_done = out_f[i] * (out_y[i] - now[0, i]) + out_s[i] * (0.5 * (now[0, i] + out_y[i]) - mean)
+            mean -= sums[OWN_MEAN, i, j] * out_f[j] + sums[OWN_MEAN_RAMP, i, j] * out_s[j]
+            v1 -= sums[OWN_RATE, i, j] * out_f[j] + sums[OWN_RATE_RAMP, i, j] * out_s[j]
+        memory = remembers(h, start, end, now[RATE, i], v1, True, spring) if spring.kind == FELT else 0.0
+        work_done = out_f[i] * (out_y[i] - now[APPROACH, i]) + out_s[i] * (0.5 * (now[APPROACH, i] + out_y[i]) - mean)
         if not fair(work_done - gained(start, end, memory, spring), start, end, spring):
             return False
     return True

@@ -36,7 +36,30 @@ from .events import (
     settle,
     strayed,
 )
-from .law import MEMORY, at, harden, meet, special_of, spring_of
+from .law import at, harden, meet, special_of, spring_of
+from .layout import (
+    A11,
+    A12,
+    A21,
+    A22,
+    APPROACH,
+    COMPRESSION,
+    ENERGY,
+    FORCE,
+    FREE_END,
+    FREE_MEAN,
+    FREE_RATE,
+    HEAD,
+    LENGTH,
+    M1,
+    M2,
+    M3,
+    MEMORY,
+    PUSH,
+    RATE,
+    SIZE,
+    START,
+)
 from .propagation import N_LANE, any_of, commit, lane_table, restore
 from .record import EXHAUSTED, FAILED, FINISHED, HORIZON, IMPACTS, SETTLED, resized, total_energy
 
@@ -142,8 +165,8 @@ def prepare(body, room, lanes, h, q, p, hint):
     bend(forms, q[first : first + count], room.bent[0])
     for i in range(count):
         n = first + i
-        drift = lanes[4, n] * (p[n] + body.twice[n] * q[n]) + h * lanes[5, n] * body.bias[n]
-        room.ends[0, i] = lanes[1, n] * q[n] / h + drift
+        drift = lanes[M1, n] * (p[n] + body.twice[n] * q[n]) + h * lanes[M2, n] * body.bias[n]
+        room.ends[0, i] = lanes[A12, n] * q[n] / h + drift
         room.pull[0, i] = 0.0
     for k in range(forms.shape[0]):
         s = 0.0
@@ -164,21 +187,21 @@ def apply_pull(body, room, lanes, h):
         n = first + i
         slope = room.pull[1, i]
         start = room.pull[0, i] - 0.5 * slope
-        room.moved[0, i] = h * (start * lanes[4, n] + slope * lanes[5, n])
-        room.moved[1, i] = start * lanes[1, n] + slope * lanes[4, n]
-        room.moved[2, i] = h * (room.pull[0, i] * lanes[5, n] + slope * lanes[6, n])
+        room.moved[0, i] = h * (start * lanes[M1, n] + slope * lanes[M2, n])
+        room.moved[1, i] = start * lanes[A12, n] + slope * lanes[M1, n]
+        room.moved[2, i] = h * (room.pull[0, i] * lanes[M2, n] + slope * lanes[M3, n])
     for c in range(body.shape.shape[0]):
-        end = room.free_end[0, c]
-        mean = room.free_end[1, c]
-        rate = room.free_end[2, c]
+        end = room.free_end[FREE_END, c]
+        mean = room.free_end[FREE_MEAN, c]
+        rate = room.free_end[FREE_RATE, c]
         for i in range(room.pull.shape[1]):
             u = body.shape[c, first + i]
             end += u * room.moved[0, i]
             mean += u * room.moved[2, i]
             rate += u * room.moved[1, i]
-        room.end[0, c] = end
-        room.end[1, c] = mean
-        room.end[2, c] = rate
+        room.end[FREE_END, c] = end
+        room.end[FREE_MEAN, c] = mean
+        room.end[FREE_RATE, c] = rate
 
 
 @inner()
@@ -203,8 +226,8 @@ def attempt(body, room, tables, all_sums, slot, h, ramp, given, offset, law, now
             mean = room.ends[0, i] + room.moved[2, i]
             for c in range(f.size):
                 u = body.shape[c, n]
-                end -= u * h * ((f[c] - 0.5 * s[c]) * lanes[4, n] + s[c] * lanes[5, n])
-                mean -= u * h * (f[c] * lanes[5, n] + s[c] * lanes[6, n])
+                end -= u * h * ((f[c] - 0.5 * s[c]) * lanes[M1, n] + s[c] * lanes[M2, n])
+                mean -= u * h * (f[c] * lanes[M2, n] + s[c] * lanes[M3, n])
             room.ends[1, i] = end
             room.ends[2, i] = mean
             room.pull[2, i] = room.pull[0, i]
@@ -304,7 +327,7 @@ def unseen(body, h, pressed, now, y, q, p):
             w = body.omega[n]
             if w * h > UNSEEN:
                 ripple += abs(body.shape[i, n]) * np.sqrt(q[n] ** 2 + (p[n] / w) ** 2)
-        if max(now[0, i], y[i]) + ripple > 0.0 and ripple > RIPPLE * (abs(now[0, i]) + abs(y[i])):
+        if max(now[APPROACH, i], y[i]) + ripple > 0.0 and ripple > RIPPLE * (abs(now[APPROACH, i]) + abs(y[i])):
             return True
     return False
 
@@ -313,7 +336,7 @@ def unseen(body, h, pressed, now, y, q, p):
 def leave_open(now, pressed, y, depth, f, s):
     """Leave out the force of an open contact that ends a step just at its onset, or the step would count as closed."""
     for i in range(y.size):
-        if not pressed[i] and y[i] <= max(depth, LOCATED * (abs(now[0, i]) + abs(y[i]))):
+        if not pressed[i] and y[i] <= max(depth, LOCATED * (abs(now[APPROACH, i]) + abs(y[i]))):
             f[i] = 0.0
             s[i] = 0.0
 
@@ -323,14 +346,14 @@ def ready(law, now, offset, fresh):
     """Bring what the contacts remember up to a fresh state, and the points at which they stand."""
     for i in range(offset.size):
         if fresh:
-            meet(law, i, now[0, i], now[4, i])
-            deeper = harden(law, i, now[0, i])
+            meet(law, i, now[APPROACH, i], now[RATE, i])
+            deeper = harden(law, i, now[APPROACH, i])
             offset[i] -= deeper
-            now[0, i] -= deeper
-        point = at(now[0, i], spring_of(law, i))
-        now[1, i] = point.compression
-        now[2, i] = point.force
-        now[3, i] = point.energy
+            now[APPROACH, i] -= deeper
+        point = at(now[APPROACH, i], spring_of(law, i))
+        now[COMPRESSION, i] = point.compression
+        now[FORCE, i] = point.force
+        now[ENERGY, i] = point.energy
 
 
 @inner()
@@ -338,12 +361,12 @@ def too_long(law, special, now, pressed, y, rate, after, h, level, still):
     """By how many halvings a step must be shorter, because contacts opened and closed again within it."""
     shorter = 0
     for i in range(y.size):
-        if pressed[i] and y[i] <= 0.0 and now[0, i] == 0.0:
-            if now[4, i] > still:
+        if pressed[i] and y[i] <= 0.0 and now[APPROACH, i] == 0.0:
+            if now[RATE, i] > still:
                 shorter = max(shorter, 3 if level == 0 else 1)
         elif dipped(now, pressed, y, rate, h, i):
             shorter = max(shorter, 1)
-        if special and pressed[i] and strayed(law, now, y, rate, after, h, i, 1.0 if now[4, i] > 0.0 else -1.0) == 2:
+        if special and pressed[i] and strayed(law, now, y, rate, after, h, i, 1.0 if now[RATE, i] > 0.0 else -1.0) == 2:
             shorter = max(shorter, 1)
     return shorter
 
@@ -382,7 +405,7 @@ def run_stretched(
     pressed = np.zeros(m, np.bool_)
     bracket = np.empty(6)
     done = np.zeros(m)
-    steps = np.zeros((64, 3 + 6 * m))
+    steps = np.zeros((64, HEAD + 6 * m))
     kept_q = q.copy()
     kept_p = p.copy()
     n_steps = ZERO
@@ -428,14 +451,14 @@ def run_stretched(
             apart = not any_of(pressed)
             if apart and not flying:
                 restore(q, p, kept_q, kept_p)
-                restore(now[0], now[4], kept_now[0], kept_now[4])
+                restore(now[APPROACH], now[RATE], kept_now[APPROACH], kept_now[RATE])
                 n_kept = n_steps
                 kept_time = time
             flying = apart
             if apart and parted(body, offset, depth, still, q, p):
                 status = FINISHED
                 restore(kept_q, kept_p, q, p)
-                restore(kept_now[0], kept_now[4], now[0], now[4])
+                restore(kept_now[APPROACH], kept_now[RATE], now[APPROACH], now[RATE])
                 n_steps = n_kept
                 time = kept_time
                 break
@@ -495,7 +518,7 @@ def run_stretched(
             tries += 1
             if guess != 0.0 and tries < LOCATE_LIMIT:
                 continue
-            if not abs(y[target]) <= 1e-9 * bracket[2]:
+            if not abs(y[target]) <= 1e-9 * bracket[SIZE]:
                 if h < 1e-3 * base:
                     seeking = NOTHING
                     events = EVENT_LIMIT + 1
@@ -576,8 +599,8 @@ def part_way(body, room, length, h, lanes, f, s, out_q, out_p):
         for c in range(f.size):
             start -= body.shape[c, n] * (f[c] - 0.5 * s[c])
             slope -= body.shape[c, n] * s[c] * length / h
-        out_q[n] = lanes[0, n] * q0 + lanes[1, n] * p0 + length * (start * lanes[4, n] + slope * lanes[5, n])
-        out_p[n] = lanes[2, n] * q0 + lanes[3, n] * p0 + start * lanes[1, n] + slope * lanes[4, n]
+        out_q[n] = lanes[A11, n] * q0 + lanes[A12, n] * p0 + length * (start * lanes[M1, n] + slope * lanes[M2, n])
+        out_p[n] = lanes[A21, n] * q0 + lanes[A22, n] * p0 + start * lanes[A12, n] + slope * lanes[M1, n]
 
 
 @outer()
@@ -621,16 +644,19 @@ def replay_stretched(
             f[:] = 0.0
             s[:] = 0.0
         else:
-            whole = steps[j, 1]
-            until = steps[j + 1, 0] if j + 1 < n_steps else steps[j, 0] + whole
+            whole = steps[j, LENGTH]
+            until = steps[j + 1, START] if j + 1 < n_steps else steps[j, START] + whole
             h = whole * 0.5**halved
             ends = time + h
             if halved == 0 or ends > until - 0.5 * h:
                 ends = until
                 h = min(whole, until - time)
             for i in range(m):
-                s[i] = steps[j, 7 + 5 * i] * h / whole
-                f[i] = steps[j, 6 + 5 * i] + steps[j, 7 + 5 * i] * (time - steps[j, 0] + 0.5 * h) / whole
+                s[i] = steps[j, HEAD + PUSH + 1 + 5 * i] * h / whole
+                f[i] = (
+                    steps[j, HEAD + PUSH + 5 * i]
+                    + steps[j, HEAD + PUSH + 1 + 5 * i] * (time - steps[j, START] + 0.5 * h) / whole
+                )
         if h != known:
             lane_table(omega, zeta, h, WHOLE, tables[0])
             known = h

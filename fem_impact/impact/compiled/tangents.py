@@ -17,8 +17,9 @@ import numpy as np
 
 from .build import LOOSE, WHOLE, inner, outer
 from .law import at, power, spring_of, steepness
+from .layout import A12, A22, M1, M2, M3
 from .one_mode import mode_moments
-from .propagation import N_LANE, lane_table
+from .propagation import N_LANE, any_of, lane_table, product, restore
 
 N_LAW = 8  # numbers of a law that may change, in the order of `law.spring_of`
 SLOTS = 12  # [-] lengths of pieces whose tables are kept
@@ -76,6 +77,25 @@ class Found(NamedTuple):
     dp: np.ndarray  # (n, n_modes)
 
 
+class Grown(NamedTuple):
+    """The rows of a `Change` that each parameter makes, and where they are not zero."""
+
+    rows: np.ndarray  # (n, 4, n_modes) of omega, zeta, shape and bias
+    seen: np.ndarray  # (n, 3, n_modes) the first three times the shape
+    spans: np.ndarray  # (n, 4, 2) first index of a row that is not zero, and one after the last; both zero for none
+
+
+class Table(NamedTuple):
+    """Coefficients of a piece of one length; a force polynomial is that of `Pieces.powers`."""
+
+    free: np.ndarray  # (s + 1, 12, n_modes) a11, a12, a21, a22 up to each node, their changes per omega and per zeta
+    forced: np.ndarray  # (6, s, n_modes) displacement and velocity at the end per unit force, and their changes
+    inner: np.ndarray  # (2, s, s) approach and its rate at a node per force polynomial
+    lean: np.ndarray  # (2, s) the same by the bias
+    pushed: np.ndarray  # (n, 2, s, s) changes of minus `inner` per parameter
+    leaned: np.ndarray  # (n, 2, s) changes of `lean`
+
+
 @inner()
 def law_slopes(d, v, law, out_slopes):
     """Force of contact 0 and its slopes in approach and rate; in out_slopes (N_LAW,) those in its numbers."""
@@ -112,12 +132,12 @@ def moments_of(omega, zeta, t, out_moments):
         lane_table(omega, zeta, t, WHOLE, lanes)
         part = 1.0 / t
         for n in range(omega.size):
-            out_moments[0, n] = lanes[3, n]
-            out_moments[1, n] = part * lanes[1, n]
-            out_moments[2, n] = part * lanes[4, n]
-            out_moments[3, n] = part * lanes[5, n]
+            out_moments[0, n] = lanes[A22, n]
+            out_moments[1, n] = part * lanes[A12, n]
+            out_moments[2, n] = part * lanes[M1, n]
+            out_moments[3, n] = part * lanes[M2, n]
         for n in range(omega.size):
-            third = part * (lanes[6, n] + 0.5 * lanes[5, n])
+            third = part * (lanes[M3, n] + 0.5 * lanes[M2, n])
             if count > 2:
                 out_moments[4, n] = third
             if (
@@ -141,24 +161,30 @@ def moments_of(omega, zeta, t, out_moments):
 def moment_slopes(omega, zeta, t, moments, out_faster, out_damped):
     """Changes of all moments but the last per unit of omega and of zeta, (count + 1, n_modes) each."""
     rows = out_faster.shape[0]
+    per = np.empty(omega.size)
+    own = np.empty(omega.size)
+    n_critical = 0
     for n in range(omega.size):
-        w, z = omega[n], zeta[n]
-        th = w * t
-        per = 1.0 / w if w > 0.0 else 0.0
-        rest = (1.0 - z) * (1.0 + z)
-        own = (1.0 / rest if abs(rest) > CRITICAL else 0.0) if w > 0.0 else 0.0
-        bend = -2.0 * z * th * moments[0, n] - th * th * moments[1, n]  # t**2 g''
-        out_faster[0, n] = per * bend
-        out_damped[0, n] = own * (-z * bend - th * (moments[0, n] + moments[1, n]))
+        rest = (1.0 - zeta[n]) * (1.0 + zeta[n])
+        near = abs(rest) <= CRITICAL
+        per[n] = 1.0 / omega[n] if omega[n] > 0.0 else 0.0
+        own[n] = 1.0 / rest if omega[n] > 0.0 and not near else 0.0
+        n_critical += 1 if omega[n] > 0.0 and near else 0
+    for n in range(omega.size):
+        th = omega[n] * t
+        out_faster[0, n] = -per[n] * th * (2.0 * zeta[n] * moments[0, n] + th * moments[1, n])  # t**2 g'' / omega
+    for n in range(omega.size):
+        bend = omega[n] * out_faster[0, n]
+        out_damped[0, n] = -own[n] * (zeta[n] * bend + omega[n] * t * (moments[0, n] + moments[1, n]))
     for k in range(rows - 1):
         for n in range(omega.size):
-            w, z = omega[n], zeta[n]
-            rest = (1.0 - z) * (1.0 + z)
-            per = 1.0 / w if w > 0.0 else 0.0
-            own = (1.0 / rest if abs(rest) > CRITICAL else 0.0) if w > 0.0 else 0.0
+            out_faster[k + 1, n] = per[n] * (moments[k, n] - (k + 1.0) * moments[k + 1, n])
+        for n in range(omega.size):
             fall = moments[k, n] - (k + 1.0) * moments[k + 1, n]
-            out_faster[k + 1, n] = per * fall
-            out_damped[k + 1, n] = -own * (z * fall + w * t * (moments[k + 1, n] - k * moments[k + 2, n]))
+            next_fall = moments[k + 1, n] - k * moments[k + 2, n]
+            out_damped[k + 1, n] = -own[n] * (zeta[n] * fall + omega[n] * t * next_fall)
+    if n_critical == 0:
+        return
     near = np.empty(rows)
     work = np.empty((2, rows))
     for n in range(omega.size):
@@ -172,112 +198,176 @@ def moment_slopes(omega, zeta, t, moments, out_faster, out_damped):
                     out_damped[k + 1, n] += side * near[k] / (2.0 * CRITICAL)
 
 
-@inner(allocates=True)
-def tangent_table(omega, zeta, shape, h, nodes, powers, out_free, out_forced, out_inner):
-    """Coefficients of one piece of length h.
-
-    out_free (s + 1, 12, n_modes): a11, a12, a21, a22 up to each node, and their changes per omega and per zeta;
-    out_forced (s + 1, 6, s, n_modes): displacement and velocity per unit force of each polynomial, and their changes;
-    out_inner (2, s, s): approach and its rate at a node per force polynomial, summed over the modes.
+@inner(fastmath=LOOSE)
+def free_slopes(omega, zeta, t, moments, faster, damped, out_free):
+    """Free motion over t and its changes, the rows of ``free`` in `tangent_table`; one loop for each, so as to run in
+    parallel lanes.
     """
+    first, first_faster, first_damped = moments[1], faster[1], damped[1]
+    for n in range(omega.size):
+        out_free[0, n] = moments[0, n] + 2.0 * zeta[n] * omega[n] * t * first[n]
+    for n in range(omega.size):
+        out_free[1, n] = t * first[n]
+    for n in range(omega.size):
+        out_free[2, n] = -omega[n] * omega[n] * t * first[n]
+    for n in range(omega.size):
+        out_free[3, n] = moments[0, n]
+    for n in range(omega.size):
+        out_free[4, n] = faster[0, n] + 2.0 * zeta[n] * t * (omega[n] * first_faster[n] + first[n])
+    for n in range(omega.size):
+        out_free[5, n] = t * first_faster[n]
+    for n in range(omega.size):
+        out_free[6, n] = -omega[n] * t * (omega[n] * first_faster[n] + 2.0 * first[n])
+    for n in range(omega.size):
+        out_free[7, n] = faster[0, n]
+    for n in range(omega.size):
+        out_free[8, n] = damped[0, n] + 2.0 * omega[n] * t * (zeta[n] * first_damped[n] + first[n])
+    for n in range(omega.size):
+        out_free[9, n] = t * first_damped[n]
+    for n in range(omega.size):
+        out_free[10, n] = -omega[n] * omega[n] * t * first_damped[n]
+    for n in range(omega.size):
+        out_free[11, n] = damped[0, n]
+
+
+@inner(allocates=True)
+def tangent_table(blow, grown, leans, h, nodes, powers, out):
+    """Coefficients of one piece of length h in ``out``, a `Table`."""
     s = nodes.size - 1
-    n_modes = omega.size
-    moments = np.empty((s + 3, n_modes))
-    faster = np.empty((s + 2, n_modes))
-    damped = np.empty((s + 2, n_modes))
+    omega, zeta = blow.omega, blow.zeta
+    moments = np.empty((s + 3, omega.size))
+    faster = np.empty((s + 2, omega.size))
+    damped = np.empty((s + 2, omega.size))
+    weights = np.empty(s)
     for a in range(s + 1):
         c = nodes[a]
         t = c * h
         moments_of(omega, zeta, t, moments)
         moment_slopes(omega, zeta, t, moments, faster, damped)
-        free = out_free[a]
-        for n in range(n_modes):
-            w, z = omega[n], zeta[n]
-            a12, a22 = t * moments[1, n], moments[0, n]
-            free[0, n] = a22 + 2.0 * z * w * a12
-            free[1, n] = a12
-            free[2, n] = -w * w * a12
-            free[3, n] = a22
-            d12 = t * faster[1, n]
-            free[4, n] = faster[0, n] + 2.0 * z * (w * d12 + a12)
-            free[5, n] = d12
-            free[6, n] = -w * (w * d12 + 2.0 * a12)
-            free[7, n] = faster[0, n]
-            d12 = t * damped[1, n]
-            free[8, n] = damped[0, n] + 2.0 * w * (z * d12 + a12)
-            free[9, n] = d12
-            free[10, n] = -w * w * d12
-            free[11, n] = damped[0, n]
+        free_slopes(omega, zeta, t, moments, faster, damped, out.free[a])
         for b in range(s):
-            forced = out_forced[a, :, b]
-            for n in range(n_modes):
-                for r in range(6):
-                    forced[r, n] = 0.0
             scale = t
             for k in range(s):
-                part = powers[b, k] * scale
-                more = t * part
-                for n in range(n_modes):
-                    forced[0, n] += more * moments[k + 2, n]
-                    forced[1, n] += part * moments[k + 1, n]
-                    forced[2, n] += more * faster[k + 2, n]
-                    forced[3, n] += part * faster[k + 1, n]
-                    forced[4, n] += more * damped[k + 2, n]
-                    forced[5, n] += part * damped[k + 1, n]
+                weights[k] = powers[b, k] * scale
                 scale *= (k + 1.0) * c
+            forced = out.forced[:, b]
+            add_up(moments[1:], weights, forced[1])
+            add_up(faster[1:], weights, forced[3])
+            add_up(damped[1:], weights, forced[5])
+            for k in range(s):
+                weights[k] *= t
+            add_up(moments[2:], weights, forced[0])
+            add_up(faster[2:], weights, forced[2])
+            add_up(damped[2:], weights, forced[4])
             if a < s:
-                out_inner[0, a, b] = seen_twice(shape, forced[0])
-                out_inner[1, a, b] = seen_twice(shape, forced[1])
+                see_forced(blow, grown, forced, a, b, out)
+            if a < s and leans:
+                see_steady(blow, grown, forced, a, b, out)
 
 
 @inner(fastmath=LOOSE)
-def seen_twice(shape, response):
-    """Sum of the squared shapes times a response of every mode."""
+def see_forced(blow, grown, forced, a, b, out):
+    """Enter what node a sees of the force polynomial b, whose responses (6, n_modes) are given, in a `Table`."""
+    shape = blow.shape
+    for k in range(2):
+        out.inner[k, a, b] = seen_thrice(shape, shape, forced[k])
+        for i in range(grown.rows.shape[0]):
+            total = 0.0
+            for r in range(3):
+                lo, hi = grown.spans[i, r, 0], grown.spans[i, r, 1]
+                if hi > 0 and r < 2:
+                    total += seen_thrice(grown.seen[i, r, lo:hi], shape[lo:hi], forced[2 + 2 * r + k, lo:hi])
+                elif hi > 0:
+                    total += 2.0 * product(grown.seen[i, r, lo:hi], forced[k, lo:hi])
+            out.pushed[i, k, a, b] = total
+
+
+@inner(fastmath=LOOSE)
+def see_steady(blow, grown, forced, a, b, out):
+    """Enter what node a sees of the bias by the force polynomial b, as `see_forced` does for the force."""
+    shape, bias = blow.shape, blow.bias
+    for k in range(2):
+        first = 0 if b == 0 else 1
+        out.lean[k, a] = first * out.lean[k, a] + seen_thrice(shape, bias, forced[k])
+        for i in range(grown.rows.shape[0]):
+            rows = grown.rows[i]
+            total = seen_thrice(bias, rows[2], forced[k]) + seen_thrice(shape, rows[3], forced[k])
+            for r in range(2):
+                total += seen_thrice(grown.seen[i, r], bias, forced[2 + 2 * r + k])
+            out.leaned[i, k, a] = first * out.leaned[i, k, a] + total
+
+
+@inner(fastmath=LOOSE)
+def add_up(rows, weights, out):
+    """Sum of weighted rows (s or more, n) in out (n,), s from 3 on; three at once, so as to run in parallel lanes."""
+    x, y, z = rows[0], rows[1], rows[2]
+    a, b, c = weights[0], weights[1], weights[2]
+    for n in range(out.size):
+        out[n] = a * x[n] + b * y[n] + c * z[n]
+    for k in range(3, weights.size):
+        x = rows[k]
+        a = weights[k]
+        for n in range(out.size):
+            out[n] += a * x[n]
+
+
+@inner(fastmath=LOOSE)
+def seen_thrice(one, two, three):
+    """Sum of the products of three rows (n,)."""
     total = 0.0
-    for n in range(shape.size):
-        total += shape[n] * shape[n] * response[n]
+    for n in range(one.size):
+        total += one[n] * two[n] * three[n]
     return total
 
 
 @inner(fastmath=LOOSE)
-def carry(blow, free, forced, force, q, p, out):
-    """State of every mode at a node, and what changes it; ``free`` and ``forced`` are the node's parts of the table.
-
-    Rows of out (10, n_modes): q and p; their changes per omega, per zeta, per shape and per bias.
-    """
-    bias, shape = blow.bias, blow.shape
-    for n in range(q.size):
-        x, v = q[n], p[n]
-        out[0, n] = free[0, n] * x + free[1, n] * v
-        out[1, n] = free[2, n] * x + free[3, n] * v
-        out[2, n] = free[4, n] * x + free[5, n] * v
-        out[3, n] = free[6, n] * x + free[7, n] * v
-        out[4, n] = free[8, n] * x + free[9, n] * v
-        out[5, n] = free[10, n] * x + free[11, n] * v
-        out[6, n] = 0.0
-        out[7, n] = 0.0
-        out[8, n] = 0.0
-        out[9, n] = 0.0
-    for b in range(force.size):
-        f = force[b]
+def move_on(free, q, p, out):
+    """Free motion of every mode to a node and its changes, rows of out (6, n_modes)."""
+    for r in range(6):
+        by_q, by_p, row = free[2 * r], free[2 * r + 1], out[r]
         for n in range(q.size):
-            pushed = bias[n] - shape[n] * f
-            x, v = forced[0, b, n], forced[1, b, n]
-            out[0, n] += x * pushed
-            out[1, n] += v * pushed
-            out[2, n] += forced[2, b, n] * pushed
-            out[3, n] += forced[3, b, n] * pushed
-            out[4, n] += forced[4, b, n] * pushed
-            out[5, n] += forced[5, b, n] * pushed
-            out[6, n] -= x * f
-            out[7, n] -= v * f
-            out[8, n] += x
-            out[9, n] += v
+            row[n] = by_q[n] * q[n] + by_p[n] * p[n]
 
 
 @inner(fastmath=LOOSE)
-def along(shape, free, out, row_of, acts, dq, dp):
-    """Change of the approach and of its rate at a node if the force did not change; ``row_of`` are the changes."""
+def glide_to(free, free_also, q, p, shape, response, out):
+    """Free motion of every mode, less its shape times a response, in out."""
+    for n in range(out.size):
+        out[n] = free[n] * q[n] + free_also[n] * p[n] - shape[n] * response[n]
+
+
+@inner(fastmath=LOOSE)
+def carry(blow, free, forced, force, leans, q, p, work, out):
+    """State of every mode at a node, and what changes it; ``free`` and ``forced`` are the node's parts of the table.
+
+    Rows of out (10, n_modes): q and p; their changes per omega, per zeta, per shape and per bias; the last are made
+    only if there is a bias or a change of one, which ``leans`` says. work (n_modes,) is room.
+    """
+    bias, shape = blow.bias, blow.shape
+    for r in range(6):
+        response = out[6 + r] if r < 2 else work
+        add_up(forced[r], force, response)
+        glide_to(free[2 * r], free[2 * r + 1], q, p, shape, response, out[r])
+    for r in range(6, 8):
+        for n in range(q.size):
+            out[r, n] = -out[r, n]
+    if leans:
+        for r in range(6):
+            steady = out[8 + r] if r < 2 else work
+            for n in range(q.size):
+                steady[n] = 0.0
+            for b in range(force.size):
+                for n in range(q.size):
+                    steady[n] += forced[r, b, n]
+            for n in range(q.size):
+                out[r, n] += bias[n] * steady[n]
+
+
+@inner(fastmath=LOOSE)
+def along(shape, free, out, grown, i, dq, dp):
+    """Change of the approach and of its rate at a node with parameter i by the free motion, of which ``out`` are the
+    rows of `move_on`.
+    """
     d = 0.0
     v = 0.0
     f11, f12, f21, f22 = free[0], free[1], free[2], free[3]
@@ -285,46 +375,46 @@ def along(shape, free, out, row_of, acts, dq, dp):
         u, x, y = shape[n], dq[n], dp[n]
         d += u * (f11[n] * x + f12[n] * y)
         v += u * (f21[n] * x + f22[n] * y)
-    for r in range(4):
-        if acts[r]:
-            row, by_d, by_v = row_of[r], out[2 + 2 * r], out[3 + 2 * r]
-            for n in range(dq.size):
-                part = shape[n] * row[n]
-                d += part * by_d[n]
-                v += part * by_v[n]
-    if acts[2]:
-        row, q, p = row_of[2], out[0], out[1]
-        for n in range(dq.size):
-            d += row[n] * q[n]
-            v += row[n] * p[n]
+    for r in range(3):
+        a, b = grown.spans[i, r, 0], grown.spans[i, r, 1]
+        if b > 0:
+            row = grown.seen[i, r, a:b] if r < 2 else grown.rows[i, r, a:b]
+            k = 2 + 2 * r if r < 2 else 0
+            by_d, by_v = seen(row, out[k, a:b], out[k + 1, a:b])
+            d += by_d
+            v += by_v
     return d, v
 
 
 @inner(fastmath=LOOSE)
-def lead(free, out, row_of, acts, dq, dp):
-    """Carry the change of the state to a node in place if the force did not change."""
-    f11, f12, f21, f22 = free[0], free[1], free[2], free[3]
-    for n in range(dq.size):
-        x, v = dq[n], dp[n]
-        dq[n] = f11[n] * x + f12[n] * v
-        dp[n] = f21[n] * x + f22[n] * v
-    for r in range(4):
-        if acts[r]:
-            row, by_q, by_p = row_of[r], out[2 + 2 * r], out[3 + 2 * r]
-            for n in range(dq.size):
-                dq[n] += row[n] * by_q[n]
-                dp[n] += row[n] * by_p[n]
+def lead(by_q, by_p, shape, forced, df, dq, dp, out):
+    """Change of the displacements or velocities by the changes of state and force, s of them, three at once."""
+    x, y, z = forced[0], forced[1], forced[2]
+    a, b, c = df[0], df[1], df[2]
+    for n in range(out.size):
+        out[n] = by_q[n] * dq[n] + by_p[n] * dp[n] - shape[n] * (a * x[n] + b * y[n] + c * z[n])
+    for k in range(3, df.size):
+        x = forced[k]
+        a = df[k]
+        for n in range(out.size):
+            out[n] -= shape[n] * a * x[n]
 
 
 @inner(fastmath=LOOSE)
-def push_on(shape, forced, df, dq, dp):
-    """Add what the change of the force does to the change of the state at the end of a piece."""
-    for b in range(df.size):
-        f = df[b]
-        x, v = forced[0, b], forced[1, b]
-        for n in range(dq.size):
-            dq[n] -= shape[n] * f * x[n]
-            dp[n] -= shape[n] * f * v[n]
+def add_grown(row_of, spans, out, dq, dp):
+    """Add what changes of the blow's numbers change in a state, with the rows that `carry` gives."""
+    for r in range(4):
+        a, b = spans[r, 0], spans[r, 1]
+        if b > 0:
+            add_times(row_of[r, a:b], out[2 + 2 * r, a:b], dq[a:b])
+            add_times(row_of[r, a:b], out[3 + 2 * r, a:b], dp[a:b])
+
+
+@inner(fastmath=LOOSE)
+def add_times(one, other, out):
+    """Add the products of two rows to a third, all (n,)."""
+    for n in range(out.size):
+        out[n] += one[n] * other[n]
 
 
 @inner(fastmath=LOOSE)
@@ -412,43 +502,89 @@ def law_at(d, v, law, out_slopes):
 
 
 @inner()
-def any_in(values):
-    """Whether any of some values is not zero."""
-    found = False
+def span(values, out_span):
+    """First of some values that is not zero, and one after the last; both zero without any."""
+    out_span[0] = 0
+    out_span[1] = 0
     for n in range(values.size):
-        found = found or values[n] != 0.0
-    return found
+        if values[n] != 0.0:
+            out_span[0] = n if out_span[1] == 0 else out_span[0]
+            out_span[1] = n + 1
+
+
+@inner()
+def enter(shape, change, out_grown, dq, dp):
+    """Rows that every parameter changes, and its change of the state at the start."""
+    for i in range(dq.shape[0]):
+        for k in range(dq.shape[1]):
+            out_grown.rows[i, 0, k] = change.omega[i, k]
+            out_grown.rows[i, 1, k] = change.zeta[i, k]
+            out_grown.rows[i, 2, k] = change.shape[i, k]
+            out_grown.rows[i, 3, k] = change.bias[i, k]
+            dq[i, k] = change.start_q[i, k]
+            dp[i, k] = change.start_p[i, k]
+        for r in range(4):
+            span(out_grown.rows[i, r], out_grown.spans[i, r])
+        for r in range(3):
+            for k in range(dq.shape[1]):
+                out_grown.seen[i, r, k] = shape[k] * out_grown.rows[i, r, k]
+
+
+@inner(allocates=True)
+def solve_forces(blow, change, grown, table, force, q, p, dq, dp, work, out_force):
+    """Change of the force at the inner nodes of a closed piece, (s, n), from the state at its start."""
+    n, s = dq.shape[0], force.size
+    matrix = np.empty((s, s))
+    slopes = np.empty(N_LAW)
+    for a in range(s):
+        move_on(table.free[a], q, p, work)
+        d, v = seen(blow.shape, work[0], work[1])
+        d += table.lean[0, a]
+        v += table.lean[1, a]
+        for b in range(s):
+            d -= force[b] * table.inner[0, a, b]
+            v -= force[b] * table.inner[1, a, b]
+        _, by_d, by_v = law_slopes(blow.offset + d, v, blow.law, slopes)
+        for b in range(s):
+            matrix[a, b] = by_d * table.inner[0, a, b] + by_v * table.inner[1, a, b]
+        matrix[a, a] += 1.0
+        for i in range(n):
+            dd, dv = along(blow.shape, table.free[a], work, grown, i, dq[i], dp[i])
+            dd += table.leaned[i, 0, a] + change.offset[i]
+            dv += table.leaned[i, 1, a]
+            for b in range(s):
+                dd -= force[b] * table.pushed[i, 0, a, b]
+                dv -= force[b] * table.pushed[i, 1, a, b]
+            df = by_d * dd + by_v * dv
+            for k in range(N_LAW):
+                df += slopes[k] * change.law[i, k]
+            out_force[a, i] = df
+    solve_many(matrix, out_force)
 
 
 @outer()
 def follow(blow, change, pieces, found):
     """Follow a recorded blow and its changes through all pieces; writes into every array of ``found``."""
     n_modes, n, s = blow.omega.size, change.offset.size, pieces.force.shape[1]
-    nodes, powers, shape = pieces.nodes, pieces.powers, blow.shape
-    dq, dp = found.dq, found.dp
-    rows = np.empty((n, 4, n_modes))
-    acts = np.zeros((n, 4), np.bool_)
+    shape = blow.shape
+    grown = Grown(np.empty((n, 4, n_modes)), np.empty((n, 3, n_modes)), np.zeros((n, 4, 2), np.int64))
+    dq, next_dq = np.empty((n, n_modes)), np.empty((n, n_modes))
+    dp, next_dp = np.empty((n, n_modes)), np.empty((n, n_modes))
+    enter(shape, change, grown, dq, dp)
+    leans = any_of(blow.bias) or any_of(grown.spans[:, 3, 1])
     q = blow.start_q.copy()
     p = blow.start_p.copy()
-    for i in range(n):
-        for k in range(n_modes):
-            rows[i, 0, k] = change.omega[i, k]
-            rows[i, 1, k] = change.zeta[i, k]
-            rows[i, 2, k] = change.shape[i, k]
-            rows[i, 3, k] = change.bias[i, k]
-            dq[i, k] = change.start_q[i, k]
-            dp[i, k] = change.start_p[i, k]
-        for r in range(4):
-            acts[i, r] = any_in(rows[i, r])
     known = np.zeros(SLOTS)
     last = np.zeros(SLOTS, np.int64)
-    all_free = np.empty((SLOTS, s + 1, 12, n_modes))
-    all_forced = np.empty((SLOTS, s + 1, 6, s, n_modes))
-    all_inner = np.empty((SLOTS, 2, s, s))
-    out = np.empty((10, n_modes))
-    matrix = np.empty((s, s))
-    slopes = np.empty(N_LAW)
-    column = np.empty(s)
+    free = np.empty((SLOTS, s + 1, 12, n_modes))
+    forced = np.empty((SLOTS, 6, s, n_modes))
+    inner_sums = np.empty((SLOTS, 2, s, s))
+    lean = np.zeros((SLOTS, 2, s))
+    pushed = np.empty((SLOTS, n, 2, s, s))
+    leaned = np.zeros((SLOTS, n, 2, s))
+    out = np.zeros((10, n_modes))
+    work = np.empty(n_modes)
+    column = np.zeros(s)
     for j in range(pieces.length.size + 1):
         d, v = seen(shape, q, p)
         found.way[j, 0] = blow.offset + d
@@ -456,9 +592,7 @@ def follow(blow, change, pieces, found):
         mark = pieces.mark[j]
         if mark >= 0:
             look(blow, change, q, p, dq, dp, found.base[mark], found.ends[mark])
-            for k in range(n_modes):
-                found.q[mark, k] = q[k]
-                found.p[mark, k] = p[k]
+            restore(q, p, found.q[mark], found.p[mark])
         if j == pieces.length.size:
             break
         h, force = pieces.length[j], pieces.force[j]
@@ -469,34 +603,23 @@ def follow(blow, change, pieces, found):
                 break
             if last[k] < last[slot]:
                 slot = k
-        free, forced, inner_sums = all_free[slot], all_forced[slot], all_inner[slot]
+        table = Table(free[slot], forced[slot], inner_sums[slot], lean[slot], pushed[slot], leaned[slot])
         if known[slot] != h:
-            tangent_table(blow.omega, blow.zeta, shape, h, nodes, powers, free, forced, inner_sums)
+            tangent_table(blow, grown, leans, h, pieces.nodes, pieces.powers, table)
             known[slot] = h
         last[slot] = j + 1
         right = found.force[j]
         if pieces.closed[j]:
-            for a in range(s):
-                carry(blow, free[a], forced[a], force, q, p, out)
-                d, v = seen(shape, out[0], out[1])
-                _, by_d, by_v = law_slopes(blow.offset + d, v, blow.law, slopes)
-                for b in range(s):
-                    matrix[a, b] = by_d * inner_sums[0, a, b] + by_v * inner_sums[1, a, b]
-                matrix[a, a] += 1.0
-                for i in range(n):
-                    dd, dv = along(shape, free[a], out, rows[i], acts[i], dq[i], dp[i])
-                    df = by_d * (dd + change.offset[i]) + by_v * dv
-                    for k in range(N_LAW):
-                        df += slopes[k] * change.law[i, k]
-                    right[a, i] = df
-            solve_many(matrix, right)
-        carry(blow, free[s], forced[s], force, q, p, out)
+            solve_forces(blow, change, grown, table, force, q, p, dq, dp, out, right)
+        carry(blow, table.free[s], table.forced, force, leans, q, p, work, out)
         for i in range(n):
-            lead(free[s], out, rows[i], acts[i], dq[i], dp[i])
-            if pieces.closed[j]:
-                for b in range(s):
-                    column[b] = right[b, i]
-                push_on(shape, forced[s], column, dq[i], dp[i])
-        for k in range(n_modes):
-            q[k] = out[0, k]
-            p[k] = out[1, k]
+            for b in range(s):
+                column[b] = right[b, i]
+            lead(table.free[s, 0], table.free[s, 1], shape, table.forced[0], column, dq[i], dp[i], next_dq[i])
+            lead(table.free[s, 2], table.free[s, 3], shape, table.forced[1], column, dq[i], dp[i], next_dp[i])
+            add_grown(grown.rows[i], grown.spans[i], out, next_dq[i], next_dp[i])
+        dq, next_dq = next_dq, dq
+        dp, next_dp = next_dp, dp
+        restore(out[0], out[1], q, p)
+    for i in range(n):
+        restore(dq[i], dp[i], found.dq[i], found.dp[i])

@@ -148,12 +148,13 @@
     line: { color: colour("grey"), width: 2 }, hoverinfo: "skip",
   });
   const solid = {
-    "plot-wave": (was) => [[surface(down(wave[instant]), largest, "m"), striker(), atRest()], stage(1.8 * largest, was)],
+    "plot-wave": (was) => [[surface(down(wave[instant]), largest, "m"), atRest(), ...(view.gap ? [striker()] : [])], stage(1.8 * largest, was)],
     "plot-mode": (was) => [[surface(shapes[picked].map((v) => phase * v), 1, ""), atRest()], stage(1.8, was)],
   };
 
   const draw = () => {
     for (const [id, make] of Object.entries(flat)) {
+      if (!$(id)) continue;   // a sequence has no striker whose energy is drawn
       const [traces, what] = make();
       $(id).querySelector(":scope > svg")?.remove();
       Plotly.react(id, traces, what, config);
@@ -180,8 +181,9 @@
     $("wave-time").setAttribute("aria-valuetext", text);
     $("wave-out").textContent = text;
     if (!canTurn) return;
-    const z = down(wave[n]), tip = striker();
-    Plotly.restyle("plot-wave", { z: [z, tip.z], intensity: [z, undefined] }, [0, 1]);
+    const z = down(wave[n]);
+    Plotly.restyle("plot-wave", { z: [z], intensity: [z] }, [0]);
+    if (view.gap) Plotly.restyle("plot-wave", { z: [striker().z] }, [2]);
   };
   const setMode = () => {
     if (!canTurn) return;

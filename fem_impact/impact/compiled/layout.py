@@ -1,0 +1,30 @@
+"""What the rows and columns of the arrays mean that the kernels share."""
+
+# columns of a law (n_contacts, 9), see `law.spring_of`; 5 to 7 by kind
+STIFFNESS, EXPONENT, LOSS, COMPLIANCE, KIND = range(5)
+DEPTH, HARD, HARD_EXPONENT = range(5, 8)  # of layers
+FIRST_YIELD = 5  # of a plastic one
+SHARE, RELAXATION = range(5, 7)  # of felt
+MEMORY, WIDTH = 8, 9  # a law of four columns is a power law
+
+# rows of where every contact stands (6, n_contacts)
+APPROACH, COMPRESSION, FORCE, ENERGY, RATE, REMEMBERED = range(6)
+
+# rows of where every contact would end if nothing pushed in the step (3, n_contacts), see `schemes.Free`
+FREE_END, FREE_MEAN, FREE_RATE = range(3)
+
+# rows of what unit forces take from that (6, n_contacts, n_contacts), see `schemes.Own`
+OWN_END, OWN_END_RAMP, OWN_MEAN, OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP = range(6)
+
+# rows of a step of every mode (7, n_modes), see `propagation.lane_table`
+A11, A12, A21, A22, M1, M2, M3 = range(7)
+
+# columns of a recorded step (n_steps, HEAD + ...), and from the first of a contact's on; see `record`
+START, LENGTH, BLIND, HEAD = range(4)
+SPEED, CLOSED, PUSH = range(1, 4)
+
+# where a crossing lies: two lengths about it, the size of the values there, and length, value and slope of a try
+LOW, HIGH, SIZE, TRIED, MISSED, SLOPE = range(6)
+
+# columns of the bounds of a flight (n_contacts, 6), see `flight.motion_bounds`
+RIGID, RIGID_RATE, RIGID_ACCELERATION, REACH, FASTEST, HARDEST = range(6)

@@ -1,0 +1,244 @@
+"""The air around a plate without a baffle: how the pressure jumps across it as each mode vibrates.
+
+Without a wall the air flows around the edge, and the plate is a sheet of dipoles. Their strength is the jump m of the
+pressure from the back to the front, which is zero at the edge. For an acceleration a of frequency omega = k c it solves
+
+    double integral of G (grad m . grad s - k**2 m s) = rho integral of a s   for all s that are zero at the edge,
+
+with G = exp(i k R) / (4 pi R). On a square lattice both integrals are convolutions (fast Fourier transforms), and the
+inverse of the whole lattice's operator makes a few iterations enough. Cells at the edge are cut by it: counting those
+whose centre lies on the plate makes it too large, since m vanishes only at the next centre; leaving these out makes it
+too small. At rest (k = 0) both are proper bounds of the energy in the air, up to the lattice's own error.
+
+References
+----------
+Nedelec (2001), Acoustic and Electromagnetic Equations, section 3.4 (the variational form); Lamb (1932), Hydrodynamics,
+section 102 (a disk, whose jump is 4 rho a sqrt(radius**2 - r**2) / pi at rest).
+"""
+
+import logging
+from collections.abc import Iterator
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.fft import fft2, ifft2, next_fast_len
+from scipy.ndimage import binary_erosion
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from .._base.check import SimulationError
+from ..mesh.meshes import measure
+from .air import mean_inverse_distance
+from .modal import Modes, Shapes
+
+LOG = logging.getLogger(__name__)
+PER_WAVE = 8.0  # [-] cells per wavelength, both of the mode and of its sound
+ACROSS = 48.0, 64.0, 96.0, 128.0  # [-] cells across a square as large as the plate, in the lattices to choose of
+RESIDUAL = 3e-3  # [-] relative, of the solved equations: far below LEAST
+DIRECTIONS = 12  # [-] over the half space in front, in which the two lattices are compared besides the listener's
+DOUBT = 2.5  # [-] half width of an estimate over half the difference of the two lattices; test_free_air.py
+LEAST = 0.1  # [-] the half width is at least this part of the mode's sound in the mean of all directions
+NEAREST = 2.0  # [-] cells of the coarsest lattice from the plate to a listener, at least: nearer, it could tell them
+TURNS, ROUNDS = 50, 8  # [-] iterations between restarts, and restarts; ten iterations are usual
+SMALLEST = 1e-3  # [-] part of the lattice's operator below which its inverse is not taken
+
+
+class Jumps(NamedTuple):
+    """Pressure jumps of some modes on one lattice, for unit modal acceleration and a density of 1 kg/m^3."""
+
+    modes: npt.NDArray[np.intp]  # (n,) which modes
+    points: npt.NDArray[np.float64]  # (n_cells, 2) [m] centres of the cells
+    size: float  # [m] side of a cell
+    inner: npt.NDArray[np.complex128]  # (n_cells, n) [m kg**-0.5] of the plate without the cells along its edge
+    outer: npt.NDArray[np.complex128]  # (n_cells, n) of the plate and the space to the next centres around it
+
+    @property
+    def mean(self) -> npt.NDArray[np.complex128]:
+        """Half way between both, (n_cells, n) [m kg**-0.5], as the plate's edge lies between theirs."""
+        return 0.5 * (self.inner + self.outer)
+
+    def bounds(
+        self, place: npt.NDArray[np.float64], omega: npt.NDArray[np.float64], speed: float
+    ) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.float64]]:
+        """Pressure of every mode at a place (3,) [m], by `mean`, and the half width of the estimate, (n,) each.
+
+        In m kg**-0.5 Pa per kg/m^3 and m/s^2: for a density of 1 kg/m^3 and unit modal acceleration at the frequencies
+        omega (n,) [rad/s].
+        """
+        middle = np.append(0.5 * (self.points.min(axis=0) + self.points.max(axis=0)), 0.0)
+        far = max(float(np.linalg.norm(place - middle)), float(np.linalg.norm(np.ptp(self.points, axis=0))))
+        places = [place, *(middle + far * _directions())]
+        own, half = np.array([
+            [np.einsum("cn,cn->n", field, each) for each in (self.mean, 0.5 * (self.outer - self.inner))]
+            for field in (dipoles(self.points, self.size, each, omega / speed) for each in places)
+        ]).transpose(1, 0, 2)  # (n_places, n) each  # fmt: skip
+        apart = np.maximum(np.abs(half[0]), np.sqrt((np.abs(half[1:]) ** 2).mean(axis=0)))
+        return own[0], DOUBT * apart + LEAST * np.sqrt((np.abs(own[1:]) ** 2).mean(axis=0))
+
+
+def dipoles(
+    points: npt.NDArray[np.float64], size: float, place: npt.NDArray[np.float64], wave: npt.NDArray[np.float64]
+) -> npt.NDArray[np.complex128]:
+    """Pressure at a place for unit jumps on cells, at wavenumbers (n,) [1/m], (n_cells, n) [-]."""
+    way = np.sqrt(((points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)
+    turn = 1j * np.outer(way, wave)
+    return (place[2] * size**2 / (4.0 * np.pi * way**3))[:, None] * (1.0 - turn) * np.exp(turn)
+
+
+def _directions() -> npt.NDArray[np.float64]:
+    """Unit vectors spread evenly over the half space in front of a plate, (DIRECTIONS, 3) [-]."""
+    number = np.arange(DIRECTIONS) + 0.5
+    up, angle = number / DIRECTIONS, np.pi * (1.0 + np.sqrt(5.0)) * number  # a spiral of the golden ratio
+    across = np.sqrt(1.0 - up**2)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), up], axis=1)
+
+
+def reach(modes: Modes, speed: float) -> npt.NDArray[np.float64]:
+    """Cells across a square as large as the plate that each mode needs, (n_modes,) [-]; rigid motions get zero."""
+    side = np.sqrt(measure(*modes.shapes.grid()))
+    number = np.arange(1, modes.n_modes + 1)  # its wavelength, by Weyl's law
+    wave = np.maximum(np.sqrt(4.0 * np.pi * number) / side, modes.omega / speed)  # [1/m]
+    return np.where(modes.omega > 0.0, np.maximum(PER_WAVE * wave * side / (2.0 * np.pi), ACROSS[0]), 0.0)
+
+
+def jumps(modes: Modes, wanted: npt.NDArray[np.bool_], speed: float) -> Iterator[Jumps]:
+    """The jumps of the wanted modes, each at its own frequency, on lattices as fine as they need."""
+    needed = reach(modes, speed)
+    side = np.sqrt(measure(*modes.shapes.grid()))
+    for coarser, across in zip((0.0, *ACROSS), ACROSS):
+        some = np.flatnonzero(wanted & (needed > coarser) & (needed <= across))
+        if some.size:
+            size = float(side / across)
+            LOG.info("the air around %d modes, on cells of %.3g m", some.size, size)
+            points, inside = _lattice(modes.shapes, size)
+            shapes = modes.shapes.take(int(some[-1]) + 1).at(points[inside])[:, some]
+            core = binary_erosion(inside)
+            sheets = Sheet(core, size), Sheet(inside, size)
+            solved = [
+                np.stack([sheet.jump(shape, omega / speed) for shape, omega in zip(rows.T, modes.omega[some])], axis=1)
+                for sheet, rows in zip(sheets, (shapes[core[inside]], shapes))
+            ]
+            inner = np.zeros(solved[1].shape, complex)
+            inner[core[inside]] = solved[0]
+            yield Jumps(some, points[inside], size, inner, solved[1])
+
+
+class Sheet:
+    """Cells of a square lattice that make up a plate.
+
+    Parameters
+    ----------
+    inside : ndarray of bool, shape (nx, ny)
+    size : float [m]
+        Side of a cell.
+    """
+
+    inside: npt.NDArray[np.bool_]
+    size: float
+    padded: tuple[int, int]
+    inverse: npt.NDArray[np.float64]  # (padded) [1/m] mean of 1 / R between two cells
+    distance: npt.NDArray[np.float64]  # (padded) [m]
+    slopes: npt.NDArray[np.float64]  # (padded) [1/m^2] of a wave on the lattice, squared
+
+    def __init__(self, inside: npt.NDArray[np.bool_], size: float) -> None:
+        self.inside, self.size = inside, size
+        nx, ny = (next_fast_len(2 * n + 2) for n in inside.shape)  # room for the next centres
+        self.padded = nx, ny
+        away = [np.minimum(np.arange(n), n - np.arange(n)) for n in self.padded]
+        steps = np.meshgrid(*away, indexing="ij")
+        self.inverse = mean_inverse_distance(nx // 2 + 1, ny // 2 + 1)[steps[0], steps[1]] / size
+        self.distance = size * np.hypot(*steps)
+        turns = (np.cos(2.0 * np.pi * np.arange(n) / n) for n in self.padded)
+        self.slopes = (4.0 - 2.0 * np.add.outer(*turns)) / size**2
+
+    def jump(self, acceleration: npt.NDArray[np.float64], wave: float) -> npt.NDArray[np.complex128]:
+        """Jump (n_cells,) [Pa] for an acceleration (n_cells,) [m/s^2] in air of 1 kg/m^3 and a wavenumber [1/m]."""
+        if not acceleration.any():
+            return np.zeros(acceleration.shape, complex)
+        apart = np.where(self.distance > 0.0, self.distance, 1.0)
+        swing = np.where(self.distance > 0.0, np.expm1(1j * wave * self.distance) / apart, 1j * wave)
+        operator = fft2((self.inverse + swing) * self.size**4 / (4.0 * np.pi)) * (self.slopes - wave**2)
+        least = SMALLEST * np.abs(operator).max()
+        inverse = 1.0 / np.where(np.abs(operator) > least, operator, least)
+        square = 2 * acceleration.shape
+        whole, rough = (
+            LinearOperator(square, partial(self._folded, each), dtype=complex) for each in (operator, inverse)
+        )
+        load = acceleration.astype(complex) * self.size**2
+        found, failed = gmres(whole, load, rtol=RESIDUAL, M=rough, restart=TURNS, maxiter=ROUNDS)
+        if failed:
+            raise SimulationError(f"the air around the plate was not solved for in {TURNS * ROUNDS} iterations")
+        return found
+
+    def _folded(
+        self, factor: npt.NDArray[np.complex128], values: npt.NDArray[np.complex128]
+    ) -> npt.NDArray[np.complex128]:
+        """Apply an operator of the whole lattice to values on the plate, (n_cells,)."""
+        field = np.zeros(self.inside.shape, complex)
+        field[self.inside] = np.ravel(values)
+        nx, ny = self.inside.shape
+        return ifft2(fft2(field, self.padded) * factor)[:nx, :ny][self.inside]
+
+
+def _lattice(shapes: Shapes, size: float) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+    """Centres (nx, ny, 2) [m] of square cells around a body, and whether each lies on it (nx, ny)."""
+    corner = shapes.grid()[0]
+    low, high = corner.min(axis=0), corner.max(axis=0)
+    count = np.ceil((high - low) / size).astype(int)
+    axes = (0.5 * (low[i] + high[i] + size * (1.0 - count[i])) + size * np.arange(count[i]) for i in (0, 1))
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    return points, shapes.contains(points.reshape(-1, 2)).reshape(points.shape[:2])
+
+
+class Field(NamedTuple):
+    """What a listener gets of the modes heard: derivatives of their amplitudes, delayed by a way through the air."""
+
+    orders: dict[int, npt.NDArray[np.float64]]  # order of derivative -> (n_ways, n) weights, for 1 kg/m^3
+    way: npt.NDArray[np.float64]  # (n_ways,) [m]
+
+
+def fields(
+    modes: Modes, wanted: npt.NDArray[np.bool_], place: npt.NDArray[np.float64], speed: float, step: float
+) -> tuple[Field, tuple[Field, Field]]:
+    """The field of the wanted modes at a place (3,) [m], and what to take from it and to add to it as its bounds.
+
+    Ways are rounded to multiples of ``step`` [m] by shares of their two neighbours. As a mode rings, the field has its
+    pressure by `Jumps.mean`, and the others in phase with it the half width of that estimate, taken away at most to
+    silence. An acceleration tells the part of a jump in phase with it, a velocity the rest.
+    """
+    grid = modes.shapes.grid()[0]
+    low, high = grid.min(axis=0), grid.max(axis=0)
+    nearest = float(np.linalg.norm(place - np.append(np.clip(place[:2], low, high), 0.0)))
+    least = NEAREST * np.sqrt(measure(*modes.shapes.grid())) / ACROSS[0]
+    if nearest < least:
+        raise ValueError(f"listener must be at least {least:.3g} m from a plate in free air, got {nearest:.3g} m")
+    column = np.cumsum(wanted) - 1
+    middle = float(np.linalg.norm(place - np.append(0.5 * (low + high), 0.0)))
+    n_ways, count = int((middle + np.linalg.norm(high - low)) / step) + 2, int(wanted.sum())
+    own = {order: np.zeros((n_ways, count)) for order in (1, 2, 3)}
+    bounds = [{order: np.zeros((1, count)) for order in (1, 2)} for _ in range(2)]
+    for part in jumps(modes, wanted, speed):
+        omega, here = modes.omega[part.modes], column[part.modes]
+        way = np.sqrt(((part.points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)
+        share, first = np.modf(way / step)
+        rows, cells = np.concatenate([first, first + 1.0]).astype(int), np.tile(np.arange(len(way)), 2)
+        gather = csr_array((np.concatenate([1.0 - share, share]), (rows, cells)), (n_ways, len(way)))
+        near = (place[2] * part.size**2 / (4.0 * np.pi * way**3))[:, None]
+        far = near * way[:, None] / speed
+        steady, turned = part.mean.real, omega * part.mean.imag
+        for order, weights in ((1, near * turned), (2, near * steady + far * turned), (3, far * steady)):
+            own[order][:, here] = gather @ weights
+        pressure, half = part.bounds(place, omega, speed)
+        for bound, size in zip(bounds, (np.minimum(half, np.abs(pressure)), half)):
+            strength = size * np.exp(1j * (np.angle(pressure) - omega * middle / speed))
+            bound[1][0, here], bound[2][0, here] = omega * strength.imag, strength.real
+    some = np.any([weights.any(axis=1) for weights in own.values()], axis=0)
+    some[0] |= not some.any()
+    field = Field(
+        {order: weights[some] for order, weights in own.items()},
+        np.multiply(np.flatnonzero(some), step, dtype=np.float64),
+    )
+    less, more = (Field(bound, np.array([middle])) for bound in bounds)
+    return field, (less, more)

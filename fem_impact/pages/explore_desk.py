@@ -1,0 +1,231 @@
+"""What the live page shows of a blow, as numbers and words that can be sent to it."""
+
+import base64
+import math
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .._base.check import SimulationError, ToleranceWarning
+from ..impact import force_spectrum
+from ..impact.response import Response
+from ..model.playing import Strokes, strokes
+from ..modes.modal import Modes
+from ..scenes.schema import written
+from ..scenes.sentences import RAISED, place, power, si
+from ..show import sound
+from ..show.figures import SPECTRUM_DEPTH
+from ..sweeps.grid import Case
+from . import report
+from .explore_map import Mapper, Picture, Window
+from .explore_model import MAP_TOLERANCE, Bench, Settings, blow, limit_of, quick
+
+BAND = (20.0, 20e3)  # [Hz] of the spectrum: the audible range
+SPECTRUM_POINTS = 240  # [-] more points take time but show no more
+ROLLED = 1.5  # [s] of a roll, which then rings
+PLAYED = 2.0  # [s] of sound: short enough to compute at each press of the button
+KNOWN = 8  # [-] strike points remembered
+Point = tuple[float, ...]
+Message = dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """The body as blows at one strike point see it."""
+
+    rest: float  # [m/N] residual compliance of the modes
+    seen: Modes | None  # Ritz vectors, where these tell the blows
+
+
+class Desk:
+    """A bench, what is known of its strike points, and everything the page shows of its blows."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.bench, self.mapper = bench, Mapper(bench)
+        self.views: dict[Point, View] = {}
+        self.rest = bench.residual(bench.start.at)  # [m/N] of the last point known, good enough for a first answer
+        self.limit: tuple[Any, float] = None, 0.0  # [Hz] the last threshold, and what it is of
+        if not bench.told:
+            self.learn(bench.start.at, View(self.rest, None))
+
+    def learn(self, at: Point, view: View) -> None:
+        """Remember a strike point; the oldest is forgotten."""
+        self.views[at] = view
+        self.rest = view.rest
+        while len(self.views) > KNOWN:
+            del self.views[next(iter(self.views))]
+
+    def look(self, at: Point) -> View:
+        """Find out what blows at a point see: seconds, if these are Ritz vectors."""
+        if at not in self.views:
+            self.learn(at, View(self.bench.residual(at), self.bench.seen(at)))
+        return self.views[at]
+
+    def case(self, settings: Settings) -> Case:
+        """The blow, on the body as far as it is known."""
+        view = self.views.get(settings.at)
+        return self.bench.case(settings, view.rest if view else self.rest, view.seen if view else None)
+
+    def answer(self, settings: Settings) -> tuple[Message, Response | None]:
+        """The blow in coarse steps: some 10 ms."""
+        case = self.case(settings)
+        try:
+            hit = quick(case)
+        except SimulationError as error:
+            return {"failed": str(error)}, None
+        return {**_force(hit), "cells": _told(hit, False), "what": _described(case.modes)}, hit
+
+    def rest_of(self, settings: Settings, hit: Response | None) -> Message:
+        """What follows the answer: spectrum, threshold and the scene file."""
+        case = self.case(settings)
+        about = case.at.tobytes(), settings.at in self.views, settings.mass, settings.thickness
+        if self.limit[0] != about:  # contact, speed and damping do not change it
+            self.limit = about, limit_of(case)
+        resonance, limit = case.resonance, self.limit[1]
+        message = {
+            "resonance": resonance, "limit": limit if 0.0 < limit < math.inf else None,
+            "resonates": _resonates(resonance, limit), "scene": self._scene(settings),
+        }  # fmt: skip
+        return message | ({} if hit is None else _spectrum(hit))
+
+    def judge(self, settings: Settings) -> Message:
+        """The blow to the tolerance, and what the model itself errs by."""
+        view = self.look(settings.at)
+        case = self.bench.case(settings, seen=view.seen)
+        try:
+            hit = blow(case)
+        except SimulationError as error:
+            return {"failed": str(error)}
+        own, model = power(hit.model_error), hit.model_verdict
+        return {
+            **_force(hit), **_spectrum(hit), "cells": [*_told(hit, True), ("model's error", own)],
+            "what": _described(case.modes), "verdict": hit.verdict, "missed": not hit.tolerance_met, "model": model,
+        }  # fmt: skip
+
+    def picture(self, settings: Settings, window: Window) -> Picture:
+        """The map in its coarsest form."""
+        return self.mapper.first(settings, window, self._seen(settings))
+
+    def finer(self, settings: Settings, picture: Picture) -> Picture:
+        """The map with twice as many points."""
+        return self.mapper.finer(settings, picture, self._seen(settings))
+
+    def sharp(self, settings: Settings, picture: Picture) -> Picture:
+        """The map up to the pixels, its borders joined by straight lines."""
+        return self.mapper.sharp(settings, picture, self._seen(settings))
+
+    def _seen(self, settings: Settings) -> Modes | None:
+        """Ritz vectors of the strike point, if they are known."""
+        view = self.views.get(settings.at)
+        return view.seen if view else None
+
+    def listen(self, settings: Settings, where: Point, height: float, rate: float | None) -> Message:
+        """The blow, or ``rate`` [1/s] of them, as heard on the surface or ``height`` [m] above it."""
+        case = self.bench.case(settings)
+        try:
+            rung = blow(case) if rate is None else rolled(case, rate)
+            if height > 0.0:
+                heard = sound.radiate(rung, (*where, height), duration=PLAYED)
+            else:
+                heard = sound.synthesise(rung, where, duration=PLAYED)
+        except (SimulationError, ValueError) as error:
+            return {"uri": "", "note": str(error)}
+        uri, note = _sounding(heard)
+        place_of = f"{si(height, 'm', 3)} above {place(where)}" if height > 0.0 else f"the surface at {place(where)}"
+        return {"uri": uri, "note": f"Heard from {place_of}. {note}"}
+
+    def said(self, settings: Settings, height: float, rate: float) -> dict[str, str]:
+        """What each slider stands at, in words."""
+        law = self.bench.law(settings)
+        raised = "" if settings.exponent == 1.0 else f"{settings.exponent:.3g}".translate(RAISED)
+        said = {
+            "mass": si(settings.mass, "kg", 3),
+            "stiffness": si(law.stiffness, "N/m", 3) + raised,
+            "exponent": f"{settings.exponent:.3g}",
+            "speed": si(settings.speed, "m/s", 3),
+            "bending": si(settings.bending or 0.0, "Hz", 3),
+            "loss": f"{settings.loss or 0.0:.3g} s/m",
+            "damping": f"{settings.damping:.3g}",
+            "thickness": f"{settings.thickness:.3g}",
+            "rate": f"{rate:.3g} a second",
+            "height": f"{si(height, 'm', 3)}, in the air" if height > 0.0 else "on the surface",
+        }
+        return said | {letter: si(value, "m", 3) for letter, value in zip("xy", settings.at)}
+
+    def _scene(self, settings: Settings) -> str:
+        text = base64.b64encode(written(self.bench.saved(settings)).encode()).decode("ascii")
+        return f"data:application/toml;base64,{text}"
+
+
+def rolled(case: Case, rate: float) -> Strokes:
+    """A roll: the blow again and again, ``rate`` times a second, on the body as it then moves."""
+    when = np.arange(max(1, round(ROLLED * rate))) / rate
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ToleranceWarning)
+        return strokes(
+            case.modes, [(float(time), case.striker, case.contact, case.at, case.speed) for time in when],
+            tolerance=MAP_TOLERANCE,
+        )  # fmt: skip
+
+
+def packed(values: np.ndarray, kind: str = "<f4") -> str:
+    """Numbers as the page reads them: base64 of 32-bit floats, or of another type."""
+    return base64.b64encode(np.asarray(values, kind).tobytes()).decode("ascii")
+
+
+def drawn(picture: Picture) -> Message:
+    """A map as the page draws it."""
+    return {
+        "columns": len(picture.mass), "rows": len(picture.stiffness), "counts": packed(picture.n_impacts, "i1"),
+        "mass": picture.mass[[0, -1]].tolist(), "stiffness": picture.stiffness[[0, -1]].tolist(),
+        "x": packed(picture.limit_mass), "y": packed(picture.limit),
+    }  # fmt: skip
+
+
+def _force(hit: Response) -> Message:
+    end = 1.15 * hit.impacts[-1].end if hit.impacts else float(hit.time[-1])
+    shown = hit.time <= end
+    return {"time": packed(hit.time[shown]), "force": packed(hit.force[shown])}
+
+
+def _spectrum(hit: Response) -> Message:
+    size = force_spectrum.magnitude(hit.time, hit.force, np.geomspace(*BAND, SPECTRUM_POINTS))
+    top = float(size.max()) or 1.0
+    return {"spectrum": packed(np.maximum(size, 0.1 * SPECTRUM_DEPTH * top)), "top": top}
+
+
+def _told(hit: Response, exact: bool) -> list[tuple[str, str]]:
+    """The blow in names and values; without an error until the hand rests and the strike point is known."""
+    error = "refining …" if not exact else power(hit.error.total) if hit.error.resolvable else "not resolvable"
+    return [
+        ("impacts", str(hit.n_impacts)),
+        ("peak force", si(hit.peak_force, "N", 3)),
+        ("time in contact", si(hit.contact_time, "s", 3)),
+        ("restitution", f"{hit.restitution:.3f}".replace("-", "−")),
+        ("estimated error", error),
+    ]
+
+
+def _resonates(resonance: float, limit: float) -> str:
+    ratio = f"body {'never' if limit else 'always'} stops it"
+    if 0.0 < limit < math.inf:
+        ratio = f"{resonance / limit:.2g} × threshold"
+    return f"{si(resonance, 'Hz', 3)}, {ratio}"
+
+
+def _described(modes: Modes) -> str:
+    """What carries the blow, in words."""
+    if modes.poorer:
+        return f"{modes.n_modes} Ritz vectors started from the strike point"
+    return f"the first {modes.n_modes} modes"
+
+
+def _sounding(heard: sound.Sound) -> tuple[str, str]:
+    """The sound as a data URI, raised if it is quiet, and its level in words."""
+    level = heard.peak_level
+    raised = max(0.0, report.QUIET - level) if math.isfinite(level) else 0.0
+    note = f"Full scale is {heard.full_scale:g} {heard.unit}; peak {level:.1f} dB"
+    note += f", raised here by {raised:.1f} dB." if raised else "."
+    return report.audio(heard.samples * 10.0 ** (raised / 20.0), heard.rate), note.replace("-", "−")

@@ -1,0 +1,181 @@
+"""The map of the live page: impacts counted over mass and stiffness, then more finely where the count changes."""
+
+import math
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+
+from .._base.check import SimulationError
+from ..impact import threshold
+from ..modes.modal import Modes
+from ..sweeps import batches, grid
+from .explore_model import MAP_TOLERANCE, Bench, Settings, quick
+
+FIRST = {False: (25, 17), True: (13, 9)}  # [-] points of mass and stiffness at first, with True where blows take longer
+FINEST = 385  # [-] points of mass at most: about one per pixel of the picture
+CAUTIOUS = 30  # [-] points of mass below which neighbours of these blows are struck, too
+MORE = 4  # [-] impacts from which on the map makes no difference
+NARROWEST = 1.001  # [-] ratio of the ends of an axis when zoomed in
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """The number of impacts of each hammer and contact at one strike point, and the threshold."""
+
+    mass: np.ndarray  # (n_masses,) [kg]
+    stiffness: np.ndarray  # (n_stiffnesses,) [-] as in `Settings`
+    n_impacts: np.ndarray  # (n_stiffnesses, n_masses) at most `MORE`; -1 if the blow failed
+    threshold: np.ndarray  # (n,) [Hz] contact resonance above which the body stops each hammer of the first map
+    limit_mass: np.ndarray  # (n,) [kg] of these hammers
+    limit: np.ndarray  # (n,) [-] stiffness that gives this resonance; NaN if there is none
+
+    @property
+    def finest(self) -> bool:
+        return len(self.mass) >= FINEST
+
+
+@dataclass(frozen=True)
+class Window:
+    """What of the map is in view."""
+
+    mass: tuple[float, float]  # [kg]
+    stiffness: tuple[float, float]  # [-]
+
+    @classmethod
+    def of(cls, bench: Bench, mass: tuple[float, float] | None, stiffness: tuple[float, float] | None) -> "Window":
+        """The part in view that lies on the map, no narrower than `NARROWEST`; None for the whole of an axis."""
+        ends = []
+        for name, wanted in (("mass", mass), ("stiffness", stiffness)):
+            least, most = bench.range(name)
+            low, high = (least, most) if wanted is None else sorted(min(max(x, least), most) for x in wanted)
+            if high < low * NARROWEST:
+                low = min(low, most / NARROWEST)
+                high = low * NARROWEST
+            ends.append((low, high))
+        return cls(*ends)
+
+
+class Mapper:
+    """Draws maps of one bench; kernels are kept while only the part in view changes."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.bench = bench
+        self.about: tuple[Settings, Modes | None] | None = None  # settings and body that the kernels are of
+        self.kernels: batches.Kernels = {}
+
+    def first(self, settings: Settings, window: Window, seen: Modes | None = None) -> Picture:
+        """The map in its coarsest form; the settings' mass and stiffness do not matter, ``seen`` as in `Bench.case`."""
+        case = self.bench.case(settings, seen=seen)
+        law = case.contact
+        slow = bool(law.lossy or law.hard_stiffness or law.exponent < 1.0)
+        mass, stiffness = (
+            np.geomspace(*ends, count) for ends, count in zip((window.mass, window.stiffness), FIRST[slow])
+        )
+        x, y = (part.ravel() for part in np.meshgrid(mass, stiffness))
+        counts = self._counts(settings, seen, x, y).reshape(len(stiffness), len(mass))
+        felt = case.striker.felt_mass / case.striker.mass
+        found = threshold.thresholds(case.modes, case.at, felt * mass)
+        there = [self.bench.case(replace(settings, mass=float(one), stiffness=1.0), seen=seen) for one in mass]
+        if law.hard_stiffness or law.remembers:  # as far as the map goes
+            reached = [[self.bench.case(replace(settings, mass=float(m), stiffness=float(k))).resonance
+                        for k in stiffness] for m in mass]  # fmt: skip
+            rising = np.maximum.accumulate(reached, axis=1)
+            limit = [np.interp(*at, np.log(stiffness), math.nan, math.nan) for at in zip(found, rising)]
+            return Picture(mass, stiffness, counts, found, mass, np.exp(limit))
+        ratio = found / np.array([one.resonance for one in there])
+        ratio[~((ratio > 0.0) & (ratio < math.inf))] = math.nan
+        # contact resonance ~ stiffness**(1 / (exponent + 1))
+        return Picture(mass, stiffness, counts, found, mass, ratio ** (settings.exponent + 1.0))
+
+    def finer(self, settings: Settings, picture: Picture, seen: Modes | None = None) -> Picture:
+        """The same map with twice as many points along each axis; blows are struck only where the counts differ.
+
+        A patch smaller than a cell of the first two maps can be missed.
+        """
+        coarse = picture.n_impacts
+        squares = np.stack([coarse[:-1, :-1], coarse[:-1, 1:], coarse[1:, :-1], coarse[1:, 1:]])
+        mixed = squares.min(axis=0) != squares.max(axis=0)
+        rows, columns = (2 * n - 1 for n in coarse.shape)
+        counts = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=1)[:rows, :columns]
+        asked = np.zeros((rows, columns), bool)
+        if len(picture.mass) < CAUTIOUS:
+            mixed = ndimage.binary_dilation(mixed, np.ones((3, 3)))
+            for i in range(3):
+                for j in range(3):
+                    asked[i : i + rows - 2 : 2, j : j + columns - 2 : 2] |= mixed
+            asked[::2, ::2] = False
+        else:
+            asked[::2, 1::2] = coarse[:, :-1] != coarse[:, 1:]
+            asked[1::2, ::2] = coarse[:-1] != coarse[1:]
+            asked[1::2, 1::2] = mixed
+        mass, stiffness = (np.geomspace(v[0], v[-1], 2 * len(v) - 1) for v in (picture.mass, picture.stiffness))
+        y, x = asked.nonzero()
+        counts[y, x] = self._counts(settings, seen, mass[x], stiffness[y])
+        return replace(picture, mass=mass, stiffness=stiffness, n_impacts=counts)
+
+    def sharp(self, settings: Settings, picture: Picture, seen: Modes | None = None) -> Picture:
+        """The same map up to the pixels, by borders located between neighbours and joined by straight lines."""
+        coarse = picture.n_impacts
+        step = (FINEST - 1) // (coarse.shape[1] - 1)  # [pixel]
+        rows, columns = (step * (n - 1) + 1 for n in coarse.shape)
+        mass, stiffness = (
+            np.geomspace(v[0], v[-1], n) for v, n in ((picture.mass, columns), (picture.stiffness, rows))
+        )
+        across, along = np.argwhere(coarse[:, :-1] != coarse[:, 1:]), np.argwhere(coarse[:-1] != coarse[1:])
+        start = np.vstack([across, along])  # (n_crossed, 2) first ends of the edges that a border crosses
+        way = np.repeat([[0, 1], [1, 0]], [len(across), len(along)], axis=0)
+        near, far = np.zeros(len(start), int), np.full(len(start), step)
+        for _ in range(step.bit_length() - 1):
+            middle = (near + far) // 2
+            y, x = (step * start + middle[:, None] * way).T
+            same = self._counts(settings, seen, mass[x], stiffness[y]) == coarse[tuple(start.T)]
+            near, far = np.where(same, middle, near), np.where(same, far, middle)
+        crossed = step * start + 0.5 * (near + far)[:, None] * way  # (n_crossed, 2) [pixel]
+        crossings: dict[tuple[int, int], list[np.ndarray]] = {}
+        for (i, j), point, upright in zip(start.tolist(), crossed, way[:, 0]):
+            for square in ((i, j), (i, j - 1) if upright else (i - 1, j)):  # on both sides of the edge
+                crossings.setdefault(square, []).append(point)
+        nearest = np.arange(rows) + step // 2, np.arange(columns) + step // 2
+        counts = coarse[np.ix_(nearest[0] // step, nearest[1] // step)]
+        y, x = np.mgrid[: step + 1, : step + 1]
+        for (i, j), points in crossings.items():
+            corners = coarse[i : i + 2, j : j + 2]
+            if len(points) != 2 or corners.shape != (2, 2) or min(i, j) < 0:
+                continue  # three counts meet, or the square is not on the map
+            (p, q), here = points, corners[0, 0]
+            side = (q[1] - p[1]) * (step * i + y - p[0]) - (q[0] - p[0]) * (step * j + x - p[1])
+            other = corners[corners != here][0]
+            block = counts[step * i : step * (i + 1) + 1, step * j : step * (j + 1) + 1]
+            block[:] = np.where(side * side[0, 0] >= 0.0, here, other)
+        return replace(picture, mass=mass, stiffness=stiffness, n_impacts=counts)
+
+    def _counts(self, settings: Settings, seen: Modes | None, mass: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+        """Impacts (n,) of hammers (n,) with contacts (n,)."""
+        settings = replace(settings, mass=self.bench.start.mass, stiffness=1.0)
+        if self.about is None or self.about[0] != settings or self.about[1] is not seen:
+            self.about, self.kernels = (settings, seen), {}
+        if not len(mass):
+            return np.empty(0, np.int8)
+        case = self.bench.case(settings, seen=seen)
+        law, shared = case.contact, np.ones(len(mass))
+        hard = stiffness * law.stiffness
+        lossy = law.loss > 0.0
+        counts = np.full(len(mass), np.nan)
+        if (
+            grid.together({name: value * shared for name, value in vars(law).items()}).all()
+            and not case.modes.stretches
+        ):
+            family = {0: batches.Family.of(case.modes, case.at, case.striker, True, lossy)}
+            blows = batches.Blows(
+                family, np.zeros(len(mass), int), case.modes.mass * shared, mass, hard, law.exponent * shared,
+                case.speed * shared, law.loss * shared,
+            )  # fmt: skip
+            found = batches.bounce(blows, tolerance=MAP_TOLERANCE, kernels=self.kernels)
+            counts[found.done] = found.n_impacts[found.done]
+        for i in np.flatnonzero(np.isnan(counts)):  # those that take long; the rest of "more" does not matter
+            one = replace(case.changed("mass", mass[i]), contact=replace(law, stiffness=float(hard[i])))
+            with suppress(SimulationError):
+                counts[i] = quick(one, most=MORE).n_impacts
+        return np.where(np.isnan(counts), -1, np.minimum(counts, MORE)).astype(np.int8)

@@ -1,0 +1,179 @@
+"""Follows one open page: answers its hand at once, and computes the rest when the hand rests."""
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import replace
+from typing import Any, Protocol
+
+from .._base.check import SimulationError
+from .explore_desk import Desk, Message, Point, View, drawn
+from .explore_map import Picture, Window
+from .explore_model import Bench, Settings
+from .explore_view import RATES, checked, pair
+
+REST = 0.15  # [s] without a change before the blow is judged and the map drawn again
+
+
+class Asks(Protocol):
+    """What a `Worker` does."""
+
+    def ask(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]": ...
+
+
+class _Superseded(Exception):
+    """The page no longer asks for what was computed."""
+
+
+class Session:
+    """The settings of one open page, and what of it is still being computed.
+
+    Everything runs on the event loop; ``judge`` and ``mapper`` are processes that hold a `Desk` each.
+    """
+
+    def __init__(self, desk: Desk, judge: Asks, mapper: Asks, send: Callable[[Message], Any]) -> None:
+        self.desk, self.judge, self.mapper, self.send = desk, judge, mapper, send
+        self.bench: Bench = desk.bench
+        self.settings: Settings = self.bench.start
+        self.height, self.rate = 0.0, RATES[2]
+        self.heard_at: Point = tuple(float(x) for x in self.bench.scene.points[0])
+        self.window = Window.of(self.bench, None, None)
+        self.number = 0  # of the last request
+        self.resting: asyncio.TimerHandle | None = None
+        self.tasks: dict[str, asyncio.Task[None]] = {}  # judging, mapping, listening
+        self.judged: Any = None  # what the numbers on the page are exact for
+        self.mapped: Any = None  # what the map on the page was drawn for
+
+    def close(self) -> None:
+        """The page is gone."""
+        if self.resting is not None:
+            self.resting.cancel()
+        for task in self.tasks.values():
+            task.cancel()
+
+    def take(self, message: Any) -> None:
+        """Do what the page asks for; ValueError if that makes no sense."""
+        if not isinstance(message, dict):
+            raise ValueError("a message must be a table")
+        turned = checked(self.bench, message.get("turn", {}))
+        number = message.get("number", 0)
+        if "play" in message:
+            self._listen(bool(message["play"] == "roll"))
+        elif "view" in message:
+            view = message["view"]
+            if view is not None and not isinstance(view, dict):
+                raise ValueError("view must be a table of mass and stiffness")
+            ends = [None, None] if view is None else [pair("view", view.get(name)) for name in ("mass", "stiffness")]
+            self.window = Window.of(self.bench, *ends)
+            self._start("map", self._map)
+        else:
+            if "ear" in message:
+                self.heard_at = self.bench.place(*pair("ear", message["ear"])) or self.heard_at
+            self._answer(number, self._turn(turned))
+
+    def _turn(self, turned: dict[str, float]) -> bool:
+        """Take over the sliders; whether the blow changes."""
+        before = self.settings
+        self.height = turned.pop("height", self.height)
+        self.rate = turned.pop("rate", self.rate)
+        at = [turned.pop(letter, None) for letter in "xy"]
+        if any(value is not None for value in at):
+            point = [old if new is None else new for old, new in zip(before.at, at)]
+            turned_at = self.bench.place(*point, *([0.0] * (2 - len(point))))
+            self.settings = replace(self.settings, at=turned_at or before.at)
+        changes: dict[str, Any] = dict(turned)
+        self.settings = replace(self.settings, **changes)
+        return self.settings != before or not self.number
+
+    def _answer(self, number: Any, again: bool) -> None:
+        """What the hand looks at first: force and numbers; spectrum, threshold and scene follow at once."""
+        self.number = number = number if isinstance(number, int) else 0
+        desk, settings = self.desk, self.settings
+        said = desk.said(settings, self.height, self.rate)
+        about = {"number": number, "said": said, "at": settings.at, "ear": self.heard_at}
+        about |= {"mass": settings.mass, "stiffness": settings.stiffness}
+        if not again:
+            self.send({"kind": "blow", **about})
+            self.send({"kind": "rest", "number": number})
+            return
+        self.judged = None
+        message, hit = desk.answer(settings)
+        self.send({"kind": "blow", **about, **message})
+        self.send({"kind": "rest", "number": number, **desk.rest_of(settings, hit)})
+        if self.resting is not None:
+            self.resting.cancel()
+        self.resting = asyncio.get_running_loop().call_later(REST, self._rested)
+
+    def _rested(self) -> None:
+        self.resting = None
+        self._start("judge", self._judge)
+        self._start("map", self._map)
+
+    def _start(self, name: str, work: Callable[[], Any]) -> None:
+        """Begin a piece of work unless it is under way: then it looks itself whether there is more to do."""
+        task = self.tasks.get(name)
+        if task is None or task.done():
+            self.tasks[name] = asyncio.get_running_loop().create_task(work())
+
+    async def _judge(self) -> None:
+        """The exact blow, until it is the one on the page; finds out about a new strike point first."""
+        while self.judged != self.settings and self.resting is None:
+            settings = self.settings
+            if settings.at not in self.desk.views:
+                view: View = await asyncio.wrap_future(self.judge.ask(Desk.look, settings.at))
+                self.desk.learn(settings.at, view)
+                self.mapper.ask(Desk.learn, settings.at, view)
+                self._start("map", self._map)
+            message = await asyncio.wrap_future(self.judge.ask(Desk.judge, settings))
+            if settings == self.settings:
+                self.judged = settings
+                self.send({"kind": "blow", "number": self.number, "exact": True, **message})
+
+    def _about_map(self) -> tuple[Any, ...]:
+        """What the map depends on."""
+        settings = replace(self.settings, mass=self.bench.start.mass, stiffness=1.0)
+        return settings, self.window, self.settings.at in self.desk.views
+
+    async def _map(self) -> None:
+        """The map in view, more and more finely, until nothing is left to refine."""
+        while self.mapped != self._about_map() and self.resting is None:
+            about = self._about_map()
+            settings, window, _ = about
+            self.mapped = None  # the page may soon show something else
+            self.send({"kind": "map", "computing": True})
+            try:
+                await self._drawn(about, settings, window)
+            except _Superseded:
+                continue
+            except (SimulationError, ValueError) as error:
+                self.send({"kind": "map", "computing": False, "failed": str(error)})
+            if about == self._about_map():
+                self.mapped = about
+
+    async def _drawn(self, about: tuple[Any, ...], settings: Settings, window: Window) -> None:
+        """One map: coarse, finer, and with sharp borders; then these are checked pixel by pixel."""
+
+        async def made(function: Callable[..., Picture], *arguments: Any) -> Picture:
+            found: Picture = await asyncio.wrap_future(self.mapper.ask(function, settings, *arguments))
+            if about != self._about_map():
+                raise _Superseded
+            return found
+
+        def sent(picture: Picture, exact: bool = False) -> Picture:
+            self.send({"kind": "map", "computing": not exact, "exact": exact, **drawn(picture)})
+            return picture
+
+        picture = sent(await made(Desk.finer, sent(await made(Desk.picture, window))))
+        sent(await made(Desk.sharp, picture))
+        while not picture.finest:
+            picture = await made(Desk.finer, picture)
+        sent(picture, exact=True)
+
+    def _listen(self, roll: bool) -> None:
+        async def work() -> None:
+            rate = self.rate if roll else None
+            asked = self.mapper.ask(Desk.listen, self.settings, self.heard_at, self.height, rate)
+            self.send({"kind": "sound", **await asyncio.wrap_future(asked)})
+
+        self.send({"kind": "sound", "uri": "", "note": "Computing the sound …"})
+        self._start("listen", work)

@@ -1,0 +1,40 @@
+"""Tests of free motion at many times, against the exponential of each mode's equations."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import expm
+
+import fem_impact as fi
+from fem_impact.impact import free_motion
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_every_mode_moves_as_its_equations_say(order):
+    # below, at and beyond critical damping, with a constant force; more times than a block holds
+    rng = np.random.default_rng(3)
+    zeta = np.array([0.0, 0.003, 0.3, 0.999, 1.0, 1.001, 4.0])
+    omega, bias = rng.uniform(50.0, 4000.0, (2, len(zeta)))
+    q, p = rng.normal(size=(2, len(zeta))) * np.array([[1.0], [1000.0]])
+    times, weights = 0.01 + 1e-4 * np.arange(300), rng.normal(size=(1, len(zeta)))
+    expected = np.zeros(len(times))
+    for n, w in enumerate(omega):
+        pull = np.array([[0.0, 1.0], [-w * w, -2.0 * zeta[n] * w]])
+        rest = bias[n] / w**2
+        states = [expm(pull * (t - times[0])) @ (q[n] - rest, p[n]) for t in times]
+        rates = {0: lambda x: x[0], 1: lambda x: x[1], 2: lambda x: (pull @ x)[1]}[order]  # noqa: B023
+        expected += weights[0, n] * np.array([rates(x) for x in states])
+    found = free_motion.swing(omega, zeta, bias, (q, p), times, weights, order)
+    # critical damping is moved aside by 1e-6
+    assert_allclose(found, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
+
+
+def test_approach_after_a_blow_is_that_of_its_modes():
+    modes = fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(fi.Material(E=70e9, nu=0.3, rho=2700.0), 2e-3), n_modes=40)
+    hit = fi.strike(modes, fi.Striker.rigid(0.05), fi.Contact.hertz(1e8), at=(0.1, 0.12), speed=1.0)
+    history = hit.history
+    times = np.linspace(0.2 * history.end_time, 3.0 * history.end_time, 500)
+    shown = history.motion(times)
+    assert_allclose(
+        shown, history.offset + history.states(times)[0] @ history.shape.T, atol=1e-12 * np.abs(shown).max()
+    )

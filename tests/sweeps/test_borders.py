@@ -1,0 +1,148 @@
+"""Borders between numbers of impacts: known curves, single blows on both sides, what is in doubt, and files."""
+
+import io
+
+import numpy as np
+import pytest
+import xarray
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.sweeps import borders, grid
+
+AT = (0.465, 0.3)
+
+
+def case():
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20)
+    return grid.Case(plate, fi.Striker.rigid(0.1), fi.Contact.linear(1e5), np.array(AT), 1.0)
+
+
+def found_of(rule, mass, stiffness):
+    """Borders of numbers of impacts told by a rule of mass and stiffness instead of blows."""
+    cells = grid.Grid(case(), {"mass": mass, "stiffness": stiffness}, 1e-3, True, None, {})
+    rounds = []
+
+    def solve(cloud, turn):
+        rounds.append((turn, cloud.n_cases, cloud.tolerance))
+        numbers = np.full((len(cloud.layers), cloud.n_cases), np.nan)
+        numbers[0] = rule(cloud.axes["mass"], cloud.axes["stiffness"])
+        return numbers, {}
+
+    return borders.find_borders(
+        cells, np.nan_to_num(rule(*np.meshgrid(mass, stiffness, indexing="ij")), nan=-1.0).astype(int), solve
+    ), rounds
+
+
+def test_a_closed_curve_is_where_its_equation_says():
+    """An ellipse in the mass and in the logarithm of the stiffness, which half of each axis holds."""
+    mass, stiffness = np.linspace(0.1, 0.3, 15), np.geomspace(1e4, 1e6, 18)
+
+    def radius(mass, stiffness):
+        return np.hypot((mass - 0.2) / 0.2, np.log(stiffness / 1e5) / np.log(1e2))
+
+    found, rounds = found_of(lambda m, k: np.where(radius(m, k) < 0.251, 4, 2), mass, stiffness)
+    assert [border.impacts for border in found.borders] == [2]
+    (border,) = found.borders
+    assert border.axes == ("mass", "stiffness") and np.array_equal(border.points[0], border.points[-1])
+    assert (border.error <= 0.75e-3).all() and (border.error > 0.0).all()
+    # located along one axis: the radius errs by no more
+    assert (np.abs(radius(*border.points.T) - 0.251) <= border.error).all()
+    assert not found.doubtful.any() and found.n_coarse == 0
+    halvings = [n for turn, n, _ in rounds if turn.startswith("halving")]
+    assert len(halvings) == 6  # 1/14 of an axis is 1.1e-3 of it after six
+    assert {tolerance for _, _, tolerance in rounds} == {borders.FINER * 1e-3}
+
+
+def test_each_number_of_impacts_has_its_border_even_where_they_meet():
+    """First 1 and 3 impacts side by side, then 1, 2 and 3."""
+    mass, stiffness = np.linspace(0.11, 0.29, 7), np.geomspace(1e4, 1e6, 4)
+    found, _ = found_of(lambda m, k: 1 + 2 * (m > 0.2), mass, stiffness)
+    assert [border.impacts for border in found.borders] == [1]
+    assert_allclose(found.borders[0].points[:, 0], 0.2, atol=0.75e-3 * 0.18)
+    found, _ = found_of(lambda m, k: 1 + (m > 0.2) + (m > 0.25), mass, stiffness)
+    assert [border.impacts for border in found.borders] == [1, 2]
+    assert_allclose(found.borders[1].points[:, 0], 0.25, atol=0.75e-3 * 0.18)
+
+
+def test_what_cannot_be_told_is_in_doubt_and_not_enclosed():
+    mass, stiffness = np.linspace(0.1, 0.3, 9), np.geomspace(1e4, 1e6, 9)
+    found, _ = found_of(lambda m, k: np.where(m > 0.26, np.nan, 1.0 + (m > 0.2)), mass, stiffness)
+    assert found.doubtful[7:].all() and not found.doubtful[:7].any()
+    assert [border.impacts for border in found.borders] == [1]  # none between numbers and refusals
+    gap, _ = found_of(lambda m, k: np.where(abs(m - 0.2125) < 1e-3, np.nan, 1.0 + (m > 0.2)), mass, stiffness)
+    assert gap.n_coarse == len(gap.borders[0].points)  # the first halving is refused
+    assert_allclose(gap.borders[0].error, 0.5 / 8)
+
+
+def test_a_number_that_changes_with_the_tolerance_is_in_doubt():
+    calls = []
+
+    def rule(mass, stiffness):
+        calls.append(mass.size)
+        return 1 + (mass > (0.2 if len(calls) == 1 else 0.24))
+
+    found, _ = found_of(rule, np.linspace(0.11, 0.31, 11), np.geomspace(1e4, 1e6, 3))
+    assert found.doubtful.any(axis=1).nonzero()[0].tolist() == [5, 6]  # 0.21 and 0.23 kg
+    assert_allclose(found.borders[0].points[:, 0], 0.24, atol=1e-4)
+
+
+@pytest.mark.parametrize("law", [fi.Contact.linear(1e5), fi.Contact.hertz(2e6)], ids=["linear", "hertz"])
+def test_blows_on_both_sides_of_a_border_differ(law):
+    """Single blows at a hundredth of the tolerance, 1e-3 of the axis to both sides of where the border is told."""
+    bare = case()
+    over = {"mass": np.linspace(0.02, 0.2, 5), "stiffness": law.stiffness * np.geomspace(0.1, 10.0, 5)}
+    table = fi.sweep(bare.modes, bare.striker, law, at=AT, speed=1.0, over=over, borders=True)
+    curves = fi.read_borders(table)
+    assert curves and "located to 0.0005 of the axes" in table.attrs["borders"]
+    for border in curves:
+        for point in border.points[:: max(1, len(border.points) // 2)]:
+            counts = set()
+            for step in ((-1e-3, 0.0), (1e-3, 0.0), (0.0, -1e-3), (0.0, 1e-3)):
+                mass, stiffness = point[0] + 0.18 * step[0], point[1] * 100.0 ** step[1]
+                contact = fi.Contact(stiffness=stiffness, exponent=law.exponent)
+                hit = fi.strike(bare.modes, fi.Striker.rigid(mass), contact, at=AT, speed=1.0, tolerance=1e-5)
+                counts.add(hit.n_impacts)
+            assert min(counts) <= border.impacts < max(counts)
+
+
+def test_a_file_keeps_the_curves():
+    bare = case()
+    over = {"mass": np.linspace(0.02, 0.2, 4), "stiffness": np.geomspace(1e4, 1e6, 4)}
+    table = fi.sweep(bare.modes, bare.striker, bare.contact, at=AT, speed=1.0, over=over, borders=True)
+    with xarray.open_dataset(io.BytesIO(bytes(table.to_netcdf(engine="scipy"))), engine="scipy") as read:
+        again = fi.read_borders(read)
+    assert len(again) == len(fi.read_borders(table)) > 0
+    for one, two in zip(again, fi.read_borders(table)):
+        assert (one.impacts, one.axes) == (two.impacts, two.axes)
+        assert np.array_equal(one.points, two.points) and np.array_equal(one.error, two.error)
+    assert table.border_stiffness.attrs["units"] == "N/m"
+    few = fi.sweep(
+        bare.modes, bare.striker, bare.contact, at=AT, speed=1.0, over={"mass": [0.01, 0.02], "stiffness": [1e3, 2e3]},
+        borders=True,
+    )  # fmt: skip
+    assert fi.read_borders(few) == () and few.attrs["borders"].startswith("no border between")
+
+
+@pytest.mark.parametrize(
+    ("over", "message"),
+    [
+        ({"mass": [0.1, 0.2]}, r"borders: a map needs two axes of two values or more, got mass \(2\)"),
+        ({"mass": [0.1, 0.2], "at": [(0.4, 0.3), (0.5, 0.3)]}, "borders: axes must have one number each"),
+        ({"mass": [0.1, 0.3, 0.2], "speed": [1.0, 2.0]}, "borders: the values of mass must ascend"),
+    ],
+)
+def test_maps_without_borders_are_told_at_once(over, message):
+    bare = case()
+    with pytest.raises(ValueError, match=message):
+        fi.sweep(bare.modes, bare.striker, bare.contact, at=AT, speed=1.0, over=over, borders=True)
+
+
+def test_borders_that_were_not_looked_for_are_none():
+    bare, over = case(), {"mass": [0.02, 0.2], "stiffness": [1e4, 1e6]}
+    shared = {"at": AT, "speed": 1.0, "over": over}
+    with pytest.raises(ValueError, match="table has no borders; make the map with borders=True"):
+        fi.read_borders(fi.sweep(bare.modes, bare.striker, bare.contact, **shared))
+    assert fi.read_borders(fi.sweep(bare.modes, bare.striker, bare.contact, **shared, borders=True))
+    with pytest.raises(ValueError, match="table must be a map"):
+        fi.read_borders({})
