@@ -376,7 +376,7 @@ def _add_choices(add: Any) -> None:
     add(
         "--target",
         metavar="KIND",
-        help="treat the struck body as rigid, infinite, by vectors or modal, whatever the plan chooses",
+        help="treat the struck body as rigid, infinite, by vectors, mixed or modal, whatever the plan chooses",
     )
     add("--n-modes", metavar="N", type=int, help="number of modes to keep for the struck body")
     add("--size", metavar="H", type=float, help="element size [m]")

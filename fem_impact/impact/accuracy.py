@@ -59,9 +59,20 @@ def cutoff_frequency(modes: Modes, at: Any, *, contact: Contact, mass: float, sp
     Meets three limits: `left_out_error`, SERIES_SHARE for the residual compliance, and BAND.
     """
     tolerance = check.positive("tolerance", tolerance)
-    omega_0, stiffness, density, s = _density(modes, at, contact, mass, speed)
+    density, s = left_out_density(modes, modes.point("at", at))
+    return _cutoff(density, s, contact, mass, speed, tolerance)
+
+
+def infinite_cutoff(mobility: float, *, contact: Contact, mass: float, speed: float, tolerance: float) -> float:
+    """As `cutoff_frequency`, for the modes of an infinite plate of a mobility [m/(N s)]."""
+    return _cutoff(2.0 * mobility / np.pi, 0.0, contact, mass, speed, tolerance)
+
+
+def _cutoff(density: float, s: float, contact: Contact, mass: float, speed: float, tolerance: float) -> float:
+    omega_0 = 2.0 * np.pi * contact_resonance(contact, mass, speed)
     power, factor = _order(contact.exponent)
-    soft = stiffness * density / ((1.0 + s) * omega_0 ** (1.0 + s))  # compliance beyond omega_0 over the contact's
+    # compliance beyond omega_0 over the contact's
+    soft = mass * omega_0**2 * density / ((1.0 + s) * omega_0 ** (1.0 + s))
     by_error = omega_0 * (factor * (1.0 + s) * soft / tolerance) ** (1.0 / (power + s))
     by_share = omega_0 * (soft / SERIES_SHARE) ** (1.0 / (1.0 + s))
     return float(max(BAND * omega_0, by_error, by_share)) / (2.0 * np.pi)
@@ -84,10 +95,11 @@ def truncation_error(
     modes: Modes, at: Any, max_frequency: float, *, contact: Contact, mass: float, speed: float
 ) -> float:
     """Expected error [-] if the modes above a frequency [Hz] are left out; the inverse of `cutoff_frequency`."""
-    omega_0, stiffness, density, s = _density(modes, at, contact, mass, speed)
+    omega_0 = 2.0 * np.pi * contact_resonance(contact, mass, speed)
+    density, s = left_out_density(modes, modes.point("at", at))
     omega_c = 2.0 * np.pi * check.positive("max_frequency", max_frequency, "Hz")
     rest = density / ((1.0 + s) * omega_c ** (1.0 + s))
-    return float(left_out_error(stiffness * rest, omega_0 / omega_c, contact.exponent, modes.dimension))
+    return float(left_out_error(mass * omega_0**2 * rest, omega_0 / omega_c, contact.exponent, modes.dimension))
 
 
 def least_tolerance(suffices: Callable[[float], bool]) -> float | None:
@@ -132,12 +144,6 @@ def _order(exponent: Any) -> tuple[Any, Any]:
     return np.minimum(SMOOTH[0] + exponent, SMOOTH[1]), np.minimum(
         np.maximum(2.0 * exponent - 1.0, FACTOR[0]), FACTOR[1]
     )
-
-
-def _density(modes: Modes, at: Any, contact: Contact, mass: float, speed: float) -> tuple[float, float, float, float]:
-    """Contact frequency [rad/s], stiffness [N/m], and A and s of the density A omega**-s of the left-out modes."""
-    omega_0 = 2.0 * np.pi * contact_resonance(contact, mass, speed)
-    return omega_0, mass * omega_0**2, *left_out_density(modes, modes.point("at", at))
 
 
 def left_out_density(modes: Modes, point: np.ndarray) -> tuple[float, float]:

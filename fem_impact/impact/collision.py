@@ -357,7 +357,7 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
     truncation, resolvable = _truncation(parts, told, contacts, system, coarse, ran, size, differ, pace, *last)
     mesh_error = _mesh_error(bodies, parts, contacts, system, coarse, ran, size, differ, options.tolerance, pace, last)
     inherited = sum(differ(_run(_joined(other, contacts), ran, size, pace, *last), coarse) for other in others)
-    parted = {"truncation": truncation, "mesh": mesh_error, "inherited": inherited}
+    parted = {"truncation": truncation, "mesh": mesh_error, "idealisation": 0.0, "inherited": inherited}
     for i, body in enumerate(bodies):
         before = history
         for cause, other in body.poorer.items():

@@ -37,6 +37,7 @@ class Outside:
     rigid: float  # [-] error of treating it as rigid
     endless: float  # [-] error of treating it as infinite; inf if that is wrong or unknown
     mobility: float  # [m/(N s)] of the infinite plate; inf if unknown
+    echo: float = 0.0  # [s] after which waves return from the nearest edge, over half the phase they return with
     notes: tuple[str, ...] = ()  # on the strike point
 
 
@@ -295,7 +296,7 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
             modes = target.finished(find(max_frequency=limit / stretch))
         rigid = rigid_error(modes, at, mass, duration)
         if modes.dimension == 1:
-            return Outside(modes.mass, rigid, np.inf, np.inf, notes)
+            return Outside(modes.mass, rigid, np.inf, np.inf, notes=notes)
     if not isinstance(section, Plate) or callable(section.thickness) or target.point_masses or target.point_supports:
         return None
     kinds = support_of_facets(mesh, dict(target.supports))
@@ -312,9 +313,10 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
         low = waves.least if first_frequency is None else slowest_rate(view, first_frequency)
         rigid = rigid_bound(view, whole, low, free, mass, duration)
         if first_frequency is not None or section.tension:
-            return Outside(whole, rigid, np.inf, np.inf, notes)
+            return Outside(whole, rigid, np.inf, np.inf, notes=notes)
     mobility = waves.mobility(stretch * whole / view.area)
     round_view = Surroundings.seen(mesh, at, waves.stretch)
     assert round_view is not None
     far = endless_error(round_view, mobility, stretch * waves.fastest, mass, duration, slowest=stretch * waves.slowest)
-    return Outside(whole, rigid, far, mobility, notes)
+    echo = round_view.clearance**2 / (stretch * waves.fastest)
+    return Outside(whole, rigid, far, mobility, echo, notes)

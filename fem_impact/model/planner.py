@@ -22,7 +22,7 @@ from ..impact.quantities import words
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, FieldShapes, Modes, at_rest
-from . import audit, cost, idealisation, vectors
+from . import audit, cost, idealisation, mixed, vectors
 from .target import FIRST_LOOK, Stages, Target, Watch
 
 SHARE = 0.45  # [-] of the tolerance for left-out modes, as much for the time steps; the mesh gets the rest
@@ -43,7 +43,7 @@ SHORT_WAVES = {  # [-] frequency error for which `find_modes` chooses the mesh
 PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}  # that a user may set
 # after modes, striker and contact; a plan is for a body at rest
 ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
-TARGETS = ("rigid", "infinite", "vectors", "modal")
+TARGETS = ("rigid", "infinite", "vectors", "mixed", "modal")
 RINGING = ("modal", "vectors")  # those of a target that rings
 DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow
 THICK_DOFS_AT_BLOW = 7500  # [-] the same of a thick plate
@@ -52,6 +52,7 @@ ROUGH, LONGEST = 1e-2, 100.0  # [-] tolerance and length, in undisturbed contact
 FAINTEST = 8.0  # [-] frequency up to which a force has the fraction FAINT of its impulse, times the contact's duration
 TOLD_AT = 200  # [-] times at which the motion of Ritz vectors is judged
 PER_MODE = 65.0  # [-] unknowns per mode found for motion and sound
+MOST_MIXED = 2e8  # [-] modes times steps of one run of a plate that is infinite above a frequency: takes ten seconds
 COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced
 
 
@@ -89,7 +90,7 @@ class Plan:
     changes: Mapping[str, Any]  # overridden arguments of the blow and pieces of the plan
     tolerance: float  # [-]
     quantities: Mapping[str, float | None]  # each with its band [Hz]
-    target: str  # "rigid", "infinite", "vectors" (Ritz vectors started from the blow) or "modal"
+    target: str  # "rigid", "infinite", "vectors" (Ritz vectors started from the blow), "mixed" (see `mixed`) or "modal"
     element: str | None  # "argyris", "hermite" or "closed form"; None for an idealised target
     size: float | None  # [m] element size
     n_dofs: int  # [-] approximate number of unknowns
@@ -306,7 +307,9 @@ def make(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
     stated = blow.target.modes is not None or {"size", "n_modes", "max_frequency"} & set(asked.pieces)
     if target is None and (held or stated):
         target = "modal"
-    plan = None if target in ("modal", "vectors") else _idealised(asked, target, stages)
+    plan = None if target in ("modal", "vectors", "mixed") else _idealised(asked, target, stages)
+    if plan is None and (target == "mixed" or (target is None and blow.target.kind == "fe")):
+        plan = _mixed(asked, target, stages, mixed.HEAVY if target is None else 0.0)
     return plan or _by_vectors(asked, target, stages) or _modal(asked, stages)
 
 
@@ -332,6 +335,8 @@ def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:
     blow, asked, margin = plan.blow, _Asked.checked(plan.blow, plan.changes), 1.0
     if plan.target == "vectors":
         return _carry_out_by_vectors(plan, asked, stages, keep)
+    if plan.target == "mixed":
+        return _carry_out_mixed(plan, asked, stages)
     fixed = {"n_modes", "max_frequency"} & set(asked.pieces) or not asked.values.get("residual", True)
     given = blow.target.kind != "fe" or blow.target.size_stated or "size" in asked.pieces
     idealised = plan.errors.get("rigid target", 0.0) + plan.errors.get("infinite plate", 0.0)
@@ -410,6 +415,76 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
     return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
 
 
+def _carry_out_mixed(plan: Plan, asked: _Asked, stages: Stages) -> Run:
+    """Strike with modes or vectors up to ever higher frequencies until the echoes left out hardly matter."""
+    values, frequency, allowed = asked.values, plan.max_frequency, SHARE * asked.tolerance
+    assert frequency is not None
+    by_parts = _mixed_by_modes if plan.size is None else _mixed_by_vectors
+    found: Any = None
+    while True:
+        try:
+            found = *by_parts(plan, asked, frequency, stages), frequency
+        except check.SimulationError:  # too fine a mesh, too many modes, or too many steps with them
+            if found is None:
+                raise
+            break
+        hit = found[0]
+        work = 2.0 * hit.history.steps.shape[0] * hit.bodies[-1].n_modes
+        many = plan.size is not None and 2.0 * hit.bodies[-1].n_modes > vectors.MOST_VECTORS
+        if hit.error.idealisation <= allowed or work > MOST_MIXED or many:
+            break
+        frequency *= 2.0
+    response, run, frequency = found
+    response = within(asked.tolerance, response, run, values)
+    plan = replace(plan, n_modes=response.bodies[-1].n_modes, max_frequency=frequency)
+    response = audit.audited(response, _outside(plan, "infinite"))
+    return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
+
+
+def _strike_mixed(
+    plan: Plan, asked: _Asked, modes: Modes, frequency: float, stages: Stages
+) -> tuple[Response, Callable[..., Response]]:
+    """One blow on a plate of these modes that is infinite above a frequency [Hz], and how to repeat it."""
+    blow, highest = plan.blow, _highest(asked, plan.mobility)
+    body = mixed.mixed(modes, asked.values["at"], plan.mobility, frequency, highest)
+    run = partial(collision.strike, body, collision.shortened(blow.striker, plan.n_striker_modes), blow.contact)
+    with stages("strike"), blow.target.blame("strike"):
+        return run(**{**asked.values, "tolerance": SHARE * asked.tolerance}), run
+
+
+def _mixed_by_modes(
+    plan: Plan, asked: _Asked, frequency: float, stages: Stages
+) -> tuple[Response, Callable[..., Response]]:
+    target = plan.blow.target
+    with stages("modes"):
+        reach = mixed.REACH * frequency / target.stretch
+        modes = target.finished(asked.find(FIRST_LOOK, reach, first=plan.first, stages=stages))
+    return _strike_mixed(plan, asked, modes, frequency, stages)
+
+
+def _mixed_by_vectors(
+    plan: Plan, asked: _Asked, frequency: float, stages: Stages
+) -> tuple[Response, Callable[..., Response]]:
+    target, reach = plan.blow.target, mixed.RESOLVED * frequency
+    assert target.mesh is not None
+    size = vectors.size_for(target, reach, asked.tolerance)
+    if size < refinement.smallest_size("argyris", target.mesh):
+        raise check.SimulationError("a mesh that resolves the frequency has too many unknowns")
+    shift, count = 2.0 * np.pi * mixed.REACH * frequency, _mixed_vectors(asked, plan.mobility, frequency)
+    seen = vectors.Seen(
+        target, asked.values["at"], reach, asked.tolerance, size, target.size_stated, stages, shift, count
+    )
+    allowed = SHARE * asked.tolerance
+    while True:
+        seen.modes(lambda found, _: float(found.frequencies[-1]))
+        assert seen.whole is not None
+        hit, run = _strike_mixed(plan, asked, seen.whole, frequency, stages)
+        if hit.error.truncation > 0.5 * allowed and seen.count < vectors.MOST_VECTORS:
+            seen.count = min(vectors.MOST_VECTORS, 2 * seen.count)  # it lasts longer than expected
+        elif not seen.improved(hit.error, allowed):
+            return hit, run
+
+
 def _in_fine_steps(run: Callable[..., Response], asked: _Asked) -> Response:
     """The blow with a small part of the tolerance for its steps, or with half of it if that takes too many."""
     with suppress(check.SimulationError):
@@ -452,9 +527,9 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
     takes too many.
     """
     plan = run.plan
-    target = "vectors" if plan.target == "vectors" else "modal"
+    target = plan.target if plan.target in ("vectors", "mixed") else "modal"
     finer: dict[str, Any] = {"tolerance": max(FINEST, plan.tolerance / VERIFYING), "target": target}
-    if plan.size is not None:
+    if plan.size is not None and plan.target != "mixed":
         finer["size"] = plan.size / 1.5
     finer.update({name: None for name in ("n_modes", "max_frequency", "n_striker_modes", "dt") if name in plan.changes})
     try:
@@ -546,6 +621,68 @@ def _last_resort(asked: _Asked, stages: Stages) -> Plan | None:
     return None
 
 
+def _mixed(asked: _Asked, target: str | None, stages: Stages, least: float = 0.0) -> Plan | None:
+    """The plan with modes up to a frequency and an infinite plate above it; None if its mobility is not known.
+
+    Or if the damping ratio of the contact with an infinite plate is not ``least``.
+    """
+    blow, values = asked.blow, asked.values
+    plain = not (blow.target.thick or blow.target.air or values["stretching"] or blow.striker.hand)
+    pressed = values["striker_force"] or values["target_force"] or blow.contact.gap < 0.0
+    fits = plain and not pressed and not asked.moving and values.get("residual", True)
+    with stages("modes"):
+        seen = idealisation.from_outside(blow.target, values["at"], asked.mass, asked.duration) if fits else None
+    resolved = blow.target.kind == "analytic" or vectors.usable(blow.target)
+    if not resolved or seen is None or not np.isfinite(seen.mobility) or not seen.echo:
+        if target is None:
+            return None
+        why = _unfit(asked) if fits else "is known for thin plates in a vacuum, of which only the blow is asked for"
+        raise ValueError(f"{blow.name}target = 'mixed' {why}; use target = 'modal'")
+    if 0.5 * np.pi * asked.mass * seen.mobility < least * asked.duration:
+        return None
+    frequency = mixed.first_frequency(asked.mass, seen.mobility, seen.echo, asked.duration)
+    highest = _highest(asked, seen.mobility)
+    number = _mixed_count(asked, frequency)
+    kept = (
+        f"the target keeps its modes up to about {frequency:.3g} Hz, or higher if the echoes left out show; above, it "
+        f"is treated as an infinite plate of mobility {seen.mobility:.3g} m/(N s), from {highest:.3g} Hz on as a spring"
+    )
+    slow = asked.mass * seen.mobility
+    why = f"the contact lasts about {asked.duration:.3g} s on a wall, and the striker slows down within {slow:.3g} s"
+    size, n_dofs, first, element, work = None, 0, None, "closed form", cost.NOTHING
+    if blow.target.kind == "analytic":
+        with stages("modes"):
+            first = asked.find(FIRST_LOOK, stages=stages)
+    else:
+        size, element = vectors.size_for(blow.target, mixed.RESOLVED * frequency, asked.tolerance), "argyris"
+        n_dofs = blow.target.unknowns(np.atleast_2d(values["at"]), size, stages)
+        count = _mixed_vectors(asked, seen.mobility, frequency)
+        work = cost.by_vectors([n_dofs, n_dofs / vectors.COARSER**2], count, 1.0)
+    return _plan(
+        asked, target="mixed", errors={"echoes left out": SHARE * asked.tolerance}, reasons=(why, kept),
+        mass=seen.mass, mobility=seen.mobility, n_modes=number, max_frequency=frequency, first=first, size=size,
+        n_dofs=n_dofs, element=element, work=work,
+        notes=plausible.together(blow.target.notes, seen.notes),
+    )  # fmt: skip
+
+
+def _highest(asked: _Asked, mobility: float) -> float:
+    """Frequency [Hz] above which an infinite plate may act as a spring."""
+    return accuracy.infinite_cutoff(mobility, mass=asked.mass, tolerance=asked.left_out, **asked.law)
+
+
+def _mixed_count(asked: _Asked, frequency: float) -> int:
+    """About how many modes the target has up to where they fade, for the infinite plate above a frequency [Hz]."""
+    return round(asked.blow.target.count_below(mixed.REACH * frequency / asked.blow.target.stretch))
+
+
+def _mixed_vectors(asked: _Asked, mobility: float, frequency: float) -> int:
+    """Number of Ritz vectors tried first, for the infinite plate above a frequency [Hz]."""
+    lasts = max(asked.duration, mixed.LASTING * asked.mass * mobility)
+    phase = 2.0 * np.pi * mixed.REACH * frequency * lasts
+    return vectors.FEWEST + min(_mixed_count(asked, frequency), round(mixed.PER_RADIAN * phase))
+
+
 def _unfit(asked: _Asked) -> str:
     """Why a target cannot be treated as rigid or infinite without its modes."""
     target = asked.blow.target
@@ -616,7 +753,7 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     assert mesh is not None
     smallest = refinement.smallest_size("argyris", mesh)
     if size < smallest and "size" not in asked.pieces and not blow.target.size_stated:
-        plan = _last_resort(asked, stages) if target is None else None
+        plan = _mixed(asked, None, stages) or _last_resort(asked, stages) if target is None else None
         if plan is not None:
             return plan
         soft = blow.contact.stiffness * (size / smallest) ** (2.0 * (blow.contact.exponent + 1.0))
@@ -700,6 +837,9 @@ def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: fl
     if target.modes is not None and number > target.modes.n_modes:
         number, limit = target.modes.n_modes, target.modes.frequencies[-1]
     if number > MOST_MODES[target.kind]:
+        plan = _mixed(asked, None, stages) if "target" not in asked.pieces and band <= needed else None
+        if plan is not None:
+            return plan
         raise check.SimulationError(
             f"{asked.blow.name}this blow needs about {number:.2g} modes, up to {limit:.2g} Hz, more than the limit of "
             f"{MOST_MODES[target.kind]}; {_fewer(asked, modes, band > needed)}"

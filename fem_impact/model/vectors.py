@@ -120,6 +120,10 @@ class Seen:
         Element size to begin with.
     fixed : bool
         Whether the user insists on this size.
+    shift : float, optional [rad/s]
+        By default, the resonance and the tolerance decide.
+    count : int, optional
+        Number of vectors tried first; the same.
     """
 
     target: Target
@@ -137,12 +141,21 @@ class Seen:
     coarse: Krylov | None
 
     def __init__(
-        self, target: Target, at: Any, resonance: float, tolerance: float, size: float, fixed: bool, stages: Stages
+        self,
+        target: Target,
+        at: Any,
+        resonance: float,
+        tolerance: float,
+        size: float,
+        fixed: bool,
+        stages: Stages,
+        shift: float | None = None,
+        count: int | None = None,
     ) -> None:
         self.target, self.at, self.size, self.fixed, self.stages = target, np.atleast_2d(at), size, fixed, stages
         strict = _strictness(tolerance)
-        self.shift = 2.0 * np.pi * resonance * SHIFT[0] * strict ** SHIFT[1] / target.stretch
-        self.count = first_count(target, resonance, tolerance)
+        self.shift = (shift or 2.0 * np.pi * resonance * SHIFT[0] * strict ** SHIFT[1]) / target.stretch
+        self.count = count or first_count(target, resonance, tolerance)
         self.margin = FOLDED[0] * strict ** FOLDED[1]
         self.whole, self.tried, self.spent = None, [], False
         self.fine = self._krylov(size)

@@ -1,0 +1,151 @@
+"""Modes below a frequency, an infinite plate above: against all modes, in closed form and by finite elements."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.model import mixed
+from fem_impact.scenes.scene import scene_of
+
+STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
+LENGTH, WIDTH, AT = 0.4, 0.3, (0.13, 0.11)
+BALL = fi.Striker.rigid(4.11e-3)  # 10 mm of steel
+HARD = fi.Contact.hertz(1.09e10)
+
+
+def mobility(thickness):
+    """Of an infinite steel plate of a thickness [m], in m/(N s)."""
+    rigidity = STEEL.E * thickness**3 / 12.0 / (1.0 - STEEL.nu**2)
+    return 0.125 / np.sqrt(rigidity * STEEL.rho * thickness)
+
+
+def modes(thickness, highest):
+    """All modes of the hinged plate up to a frequency [Hz]."""
+    section = fi.Plate(STEEL, thickness)
+    return fi.analytic.rectangle(LENGTH, WIDTH, section=section, max_frequency=highest).damped(1e-3)
+
+
+def strike(body, *, speed=1.0, tolerance=1e-3):
+    return fi.strike(body, BALL, HARD, at=AT, speed=speed, tolerance=tolerance)
+
+
+def system(thickness):
+    """The same plate, to be meshed."""
+    plate = fi.mesh.rectangle(LENGTH, WIDTH)
+    return fi.assemble(plate, fi.Plate(STEEL, thickness), {"boundary": "hinged"})
+
+
+def test_modes_and_what_stands_above_them_are_the_infinite_plate():
+    """Before any echo: with modes as dense as those of a wide plate, the mobility is real and that of the plate."""
+    wanted, frequency, density = 0.04, 1e4, 400
+    above, shape, rest = mixed.absorbing(wanted, frequency, 1e8)
+    edges = 2.0 * np.pi * frequency * np.geomspace(1e-6, 1e3, 9 * density + 1)
+    low = np.sqrt(edges[1:] * edges[:-1])
+    squared = 2.0 * wanted / np.pi * np.diff(edges) * mixed.kept(low, wanted, above, shape)
+    damped = 2e-2  # [-] ratio that makes the sum over the low modes an integral, for frequencies off its edges
+    for omega in 2.0 * np.pi * frequency * np.array([1e-2, 0.1, 0.5, 2.0, 10.0, 100.0]):
+        low_part = 1j * omega * (squared / (low**2 - omega**2 + 2j * damped * low * omega)).sum()
+        high = 2.0 * np.sin(mixed.ANGLE) * above * omega
+        high_part = 1j * omega * ((shape**2 / (above**2 - omega**2 + 1j * high)).sum() + rest)
+        # the damping that smooths the low sum changes it by 2 / pi times the ratio
+        assert_allclose(low_part + high_part, wanted, rtol=0.03, err_msg=f"{omega:g} rad/s")
+
+
+def test_share_that_modes_keep_falls_from_one_to_zero():
+    above, shape, _ = mixed.absorbing(0.04, 1e4, 1e9)
+    ratio = np.array([0.0, 0.01, 0.1, 0.5, 1.0, 2.0, 10.0])
+    share = mixed.kept(2e4 * np.pi * ratio, 0.04, above, shape)
+    assert (np.diff(share) < 0.0).all() and share[0] == 1.0
+    assert share[2] > 0.999 and 0.3 < share[4] < 0.7 and share[5] < 0.02
+
+
+@pytest.mark.parametrize("frequency", [2e4, 4e4, 8e4])
+def test_blow_errs_by_no_more_than_it_states(frequency):
+    """A plate of 1 mm, of which 15 190 modes tell everything: a ball that stops dead and is thrown back by echoes."""
+    whole = modes(1e-3, 4e5)
+    true = strike(whole)
+    hit = strike(mixed.mixed(whole, AT, mobility(1e-3), frequency, 4e5))
+    assert hit.bodies[-1].n_modes < 0.5 * whole.n_modes
+    # until the echo the plate is infinite: the modes err by 1e-3 there themselves
+    assert_allclose(hit.peak_force, true.peak_force, rtol=3e-3)
+    error = abs(hit.restitution - true.restitution)
+    assert error <= hit.error.total
+    assert error < 2e-3
+
+
+def test_half_the_frequency_is_the_poorer_description():
+    body = mixed.mixed(modes(1e-3, 1e5), AT, mobility(1e-3), 4e4, 4e5)
+    assert list(body.poorer) == ["idealisation"]
+    assert body.poorer["idealisation"].omega[-1] > 0.9 * body.omega[-1]
+    hit = strike(body)
+    assert hit.error.idealisation > 0.0 and "simplified" in hit.error.dominant[0]
+
+
+def test_ball_on_a_thin_sheet_is_planned_in_both_ways():
+    """By all modes it would need some 90 000; in closed form there may be so many, by elements not."""
+    blow = {"at": AT, "speed": 1.0, "tolerance": 1e-2}
+    plan = fi.plan(system(0.5e-3), BALL, HARD, **blow)
+    assert plan.target == "mixed" and plan.meets and plan.element == "argyris"
+    assert "above, it is treated as an infinite plate of mobility 0.0407 m/(N s)" in str(plan)
+    assert fi.plan(system(5e-3), BALL, HARD, **blow).target != "mixed"  # where the ball bounces off
+
+
+@pytest.mark.parametrize(
+    "asked, words",
+    [
+        ({"quantity": "sound=1000"}, "is known for thin plates in a vacuum, of which only the blow is asked for"),
+        ({"stretching": True}, "is known for thin plates in a vacuum, of which only the blow is asked for"),
+    ],
+)
+def test_what_it_does_not_know_is_refused(asked, words):
+    with pytest.raises(ValueError, match=f"target = 'mixed' {words}; use target = 'modal'$"):
+        fi.plan(system(1e-3), BALL, HARD, at=AT, speed=1.0, target="mixed", **asked)
+
+
+def test_beam_is_refused():
+    beam = fi.assemble(
+        fi.mesh.line(0.4), fi.Beam(STEEL, width=0.02, height=1e-3), {"left": "hinged", "right": "hinged"}
+    )
+    with pytest.raises(ValueError, match=r"target = 'mixed' is not known for this body; use target = 'modal'$"):
+        fi.plan(beam, BALL, HARD, at=0.13, speed=1.0, target="mixed")
+
+
+def tables(thickness, speed):
+    return {
+        "mesh": {"shape": "rectangle", "length": LENGTH, "width": WIDTH},
+        "material": {"E": STEEL.E, "nu": STEEL.nu, "rho": STEEL.rho},
+        "section": {"kind": "plate", "thickness": thickness},
+        "supports": {"boundary": "hinged"},
+        "target": {"damping_ratio": 1e-3},
+        "striker": {"kind": "rigid", "mass": BALL.mass},
+        "contact": {"kind": "hertz", "stiffness": HARD.stiffness},
+        "strike": {"at": list(AT), "speed": speed, "tolerance": 1e-2},
+    }
+
+
+@pytest.mark.slow
+def test_scene_in_closed_form_against_all_modes():
+    """A sheet of 0.2 mm, struck slowly: the 38 105 modes of the comparison err by 2e-3 themselves."""
+    scene = scene_of(tables(0.2e-3, 1e-3), Path("sheet"), folder=Path())
+    run = scene.run()
+    assert run.plan.target == "mixed" and run.response.tolerance_met
+    true = strike(modes(0.2e-3, 2e5), speed=1e-3, tolerance=3e-3)
+    assert run.response.n_impacts == true.n_impacts
+    assert abs(run.response.restitution - true.restitution) < 5e-4
+    assert_allclose(run.response.impulse, true.impulse, rtol=1e-3)
+    assert_allclose(run.response.contact_time, true.contact_time, rtol=1e-2)
+    assert_allclose(run.response.peak_force, true.peak_force, rtol=5e-3)
+
+
+@pytest.mark.slow
+def test_sheet_by_elements_against_all_modes():
+    """A plate of 1 mm, of which Ritz vectors alone miss the restitution by 0.6 and say so."""
+    true = strike(modes(1e-3, 4e5))
+    how = {"quantity": ("restitution", "impulse", "force"), "tolerance": 3e-2, "damping_ratio": 1e-3}
+    hit = fi.strike(system(1e-3), BALL, HARD, at=AT, speed=1.0, **how)
+    assert hit.tolerance_met
+    assert abs(hit.restitution - true.restitution) <= hit.error.total
+    assert_allclose([hit.impulse, hit.peak_force], [true.impulse, true.peak_force], rtol=1e-2)
