@@ -2,14 +2,14 @@
 
     python studies/is_the_model_right.py [--points 11] [--only steel stretching everyday ...] [--out DIR]
 
-Three bodies are struck by a ball from 1 mm/s to 30 m/s: a hinged steel plate of 0.4 m by 0.3 m from 0.2 mm to 30 mm
-by a steel ball of 10 mm, a free bar of spruce of 0.35 m from 2 mm to 60 mm by a wooden ball of 30 mm, and a flat
-bronze disk of 0.4 m from 0.3 mm to 5 mm, a cymbal without its hole, by the same wooden ball. All materials are stated,
-with typical values, so that nothing is unknown. A plate that has too many modes for a blow is infinite above a frequency.
-Each blow is examined (`Response.assumptions`); the picture shows the assumption that changes the blow most and the contours
-of that change; another one shows a plate with and without stretching. Then prints what every assumption changes in the
-everyday scenes (`scenes/everyday/`): the largest change of a quantity asked for, "?" where it is not known. Writes a
-CSV and the pictures.
+Three bodies are struck by a ball from 1 mm/s to 30 m/s: a hinged steel plate of 0.4 m by 0.3 m from 0.2 mm to 30 mm by
+a steel ball of 10 mm, a free bar of spruce of 0.35 m from 2 mm to 60 mm by a wooden ball of 30 mm, and a flat bronze
+disk of 0.4 m from 0.3 mm to 5 mm, a cymbal without its hole, by the same wooden ball. All materials are stated, with
+typical values, so that nothing is unknown. A plate that has too many modes for a blow is infinite above a frequency.
+Each blow is examined (`Response.assumptions`); the picture shows the assumption that changes the blow most and the
+contours of that change; another one shows a plate with and without stretching. Then prints what every assumption
+changes in the everyday scenes (`scenes/everyday/`): the largest change of a quantity asked for, "?" where it is not
+known. Writes a CSV and the pictures.
 """
 
 import argparse

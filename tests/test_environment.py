@@ -134,7 +134,8 @@ def without(tmp_path):
 @pytest.mark.parametrize("words", CORE)
 def test_core_commands_work_without_extras(tmp_path, without, words):
     done = run(tmp_path, f"$FEM {words}", without)
-    assert (done.returncode, done.stderr) == (0, "")
+    told = [line for line in done.stderr.splitlines() if "Ctrl-C stops it" not in line]  # a slow machine's forecast
+    assert (done.returncode, told) == (0, [])
     if words == "doctor":
         assert "pip install 'fem-impact[cad]'" in " ".join(done.stdout.split())
 

@@ -629,7 +629,8 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, least: float = 0.0
     blow, values = asked.blow, asked.values
     plain = not (blow.target.thick or blow.target.air or values["stretching"] or blow.striker.hand)
     pressed = values["striker_force"] or values["target_force"] or blow.contact.gap < 0.0
-    fits = plain and not pressed and not asked.moving and values.get("residual", True)
+    stated = pressed or {"n_modes", "max_frequency"} & set(asked.pieces)
+    fits = plain and not stated and not asked.moving and values.get("residual", True)
     with stages("modes"):
         seen = idealisation.from_outside(blow.target, values["at"], asked.mass, asked.duration) if fits else None
     resolved = blow.target.kind == "analytic" or vectors.usable(blow.target)

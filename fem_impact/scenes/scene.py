@@ -159,8 +159,8 @@ class Scene:
             Called with the name of each stage; returns a context manager that is open during the stage.
         **changes
             Arguments of `strike` that replace those of the scene, such as ``tolerance`` and ``quantity``; and parts of
-            the plan to fix by hand: ``target`` ("rigid", "infinite", "vectors", "mixed" or "modal"), ``size`` [m] of elements,
-            ``n_modes`` or ``max_frequency`` [Hz] of the target, ``n_striker_modes``.
+            the plan to fix by hand: ``target`` ("rigid", "infinite", "vectors", "mixed" or "modal"), ``size`` [m] of
+            elements, ``n_modes`` or ``max_frequency`` [Hz] of the target, ``n_striker_modes``.
 
         Returns
         -------
@@ -509,8 +509,8 @@ def plan(
         Called with the name of each stage; returns a context manager that is open during the stage.
     **changes
         Arguments of `strike`, such as ``at``, ``speed``, ``tolerance`` and ``quantity``, which replace those of a
-        scene; and parts of the plan to fix by hand: ``target`` ("rigid", "infinite", "vectors", "mixed" or "modal"), ``size``
-        [m] of the elements, ``n_modes`` or ``max_frequency`` [Hz] of the target, ``n_striker_modes``.
+        scene; and parts of the plan to fix by hand: ``target`` ("rigid", "infinite", "vectors", "mixed" or "modal"),
+        ``size`` [m] of the elements, ``n_modes`` or ``max_frequency`` [Hz] of the target, ``n_striker_modes``.
 
     Returns
     -------

@@ -194,7 +194,7 @@ def test_every_piece_can_be_set():
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"target": "wall"}, "target must be one of rigid, infinite, vectors, modal, got 'wall'"),
+        ({"target": "wall"}, "target must be one of rigid, infinite, vectors, mixed, modal, got 'wall'"),
         ({"n_modes": 0}, "n_modes"),
         ({"size": -1.0}, "size must be positive"),
         ({"quantity": "restituton"}, "quantity must be one of .*did you mean 'restitution'"),

@@ -194,7 +194,7 @@ def test_killed_workers_and_killed_runs_lose_nothing(tmp_path, cluster, monkeypa
 
 
 def _times(store):
-    """When each finished block of numbers was written; a worker killed before its flag leaves numbers to write again."""
+    """When each finished block was written; a worker killed before its flag leaves numbers to be written again."""
     done = np.flatnonzero(Store(store).group["done"][:])
     return {path: path.stat().st_mtime_ns for path in (store / "numbers" / "c" / "0" / str(block) for block in done)}
 
