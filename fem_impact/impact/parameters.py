@@ -207,7 +207,7 @@ class Parameters:
         section = self.hit.bodies[-1].section
         return SCALE[type(section)] if name == "target.scale" else self._powers[name]
 
-    @property
+    @cached_property
     def _bodies(self) -> tuple[slice, slice]:
         return self.hit.body_slice(0), self.hit.body_slice(1)
 

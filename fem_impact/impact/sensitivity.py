@@ -125,13 +125,7 @@ class Sensitivity:
         )  # fmt: skip
         follow(blow, change, pieces, found)
         told = cls(history, change, time, pieces, found, top, apart)
-        return told if smooth or np.isnan(top) else told._at_summit()
-
-    def _at_summit(self) -> "Sensitivity":
-        """The same with the largest force where the polynomial that its changes are read from has it, in its step."""
-        start, end = _step_at(self.history, self.peak)
-        later = self.peak + self._late
-        return replace(self, peak=later) if start < later < end else self
+        return told if smooth or np.isnan(top) or history.law[0, layout.LOSS] else replace(told, peak=told._summit())
 
     @cached_property
     def deepest(self) -> float:
@@ -281,10 +275,25 @@ class Sensitivity:
             return self.found.base[at, :4], self.found.ends[at]
         return self._through_ends(2 if self.history.law[0, layout.LOSS] else 3)
 
+    def _summit(self) -> float:
+        """When the quintic through the ends of the step with the peak turns back [s], which it was not found by."""
+        start, end, ends = self._peak_step
+        inside = (self.peak - start) / (end - start)
+        powers = hermite(3) @ (np.tile((end - start) ** np.arange(3.0), 2) * self.found.base[ends, :3].ravel())
+        for _ in range(2):
+            _, rate, bend, _ = derivatives(inside, 6) @ powers
+            inside -= rate / bend if bend < 0.0 else 0.0
+        return start + inside * (end - start) if 0.0 < inside < 1.0 else self.peak
+
+    @property
+    def _peak_step(self) -> tuple[float, float, np.ndarray]:
+        """Start and end [s] of the step with the largest force, and the marks there."""
+        start, end = _step_at(self.history, self.peak)
+        return start, end, self.pieces.mark[[_nearest(self.time, start), _nearest(self.time, end)]]
+
     def _through_ends(self, n_rates: int) -> tuple[np.ndarray, np.ndarray]:
         """The same at the peak by the polynomial with the approach and rates, so many in all, at the ends of a step."""
-        start, end = _step_at(self.history, self.peak)
-        ends = self.pieces.mark[[_nearest(self.time, start), _nearest(self.time, end)]]
+        start, end, ends = self._peak_step
         scale = (end - start) ** np.arange(4.0)
         at_ends = np.tile(scale[:n_rates], 2)
         inside = (self.peak - start) / (end - start)
