@@ -159,6 +159,13 @@ def test_the_peak_is_that_of_the_motion_and_not_of_the_steps():
     assert off <= 3.0 * ((rough.error + fine.error) * np.abs(fine.numbers)).sum() / scale
 
 
+def test_two_maxima_alike_are_refused_though_a_step_holds_both():
+    """Seed 2: the lossy force rings within its steps, and its ends alone would not show the rival."""
+    numbers = random_numbers(np.random.default_rng(2))
+    with pytest.raises(fi.SimulationError, match="two maxima differ by 3.6e-05 of it"):
+        strike(numbers, 1e-4).gradient("peak_force")
+
+
 def test_gradients_of_layers_are_differences_of_blows():
     """A soft layer over a hard one, pressed beyond its depth."""
     numbers = {"stiffness": 1e5, "exponent": 1.3, "depth": 2e-4, "hard_stiffness": 1e8, "hard_exponent": 1.5}
