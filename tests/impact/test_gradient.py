@@ -162,7 +162,7 @@ def test_the_peak_is_that_of_the_motion_and_not_of_the_steps():
 def test_two_maxima_alike_are_refused_though_a_step_holds_both():
     """Seed 2: the lossy force rings within its steps, and its ends alone would not show the rival."""
     numbers = random_numbers(np.random.default_rng(2))
-    with pytest.raises(fi.SimulationError, match="two maxima differ by 3.6e-05 of it"):
+    with pytest.raises(fi.SimulationError, match="two maxima differ by"):
         strike(numbers, 1e-4).gradient("peak_force")
 
 
