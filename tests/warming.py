@@ -31,7 +31,7 @@ def stretching():
 
 def gradient():
     """Changes of a blow."""
-    strike().gradient("restitution")
+    strike().gradient(("restitution", "peak_force"))
 
 
 def many():

@@ -14,7 +14,7 @@ from ..fe.variation import SectionChange
 from .compiled import record
 from .compiled.layout import KIND
 from .parameters import POSSIBLE, UNITS, Parameters
-from .sensitivity import ENOUGH, Sensitivity, together
+from .sensitivity import Sensitivity, together
 
 if TYPE_CHECKING:
     from .response import History, Response
@@ -30,7 +30,7 @@ UNIT_OF = {
 GRAZE = 1e-3  # [-] of the deepest approach: a touch or gap below it may come or go with a small change
 TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a small change may make the other the largest
 LOOKS = 16.0, 20_000  # [-] times per contact at which a flight is searched for near misses, and their largest number
-WITHIN = np.linspace(0.0, 1.0, 9)  # [-] fractions of a piece of time at which its cubic is looked at
+CUBIC = np.linspace(0.0, 1.0, 9) ** np.arange(4)[:, None]  # where in a piece of time its cubic is looked at, as powers
 # halving the steps brings these no sure gain
 ROUGH = "contact_time", "peak_time", "spectral_centroid", "spectral_level"
 # [-] difference of two runs over the error of the finer one, for schemes A, A4 and collocation, of all others
@@ -144,21 +144,22 @@ def gradients(
     joined = 1 if coarse is None else together(coarse)
     fine = Sensitivity.of(hit.history, change, peak, joined)
     _check_grazing(fine)
-    rough = None if coarse is None else Sensitivity.of(coarse, change, peak, joined)
+    rough = None if coarse is None else Sensitivity.of(coarse, change, peak, joined, coarse=True)
     numbers = np.array([sections[name][0] if name in sections else parameters.values[name] for name in names])
     found = {}
     if peak:
-        _check_tie(hit.history)
+        _check_tie(fine.apart)
     for name, band in wanted:
         if name == "modal_energy" and (hit.rings is not None or hit.ringing is not None):
             raise SimulationError(
                 "no gradient of modal_energy: the modes that ring did not tell the blow; strike modes, of find_modes"
             )
-        value, slopes = _slopes(hit, fine, names, name, band)
+        value, spectrum = _value(hit, fine, name, band)
+        slopes = _slopes(hit, fine, names, name, band, value, spectrum)
         if rough is None:
             error = np.full(slopes.shape, np.inf)
         else:
-            apart = np.abs(slopes - _slopes(hit, rough, names, name, band)[1])
+            apart = np.abs(slopes - _slopes(hit, rough, names, name, band, value, spectrum))
             gained = 1.0 if name in ROUGH else RICHARDSON[hit.scheme]
             if name == "peak_time":
                 apart = np.maximum(apart, fine.peak_doubt)
@@ -199,43 +200,53 @@ def _asked(item: Any) -> tuple[str, float | None]:
         ) from None
 
 
+def _value(hit: "Response", found: Sensitivity, name: str, band: float | None) -> tuple[Any, np.ndarray | None]:
+    """Value of a quantity, and the force's spectrum [N s] that it was read from, if any."""
+    if name == "modal_energy":
+        part, h = hit.body_slice(1), hit.history
+        return 0.5 * (h.end_p[part] ** 2 + (h.omega[part] * h.end_q[part]) ** 2), None
+    if name == "spectral_centroid":
+        assert band is not None
+        return _centroid(band, hit.band_spectrum(band)[1])
+    if name == "spectral_level":
+        spectrum = hit.spectrum(np.array([0.0, band]))
+        return level_of(spectrum), spectrum
+    return found.when_largest if name == "peak_time" else getattr(hit, name), None
+
+
+def _centroid(band: float, spectrum: np.ndarray) -> tuple[float, np.ndarray]:
+    """Centroid [Hz] of a spectrum at equally spaced frequencies up to a band, and the spectrum."""
+    size, number = np.abs(spectrum), np.arange(len(spectrum))
+    whole = size.sum() - 0.5 * (size[0] + size[-1])
+    return band / (len(size) - 1) * float((size @ number - 0.5 * size[-1] * number[-1]) / whole), spectrum
+
+
 def _slopes(
-    hit: "Response", found: Sensitivity, names: tuple[str, ...], name: str, band: float | None
-) -> tuple[Any, np.ndarray]:
-    """Value of a quantity, and its derivatives (n,) or (n, n_modes)."""
+    hit: "Response", found: Sensitivity, names: tuple[str, ...], name: str, band: float | None, value: Any,
+    spectrum: np.ndarray | None,
+) -> np.ndarray:  # fmt: skip
+    """Derivatives (n,) or (n, n_modes) of a quantity, of which `_value` is known."""
     if name == "restitution":
         rigid = np.arange(hit.bodies[0].n_rigid)
         faster = np.array([float(other == "strike.speed") for other in names])
-        return hit.restitution, -(found.speed(rigid) + hit.restitution * faster) / hit.speed
+        return -(found.speed(rigid) + value * faster) / hit.speed
     if name == "modal_energy":
-        part = hit.body_slice(1)
-        h = hit.history
-        energy = 0.5 * (h.end_p[part] ** 2 + (h.omega[part] * h.end_q[part]) ** 2)
-        return energy, found.energies(part).T
+        return found.energies(hit.body_slice(1)).T
     if name == "spectral_centroid":
-        assert band is not None
-        frequencies = hit._band(band)
-        if found.history is hit.history:
-            spectrum = hit.spectrum(frequencies)
-        else:  # the error of the coarser run's own spectrum counts, too
-            spectrum = found.even_spectrum(len(frequencies), frequencies[1])
-        size = np.abs(spectrum)
-        whole = np.trapezoid(size, frequencies)
-        centre = float(np.trapezoid(frequencies * size, frequencies) / whole)
-        unit = np.conj(spectrum) / np.where(size > 0.0, size, 1.0)
-        share = np.gradient(frequencies)  # of the trapezoidal rule
-        share[[0, -1]] *= 0.5
-        return centre, found.spectral_sum(share * (frequencies - centre) / whole * unit, frequencies[1])
+        assert band is not None and spectrum is not None
+        step = band / (len(spectrum) - 1)
+        even = found.even_spectrum(len(spectrum), step)
+        if found.history is not hit.history:  # the error of the coarser run's own spectrum counts, too
+            value, spectrum = _centroid(band, even.value)
+        size, share = np.abs(spectrum), np.ones(len(spectrum))  # of the trapezoidal rule
+        share[[0, -1]] = 0.5
+        weights = share * (step * np.arange(len(size)) - value) / (share @ size)
+        return even.change(weights * np.conj(spectrum) / np.where(size > 0.0, size, 1.0))
     if name == "spectral_level":
-        assert band is not None
-        ends = np.array([0.0, band])
-        spectrum = hit.spectrum(ends)
-        rates = np.real(found.spectrum(ends) / spectrum[:, None])  # (2, n) of the logarithms
-        return level_of(spectrum), 20.0 / np.log(10.0) * (rates[1] - rates[0])
-    if name == "peak_time":
-        return found.when_largest, found.peak_time
-    value: float = getattr(hit, name)
-    return value, getattr(found, name)
+        assert band is not None and spectrum is not None
+        rates = np.real(found.spectrum(np.array([0.0, band])) / spectrum[:, None])  # (2, n) of the logarithms
+        return np.asarray(20.0 / np.log(10.0) * (rates[1] - rates[0]))
+    return np.asarray(getattr(found, name))
 
 
 def level_of(spectrum: np.ndarray) -> float:
@@ -244,23 +255,26 @@ def level_of(spectrum: np.ndarray) -> float:
     return 20.0 * float(np.log10(size[1] / size[0]))
 
 
-def _check_tie(history: "History") -> None:
+def _check_tie(apart: float) -> None:
     """Raise SimulationError where two maxima of the force are so alike that either may be the largest."""
-    rows = np.flatnonzero(history.pressed[:, 0])
-    looks = int(np.clip(ENOUGH // len(rows), 4, 16))
-    force = history.force(rows, 0, np.arange(looks) / looks).ravel()
-    before, after = np.append(0.0, force[:-1]), np.append(force[1:], 0.0)
-    tops = np.sort(force[(force > before) & (force >= after)])[::-1]
-    if len(tops) > 1 and tops[0] - tops[1] < TIE * tops[0]:
+    if apart < TIE:
         raise SimulationError(
-            f"no gradient of the largest force: two maxima differ by {(tops[0] - tops[1]) / tops[0]:.1e} of it, and a "
-            "small change may make the other the largest"
+            f"no gradient of the largest force: two maxima differ by {apart:.1e} of it, and a small change may make "
+            "the other the largest"
         )
 
 
 def _check_grazing(found: Sensitivity) -> None:
     """Raise SimulationError next to a contact or a separation that barely happens, or barely does not."""
-    for what, least in (("touch", _shallowest(found)), ("gap", _narrowest(found)), ("miss", _nearest_miss(found))):
+    parts = _impact_pieces(found)
+    depth = _between(found.found.way[:, 0], found.found.way[:, 1], found.pieces.length)
+    gap, miss = _nearest(found, parts)
+    nearly = (
+        ("touch", min((depth[part].max() for part in parts), default=np.inf)),
+        ("gap", min(gap, _turned(found, depth))),
+        ("miss", miss),
+    )
+    for what, least in nearly:
         if least < GRAZE * found.deepest:
             words = {
                 "touch": "an impact is only {} m deep, and would vanish",
@@ -274,58 +288,45 @@ def _check_grazing(found: Sensitivity) -> None:
             )
 
 
-def _cubic(found: Sensitivity) -> np.ndarray:
-    """Approach [m] at fractions `WITHIN` of every piece, (n_pieces, 9)."""
-    return _between(found.found.way[:, 0], found.found.way[:, 1], found.pieces.length)
-
-
 def _between(d: np.ndarray, v: np.ndarray, h: np.ndarray) -> np.ndarray:
-    t = WITHIN
-    d0, d1, v0, v1 = (x[:, None] for x in (d[:-1], d[1:], v[:-1] * h, v[1:] * h))
-    return d0 + t * (v0 + t * (3.0 * (d1 - d0) - 2.0 * v0 - v1 + t * (2.0 * (d0 - d1) + v0 + v1)))
+    """Approach [m] at the places of `CUBIC` in pieces of time, (n, 9), by cubics through the ends (n + 1,)."""
+    d0, d1, v0, v1 = d[:-1], d[1:], v[:-1] * h, v[1:] * h
+    return np.stack([d0, v0, 3.0 * (d1 - d0) - 2.0 * v0 - v1, 2.0 * (d0 - d1) + v0 + v1], axis=1) @ CUBIC
 
 
 def _impact_pieces(found: Sensitivity) -> list[slice]:
     """The pieces of every impact."""
-    closed = np.concatenate([[False], found.pieces.closed, [False]]).astype(int)
-    edges = np.flatnonzero(np.diff(closed))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], found.pieces.closed, [0]]))).tolist()
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2])]
 
 
-def _shallowest(found: Sensitivity) -> float:
-    """Depth of the least deep impact [m]."""
-    depth = _cubic(found)
-    return float(min((depth[part].max() for part in _impact_pieces(found)), default=np.inf))
+def _turned(found: Sensitivity, depth: np.ndarray) -> float:
+    """Least approach at which a contact nearly opens [m]."""
+    v = found.found.way[:, 1]
+    return float(np.abs(depth[found.pieces.closed & (v[:-1] < 0.0) & (v[1:] > 0.0)]).min(initial=np.inf))
 
 
-def _narrowest(found: Sensitivity) -> float:
-    """Least approach at which a contact nearly opens, or least gap between two impacts [m]."""
-    depth, v = _cubic(found), found.found.way[:, 1]
-    turns = found.pieces.closed & (v[:-1] < 0.0) & (v[1:] > 0.0)
-    least = float(np.abs(depth[turns]).min(initial=np.inf))
-    parts = _impact_pieces(found)
-    for one, two in pairwise(parts):
-        if two.start > one.stop:
-            times, d, v = _flight(found, one.stop, found.time[two.start])
-            least = min(least, float(-_between(d, v, np.diff(times)).min(initial=0.0)))
-    return least
+def _nearest(found: Sensitivity, parts: list[slice]) -> tuple[float, float]:
+    """Least gap between two impacts [m], and the least at which the bodies pass each other without touching.
 
-
-def _nearest_miss(found: Sensitivity) -> float:
-    """Least gap at which the bodies pass each other without touching [m], later ones too if the run saw the end."""
-    history, parts = found.history, _impact_pieces(found)
-    spans = [(one.stop, found.time[two.start]) for one, two in pairwise(parts)]
+    The latter also later if the run saw the end.
+    """
+    history = found.history
+    spans = [(one.stop, found.time[two.start]) for one, two in pairwise(parts) if two.start > one.stop]
+    n_between = len(spans)
     if history.status == record.FINISHED:
         spans.append((len(found.time) - 1, history.end_time + _ahead(history)))
     elif parts and not found.pieces.closed[-1]:
         spans.append((parts[-1].stop, history.end_time))
-    least = np.inf
-    for begin, end in spans:
+    gap, miss = np.inf, np.inf
+    for i, (begin, end) in enumerate(spans):
         times, d, v = _flight(found, begin, end)
         depth = _between(d, v, np.diff(times))
+        if i < n_between:
+            gap = min(gap, float(-depth.min(initial=0.0)))
         turns = (v[:-1] > 0.0) & (v[1:] < 0.0)
-        least = min(least, float((-depth[turns].max(axis=1, initial=-np.inf)).min(initial=np.inf)))
-    return least
+        miss = min(miss, float((-depth[turns].max(axis=1, initial=-np.inf)).min(initial=np.inf)))
+    return gap, miss
 
 
 def _ahead(history: "History") -> float:

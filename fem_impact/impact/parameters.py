@@ -207,7 +207,7 @@ class Parameters:
         section = self.hit.bodies[-1].section
         return SCALE[type(section)] if name == "target.scale" else self._powers[name]
 
-    @property
+    @cached_property
     def _bodies(self) -> tuple[slice, slice]:
         return self.hit.body_slice(0), self.hit.body_slice(1)
 
@@ -280,8 +280,7 @@ class Parameters:
         """The target struck further along an axis, for each parameter its own."""
         hit, target, part = self.hit, self.hit.bodies[1], self._bodies[1]
         assert hit.at is not None
-        corners = target.shapes.grid()[0]
-        span = float(np.ptp(corners, axis=0).max())
+        span = max(float(np.ptp(column)) for column in target.shapes.grid()[0].T)
         waves = np.pi * float(len(target.omega)) ** (1.0 / target.dimension) / span  # [rad/m] of the shortest wave
         slopes = _slopes(target, hit.at, axes.values(), SHIFT / waves, target.shapes.at)
         flexible = target.omega > 0.0

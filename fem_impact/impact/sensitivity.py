@@ -10,21 +10,22 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
-from .compiled import layout, record
-from .compiled.tangents import N_LAW, Blow, Change, Found, Pieces, follow, law_at
+from .compiled import build, layout, record
+from .compiled.tangents import N_LAW, Blow, Change, Found, Pieces, follow, law_at, rate_slopes
 
 if TYPE_CHECKING:
     from .response import History
 
 NODES = 3, 5  # [-] Gauss nodes per piece: for a force that is linear in each step, and for one of higher order
-# [-] of the median step in contact: where the first step of a contact, in which its force is no polynomial, is cut, and
-# mirrored the last: there the slope of a power law goes as (exponent - 1) powers of time
-GRADED = np.array([4.0**-4, 4.0**-3, 4.0**-2, 4.0**-1])
+# [-] how often the first step of a contact is cut, each time to a quarter of the median step in contact, and mirrored
+# the last, for a force that is linear in each step and for one of higher order, whose steps are long for their error:
+# there the slope of a power law goes as (exponent - 1) powers of time, that in the exponent as its logarithm
+GRADES = 3, 6
 WHOLLY = 0.9  # [-] of such a step: what is left beyond goes to the last of them
 NEAR = 4  # [-] steps from the start or end of a contact, per step that a piece may hold there
-FULL = 32  # [-] steps of a contact, above twice of which pieces are of two steps, and so on
-LOOKS, ROUNDS = 16, 2  # [-] samples per step in the search for the largest force; one step of Newton's method follows
-ENOUGH = 1024  # [-] samples of a blow in that search; of long ones a step needs only few
+# [-] steps of a contact from which on pieces are of two steps, and of four; a lossy force rings with every mode
+FULL = {False: (24, 128), True: (64, 128)}
+BESIDE = 1e-4  # [-] of a step: distance of two rates of the force from which its peak is told; leaves 1e-12 of the step
 NUDGE = 1e-5  # [-] relative change at which the curvature of a contact law is taken; leaves 1e-10
 MORE = 2  # [-] Gauss nodes beyond those of the force, and three per radian of half the phase over a piece: err by 1e-9
 EDGE = 1e-9  # [-] of a step: what lies nearer to its ends is at them
@@ -76,30 +77,39 @@ class Sensitivity:
     pieces: Pieces
     found: Found
     peak: float  # [s] when the force is largest, nearly; NaN if it is not wanted
+    apart: float  # [-] how much smaller the next of its maxima is
 
     def __repr__(self) -> str:
         return check.brief(self)
 
     @classmethod
-    def of(cls, history: "History", change: Change, peak: bool = True, together: int = 1) -> "Sensitivity":
+    def of(
+        cls, history: "History", change: Change, peak: bool = True, together: int = 1, coarse: bool = False
+    ) -> "Sensitivity":
         """Follow the record; raises SimulationError where it passed over contacts without locating them.
 
-        ``peak`` says whether the largest force is wanted; up to ``together`` steps make one piece, see `together`.
+        ``peak`` says whether the largest force is wanted; up to ``together`` steps make one piece, see `together`. A
+        ``coarse`` record is cut once less where a contact starts and ends: two runs may share their first steps, and
+        the error made there would not show in their difference.
         """
         if history.n_blind:
             raise SimulationError(
                 "no gradient: the bodies chatter, and the run passed over contacts without locating them; give "
                 "max_impacts, a shorter duration or no dt"
             )
-        top = _peak(history) if peak else None
+        top, apart = _peak(history) if peak else (np.nan, np.inf)
         smooth = history.n_coefficients > 2
+        if smooth and not np.isnan(top):
+            top = _sharper(history, top)
         wanted = [when for each in history.impacts for when in (each.start, each.end)]
-        marked = [] if top is None else [top] if smooth else list(_step_at(history, top))
-        time, row, part, count = _cut(history, [*wanted, *marked], together)
+        marked = [] if np.isnan(top) else [top] if smooth else list(_step_at(history, top))
+        bent = float(history.law[0, layout.EXPONENT]) != 1.0 or change.law[:, layout.EXPONENT].any()
+        grades = 4.0 ** -np.arange(GRADES[smooth] - coarse, 0.0, -1.0) if bent else np.zeros(0)
+        time, row, part, count = _cut(history, [*wanted, *marked], grades, together)
         wanted = [0.0, *wanted, *marked, time[-1]]
         nodes, powers = gauss(NODES[int(smooth)])
         n, n_modes, s = len(change.offset), len(history.omega), len(powers)
-        marks = np.unique([int(np.abs(time - when).argmin()) for when in wanted])
+        marks = sorted({_nearest(time, when) for when in wanted})
         mark = np.full(len(time), -1)
         mark[marks] = np.arange(len(marks))
         length, closed = _alike(np.diff(time)), history.pressed[row, 0]
@@ -114,7 +124,8 @@ class Sensitivity:
             float(history.offset[0]), history.law,
         )  # fmt: skip
         follow(blow, change, pieces, found)
-        return cls(history, change, time, pieces, found, np.nan if top is None else top)
+        told = cls(history, change, time, pieces, found, top, apart)
+        return told if smooth or np.isnan(top) or history.law[0, layout.LOSS] else replace(told, peak=told._summit())
 
     @cached_property
     def deepest(self) -> float:
@@ -128,7 +139,7 @@ class Sensitivity:
 
     def _moved(self, time: float) -> np.ndarray:
         """Change of an onset or release."""
-        k = int(np.abs(self.time - time).argmin())
+        k = _nearest(self.time, time)
         mark = self.pieces.mark[k]
         d, v, a = self.found.base[mark, :3]
         dd, dv = self.found.ends[mark, :2]
@@ -183,30 +194,18 @@ class Sensitivity:
 
     def spectrum(self, frequencies: np.ndarray) -> np.ndarray:
         """Change (n_frequencies, n) of the force's Fourier transform [N s], for few frequencies."""
-        time, force = self._impulses(float(np.abs(frequencies).max(initial=0.0)))
+        time, force = self._impulses(float(np.abs(frequencies).max(initial=0.0)), self.found.force)
         return np.exp(-2j * np.pi * frequencies[:, None] * time) @ force
 
-    def spectral_sum(self, weights: np.ndarray, step: float) -> np.ndarray:
-        """Change (n,) of the real part of a weighted sum of the transform at 0, step, 2 step, ... [Hz].
+    def even_spectrum(self, count: int, step: float) -> "EvenSpectrum":
+        """Transform of the force and its changes at 0, step, 2 step, ... [Hz], so many frequencies."""
+        time, force = self._impulses(step * count, np.concatenate([self.pieces.force[..., None], self.found.force], 2))
+        return EvenSpectrum(count, *_turns(count, step, time), force)
 
-        The sum over frequencies k = a K + b at each time is that over a of sums over b, a product of matrices.
-        """
-        time, force = self._impulses(step * len(weights))
-        few, many = _turns(len(weights), step, time)
-        table = np.zeros(len(few) ** 2, complex)
-        table[: len(weights)] = weights
-        return np.real((many * (table.reshape(len(few), -1) @ few)).sum(axis=0)) @ force
+    def _impulses(self, highest: float, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Times (m,) [s] and impulses there (m, n) with the same spectrum up to a frequency [Hz] as forces.
 
-    def even_spectrum(self, count: int, step: float) -> np.ndarray:
-        """Transform (count,) of the recorded force itself at 0, step, 2 step, ... [Hz], by the same products."""
-        time, force = self._impulses(step * count, self.pieces.force[:, :, None])
-        few, many = _turns(count, step, time)
-        return ((many * force[:, 0]) @ few.T).ravel()[:count]
-
-    def _impulses(self, highest: float, force: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Times (m,) [s] and changes of impulses there (m, n) with the same spectrum up to a frequency [Hz].
-
-        Or the impulses of another force (n_pieces, s, n) at the nodes.
+        The forces (n_pieces, s, n) [N] are those at the nodes.
         """
         pieces = self.pieces
         phase = np.pi * highest * pieces.length[pieces.closed].max(initial=0.0)
@@ -215,8 +214,7 @@ class Sensitivity:
         basis = np.vander(nodes, len(pieces.powers), increasing=True) @ pieces.powers.T  # (rule, s)
         length = pieces.length[pieces.closed, None]
         time = (self.time[:-1][pieces.closed, None] + nodes * length).ravel()
-        at_nodes = (self.found.force if force is None else force)[pieces.closed]
-        values = np.einsum("ab,jbi->jai", basis, at_nodes) * (shares(rule) * length)[:, :, None]
+        values = basis @ force[pieces.closed] * (shares(rule) * length)[:, :, None]
         return time, values.reshape(len(time), -1)
 
     @property
@@ -273,19 +271,33 @@ class Sensitivity:
         force that the peak was found in.
         """
         if self.history.n_coefficients > 2:
-            at = self.pieces.mark[np.abs(self.time - self.peak).argmin()]
+            at = self.pieces.mark[_nearest(self.time, self.peak)]
             return self.found.base[at, :4], self.found.ends[at]
         return self._through_ends(2 if self.history.law[0, layout.LOSS] else 3)
 
+    def _summit(self) -> float:
+        """When the quintic through the ends of the step with the peak turns back [s], which it was not found by."""
+        start, end, ends = self._peak_step
+        inside = (self.peak - start) / (end - start)
+        powers = hermite(3) @ (np.tile((end - start) ** np.arange(3.0), 2) * self.found.base[ends, :3].ravel())
+        for _ in range(2):
+            _, rate, bend, _ = derivatives(inside, 6) @ powers
+            inside -= rate / bend if bend < 0.0 else 0.0
+        return start + inside * (end - start) if 0.0 < inside < 1.0 else self.peak
+
+    @property
+    def _peak_step(self) -> tuple[float, float, np.ndarray]:
+        """Start and end [s] of the step with the largest force, and the marks there."""
+        start, end = _step_at(self.history, self.peak)
+        return start, end, self.pieces.mark[[_nearest(self.time, start), _nearest(self.time, end)]]
+
     def _through_ends(self, n_rates: int) -> tuple[np.ndarray, np.ndarray]:
         """The same at the peak by the polynomial with the approach and rates, so many in all, at the ends of a step."""
-        start, end = _step_at(self.history, self.peak)
-        ends = [int(self.pieces.mark[np.abs(self.time - when).argmin()]) for when in (start, end)]
-        length, powers = end - start, np.eye(2 * n_rates)
-        inside = (self.peak - start) / length
-        scale = length ** np.arange(4.0)[:, None]
-        at_ends = np.vstack([_rates(powers, where, n_rates) / scale[:n_rates] for where in (0.0, 1.0)])
-        rates = _rates(powers, inside, 4) / scale @ np.linalg.inv(at_ends)
+        start, end, ends = self._peak_step
+        scale = (end - start) ** np.arange(4.0)
+        at_ends = np.tile(scale[:n_rates], 2)
+        inside = (self.peak - start) / (end - start)
+        rates = derivatives(inside, 2 * n_rates) @ hermite(n_rates) * at_ends / scale[:, None]
         base = rates @ self.found.base[ends, :n_rates].ravel()
         changes = rates[:3] @ self.found.ends[ends, :n_rates].reshape(2 * n_rates, -1)
         slopes = np.zeros(N_LAW)
@@ -307,40 +319,39 @@ class Sensitivity:
     @cached_property
     def _late(self) -> float:
         """How much later than `peak` [s] the force is largest: one step of Newton's method."""
-        return -_force_rate(self._at_peak[0][:3], self.history.law) / self._bend if self._bend else 0.0
+        return -self._turning[0] / self._bend if self._bend else 0.0
 
-    @cached_property
+    @property
     def _bend(self) -> float:
         """Second rate of the force at its peak [N/s^2]; zero if the force is largest at an end of the blow."""
-        if not EDGE < self.peak / self.time[-1] < 1.0 - EDGE:
-            return 0.0
-        return self._slope(self._at_peak[0][1:], np.zeros(N_LAW))
+        return float(self._turning[1]) if EDGE < self.peak / self.time[-1] < 1.0 - EDGE else 0.0
 
-    @cached_property
+    @property
     def _rate_change(self) -> np.ndarray:
         """Change (n,) of the rate of the force at its peak."""
-        none, changes, law = np.zeros(3), self._at_peak[1][:3], self.change.law
-        by_state = sum(self._slope(each, np.zeros(N_LAW)) * change for each, change in zip(np.eye(3), changes))
-        used = np.flatnonzero(law.any(axis=0))
-        by_law = [self._slope(none, each) for each in np.eye(N_LAW)[used]]
-        return np.asarray(by_state + law[:, used] @ np.array(by_law))
+        law = self.change.law
+        return np.asarray(self._turning[2:5] @ self._at_peak[1][:3] + law @ self._turning[5:])
 
-    def _slope(self, along: np.ndarray, dlaw: np.ndarray) -> float:
-        """Slope of the force's rate at its peak along changes (3,) of the approach and its rates, and of the law.
-
-        By a central difference.
+    @cached_property
+    def _turning(self) -> np.ndarray:
+        """Rate of the force at its peak [N/s], and its slopes along the motion, in the approach and its first two rates
+        and in the numbers of the law, (5 + N_LAW,); by central differences.
         """
-        now = self._at_peak[0][:3]
-        law, law_along = self.history.law, np.zeros(self.history.law.shape)
-        width = min(len(dlaw), law.shape[1])
-        law_along[0, :width] = dlaw[:width]
-        scale = np.array([1.0, *self._fast]) * now[0]
-        sizes = [np.abs(along / scale).max(), np.abs(law_along / np.where(law, law, 1.0)).max()]
-        if not max(sizes):
-            return 0.0
-        step = NUDGE / max(sizes)
-        high, low = (_force_rate(now + side * step * along, law + side * step * law_along) for side in (1.0, -1.0))
-        return float((high - low) / (2.0 * step))
+        now, law = self._at_peak[0], self.history.law
+        along = np.zeros((4 + N_LAW, 3 + N_LAW))
+        along[0, :3] = now[1:]
+        used = np.flatnonzero(self.change.law.any(axis=0))
+        along[np.arange(1, 4), np.arange(3)] = 1.0
+        along[4 + used, 3 + used] = 1.0
+        width = min(N_LAW, law.shape[1])
+        scale = np.ones(3 + N_LAW)
+        scale[:3] = np.array([1.0, *self._fast]) * now[0]
+        scale[3 : 3 + width] = np.where(law[0, :width], law[0, :width], 1.0)
+        sizes = np.abs(along / scale).max(axis=1)
+        found = np.empty(5 + N_LAW)
+        rate_slopes(now[:3], law, along * (NUDGE / np.where(sizes, sizes, 1.0))[:, None], found)
+        found[1:] *= sizes / NUDGE
+        return found
 
     @property
     def _fast(self) -> tuple[float, float]:
@@ -349,17 +360,67 @@ class Sensitivity:
         return float(fastest[0]), float(fastest[1])
 
 
-def _rates(powers: np.ndarray, at: float, count: int) -> np.ndarray:
-    """Values and rates (count, n) at a place of n polynomials with coefficients (n_powers, n), ascending."""
-    derivatives = (np.polynomial.polynomial.polyder(powers, k) if k else powers for k in range(count))
-    return np.stack([np.polynomial.polynomial.polyval(at, each) for each in derivatives])
+@dataclass(frozen=True, eq=False)
+class EvenSpectrum:
+    """Fourier transform of a recorded force and of its changes at equally spaced frequencies from zero on.
+
+    A sum over frequencies or times is a product of matrices, as the frequency k = a K + b turns by two factors.
+    """
+
+    count: int  # of frequencies
+    few: np.ndarray  # (K, m) factors of b at each time, see `_turns`
+    many: np.ndarray  # (K, m) of a
+    impulses: np.ndarray  # (m, 1 + n) [N s] of the force, and their changes
+
+    def __repr__(self) -> str:
+        return check.brief(self)
+
+    @property
+    def value(self) -> np.ndarray:
+        """Transform of the force itself, (count,) [N s]."""
+        return ((self.many * self.impulses[:, 0]) @ self.few.T).ravel()[: self.count]
+
+    def change(self, weights: np.ndarray) -> np.ndarray:
+        """Change (n,) of the real part of the sum of the transform times weights (count,)."""
+        table = np.zeros(len(self.few) ** 2, complex)
+        table[: self.count] = weights
+        summed = np.real((self.many * (table.reshape(len(self.few), -1) @ self.few)).sum(axis=0))
+        return np.asarray(summed @ self.impulses[:, 1:])
+
+
+def derivatives(x: float, count: int) -> np.ndarray:
+    """Value and first three derivatives at x of the first powers of x, (4, count)."""
+    order, power = np.arange(4)[:, None], np.arange(count)
+    rows = [np.ones(count)]
+    for k in range(3):
+        rows.append(rows[-1] * np.maximum(power - k, 0))
+    return np.stack(rows) * float(x) ** np.maximum(power - order, 0)
+
+
+@cache
+def hermite(n_rates: int) -> np.ndarray:
+    """Coefficients by values and further rates, so many in all, at 0 and then at 1, (2 n_rates, 2 n_rates)."""
+    return np.linalg.inv(np.vstack([derivatives(x, 2 * n_rates)[:n_rates] for x in (0.0, 1.0)]))
 
 
 def _turns(count: int, step: float, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Factors exp(-2 pi i f t) at b step and at a K step [Hz], a, b < K, (K, n_times) each, K * K not below count."""
     size = int(np.ceil(np.sqrt(count)))
-    turn = -2j * np.pi * step * np.arange(size)[:, None] * time
-    return np.exp(turn), np.exp(size * turn)
+    few, many = np.ones((2, size, len(time)), complex)
+    for table, stride in ((few, 1), (many, size)):
+        table[1:2] = np.exp(-2j * np.pi * step * stride * time)
+        done = 2
+        while done < size:  # powers as products of two, which is faster than exponentials
+            more = min(done - 1, size - done)
+            np.multiply(table[1 : more + 1], table[done - 1], out=table[done : done + more])
+            done += more
+    return few, many
+
+
+def _nearest(times: np.ndarray, time: float) -> int:
+    """Index of the one of some ascending times next to a time."""
+    k = int(np.searchsorted(times, time))
+    return k - 1 if k == len(times) or (k > 0 and time - times[k - 1] <= times[k] - time) else k
 
 
 def _alike(length: np.ndarray) -> np.ndarray:
@@ -372,34 +433,33 @@ def _alike(length: np.ndarray) -> np.ndarray:
     return found
 
 
-def _force_rate(state: np.ndarray, law: np.ndarray) -> float:
-    """Rate [N/s] of the contact force at an approach and its first two rates, (3,)."""
-    d, v, a = state.tolist()
-    _, by_d, by_v = law_at(d, v, law, np.zeros(N_LAW))
-    return by_d * v + by_v * a
-
-
-def _peak(history: "History") -> float | None:
-    """When the force is largest [s]."""
+def _peak(history: "History") -> tuple[float, float]:
+    """When the force is largest [s], and by how much it exceeds the next of its maxima [-]; NaN without impacts."""
     if not history.impacts:
-        return None
-    rows = np.flatnonzero(history.pressed[:, 0])
-    start, length = history.steps[rows, layout.START], history.steps[rows, layout.LENGTH]
-    looks = int(np.clip(ENOUGH // len(rows), 4, LOOKS))
-    part = np.arange(looks + 1) / looks
-    i, k = divmod(int(history.force(rows, 0, part).argmax()), looks + 1)
-    times = start[i] + np.array([-length[i - 1] if i else 0.0, 0.0, *(part[1:] * length[i]), 2.0 * length[i]])
-    low, high = (times[1 + k] - length[i] / looks), (times[1 + k] + length[i] / looks)
-    low, high = max(low, start[0]), min(high, start[-1] + length[-1])
+        return np.nan, np.inf
+    time, top, rival = record.largest_force(history.steps, history.now, history.law, history.n_coefficients, build.ZERO)
+    return time, (top - rival) / top if top > 0.0 else np.inf
 
-    for _ in range(ROUNDS):
-        near = np.linspace(low, high, LOOKS + 1)
-        rate = history.force_at(near, 0)[1]
-        falls = int(np.argmax((rate[:-1] > 0.0) & (rate[1:] <= 0.0)))
-        if not rate[falls] > 0.0 >= rate[falls + 1]:
-            return float(times[1 + k])
-        low, high = float(near[falls]), float(near[falls + 1])
-    return low + (high - low) * float(rate[falls] / (rate[falls] - rate[falls + 1]))
+
+def _sharper(history: "History", time: float) -> float:
+    """When the force is largest [s] by the motion itself, from a time nearby.
+
+    The force of a long step is a polynomial through its nodes, whose largest value is a little beside that of the law.
+    """
+    start, end = _step_at(history, time)
+    shape, omega, zeta, beside = history.shape[0], history.omega, history.zeta, BESIDE * (end - start)
+    best = time
+    for _ in range(2):
+        rates = np.empty(2)
+        for i, (q, p) in enumerate(zip(*history.states(np.array([best, best + beside])))):
+            d, v = float(history.offset[0] + shape @ q), float(shape @ p)
+            force, by_d, by_v = law_at(d, v, history.law, np.zeros(N_LAW))
+            rates[i] = by_d * v + by_v * (shape @ (history.bias - shape * force - omega * (2.0 * zeta * p + omega * q)))
+        later = best - rates[0] * beside / (rates[1] - rates[0]) if rates[1] < rates[0] else best
+        if not start < later < end:
+            return time
+        best = float(later)
+    return best
 
 
 def _step_at(history: "History", time: float) -> tuple[float, float]:
@@ -416,7 +476,8 @@ def together(history: "History") -> int:
     together where a step's force is of high order itself.
     """
     per_impact = history.pressed[:, 0].sum() / max(1, len(history.impacts))
-    return 1 if history.n_coefficients > 2 else int(np.clip(2 ** np.floor(np.log2(max(1.0, per_impact / FULL))), 1, 4))
+    lossy = bool(history.law[0, layout.LOSS])
+    return 1 if history.n_coefficients > 2 else 2 ** sum(per_impact >= least for least in FULL[lossy])
 
 
 def _recorded(
@@ -441,11 +502,12 @@ def _recorded(
 
 
 def _cut(
-    history: "History", times: Sequence[float], most: int
+    history: "History", times: Sequence[float], grades: np.ndarray, most: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Ends of all pieces [s], (n_pieces + 1,), the step each begins in, where in it [-], and of how many steps it is.
 
-    A piece begins at each of some times, and up to ``most`` steps make one.
+    A piece begins at each of some times and ``grades`` of the median step from where a contact starts or ends; up to
+    ``most`` steps make one.
     """
     steps, pressed = history.steps, history.pressed[:, 0]
     if not len(steps):
@@ -455,8 +517,8 @@ def _cut(
     for i, when in zip(places.tolist(), times):
         inside[i].add(float((when - steps[i, layout.START]) / steps[i, layout.LENGTH]))
     edges = np.flatnonzero(np.diff(np.concatenate([[False], pressed, [False]]).astype(int)))
-    if float(history.law[0, layout.EXPONENT]) != 1.0:
-        grades = GRADED * float(np.median(steps[pressed, layout.LENGTH])) if len(edges) else GRADED
+    if len(edges) and len(grades):
+        grades = grades * float(np.median(steps[pressed, layout.LENGTH]))
         for first, last in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist()):
             inside[first].update(part for part in (grades / steps[first, layout.LENGTH]).tolist() if part < WHOLLY)
             inside[last].update(1.0 - part for part in (grades / steps[last, layout.LENGTH]).tolist() if part < WHOLLY)

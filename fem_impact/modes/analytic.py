@@ -24,6 +24,7 @@ SERIES: np.ndarray = (
     (-1.0) ** POWERS * special.bernoulli(60)[POWERS - 1] / (POWERS - 1.0) / special.factorial(POWERS)
 )  # zeta(2-k)/k!
 POLYLOG_TERMS = 40  # [-] terms of the direct sum used beyond NEAR_POLE; the next one is about exp(-40)
+FAR = 4.0  # [-] distance x beyond which so many fewer of them do
 DISK_TERMS = 100_000  # [-] most terms summed at the edge of a disk, where they only fall as n**-3; error 5e-11
 MOST_MODES = 1_000_000  # [-] largest number of modes of a rectangle or beam; they take a few seconds
 MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a root search
@@ -173,10 +174,9 @@ class RectangleShapes(Shapes):
         scale = sides[across]
         place, load = points[:, None, None] / scale, loads[None, :, None] / scale  # (n_points, n_loads, n_images, 2)
         images = 2.0 * sides[along] / scale * np.arange(-IMAGES, IMAGES + 1)
-        total = sum(
-            sign * _strip(place[..., along] - sign * load[..., along] + images, place[..., across], load[..., across])
-            for sign in (1.0, -1.0)
-        )
+        shift = np.stack([place[..., along] + sign * load[..., along] + images for sign in (-1.0, 1.0)])
+        once, mirrored = _strip(shift, place[..., across], load[..., across])
+        total = once - mirrored
         return np.where(_inside(points, sides)[:, None] & _inside(loads, sides), scale**2 * total, 0.0)
 
     def take(self, n_modes: int) -> "RectangleShapes":
@@ -212,9 +212,10 @@ def _strip(shift: np.ndarray, place: np.ndarray, load: np.ndarray) -> np.ndarray
     linear terms cancel.
     """
     x = np.pi * np.abs(shift)
-    near, far = np.broadcast_arrays(np.pi * np.abs(place - load), np.pi * (place + load), x)[:2]
-    both = _decaying_cosines(x, near) - _decaying_cosines(x, np.minimum(far, 2.0 * np.pi - far))
-    return both.sum(axis=-1) / (4.0 * np.pi**3)
+    far = np.pi * (place + load)
+    angles = np.stack(np.broadcast_arrays(np.pi * np.abs(place - load), np.minimum(far, 2.0 * np.pi - far), x)[:2])
+    near, far = _decaying_cosines(np.broadcast_to(x, angles.shape), angles)
+    return (near - far).sum(axis=-1) / (4.0 * np.pi**3)
 
 
 def _decaying_cosines(x: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -230,12 +231,25 @@ def _decaying_cosines(x: np.ndarray, angle: np.ndarray) -> np.ndarray:
     near = x < NEAR_POLE
     gap, u = x[near], -x[near] + 1j * angle[near]
     log = np.log(np.where(u == 0.0, 1.0, -u))
-    series = (SERIES * (gap[:, None] + u[:, None] / (POWERS + 1.0)) * u[:, None] ** POWERS).sum(axis=1)
+    powers = np.empty((len(POWERS), len(u)), complex)  # by products, many times as fast as by powers
+    powers[0], powers[1] = u**2, u**3
+    powers[2:] = u**2
+    np.multiply.accumulate(powers[1:], out=powers[1:])
+    series = gap * (SERIES @ powers) + u * ((SERIES / (POWERS + 1.0)) @ powers)
     result[near] = (0.5 * u**2 * (1.5 - log) + gap * u * (1.0 - log) + series).real
-    m = np.arange(1, POLYLOG_TERMS + 1)
-    z = x[~near][:, None] * m
-    result[~near] = (np.exp(-z) * (1.0 + z) * (np.cos(angle[~near][:, None] * m) - 1.0) / m**3).sum(axis=1)
+    for part, n_terms in ((~near & (x < FAR), POLYLOG_TERMS), (x >= FAR, int(POLYLOG_TERMS / FAR))):
+        if part.any():
+            result[part] = _falling_cosines(x[part], angle[part], n_terms)
     return result
+
+
+def _falling_cosines(x: np.ndarray, angle: np.ndarray, n_terms: int) -> np.ndarray:
+    """The sum of `_decaying_cosines` itself over so many terms, at (n,) places."""
+    m = np.arange(1.0, n_terms + 1.0)[:, None]
+    waves = np.empty((n_terms, 2, len(x)), complex)
+    waves[:, 0], waves[:, 1] = np.exp(-x + 1j * angle), np.exp(-x)
+    waves = np.multiply.accumulate(waves).real
+    return np.asarray(((1.0 + m * x) * (waves[:, 0] - waves[:, 1]) / m**3).sum(axis=0))
 
 
 def rectangle(

@@ -15,15 +15,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .build import LOOSE, WHOLE, inner, outer
+from .arrays import ANGLE_LIMIT, LIGHT
+from .build import LOOSE, inner, outer
 from .law import at, power, spring_of, steepness
-from .layout import A12, A22, M1, M2, M3
+from .layout import A12, A21, A22
 from .one_mode import mode_moments
-from .propagation import N_LANE, any_of, lane_table, product, restore
+from .propagation import any_of, free_table, product, restore
 
 N_LAW = 8  # numbers of a law that may change, in the order of `law.spring_of`
 SLOTS = 12  # [-] lengths of pieces whose tables are kept
-SMALL = 1e-2  # [rad] phase below which the fourth moment is taken from two terms of its series
+SMALL = 0.5  # [rad] phase below which the recursion of the moments cancels: two orders lose a digit
+TERMS = 13  # [-] of their power series there: leave 1e-16
 CRITICAL = 1e-4  # [-] this near to critical damping, derivatives in zeta are differences; they err by its square
 
 
@@ -89,11 +91,24 @@ class Table(NamedTuple):
     """Coefficients of a piece of one length; a force polynomial is that of `Pieces.powers`."""
 
     free: np.ndarray  # (s + 1, 12, n_modes) a11, a12, a21, a22 up to each node, their changes per omega and per zeta
+    sight: np.ndarray  # (s, 4, n_modes) the shape times the first four at an inner node
     forced: np.ndarray  # (6, s, n_modes) displacement and velocity at the end per unit force, and their changes
+    thrust: np.ndarray  # (2, s, n_modes) the shape times the first two
     inner: np.ndarray  # (2, s, s) approach and its rate at a node per force polynomial
     lean: np.ndarray  # (2, s) the same by the bias
     pushed: np.ndarray  # (n, 2, s, s) changes of minus `inner` per parameter
     leaned: np.ndarray  # (n, 2, s) changes of `lean`
+
+
+class Room(NamedTuple):
+    """Room for what a piece needs."""
+
+    out: np.ndarray  # (10, n_modes), see `carry`
+    work: np.ndarray  # (n_modes,)
+    matrix: np.ndarray  # (s, s)
+    slopes: np.ndarray  # (N_LAW,)
+    by_change: np.ndarray  # (s, 2, n)
+    column: np.ndarray  # (s,)
 
 
 @inner()
@@ -123,53 +138,112 @@ def law_slopes(d, v, law, out_slopes):
     return point.force * factor, steep * soft * factor, point.force * spring.loss
 
 
-@inner(allocates=True)
+@inner(allocates=True, fastmath={"contract"})
 def moments_of(omega, zeta, t, out_moments):
-    """Moments m_(-1), m_0, .. of every mode over t, (count + 2, n_modes)."""
+    """Moments m_(-1), m_0, .. of every mode over t, (count + 2, n_modes), by the recursion in `propagation`.
+
+    Where it cancels, the last two come from power series and the others from the recursion backwards.
+    """
     count = out_moments.shape[0] - 2
-    if count <= 4:
-        lanes = np.empty((N_LANE, omega.size))
-        lane_table(omega, zeta, t, WHOLE, lanes)
-        part = 1.0 / t
-        for n in range(omega.size):
-            out_moments[0, n] = lanes[A22, n]
-            out_moments[1, n] = part * lanes[A12, n]
-            out_moments[2, n] = part * lanes[M1, n]
-            out_moments[3, n] = part * lanes[M2, n]
-        for n in range(omega.size):
-            third = part * (lanes[M3, n] + 0.5 * lanes[M2, n])
-            if count > 2:
-                out_moments[4, n] = third
-            if (
-                count > 3
-            ):  # only changes per zeta take this one, with a factor omega t: few digits will do if that is small
-                th, x = omega[n] * t, zeta[n] * omega[n] * t
-                near = 1.0 / 120.0 - x / 360.0
-                full = (1.0 / 6.0 - 2.0 * x * third - out_moments[3, n]) / (th * th if th > SMALL else 1.0)
-                out_moments[5, n] = full if th > SMALL else near
-        return
-    moments = np.empty(count + 1)
-    work = np.empty((2, count))
+    free = np.empty((4, omega.size))
+    double = np.empty(omega.size)
+    near = np.empty(omega.size, np.int64)
+    n_single, _ = free_table(omega, zeta, t, free, double)
+    n_near = 0
     for n in range(omega.size):
-        _, _, a22 = mode_moments(omega[n], zeta[n], t, moments, work)
-        out_moments[0, n] = a22
-        for k in range(count + 1):
-            out_moments[k + 1, n] = moments[k]
+        if omega[n] * t < SMALL:
+            near[n_near] = n
+            n_near += 1
+    part = 1.0 / t
+    for n in range(omega.size):
+        out_moments[0, n] = free[A22, n]
+    for n in range(omega.size):
+        out_moments[1, n] = part * free[A12, n]
+    square = free[A21]
+    for n in range(omega.size):
+        square[n] = 1.0 / max(omega[n] * t, SMALL) ** 2
+    whole = 1.0
+    for k in range(count):
+        last, now = out_moments[k], out_moments[k + 1]
+        further(whole, double, square, now, last, out_moments[k + 2])
+        whole /= k + 1.0
+    if n_near > 0:
+        power_series(omega, t, double, near[:n_near], out_moments)
+    if n_single > 0:
+        moments = np.empty(count + 1)
+        work = np.empty((2, count))
+        for n in range(omega.size):
+            if zeta[n] > LIGHT or omega[n] * t >= ANGLE_LIMIT:
+                _, _, a22 = mode_moments(omega[n], zeta[n], t, moments, work)
+                out_moments[0, n] = a22
+                for k in range(count + 1):
+                    out_moments[k + 1, n] = moments[k]
 
 
-@inner(allocates=True)
-def moment_slopes(omega, zeta, t, moments, out_faster, out_damped):
-    """Changes of all moments but the last per unit of omega and of zeta, (count + 1, n_modes) each."""
-    rows = out_faster.shape[0]
-    per = np.empty(omega.size)
-    own = np.empty(omega.size)
+@inner(fastmath={"contract"})
+def further(whole, double, square, now, last, out):
+    """The next moment of every mode, ``square`` is 1 / (omega h)**2."""
+    for n in range(out.size):
+        out[n] = (whole - double[n] * now[n] - last[n]) * square[n]
+
+
+@inner(allocates=True, fastmath={"contract"})
+def power_series(omega, t, double, near, out_moments):
+    """All moments from m_1 on of some modes, for which omega t is below SMALL."""
+    count, size = out_moments.shape[0] - 2, near.size
+    now, last = np.ones(size), np.zeros(size)
+    high, low = np.zeros(size), np.zeros(size)
+    twice, square = np.empty(size), np.empty(size)
+    for i in range(size):
+        twice[i] = double[near[i]]
+        square[i] = (omega[near[i]] * t) ** 2
+    factor = 1.0
+    for k in range(1, count + 1):
+        factor /= k
+    after = factor
+    for j in range(1, TERMS):
+        factor = after
+        after = factor / (j + count)
+        for i in range(size):
+            value = now[i]
+            low[i] += value * factor
+            high[i] += value * after
+            now[i] = -twice[i] * value - square[i] * last[i]
+            last[i] = value
+    whole = 1.0
+    for k in range(1, count):
+        whole /= k
+    for i in range(size):
+        out_moments[count + 1, near[i]] = high[i]
+        out_moments[count, near[i]] = low[i]
+    for k in range(count - 1, 1, -1):  # m_(k-1) from m_k and m_(k+1)
+        for i in range(size):
+            value = whole - twice[i] * low[i] - square[i] * high[i]
+            high[i] = low[i]
+            low[i] = value
+            out_moments[k, near[i]] = value
+        whole *= k
+
+
+@inner()
+def divisors(omega, zeta, out_per, out_own):
+    """1 / omega and 1 / (1 - zeta**2) of every mode, zero for rigid ones; the number of nearly critically damped ones,
+    for which the latter is zero, too.
+    """
     n_critical = 0
     for n in range(omega.size):
         rest = (1.0 - zeta[n]) * (1.0 + zeta[n])
         near = abs(rest) <= CRITICAL
-        per[n] = 1.0 / omega[n] if omega[n] > 0.0 else 0.0
-        own[n] = 1.0 / rest if omega[n] > 0.0 and not near else 0.0
+        out_per[n] = 1.0 / omega[n] if omega[n] > 0.0 else 0.0
+        out_own[n] = 1.0 / rest if omega[n] > 0.0 and not near else 0.0
         n_critical += 1 if omega[n] > 0.0 and near else 0
+    return n_critical
+
+
+@inner(allocates=True)
+def moment_slopes(omega, zeta, t, moments, per, own, n_critical, out_faster, out_damped):
+    """Changes of all moments but the last per unit of omega and of zeta, (count + 1, n_modes) each."""
+    rows = out_faster.shape[0]
     for n in range(omega.size):
         th = omega[n] * t
         out_faster[0, n] = -per[n] * th * (2.0 * zeta[n] * moments[0, n] + th * moments[1, n])  # t**2 g'' / omega
@@ -231,69 +305,86 @@ def free_slopes(omega, zeta, t, moments, faster, damped, out_free):
 
 
 @inner(allocates=True)
-def tangent_table(blow, grown, leans, h, nodes, powers, out):
-    """Coefficients of one piece of length h in ``out``, a `Table`."""
+def tangent_table(blow, grown, leans, closed, h, nodes, powers, out):
+    """Coefficients of one piece of length h in ``out``, a `Table`; of an open contact only those of the end."""
     s = nodes.size - 1
     omega, zeta = blow.omega, blow.zeta
     moments = np.empty((s + 3, omega.size))
     faster = np.empty((s + 2, omega.size))
     damped = np.empty((s + 2, omega.size))
+    per = np.empty(omega.size)
+    own = np.empty(omega.size)
     weights = np.empty(s)
-    for a in range(s + 1):
+    n_critical = divisors(omega, zeta, per, own)
+    for a in range(0 if closed else s, s + 1):
         c = nodes[a]
         t = c * h
         moments_of(omega, zeta, t, moments)
-        moment_slopes(omega, zeta, t, moments, faster, damped)
+        moment_slopes(omega, zeta, t, moments, per, own, n_critical, faster, damped)
         free_slopes(omega, zeta, t, moments, faster, damped, out.free[a])
+        if a < s:
+            for r in range(4):
+                set_times(blow.shape, out.free[a, r], out.sight[a, r])
+        elif not (closed or leans):
+            break
         for b in range(s):
             scale = t
             for k in range(s):
                 weights[k] = powers[b, k] * scale
                 scale *= (k + 1.0) * c
-            forced = out.forced[:, b]
-            add_up(moments[1:], weights, forced[1])
-            add_up(faster[1:], weights, forced[3])
-            add_up(damped[1:], weights, forced[5])
+            add_up(moments[1:], weights, out.forced[1, b])
+            add_up(faster[1:], weights, out.forced[3, b])
+            add_up(damped[1:], weights, out.forced[5, b])
             for k in range(s):
                 weights[k] *= t
-            add_up(moments[2:], weights, forced[0])
-            add_up(faster[2:], weights, forced[2])
-            add_up(damped[2:], weights, forced[4])
+            add_up(moments[2:], weights, out.forced[0, b])
+            add_up(faster[2:], weights, out.forced[2, b])
+            add_up(damped[2:], weights, out.forced[4, b])
             if a < s:
-                see_forced(blow, grown, forced, a, b, out)
+                see_forced(blow, grown, a, b, out)
+            else:
+                set_times(blow.shape, out.forced[0, b], out.thrust[0, b])
+                set_times(blow.shape, out.forced[1, b], out.thrust[1, b])
             if a < s and leans:
-                see_steady(blow, grown, forced, a, b, out)
+                see_steady(blow, grown, a, b, out)
+
+
+@inner()
+def set_times(one, other, out):
+    """The products of two rows in a third, all (n,)."""
+    for n in range(out.size):
+        out[n] = one[n] * other[n]
 
 
 @inner(fastmath=LOOSE)
-def see_forced(blow, grown, forced, a, b, out):
-    """Enter what node a sees of the force polynomial b, whose responses (6, n_modes) are given, in a `Table`."""
-    shape = blow.shape
+def see_forced(blow, grown, a, b, out):
+    """Enter what node a sees of the force polynomial b, whose responses there are ``out.forced``, in a `Table`."""
+    shape, forced = blow.shape, out.forced
     for k in range(2):
-        out.inner[k, a, b] = seen_thrice(shape, shape, forced[k])
+        out.inner[k, a, b] = seen_thrice(shape, shape, forced[k, b])
         for i in range(grown.rows.shape[0]):
             total = 0.0
             for r in range(3):
                 lo, hi = grown.spans[i, r, 0], grown.spans[i, r, 1]
                 if hi > 0 and r < 2:
-                    total += seen_thrice(grown.seen[i, r, lo:hi], shape[lo:hi], forced[2 + 2 * r + k, lo:hi])
+                    total += seen_thrice(grown.seen[i, r, lo:hi], shape[lo:hi], forced[2 + 2 * r + k, b, lo:hi])
                 elif hi > 0:
-                    total += 2.0 * product(grown.seen[i, r, lo:hi], forced[k, lo:hi])
+                    total += 2.0 * product(grown.seen[i, r, lo:hi], forced[k, b, lo:hi])
             out.pushed[i, k, a, b] = total
 
 
 @inner(fastmath=LOOSE)
-def see_steady(blow, grown, forced, a, b, out):
+def see_steady(blow, grown, a, b, out):
     """Enter what node a sees of the bias by the force polynomial b, as `see_forced` does for the force."""
-    shape, bias = blow.shape, blow.bias
+    shape, bias, forced = blow.shape, blow.bias, out.forced
     for k in range(2):
         first = 0 if b == 0 else 1
-        out.lean[k, a] = first * out.lean[k, a] + seen_thrice(shape, bias, forced[k])
+        out.lean[k, a] = first * out.lean[k, a] + seen_thrice(shape, bias, forced[k, b])
         for i in range(grown.rows.shape[0]):
             rows = grown.rows[i]
-            total = seen_thrice(bias, rows[2], forced[k]) + seen_thrice(shape, rows[3], forced[k])
+            total = seen_thrice(bias, rows[2], forced[k, b]) + seen_thrice(shape, rows[3], forced[k, b])
             for r in range(2):
-                total += seen_thrice(grown.seen[i, r], bias, forced[2 + 2 * r + k])
+                total += seen_thrice(grown.seen[i, r], bias, forced[2 + 2 * r + k, b])
             out.leaned[i, k, a] = first * out.leaned[i, k, a] + total
 
 
@@ -364,17 +455,29 @@ def carry(blow, free, forced, force, leans, q, p, work, out):
 
 
 @inner(fastmath=LOOSE)
-def along(shape, free, out, grown, i, dq, dp):
-    """Change of the approach and of its rate at a node with parameter i by the free motion, of which ``out`` are the
-    rows of `move_on`.
+def see_two(sight, dq, dp, i, j):
+    """Changes of the approach and of its rate at a node with parameters i and j by the free motion of their changes."""
+    by_q, by_p, sped_q, sped_p = sight[0], sight[1], sight[2], sight[3]
+    q_i, p_i, q_j, p_j = dq[i], dp[i], dq[j], dp[j]
+    d_i = 0.0
+    v_i = 0.0
+    d_j = 0.0
+    v_j = 0.0
+    for n in range(q_i.size):
+        d_i += by_q[n] * q_i[n] + by_p[n] * p_i[n]
+        v_i += sped_q[n] * q_i[n] + sped_p[n] * p_i[n]
+        d_j += by_q[n] * q_j[n] + by_p[n] * p_j[n]
+        v_j += sped_q[n] * q_j[n] + sped_p[n] * p_j[n]
+    return d_i, v_i, d_j, v_j
+
+
+@inner(fastmath=LOOSE)
+def see_grown(grown, i, out):
+    """Changes of the approach and of its rate at a node by what parameter i changes of the blow; ``out`` is that of
+    `move_on`.
     """
     d = 0.0
     v = 0.0
-    f11, f12, f21, f22 = free[0], free[1], free[2], free[3]
-    for n in range(dq.size):
-        u, x, y = shape[n], dq[n], dp[n]
-        d += u * (f11[n] * x + f12[n] * y)
-        v += u * (f21[n] * x + f22[n] * y)
     for r in range(3):
         a, b = grown.spans[i, r, 0], grown.spans[i, r, 1]
         if b > 0:
@@ -387,27 +490,24 @@ def along(shape, free, out, grown, i, dq, dp):
 
 
 @inner(fastmath=LOOSE)
-def lead(by_q, by_p, shape, forced, df, dq, dp, out):
+def lead(by_q, by_p, thrust, df, dq, dp, out):
     """Change of the displacements or velocities by the changes of state and force, s of them, three at once."""
-    x, y, z = forced[0], forced[1], forced[2]
+    x, y, z = thrust[0], thrust[1], thrust[2]
     a, b, c = df[0], df[1], df[2]
-    for n in range(out.size):
-        out[n] = by_q[n] * dq[n] + by_p[n] * dp[n] - shape[n] * (a * x[n] + b * y[n] + c * z[n])
+    for n in range(out.size):  # with more arrays at once they would not run in parallel lanes
+        out[n] = by_q[n] * dq[n] + by_p[n] * dp[n] - (a * x[n] + b * y[n] + c * z[n])
     for k in range(3, df.size):
-        x = forced[k]
+        x = thrust[k]
         a = df[k]
         for n in range(out.size):
-            out[n] -= shape[n] * a * x[n]
+            out[n] -= a * x[n]
 
 
 @inner(fastmath=LOOSE)
-def add_grown(row_of, spans, out, dq, dp):
-    """Add what changes of the blow's numbers change in a state, with the rows that `carry` gives."""
-    for r in range(4):
-        a, b = spans[r, 0], spans[r, 1]
-        if b > 0:
-            add_times(row_of[r, a:b], out[2 + 2 * r, a:b], dq[a:b])
-            add_times(row_of[r, a:b], out[3 + 2 * r, a:b], dp[a:b])
+def glide(by_q, by_p, dq, dp, out):
+    """The same without a force."""
+    for n in range(out.size):
+        out[n] = by_q[n] * dq[n] + by_p[n] * dp[n]
 
 
 @inner(fastmath=LOOSE)
@@ -453,42 +553,44 @@ def solve_many(matrix, right):
             right[i, j] /= matrix[i, i]
 
 
-@inner(allocates=True)
+@inner(allocates=True, fastmath=LOOSE)
 def look(blow, change, q, p, dq, dp, out_base, out_ends):
     """Approach, its three rates and the force in a state, and their changes but for that of the third; see `Found`."""
     slopes = np.empty(N_LAW)
+    rate = np.empty(q.size)
     d, v = seen(blow.shape, q, p)
     d += blow.offset
     f, by_d, by_v = law_slopes(d, v, blow.law, slopes)
     u, w, z = blow.shape, blow.omega, blow.zeta
     a = 0.0
     for n in range(q.size):
-        a += u[n] * (blow.bias[n] - u[n] * f - w[n] * (2.0 * z[n] * p[n] + w[n] * q[n]))
-    out_base[0] = d
-    out_base[1] = v
-    out_base[2] = a
+        rate[n] = blow.bias[n] - u[n] * f - w[n] * (2.0 * z[n] * p[n] + w[n] * q[n])
+        a += u[n] * rate[n]
     turn = 0.0
     grows = by_d * v + by_v * a
     for n in range(q.size):
-        rate = blow.bias[n] - u[n] * f - w[n] * (2.0 * z[n] * p[n] + w[n] * q[n])
-        turn -= u[n] * (u[n] * grows + w[n] * (2.0 * z[n] * rate + w[n] * p[n]))
+        turn -= u[n] * (u[n] * grows + w[n] * (2.0 * z[n] * rate[n] + w[n] * p[n]))
+    out_base[0] = d
+    out_base[1] = v
+    out_base[2] = a
     out_base[3] = turn
     out_base[4] = f
     for i in range(dq.shape[0]):
+        du, dw, dz, db = change.shape[i], change.omega[i], change.zeta[i], change.bias[i]
+        x, y = dq[i], dp[i]
         dd = change.offset[i]
         dv = 0.0
         for n in range(q.size):
-            dd += u[n] * dq[i, n] + change.shape[i, n] * q[n]
-            dv += u[n] * dp[i, n] + change.shape[i, n] * p[n]
+            dd += u[n] * x[n] + du[n] * q[n]
+            dv += u[n] * y[n] + du[n] * p[n]
         df = by_d * dd + by_v * dv
         for k in range(N_LAW):
             df += slopes[k] * change.law[i, k]
         da = 0.0
         for n in range(q.size):
-            du, dw, dz = change.shape[i, n], change.omega[i, n], change.zeta[i, n]
-            da += du * (blow.bias[n] - u[n] * f - w[n] * (2.0 * z[n] * p[n] + w[n] * q[n]))
-            more = change.bias[i, n] - du * f - u[n] * df - w[n] * (2.0 * z[n] * dp[i, n] + w[n] * dq[i, n])
-            da += u[n] * (more - 2.0 * (dz * w[n] + z[n] * dw) * p[n] - 2.0 * w[n] * dw * q[n])
+            more = db[n] - du[n] * f - u[n] * df - w[n] * (2.0 * z[n] * y[n] + w[n] * x[n])
+            more -= 2.0 * ((dz[n] * w[n] + z[n] * dw[n]) * p[n] + w[n] * dw[n] * q[n])
+            da += u[n] * more + du[n] * rate[n]
         out_ends[0, i] = dd
         out_ends[1, i] = dv
         out_ends[2, i] = da
@@ -499,6 +601,32 @@ def look(blow, change, q, p, dq, dp, out_base, out_ends):
 def law_at(d, v, law, out_slopes):
     """`law_slopes` for use from Python."""
     return law_slopes(d, v, law, out_slopes)
+
+
+@inner()
+def force_rate(d, v, a, law, slopes):
+    """Rate of the force of contact 0 at an approach, rate and acceleration."""
+    _, by_d, by_v = law_slopes(d, v, law, slopes)
+    return by_d * v + by_v * a
+
+
+@outer()
+def rate_slopes(now, law, along, out):
+    """The force's rate at an approach and its first two rates, and half its differences to both sides along others.
+
+    ``now`` (3,), ``along`` (n, 3 + N_LAW) also of the law's numbers, ``out`` (1 + n,).
+    """
+    slopes = np.empty(N_LAW)
+    width = min(N_LAW, law.shape[1])
+    near = law.copy()
+    out[0] = force_rate(now[0], now[1], now[2], law, slopes)
+    for i in range(along.shape[0]):
+        out[1 + i] = 0.0
+        for side in (-0.5, 0.5):
+            for k in range(width):
+                near[0, k] = law[0, k] + 2.0 * side * along[i, 3 + k]
+            d, v, a = now[0] + 2.0 * side * along[i, 0], now[1] + 2.0 * side * along[i, 1], now[2]
+            out[1 + i] += side * force_rate(d, v, a + 2.0 * side * along[i, 2], near, slopes)
 
 
 @inner()
@@ -530,15 +658,22 @@ def enter(shape, change, out_grown, dq, dp):
                 out_grown.seen[i, r, k] = shape[k] * out_grown.rows[i, r, k]
 
 
-@inner(allocates=True)
-def solve_forces(blow, change, grown, table, force, q, p, dq, dp, work, out_force):
+@inner()
+def solve_forces(blow, change, grown, table, force, q, p, dq, dp, room, out_force):
     """Change of the force at the inner nodes of a closed piece, (s, n), from the state at its start."""
     n, s = dq.shape[0], force.size
-    matrix = np.empty((s, s))
-    slopes = np.empty(N_LAW)
+    matrix, slopes, by_change = room.matrix, room.slopes, room.by_change
+    for i in range(0, n, 2):
+        j = min(i + 1, n - 1)
+        for a in range(s):
+            d, v, other_d, other_v = see_two(table.sight[a], dq, dp, i, j)
+            by_change[a, 0, i] = d
+            by_change[a, 1, i] = v
+            by_change[a, 0, j] = other_d
+            by_change[a, 1, j] = other_v
     for a in range(s):
-        move_on(table.free[a], q, p, work)
-        d, v = seen(blow.shape, work[0], work[1])
+        move_on(table.free[a], q, p, room.out)
+        d, v = seen(blow.shape, room.out[0], room.out[1])
         d += table.lean[0, a]
         v += table.lean[1, a]
         for b in range(s):
@@ -549,44 +684,64 @@ def solve_forces(blow, change, grown, table, force, q, p, dq, dp, work, out_forc
             matrix[a, b] = by_d * table.inner[0, a, b] + by_v * table.inner[1, a, b]
         matrix[a, a] += 1.0
         for i in range(n):
-            dd, dv = along(blow.shape, table.free[a], work, grown, i, dq[i], dp[i])
-            dd += table.leaned[i, 0, a] + change.offset[i]
-            dv += table.leaned[i, 1, a]
+            dd, dv = see_grown(grown, i, room.out)
+            dd += by_change[a, 0, i] + table.leaned[i, 0, a] + change.offset[i]
+            dv += by_change[a, 1, i] + table.leaned[i, 1, a]
             for b in range(s):
                 dd -= force[b] * table.pushed[i, 0, a, b]
                 dv -= force[b] * table.pushed[i, 1, a, b]
-            df = by_d * dd + by_v * dv
-            for k in range(N_LAW):
-                df += slopes[k] * change.law[i, k]
-            out_force[a, i] = df
+            out_force[a, i] = by_d * dd + by_v * dv + product(slopes, change.law[i])
     solve_many(matrix, out_force)
+
+
+@inner()
+def march(grown, table, closed, n_rows, df, room, dq, dp, out_dq, out_dp):
+    """Changes of the state at the end of a piece; ``n_rows`` of the rows of `Grown` act in it."""
+    s = df.shape[0]
+    free, column = table.free[s], room.column
+    for i in range(dq.shape[0]):
+        if closed:
+            for b in range(s):
+                column[b] = df[b, i]
+            lead(free[0], free[1], table.thrust[0], column, dq[i], dp[i], out_dq[i])
+            lead(free[2], free[3], table.thrust[1], column, dq[i], dp[i], out_dp[i])
+        else:
+            glide(free[0], free[1], dq[i], dp[i], out_dq[i])
+            glide(free[2], free[3], dq[i], dp[i], out_dp[i])
+        for r in range(n_rows):
+            a, b = grown.spans[i, r, 0], grown.spans[i, r, 1]
+            if b > 0:
+                row = grown.rows[i, r, a:b]
+                add_times(row, room.out[2 + 2 * r, a:b], out_dq[i, a:b])
+                add_times(row, room.out[3 + 2 * r, a:b], out_dp[i, a:b])
 
 
 @outer()
 def follow(blow, change, pieces, found):
     """Follow a recorded blow and its changes through all pieces; writes into every array of ``found``."""
     n_modes, n, s = blow.omega.size, change.offset.size, pieces.force.shape[1]
-    shape = blow.shape
     grown = Grown(np.empty((n, 4, n_modes)), np.empty((n, 3, n_modes)), np.zeros((n, 4, 2), np.int64))
     dq, next_dq = np.empty((n, n_modes)), np.empty((n, n_modes))
     dp, next_dp = np.empty((n, n_modes)), np.empty((n, n_modes))
-    enter(shape, change, grown, dq, dp)
+    enter(blow.shape, change, grown, dq, dp)
     leans = any_of(blow.bias) or any_of(grown.spans[:, 3, 1])
     q = blow.start_q.copy()
     p = blow.start_p.copy()
     known = np.zeros(SLOTS)
     last = np.zeros(SLOTS, np.int64)
     free = np.empty((SLOTS, s + 1, 12, n_modes))
+    sight = np.empty((SLOTS, s, 4, n_modes))
     forced = np.empty((SLOTS, 6, s, n_modes))
+    thrust = np.empty((SLOTS, 2, s, n_modes))
     inner_sums = np.empty((SLOTS, 2, s, s))
     lean = np.zeros((SLOTS, 2, s))
     pushed = np.empty((SLOTS, n, 2, s, s))
     leaned = np.zeros((SLOTS, n, 2, s))
-    out = np.zeros((10, n_modes))
-    work = np.empty(n_modes)
-    column = np.zeros(s)
+    room = Room(
+        np.zeros((10, n_modes)), np.empty(n_modes), np.empty((s, s)), np.empty(N_LAW), np.empty((s, 2, n)), np.zeros(s)
+    )
     for j in range(pieces.length.size + 1):
-        d, v = seen(shape, q, p)
+        d, v = seen(blow.shape, q, p)
         found.way[j, 0] = blow.offset + d
         found.way[j, 1] = v
         mark = pieces.mark[j]
@@ -595,31 +750,39 @@ def follow(blow, change, pieces, found):
             restore(q, p, found.q[mark], found.p[mark])
         if j == pieces.length.size:
             break
-        h, force = pieces.length[j], pieces.force[j]
+        h, force, closed = pieces.length[j], pieces.force[j], pieces.closed[j]
+        key = h if closed else -h
         slot = 0
         for k in range(SLOTS):
-            if known[k] == h:
+            if known[k] == key:
                 slot = k
                 break
             if last[k] < last[slot]:
                 slot = k
-        table = Table(free[slot], forced[slot], inner_sums[slot], lean[slot], pushed[slot], leaned[slot])
-        if known[slot] != h:
-            tangent_table(blow, grown, leans, h, pieces.nodes, pieces.powers, table)
-            known[slot] = h
+        table = Table(
+            free[slot],
+            sight[slot],
+            forced[slot],
+            thrust[slot],
+            inner_sums[slot],
+            lean[slot],
+            pushed[slot],
+            leaned[slot],
+        )
+        if known[slot] != key:
+            tangent_table(blow, grown, leans, closed, h, pieces.nodes, pieces.powers, table)
+            known[slot] = key
         last[slot] = j + 1
-        right = found.force[j]
-        if pieces.closed[j]:
-            solve_forces(blow, change, grown, table, force, q, p, dq, dp, out, right)
-        carry(blow, table.free[s], table.forced, force, leans, q, p, work, out)
-        for i in range(n):
-            for b in range(s):
-                column[b] = right[b, i]
-            lead(table.free[s, 0], table.free[s, 1], shape, table.forced[0], column, dq[i], dp[i], next_dq[i])
-            lead(table.free[s, 2], table.free[s, 3], shape, table.forced[1], column, dq[i], dp[i], next_dp[i])
-            add_grown(grown.rows[i], grown.spans[i], out, next_dq[i], next_dp[i])
+        if closed:
+            solve_forces(blow, change, grown, table, force, q, p, dq, dp, room, found.force[j])
+        if closed or leans:
+            carry(blow, table.free[s], table.forced, force, leans, q, p, room.work, room.out)
+        else:
+            move_on(table.free[s], q, p, room.out)
+        n_rows = 4 if leans else 3 if closed else 2
+        march(grown, table, closed, n_rows, found.force[j], room, dq, dp, next_dq, next_dp)
         dq, next_dq = next_dq, dq
         dp, next_dp = next_dp, dp
-        restore(out[0], out[1], q, p)
+        restore(room.out[0], room.out[1], q, p)
     for i in range(n):
         restore(dq[i], dp[i], found.dq[i], found.dp[i])
