@@ -458,7 +458,7 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
 @inner()
 def ramp_forces(h, y, now, law, e, ea, vf, sums, work, out_f, out_s, out_r):
     """Mean and slope of the forces of scheme A4 if the step ended at approaches y, and the residual in y."""
-    m = law.shape[0]
+    m = e.size
     matrix = work[0]
     vector = work[2, 2]
     for i in range(m):
