@@ -24,12 +24,13 @@ FIRST = 84, 0.22  # vectors tried first: they resolve one undisturbed contact
 FOLDED = 4.0, 0.6  # what modes left out may err, over what the highest pairs may that act as a spring
 EXCITED = 12.0, 0.25  # highest frequency of a mode that matters, over that of the contact
 FEWEST = 30  # [-] vectors besides those that stand for modes: for the dip under the load
-MORE = 1.1, 1.4  # [-] smallest and largest factor on the number of vectors as long as they are too few
+MORE = 1.2, 1.4  # [-] smallest and largest factor on the number of vectors as long as they are too few
 FALLING = 3.0  # [-] power of the number of vectors with which their error falls, once they resolve the contact
 LESS_FOLDED = 16.0  # [-] divides what those of poorer descriptions may err
 NOTCH = 4.0  # [-] divides what the highest Ritz pairs, which act as a spring, may err, each time
 PATIENCE, LEAST_GAIN = 3, 0.7  # [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7
 TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before
+AIM = 0.5  # [-] of what the steps leave of the tolerance: errors that more vectors are to reach, without ever more runs
 AT_FAULT = 3.0  # [-] the mesh is refined if it errs so many times more than too few vectors, which its error contains
 COARSER = 1.5  # [-] element size of the comparison over that of the blow
 MOST_VECTORS = 2000  # [-] limit on their number: a mesh of 20 000 unknowns takes some 0.3 GB for them
@@ -187,7 +188,7 @@ class Seen:
         coarse = error.mesh > max(AT_FAULT * error.truncation, 0.5 * allowed)
         self.spent = self.spent or (not coarse and (self.count >= MOST_VECTORS or self._stuck(error.truncation)))
         if not coarse and not self.spent:
-            more = np.clip(much ** (1.0 / FALLING), *MORE)
+            more = np.clip((much / AIM) ** (1.0 / FALLING), *MORE)
             self.count, self.margin = min(MOST_VECTORS, round(more * self.count)), NOTCH * self.margin
             return True
         more = self.fine.system.n_dofs * COARSER**2
