@@ -24,13 +24,14 @@ FIRST = 84, 0.22  # vectors tried first: they resolve one undisturbed contact
 FOLDED = 4.0, 0.6  # what modes left out may err, over what the highest pairs may that act as a spring
 EXCITED = 12.0, 0.25  # highest frequency of a mode that matters, over that of the contact
 FEWEST = 30  # [-] vectors besides those that stand for modes: for the dip under the load
-MORE = 1.1, 1.4  # [-] smallest and largest factor on the number of vectors as long as they are too few
+MORE = 1.2, 1.4  # [-] smallest and largest factor on the number of vectors as long as they are too few
 FALLING = 3.0  # [-] power of the number of vectors with which their error falls, once they resolve the contact
 LESS_FOLDED = 16.0  # [-] divides what those of poorer descriptions may err
 NOTCH = 4.0  # [-] divides what the highest Ritz pairs, which act as a spring, may err, each time
 PATIENCE, LEAST_GAIN = 3, 0.7  # [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7
 TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before
-SHARE = 0.45  # [-] of what the steps leave of the tolerance, for too few vectors, before the mesh is compared
+AIM = 0.5  # [-] of what the steps leave of the tolerance: errors that more vectors are to reach, without ever more runs
+AT_FAULT = 3.0  # [-] the mesh is refined if it errs so many times more than too few vectors, which its error contains
 COARSER = 1.5  # [-] element size of the comparison over that of the blow
 MOST_VECTORS = 2000  # [-] limit on their number: a mesh of 20 000 unknowns takes some 0.3 GB for them
 
@@ -138,7 +139,7 @@ class Seen:
     tried: list[float]  # [-] truncation errors of the blows so far
     spent: bool  # whether more vectors no longer help
     fine: Krylov
-    coarse: Krylov | None
+    coarse: Krylov  # on larger elements; on smaller ones if the user insists on a size and the outline allows no larger
 
     def __init__(
         self,
@@ -158,8 +159,10 @@ class Seen:
         self.count = count or first_count(target, resonance, tolerance)
         self.margin = FOLDED[0] * strict ** FOLDED[1]
         self.whole, self.tried, self.spent = None, [], False
-        self.fine = self._krylov(size)
-        self.coarse = None
+        self.size, other = compared(target, self.at, size, stages)
+        if fixed and self.size != size:  # there are no larger elements to compare with
+            self.size, other = other, self.size
+        self.fine, self.coarse = self._krylov(self.size), self._krylov(other)
 
     def _stuck(self, truncation: float) -> bool:
         """Whether the last PATIENCE steps towards more vectors gained nothing."""
@@ -181,38 +184,25 @@ class Seen:
         self.whole, kept = self._struck(self.fine, self.coarse, cutoff)
         return kept
 
-    def _struck(
-        self, fine: Krylov, coarse: Krylov | None, cutoff: Callable[[Modes, float], float]
-    ) -> tuple[Modes, Modes]:
+    def _struck(self, fine: Krylov, coarse: Krylov, cutoff: Callable[[Modes, float], float]) -> tuple[Modes, Modes]:
         """All Ritz pairs of the vectors, with those on a coarser mesh, and the same up to ``cutoff``."""
         with self.stages("vectors"):
-            found = fine.modes(self.count)
-            if coarse is not None:
-                few = found.poorer.get("truncation", found)  # as many vectors on either mesh
-                other = coarse.pairs(few.n_modes - coarse.system.rigid.shape[1])
-                found = replace(found, poorer={**found.poorer, "mesh": other})
+            found = fine.pairs(self.count)
+            other = coarse.modes(found.n_modes - fine.system.rigid.shape[1])  # as many vectors on either mesh
+        found = replace(found, poorer={"mesh": replace(other, poorer={}), **other.poorer})
         found = self.target.finished_vectors(found)
         return found, folded(found, cutoff, self.margin)
 
     def improved(self, error: Error, allowed: float) -> bool:
         """Take more vectors or a finer mesh, whichever the error of a blow calls for; False if neither is possible."""
-        first = self.coarse is None  # the mesh is compared only when there are vectors enough
-        if not first and error.truncation + error.mesh <= allowed:
+        much = (error.truncation + error.mesh) / allowed if allowed > 0.0 else np.inf
+        if much <= 1.0:
             return False
-        share = SHARE * allowed if first else allowed - error.mesh
-        much = error.truncation / share if share > 0.0 else np.inf
-        few = much > 1.0 and (first or error.truncation > error.mesh or much < MORE[1] ** FALLING)
-        self.spent = self.spent or (few and (self.count >= MOST_VECTORS or self._stuck(error.truncation)))
-        if few and not self.spent:
-            more = np.clip(much ** (1.0 / FALLING), *MORE)
+        coarse = error.mesh > max(AT_FAULT * error.truncation, 0.5 * allowed)
+        self.spent = self.spent or (not coarse and (self.count >= MOST_VECTORS or self._stuck(error.truncation)))
+        if not coarse and not self.spent:
+            more = np.clip((much / AIM) ** (1.0 / FALLING), *MORE)
             self.count, self.margin = min(MOST_VECTORS, round(more * self.count)), NOTCH * self.margin
-            return True
-        if first:
-            size, coarser = compared(self.target, self.at, self.size, self.stages)
-            if size == self.size:
-                self.coarse = self._krylov(coarser)
-            else:
-                self._refine()
             return True
         more = self.fine.system.n_dofs * COARSER**2
         useless = self.spent and error.truncation > allowed
@@ -222,10 +212,6 @@ class Seen:
         return True
 
     def _refine(self) -> None:
-        """Take a finer mesh; the difference of two counts for either, and a size that the user insists on stays."""
-        before, size = self.fine, finer(self.target, self.at, self.size, self.stages)
-        other = self._krylov(size)
-        if self.fixed:
-            self.coarse = other
-        else:
-            self.coarse, self.fine, self.size = before, other, size
+        """Take a finer mesh; the last one is then the coarser."""
+        self.size = finer(self.target, self.at, self.size, self.stages)
+        self.fine, self.coarse = self._krylov(self.size), self.fine

@@ -32,7 +32,7 @@ class Views(Seen):
     """`Seen` from several points (n_points, 2) [m]: with the same shift, meshes and number of vectors."""
 
     fine: Krylovs
-    coarse: Krylovs | None
+    coarse: Krylovs
 
     def _krylov(self, size: float) -> Krylovs:
         system = self.target.near(self.at, size, self.stages)
@@ -41,5 +41,4 @@ class Views(Seen):
 
     def of(self, point: int, cutoff: Callable[[Modes, float], float]) -> Modes:
         """The target as seen from one of the points; ``cutoff`` as in `Seen.modes`."""
-        coarse = None if self.coarse is None else self.coarse.each[point]
-        return self._struck(self.fine.each[point], coarse, cutoff)[1]
+        return self._struck(self.fine.each[point], self.coarse.each[point], cutoff)[1]

@@ -227,7 +227,7 @@ class Modes:
     frequency_error: np.ndarray | None = None  # (n_modes,) [-] estimated relative error; find_modes always gives it
     bounds: np.ndarray | None = None  # (n_modes, 2) [Hz] guaranteed lower and upper bound of each frequency
     notes: tuple[str, ...] = field(default=(), repr=False)  # what was assumed, and probable slips of a unit
-    # The same body described less and less well, in this order: "truncation", "mesh", "idealisation". The blow with
+    # The same body described less and less well, in this order: "mesh", "truncation", "idealisation". The blow with
     # each differs by this part of `Error` from the blow with the description before it
     poorer: Mapping[str, "Modes"] = field(default_factory=dict, repr=False)
     section: Plate | Beam | None = field(default=None, repr=False)  # None if not known, as that of a scaled body

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 import fem_impact as fi
-from fem_impact.model import planner
-from fem_impact.model.target import Target
+from fem_impact.impact.response import Error
+from fem_impact.model import planner, vectors
+from fem_impact.model.target import Stages, Target
+from fem_impact.modes import ritz
 
 WOOD = fi.Material(E=10e9, nu=0.3, rho=450.0)
 
@@ -83,6 +85,31 @@ def test_damping_over_frequency_acts_on_vectors_as_on_modes():
     body, at = truth.target.damped(0.0), blow[-1]
     undamped = fi.strike(body, run.plan.blow.striker, run.plan.blow.contact, at=at, speed=1.0, tolerance=1e-4)
     assert run.response.tolerance_met and missed(undamped, truth) > 5.0 * 4e-4  # damping shows beyond the tolerance
+
+
+def test_mesh_is_refined_when_it_errs_more_than_too_few_vectors_explain():
+    """Two meshes with as few vectors differ by what the vectors leave out, too, which no finer mesh mends."""
+    blow = np.array([0.2, 0.11]), 200.0, 1e-3, 0.06
+    seen = vectors.Seen(Target.of(plate({"boundary": "hinged"}), None), *blow, False, Stages(None))
+    count, size, fine = seen.count, seen.size, seen.fine
+    assert seen.coarse.system.n_dofs < fine.system.n_dofs
+    assert not seen.improved(Error(0.0, 4e-4, 5e-4), 1e-3) and seen.count == count
+    assert seen.improved(Error(0.0, 1e-3, 2e-3), 1e-3) and seen.count > count and seen.size == size
+    count = seen.count
+    assert seen.improved(Error(0.0, 1e-4, 2e-3), 1e-3) and seen.count == count and seen.size < size
+    assert seen.coarse is fine and seen.fine.system.n_dofs > fine.system.n_dofs
+
+
+def test_meshes_are_compared_with_all_vectors():
+    """Each description is poorer than the one before in one respect only."""
+    blow = np.array([0.2, 0.11]), 200.0, 1e-3, 0.06
+    seen = vectors.Seen(Target.of(plate({"boundary": "hinged"}), None), *blow, False, Stages(None))
+    found = seen.modes(lambda modes, margin: 1e9)
+    mesh, truncation = found.poorer["mesh"], found.poorer["truncation"]
+    assert list(found.poorer) == ["mesh", "truncation"] and found.n_modes == mesh.n_modes > truncation.n_modes
+    few = seen.coarse.pairs(int(ritz.FEWER * seen.count))
+    np.testing.assert_allclose(mesh.omega, seen.coarse.pairs(seen.count).omega, rtol=1e-12)  # the same numbers
+    np.testing.assert_allclose(truncation.omega, few.omega, rtol=1e-12)
 
 
 @pytest.mark.slow
