@@ -23,7 +23,7 @@ from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, FieldShapes, Modes, at_rest
 from . import audit, cost, idealisation, vectors
-from .target import FIRST_LOOK, Stages, Target, Watch
+from .target import FIRST_LOOK, Elements, Stages, Target, Watch
 
 SHARE = 0.45  # [-] of the tolerance for left-out modes, as much for the time steps; the mesh gets the rest
 STEPS = 0.1  # [-] of the tolerance for the time steps of a blow by Ritz vectors: finer steps cost nothing there
@@ -368,7 +368,8 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
     assert plan.size is not None
     resonance = 0.5 / asked.duration
     fixed = blow.target.size_stated or "size" in asked.pieces
-    seen = vectors.Seen(blow.target, values["at"], resonance, asked.tolerance, plan.size, fixed, stages)
+    elements = _elements(asked, plan.size)
+    seen = vectors.Seen(blow.target, values["at"], resonance, asked.tolerance, elements, fixed, stages)
     if seen.at_rest:
         return _carry_out(_modal(asked, stages), stages, keep)
 
@@ -386,7 +387,14 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
         run = partial(collision.strike, modes, striker, blow.contact)
         with stages("strike"), blow.target.blame("strike"):
             try:
-                found = _in_fine_steps(run, asked), run, seen.count, seen.size, seen.fine.system.n_dofs, seen.whole
+                found = (
+                    _in_fine_steps(run, asked),
+                    run,
+                    seen.count,
+                    seen.elements.size,
+                    seen.fine.system.n_dofs,
+                    seen.whole,
+                )
             except check.SimulationError:  # more vectors take more steps than allowed: what there is has missed
                 if found is None:
                     raise
@@ -628,17 +636,18 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     with blow.target.blame("strike"):
         at = check.array("at", values["at"], (2,), "m", lift=True)[None]
     lasts, impacts = _foreseen(asked)
-    n_dofs, fixed = blow.target.unknowns(at, size, stages), blow.target.size_stated or "size" in asked.pieces
-    sizes = list(vectors.compared(blow.target, at, size, stages))
+    elements, fixed = _elements(asked, size), blow.target.size_stated or "size" in asked.pieces
+    n_dofs = blow.target.unknowns(at, elements, stages)
+    meshes = list(vectors.compared(blow.target, elements, stages))
     if impacts > MANY and not fixed:
-        sizes.append(vectors.finer(blow.target, at, sizes[0], stages))
+        meshes.append(vectors.finer(blow.target, meshes[0], stages))
     count = vectors.first_count(blow.target, 0.5 / asked.duration, asked.tolerance)
     kept = f"the target is described by some {count} Ritz vectors started from the blow, more if their error shows"
     reason = f"argyris elements of {size:.3g} m, smaller towards the blow, with some {n_dofs} unknowns"
     if asked.moving:
         reason += "; motion comes from the vectors as long as they tell it, later motion and sound from modes driven "
         reason += "by the force that the blow finds"
-    work = cost.by_vectors([blow.target.unknowns(at, each, stages) for each in sizes], count, lasts)
+    work = cost.by_vectors([blow.target.unknowns(at, each, stages) for each in meshes], count, lasts)
     if asked.moving:
         rings = _ringing_count(asked)
         work += cost.by_modes(PER_MODE * FIRST_LOOK, FIRST_LOOK) + cost.by_modes(PER_MODE * rings, rings)
@@ -648,6 +657,11 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
         asked, target="vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
         element="argyris", steps=STEPS, mass=blow.target.mass, notes=blow.target.notes, work=work,
     )  # fmt: skip
+
+
+def _elements(asked: _Asked, size: float) -> Elements:
+    """Elements of a size [m] for a blow by Ritz vectors."""
+    return vectors.elements_for(asked.blow.target, size, asked.mass, 0.5 / asked.duration, asked.tolerance)
 
 
 def _foreseen(asked: _Asked) -> tuple[float, int]:

@@ -12,10 +12,11 @@ import numpy as np
 
 from ..fe import point_load, refinement
 from ..fe.section import Plate
+from ..fe.splitting import DEPTH
 from ..impact.response import Error
 from ..modes.modal import Modes
 from ..modes.ritz import Krylov
-from .target import Stages, Target
+from .target import Elements, Stages, Target
 
 # [-] value at a tolerance of 1e-2 or more, and power of 1e-2 / tolerance with which it grows
 WAVES = 1.6, 0.37  # highest frequency that the first mesh resolves, over that of the contact
@@ -32,6 +33,12 @@ PATIENCE, LEAST_GAIN = 3, 0.7  # [-] more vectors are given up if so many steps 
 TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before
 SHARE = 0.45  # [-] of what the steps leave of the tolerance, for too few vectors, before the mesh is compared
 COARSER = 1.5  # [-] element size of the comparison over that of the blow
+ALIKE = 0.85  # [-] a mesh with more than this fraction of the elements of another is no coarser: its outline forbids
+FLATTER = 2.0  # [-] the same at the blow, where triangles halve
+# [-] largest (size wave)**2 mass wave**2 / inertia of the triangles at the blow over the tolerance, see `elements_for`:
+# a blow on a hinged plate then errs by 2 % of it, whatever its other elements; test_vectors.py
+DIP = 60.0
+FLATTEST = 64.0  # [-] coarsest triangles at a blow; coarser ones were not tried
 MOST_VECTORS = 2000  # [-] limit on their number: a mesh of 20 000 unknowns takes some 0.3 GB for them
 
 
@@ -71,21 +78,34 @@ def size_for(target: Target, resonance: float, tolerance: float) -> float:
     return size
 
 
-def finer(target: Target, at: np.ndarray, size: float, stages: Stages) -> float:
-    """The next smaller element size [m] with more unknowns."""
-    before = target.unknowns(at, size, stages)
+def elements_for(target: Target, size: float, mass: float, resonance: float, tolerance: float) -> Elements:
+    """Elements of a size [m], with those at the blow small enough for its tolerance.
+
+    Triangles of a size there lack compliance. Over that of a contact of this resonance [Hz] with a striker of a mass
+    [kg], it is ``(size wave)**2 mass wave**2 / inertia`` times a constant, with the plate's wavenumber and inertia.
+    """
+    assert target.mesh is not None
+    wave, area = target.wave(resonance / target.stretch, tense=False), target.mesh.area
+    allowed = (DIP * min(tolerance, 1e-2) * target.mass / (mass * wave**2 * area)) ** 0.5 / wave
+    return Elements(size, min(allowed / (DEPTH * area / target.mesh.perimeter), FLATTEST))
+
+
+def finer(target: Target, elements: Elements, stages: Stages) -> Elements:
+    """The next smaller elements: more of them, and smaller at the blow."""
+    size, before = elements.size, target.n_cells(elements.size, stages)
     for _ in range(TRIES):
         size /= COARSER
-        if target.unknowns(at, size, stages) > before:
+        if ALIKE * target.n_cells(size, stages) >= before:
             break
-    return size
+    return Elements(size, elements.coarseness / FLATTER)
 
 
-def compared(target: Target, at: np.ndarray, size: float, stages: Stages) -> tuple[float, float]:
-    """Element sizes [m] of the first two meshes that are compared: finer ones if the outline allows no larger ones."""
-    if target.unknowns(at, COARSER * size, stages) < target.unknowns(at, size, stages):
-        return size, COARSER * size
-    return finer(target, at, size, stages), size
+def compared(target: Target, elements: Elements, stages: Stages) -> tuple[Elements, Elements]:
+    """Elements of the first two meshes that are compared: finer ones if the outline allows no larger ones."""
+    coarser = Elements(COARSER * elements.size, FLATTER * elements.coarseness)
+    if target.n_cells(coarser.size, stages) <= ALIKE * target.n_cells(elements.size, stages):
+        return elements, coarser
+    return finer(target, elements, stages), elements
 
 
 def hopeless(tried: list[float]) -> bool:
@@ -116,15 +136,15 @@ class Seen:
     resonance : float [Hz]
         One over twice the duration of the contact on a rigid wall.
     tolerance : float [-]
-    size : float [m]
-        Element size to begin with.
+    elements : Elements
+        Those to begin with.
     fixed : bool
-        Whether the user insists on this size.
+        Whether the user insists on their size.
     """
 
     target: Target
     at: np.ndarray  # (1, 2) [m], or of several points
-    size: float  # [m]
+    elements: Elements
     fixed: bool
     stages: Stages
     shift: float  # [rad/s] before scaling, see `Krylov`
@@ -137,15 +157,22 @@ class Seen:
     coarse: Krylov | None
 
     def __init__(
-        self, target: Target, at: Any, resonance: float, tolerance: float, size: float, fixed: bool, stages: Stages
-    ) -> None:
-        self.target, self.at, self.size, self.fixed, self.stages = target, np.atleast_2d(at), size, fixed, stages
+        self, target: Target, at: Any, resonance: float, tolerance: float, elements: Elements, fixed: bool,
+        stages: Stages,
+    ) -> None:  # fmt: skip
+        self.target, self.at, self.elements, self.fixed, self.stages = (
+            target,
+            np.atleast_2d(at),
+            elements,
+            fixed,
+            stages,
+        )
         strict = _strictness(tolerance)
         self.shift = 2.0 * np.pi * resonance * SHIFT[0] * strict ** SHIFT[1] / target.stretch
         self.count = first_count(target, resonance, tolerance)
         self.margin = FOLDED[0] * strict ** FOLDED[1]
         self.whole, self.tried, self.spent = None, [], False
-        self.fine = self._krylov(size)
+        self.fine = self._krylov(elements)
         self.coarse = None
 
     def _stuck(self, truncation: float) -> bool:
@@ -153,8 +180,8 @@ class Seen:
         self.tried.append(truncation)
         return hopeless(self.tried)
 
-    def _krylov(self, size: float) -> Krylov:
-        system = self.target.near(self.at, size, self.stages)
+    def _krylov(self, elements: Elements) -> Krylov:
+        system = self.target.near(self.at, elements, self.stages)
         with self.stages("vectors"):
             return Krylov(system, self.at, self.shift)
 
@@ -195,8 +222,8 @@ class Seen:
             self.count, self.margin = min(MOST_VECTORS, round(more * self.count)), NOTCH * self.margin
             return True
         if first:
-            size, coarser = compared(self.target, self.at, self.size, self.stages)
-            if size == self.size:
+            fine, coarser = compared(self.target, self.elements, self.stages)
+            if fine == self.elements:
                 self.coarse = self._krylov(coarser)
             else:
                 self._refine()
@@ -210,9 +237,9 @@ class Seen:
 
     def _refine(self) -> None:
         """Take a finer mesh; the difference of two counts for either, and a size that the user insists on stays."""
-        before, size = self.fine, finer(self.target, self.at, self.size, self.stages)
-        other = self._krylov(size)
+        before, elements = self.fine, finer(self.target, self.elements, self.stages)
+        other = self._krylov(elements)
         if self.fixed:
             self.coarse = other
         else:
-            self.coarse, self.fine, self.size = before, other, size
+            self.coarse, self.fine, self.elements = before, other, elements
