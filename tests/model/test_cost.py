@@ -190,6 +190,8 @@ def test_predicted_time_is_of_the_right_size(name):
     scene = fi.load_scene(SCENES / f"{name}.toml")
     plan = scene.plan(tolerance=1e-2)
     start = time.process_time()
-    plan.run()
+    run = plan.run()
+    if plan.blow.moving:  # the modes that ring on are predicted, too, but found when asked for
+        assert run.response.target.n_modes
     taken = time.process_time() - start
     assert taken / 4.0 < plan.seconds < 4.0 * taken
