@@ -77,7 +77,7 @@ def page():
         home = getattr(fi, name)
         own = {
             key: item
-            for key, item in vars(home).items()
+            for key, item in inspect.getmembers(home)
             if not key.startswith("_")
             and inspect.isfunction(item)
             and f"{item.__module__}.".startswith(f"{home.__name__}.")

@@ -167,7 +167,7 @@ def dials(whole: fi.Scene, target: str | None = None) -> list[Dial]:
     """Run the chain for each tolerance, loosest first, because peak memory only grows within a process."""
     found = []
     for tolerance in TOLERANCES:
-        repeats = REPEATS if tolerance > 1e-6 else 1
+        repeats = REPEATS if tolerance >= 1e-6 else 1
         seconds, run = timed(lambda: whole.run(tolerance=tolerance, target=target), repeats)  # noqa: B023
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
         found.append(Dial(tolerance, seconds, run, peak))

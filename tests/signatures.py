@@ -86,7 +86,7 @@ def public() -> dict[str, Callable[..., Any]]:
         add(name, item)
     for name, home in homes.items():
         if inspect.ismodule(home):
-            for key, item in vars(home).items():
+            for key, item in inspect.getmembers(home):
                 if not key.startswith("_") and f"{getattr(item, '__module__', '')}.".startswith(f"{home.__name__}."):
                     add(f"{name}.{key}", item)
     shapes = tuple(f"analytic.{kind}Shapes." for kind in ("Rectangle", "Beam", "Disk"))

@@ -12,7 +12,10 @@ import numpy as np
 
 from .._base import check, isolated
 from .loops import (
+    FARTHEST,
+    LARGEST,
     MOST_PIECES,
+    UNITS,
     Arc,
     Bezier,
     Loop,
@@ -25,7 +28,6 @@ from .loops import (
     signed_area,
     tangent,
 )
-from .mesh_files import FARTHEST, LARGEST, UNITS
 from .smooth_edges import smooth_runs
 
 PIXEL = 0.0254 / 96.0  # [m] one SVG px: 1/96 inch by the CSS standard

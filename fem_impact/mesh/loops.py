@@ -9,6 +9,9 @@ import shapely
 
 from .._base import check
 
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "km": 1e3}
+FARTHEST = 1e12  # [-] largest coordinate accepted: products of larger ones lose digits or overflow
+LARGEST = 20.0  # [m] a plate larger than this was probably drawn in millimetres
 SLENDER = 1e4  # [-] largest area / half width**2: the mesher is fast up to 4e3 and hangs from 4e4
 FINEST = 16  # [-] half widths tested are extent / 4**k for k < FINEST; the smallest is near rounding
 TURN = 0.25  # [rad] largest turn within one facet: puts 26 facets on a circle

@@ -14,10 +14,8 @@ from scipy.spatial import cKDTree
 
 from .._base import check
 from . import meshio_reader
+from .loops import FARTHEST, LARGEST, UNITS
 
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "km": 1e3}
-FARTHEST = 1e12  # [-] largest coordinate accepted: products of larger ones lose digits or overflow
-LARGEST = 20.0  # [m] a plate larger than this was probably drawn in millimetres
 SAME = 1e-9  # [-] nodes closer than this fraction of the extent are merged
 CROWD = 16  # [-] a file with more than this many nodes per point on average is refused as damaged
 THIN = 1e-9  # [-] a triangle with a smaller ratio of height to longest side has no area

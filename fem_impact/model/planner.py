@@ -23,7 +23,7 @@ from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, FieldShapes, Modes, at_rest
 from . import audit, cost, idealisation, mixed, vectors
-from .target import FIRST_LOOK, Stages, Target, Watch
+from .target import FIRST_LOOK, Elements, Stages, Target, Watch
 
 SHARE = 0.45  # [-] of the tolerance for left-out modes, as much for the time steps; the mesh gets the rest
 STEPS = 0.1  # [-] of the tolerance for the time steps of a blow by Ritz vectors: finer steps cost nothing there
@@ -373,7 +373,8 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
     assert plan.size is not None
     resonance = 0.5 / asked.duration
     fixed = blow.target.size_stated or "size" in asked.pieces
-    seen = vectors.Seen(blow.target, values["at"], resonance, asked.tolerance, plan.size, fixed, stages)
+    elements = _elements(asked, plan.size)
+    seen = vectors.Seen(blow.target, values["at"], resonance, asked.tolerance, elements, fixed, stages)
     if seen.at_rest:
         return _carry_out(_modal(asked, stages), stages, keep)
 
@@ -391,7 +392,14 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
         run = partial(collision.strike, modes, striker, blow.contact)
         with stages("strike"), blow.target.blame("strike"):
             try:
-                found = _in_fine_steps(run, asked), run, seen.count, seen.size, seen.fine.system.n_dofs, seen.whole
+                found = (
+                    _in_fine_steps(run, asked),
+                    run,
+                    seen.count,
+                    seen.elements.size,
+                    seen.fine.system.n_dofs,
+                    seen.whole,
+                )
             except check.SimulationError:  # more vectors take more steps than allowed: what there is has missed
                 if found is None:
                     raise
@@ -468,11 +476,12 @@ def _mixed_by_vectors(
     target, reach = plan.blow.target, mixed.RESOLVED * frequency
     assert target.mesh is not None
     size = vectors.size_for(target, reach, asked.tolerance)
+    elements = vectors.elements_for(target, size, asked.mass, reach, asked.tolerance)
     if size < refinement.smallest_size("argyris", target.mesh):
         raise check.SimulationError("a mesh that resolves the frequency has too many unknowns")
     shift, count = 2.0 * np.pi * mixed.REACH * frequency, _mixed_vectors(asked, plan.mobility, frequency)
     seen = vectors.Seen(
-        target, asked.values["at"], reach, asked.tolerance, size, target.size_stated, stages, shift, count
+        target, asked.values["at"], reach, asked.tolerance, elements, target.size_stated, stages, shift, count
     )
     allowed = SHARE * asked.tolerance
     while True:
@@ -656,7 +665,7 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, least: float = 0.0
             first = asked.find(FIRST_LOOK, stages=stages)
     else:
         size, element = vectors.size_for(blow.target, mixed.RESOLVED * frequency, asked.tolerance), "argyris"
-        n_dofs = blow.target.unknowns(np.atleast_2d(values["at"]), size, stages)
+        n_dofs = blow.target.unknowns(np.atleast_2d(values["at"]), _elements(asked, size), stages)
         count = _mixed_vectors(asked, seen.mobility, frequency)
         work = cost.by_vectors([n_dofs, n_dofs / vectors.COARSER**2], count, 1.0)
     return _plan(
@@ -766,17 +775,18 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     with blow.target.blame("strike"):
         at = check.array("at", values["at"], (2,), "m", lift=True)[None]
     lasts, impacts = _foreseen(asked)
-    n_dofs, fixed = blow.target.unknowns(at, size, stages), blow.target.size_stated or "size" in asked.pieces
-    sizes = list(vectors.compared(blow.target, at, size, stages))
+    elements, fixed = _elements(asked, size), blow.target.size_stated or "size" in asked.pieces
+    n_dofs = blow.target.unknowns(at, elements, stages)
+    meshes = list(vectors.compared(blow.target, elements, stages))
     if impacts > MANY and not fixed:
-        sizes.append(vectors.finer(blow.target, at, sizes[0], stages))
+        meshes.append(vectors.finer(blow.target, meshes[0], stages))
     count = vectors.first_count(blow.target, 0.5 / asked.duration, asked.tolerance)
     kept = f"the target is described by some {count} Ritz vectors started from the blow, more if their error shows"
     reason = f"argyris elements of {size:.3g} m, smaller towards the blow, with some {n_dofs} unknowns"
     if asked.moving:
         reason += "; motion comes from the vectors as long as they tell it, later motion and sound from modes driven "
         reason += "by the force that the blow finds"
-    work = cost.by_vectors([blow.target.unknowns(at, each, stages) for each in sizes], count, lasts)
+    work = cost.by_vectors([blow.target.unknowns(at, each, stages) for each in meshes], count, lasts)
     if asked.moving:
         rings = _ringing_count(asked)
         work += cost.by_modes(PER_MODE * FIRST_LOOK, FIRST_LOOK) + cost.by_modes(PER_MODE * rings, rings)
@@ -786,6 +796,11 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
         asked, target="vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
         element="argyris", steps=STEPS, mass=blow.target.mass, notes=blow.target.notes, work=work,
     )  # fmt: skip
+
+
+def _elements(asked: _Asked, size: float) -> Elements:
+    """Elements of a size [m] for a blow by Ritz vectors."""
+    return vectors.elements_for(asked.blow.target, size, asked.mass, 0.5 / asked.duration, asked.tolerance)
 
 
 def _foreseen(asked: _Asked) -> tuple[float, int]:

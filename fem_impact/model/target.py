@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,6 +45,18 @@ COARSEST = 1e-30  # [-] own element size over a stated one: beyond, the mesh of 
 Watch = Callable[[str], AbstractContextManager[Any]]
 # Says where an error comes from; takes "mesh", "supports" or another part of a scene, and the names of what was changed
 Blame = Callable[..., AbstractContextManager[Any]]
+
+
+class Elements(NamedTuple):
+    """The triangles of a struck plate."""
+
+    size: float  # [m]
+    coarseness: float = 0.0  # [-] of those at the blow, see `assemble`; stands for 1 if it is less
+
+    @property
+    def at_blow(self) -> float:
+        """Coarseness as `assemble` takes it."""
+        return max(1.0, self.coarseness)
 
 
 def _nobody(*_: Any) -> AbstractContextManager[Any]:
@@ -185,14 +197,18 @@ class Target:
         scaled = vectors.stretched(mass, self.stretch)
         return scaled if self.damping_ratio is None else scaled.damped(self.damping_ratio)
 
-    def wave(self, frequency: float) -> float:
-        """Largest wavenumber [rad/m] of the plate's own waves, before scaling, at a frequency [Hz]."""
+    def wave(self, frequency: float, tense: bool = True) -> float:
+        """Largest wavenumber [rad/m] of the plate's own waves, before scaling, at a frequency [Hz].
+
+        If not ``tense``, that without its tension, which does not act on lengths below that of the bending layer.
+        """
         section, mesh = self.section, self.mesh
         assert isinstance(section, Plate) and mesh is not None
         middle = mesh.points[mesh.cells].mean(axis=1)
         stiffness, inertia = section.stiffness(middle), section.inertia(middle)
         bending = np.minimum(stiffness[:, 0, 0], stiffness[:, 1, 1])
-        return float(_squared_wave(bending, section.tension or 0.0, inertia, frequency).max() ** 0.5)
+        tension = (section.tension or 0.0) if tense else 0.0
+        return float(_squared_wave(bending, tension, inertia, frequency).max() ** 0.5)
 
     @property
     def mass(self) -> float:
@@ -225,26 +241,32 @@ class Target:
         with stages("mesh"), self.blame("mesh"):
             return self._meshes.found(np.array(size), lambda _: mesh.refined(mesh.size / size))
 
-    def unknowns(self, at: np.ndarray, size: float, stages: Stages) -> int:
+    def n_cells(self, size: float, stages: Stages) -> int:
+        """Number of triangles of a size [m], before they shrink towards a blow."""
+        return len(self._meshed(size, stages).cells)
+
+    def unknowns(self, at: np.ndarray, elements: Elements, stages: Stages) -> int:
         """About how many unknowns `near` makes; it takes a tenth of the time."""
 
         def count(_: np.ndarray) -> int:
             assert isinstance(self.section, Plate)
-            mesh, graded = self._meshed(size, stages), self.system is None or self.system.graded
+            mesh, graded = self._meshed(elements.size, stages), self.system is None or self.system.graded
             with stages("mesh"), self.blame("supports"), np.errstate(all="ignore"):
                 masses = np.reshape([place for place, _ in self.point_masses], (-1, 2))
-                return unknowns_near(mesh, self.section, dict(self.supports), np.vstack([at, masses]), graded)
+                points, coarseness = np.vstack([at, masses]), np.ones(len(at) + len(masses))
+                coarseness[: len(at)] = elements.at_blow
+                return unknowns_near(mesh, self.section, dict(self.supports), points, graded, coarseness)
 
-        return self._counts.found(np.append(size, at), count)
+        return self._counts.found(np.append(elements, at), count)
 
-    def near(self, at: np.ndarray, size: float, stages: Stages) -> System:
-        """The body assembled with elements of a size [m] that shrink towards points (n_points, 2) [m]."""
+    def near(self, at: np.ndarray, elements: Elements, stages: Stages) -> System:
+        """The body assembled with elements that shrink towards points (n_points, 2) [m]."""
         assert self.mesh is not None and self.section is not None
-        mesh, graded = self._meshed(size, stages), self.system is None or self.system.graded
+        mesh, graded = self._meshed(elements.size, stages), self.system is None or self.system.graded
         with stages("assembly"), self.blame("supports"), np.errstate(all="ignore"):
             return assemble(
                 mesh, self.section, dict(self.supports), point_masses=self.point_masses,
-                point_supports=self.point_supports, near=at, graded=graded,
+                point_supports=self.point_supports, near=at, coarseness=elements.at_blow, graded=graded,
             )  # fmt: skip
 
     def find(

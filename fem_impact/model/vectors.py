@@ -12,10 +12,11 @@ import numpy as np
 
 from ..fe import point_load, refinement
 from ..fe.section import Plate
+from ..fe.splitting import DEPTH
 from ..impact.response import Error
 from ..modes.modal import Modes
 from ..modes.ritz import Krylov
-from .target import Stages, Target
+from .target import Elements, Stages, Target
 
 # [-] value at a tolerance of 1e-2 or more, and power of 1e-2 / tolerance with which it grows
 WAVES = 1.6, 0.37  # highest frequency that the first mesh resolves, over that of the contact
@@ -33,6 +34,12 @@ TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before
 AIM = 0.5  # [-] of what the steps leave of the tolerance: errors that more vectors are to reach, without ever more runs
 AT_FAULT = 3.0  # [-] the mesh is refined if it errs so many times more than too few vectors, which its error contains
 COARSER = 1.5  # [-] element size of the comparison over that of the blow
+ALIKE = 0.85  # [-] a mesh with more than this fraction of the elements of another is no coarser: its outline forbids
+FLATTER = 2.0  # [-] the same at the blow, where triangles halve
+# [-] largest (size wave)**2 mass wave**2 / inertia of the triangles at the blow over the tolerance, see `elements_for`:
+# a blow on a hinged plate then errs by 2 % of it, whatever its other elements; test_vectors.py
+DIP = 60.0
+FLATTEST = 64.0  # [-] coarsest triangles at a blow; coarser ones were not tried
 MOST_VECTORS = 2000  # [-] limit on their number: a mesh of 20 000 unknowns takes some 0.3 GB for them
 
 
@@ -72,21 +79,34 @@ def size_for(target: Target, resonance: float, tolerance: float) -> float:
     return size
 
 
-def finer(target: Target, at: np.ndarray, size: float, stages: Stages) -> float:
-    """The next smaller element size [m] with more unknowns."""
-    before = target.unknowns(at, size, stages)
+def elements_for(target: Target, size: float, mass: float, resonance: float, tolerance: float) -> Elements:
+    """Elements of a size [m], with those at the blow small enough for its tolerance.
+
+    Triangles of a size there lack compliance. Over that of a contact of this resonance [Hz] with a striker of a mass
+    [kg], it is ``(size wave)**2 mass wave**2 / inertia`` times a constant, with the plate's wavenumber and inertia.
+    """
+    assert target.mesh is not None
+    wave, area = target.wave(resonance / target.stretch, tense=False), target.mesh.area
+    allowed = (DIP * min(tolerance, 1e-2) * target.mass / (mass * wave**2 * area)) ** 0.5 / wave
+    return Elements(size, min(allowed / (DEPTH * area / target.mesh.perimeter), FLATTEST))
+
+
+def finer(target: Target, elements: Elements, stages: Stages) -> Elements:
+    """The next smaller elements: more of them, and smaller at the blow."""
+    size, before = elements.size, target.n_cells(elements.size, stages)
     for _ in range(TRIES):
         size /= COARSER
-        if target.unknowns(at, size, stages) > before:
+        if ALIKE * target.n_cells(size, stages) >= before:
             break
-    return size
+    return Elements(size, elements.coarseness / FLATTER)
 
 
-def compared(target: Target, at: np.ndarray, size: float, stages: Stages) -> tuple[float, float]:
-    """Element sizes [m] of the first two meshes that are compared: finer ones if the outline allows no larger ones."""
-    if target.unknowns(at, COARSER * size, stages) < target.unknowns(at, size, stages):
-        return size, COARSER * size
-    return finer(target, at, size, stages), size
+def compared(target: Target, elements: Elements, stages: Stages) -> tuple[Elements, Elements]:
+    """Elements of the first two meshes that are compared: finer ones if the outline allows no larger ones."""
+    coarser = Elements(COARSER * elements.size, FLATTER * elements.coarseness)
+    if target.n_cells(coarser.size, stages) <= ALIKE * target.n_cells(elements.size, stages):
+        return elements, coarser
+    return finer(target, elements, stages), elements
 
 
 def hopeless(tried: list[float]) -> bool:
@@ -117,10 +137,10 @@ class Seen:
     resonance : float [Hz]
         One over twice the duration of the contact on a rigid wall.
     tolerance : float [-]
-    size : float [m]
-        Element size to begin with.
+    elements : Elements
+        Those to begin with.
     fixed : bool
-        Whether the user insists on this size.
+        Whether the user insists on their size.
     shift : float, optional [rad/s]
         By default, the resonance and the tolerance decide.
     count : int, optional
@@ -129,7 +149,7 @@ class Seen:
 
     target: Target
     at: np.ndarray  # (1, 2) [m], or of several points
-    size: float  # [m]
+    elements: Elements
     fixed: bool
     stages: Stages
     shift: float  # [rad/s] before scaling, see `Krylov`
@@ -142,35 +162,27 @@ class Seen:
     coarse: Krylov  # on larger elements; on smaller ones if the user insists on a size and the outline allows no larger
 
     def __init__(
-        self,
-        target: Target,
-        at: Any,
-        resonance: float,
-        tolerance: float,
-        size: float,
-        fixed: bool,
-        stages: Stages,
-        shift: float | None = None,
-        count: int | None = None,
-    ) -> None:
-        self.target, self.at, self.size, self.fixed, self.stages = target, np.atleast_2d(at), size, fixed, stages
+        self, target: Target, at: Any, resonance: float, tolerance: float, elements: Elements, fixed: bool,
+        stages: Stages, shift: float | None = None, count: int | None = None,
+    ) -> None:  # fmt: skip
+        self.target, self.at, self.fixed, self.stages = target, np.atleast_2d(at), fixed, stages
         strict = _strictness(tolerance)
         self.shift = (shift or 2.0 * np.pi * resonance * SHIFT[0] * strict ** SHIFT[1]) / target.stretch
         self.count = count or first_count(target, resonance, tolerance)
         self.margin = FOLDED[0] * strict ** FOLDED[1]
         self.whole, self.tried, self.spent = None, [], False
-        self.size, other = compared(target, self.at, size, stages)
-        if fixed and self.size != size:  # there are no larger elements to compare with
-            self.size, other = other, self.size
-        self.fine, self.coarse = self._krylov(self.size), self._krylov(other)
+        self.elements, other = compared(target, elements, stages)
+        if fixed and self.elements != elements:  # there are no larger elements to compare with
+            self.elements, other = other, self.elements
+        self.fine, self.coarse = self._krylov(self.elements), self._krylov(other)
 
     def _stuck(self, truncation: float) -> bool:
         """Whether the last PATIENCE steps towards more vectors gained nothing."""
         self.tried.append(truncation)
         return hopeless(self.tried)
 
-    def _krylov(self, size: float) -> Krylov:
-        system = self.target.near(self.at, size, self.stages)
+    def _krylov(self, elements: Elements) -> Krylov:
+        system = self.target.near(self.at, elements, self.stages)
         with self.stages("vectors"):
             return Krylov(system, self.at, self.shift)
 
@@ -213,5 +225,5 @@ class Seen:
 
     def _refine(self) -> None:
         """Take a finer mesh; the last one is then the coarser."""
-        self.size = finer(self.target, self.at, self.size, self.stages)
-        self.fine, self.coarse = self._krylov(self.size), self.fine
+        self.elements = finer(self.target, self.elements, self.stages)
+        self.fine, self.coarse = self._krylov(self.elements), self.fine

@@ -11,6 +11,7 @@ import numpy as np
 from ..fe.assembly import System
 from ..modes.modal import Modes
 from ..modes.ritz import Krylov
+from .target import Elements
 from .vectors import Seen
 
 TOGETHER = 8  # [-] points that share a mesh: each adds elements that shrink towards it
@@ -34,8 +35,8 @@ class Views(Seen):
     fine: Krylovs
     coarse: Krylovs
 
-    def _krylov(self, size: float) -> Krylovs:
-        system = self.target.near(self.at, size, self.stages)
+    def _krylov(self, elements: Elements) -> Krylovs:
+        system = self.target.near(self.at, elements, self.stages)
         with self.stages("vectors"):
             return Krylovs(system, self.at, self.shift)
 

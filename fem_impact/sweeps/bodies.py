@@ -21,7 +21,7 @@ from ..impact.contact import Contact
 from ..impact.response import Error
 from ..impact.striker import Striker
 from ..model import planner, vectors
-from ..model.target import CLOSE, FIRST_FLEXIBLE, Stages, Target
+from ..model.target import CLOSE, FIRST_FLEXIBLE, Elements, Stages, Target
 from ..model.target import FIRST_LOOK as LEAST_KEPT
 from ..model.views import TOGETHER, Views
 from ..modes.modal import FieldShapes, Modes, SampledShapes, damping_ratios
@@ -227,7 +227,8 @@ class Sized:
         views: dict[tuple[float, ...], Modes] = {}
         for start in range(0, len(points), TOGETHER):
             some = points[start : start + TOGETHER]
-            seen = Views(self.target, some, max(resonance), self.tolerance, size, self.target.size_stated, stages)
+            elements, fixed = Elements(size), self.target.size_stated
+            seen = Views(self.target, some, max(resonance), self.tolerance, elements, fixed, stages)
             if seen.at_rest:
                 return None
             tried: dict[tuple[int, int], list[float]] = {}

@@ -60,6 +60,14 @@ def test_holes_are_not_parsed(tmp_path, name, size):
         isolated.read(tmp_path / name, "a mesh", "mesh.meshio_reader:read")
 
 
+@pytest.mark.parametrize("reader", ["mesh.meshio_reader:arrays", "mesh.drawings:svg_arrays"])
+def test_the_process_that_reads_loads_no_mesher_and_no_solver(reader):
+    module = reader.split(":")[0]  # each new process would take three times as long
+    code = f"import sys, fem_impact._base.isolated, fem_impact.{module}\nprint(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"scipy", "netgen", "skfem", "numba", "fem_impact.mesh.meshes"} & set(loaded)
+
+
 def test_memory_of_the_reader_is_limited():
     script = "from fem_impact._base import isolated; isolated.limit_memory(); bytearray(3 << 30)"
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)

@@ -22,6 +22,17 @@ def areas(mesh):
     return 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
 
 
+@pytest.mark.parametrize("coarseness", [1.0, 4.0, 64.0])
+def test_triangles_at_a_point_are_as_coarse_as_asked_for(coarseness):
+    mesh, place = fi.mesh.rectangle(1.0, 1.0), np.array([[0.31, 0.47]])
+    fine = towards_points(mesh, place, np.zeros(len(mesh.facets), bool), coarseness=coarseness)
+    corner = fine.points[fine.cells]
+    nearest = np.linalg.norm(corner.mean(axis=1) - place, axis=1).argmin()
+    longest = np.linalg.norm(corner[nearest] - np.roll(corner[nearest], 1, axis=0), axis=1).max()
+    allowed = coarseness * DEPTH * mesh.area / mesh.perimeter
+    assert 0.4 * allowed < longest <= allowed  # the longest side of a triangle is halved every second time
+
+
 @pytest.mark.parametrize(("name", "place"), [(name, place) for name in BODIES for place in PLACES[name]])
 def test_triangles_shrink_towards_a_point(name, place):
     mesh, area = BODIES[name]

@@ -69,14 +69,14 @@ def test_many_first_vectors_become_more_and_each_costs_more():
 @pytest.mark.parametrize(
     ("name", "meshes", "vectors"),
     [
-        ("guitar_fingernail", (29086, 6372), 84),  # a mesh file whose triangles are split in four
-        pytest.param("guitar_fingertip", (9620, 4927), 70, marks=pytest.mark.slow),
-        ("cymbal_ride_20_oak", (9751, 6832, 16541), 231),  # four impacts
+        ("guitar_fingernail", (27907, 4248), 84),  # a mesh file whose triangles are split in four
+        pytest.param("guitar_fingertip", (7253, 2227), 70, marks=pytest.mark.slow),
+        ("cymbal_ride_20_oak", (7924, 4915, 15317), 182),  # four impacts
         pytest.param(
-            "cymbal_splash_10_maple", (7386, 6232), 165, marks=pytest.mark.slow
+            "cymbal_splash_10_maple", (5685, 3766), 165, marks=pytest.mark.slow
         ),  # the stick stays for fourteen undisturbed contacts
-        ("drumstick", (3918, 3575), 149),
-        pytest.param("hammer_car_bonnet", (6309, 5221), 84, marks=pytest.mark.slow),
+        ("drumstick", (2082, 1536), 149),
+        pytest.param("hammer_car_bonnet", (4311, 2845), 84, marks=pytest.mark.slow),
     ],
 )
 def test_the_plan_counts_the_unknowns_and_vectors_that_its_run_has(name, meshes, vectors, monkeypatch):
@@ -190,6 +190,8 @@ def test_predicted_time_is_of_the_right_size(name):
     scene = fi.load_scene(SCENES / f"{name}.toml")
     plan = scene.plan(tolerance=1e-2)
     start = time.process_time()
-    plan.run()
+    run = plan.run()
+    if plan.blow.moving:  # the modes that ring on are predicted, too, but found when asked for
+        assert run.response.target.n_modes
     taken = time.process_time() - start
     assert taken / 4.0 < plan.seconds < 4.0 * taken

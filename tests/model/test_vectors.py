@@ -2,16 +2,20 @@
 
 import pickle
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fem_impact as fi
+from fem_impact.impact import accuracy
 from fem_impact.impact.response import Error
 from fem_impact.model import planner, vectors
 from fem_impact.model.target import Stages, Target
 from fem_impact.modes import ritz
+from fem_impact.modes.ritz import Krylov
 
+MESHES = Path(__file__).parents[2] / "meshes"
 WOOD = fi.Material(E=10e9, nu=0.3, rho=450.0)
 
 
@@ -188,6 +192,42 @@ def test_blow_that_no_mesh_resolves_names_a_contact_that_one_does():
 def test_vectors_refuse_what_only_modes_have(wrong):
     with pytest.raises(ValueError, match="target = 'vectors' needs"):
         fi.strike(plate({"boundary": "hinged"}), BALL, WOODEN, **BLOW, target="vectors", **wrong)
+
+
+@pytest.mark.parametrize(("tolerance", "coarseness"), [(1e-1, 8.0), (1e-3, 2.0), (1e-5, 0.1)])
+def test_triangles_at_the_blow_err_by_little_of_the_tolerance(tolerance, coarseness):
+    """As `vectors.DIP` says: against the finest triangles there, with the same elements elsewhere."""
+    target = Target.of(plate({"boundary": "hinged"}), None)
+    law = fi.Contact.hertz(1e6)
+    resonance = accuracy.contact_resonance(law, 0.03, 1.0)
+    elements = vectors.elements_for(target, 0.04, 0.03, resonance, tolerance)
+    assert elements.coarseness > coarseness
+    hits = []
+    for each in (elements, vectors.Elements(0.04)):
+        krylov = Krylov(target.near(np.array([[0.2, 0.11]]), each, Stages()), np.array([[0.2, 0.11]]), 2e4)
+        hits.append(fi.strike(krylov.pairs(120), BALL, law, at=(0.2, 0.11), speed=1.0, tolerance=1e-7))
+    assert missed(*hits) < 0.05 * tolerance
+
+
+def test_tension_makes_no_triangle_at_the_blow_larger():
+    """Its waves are longer, but a point force bends a skin within a layer that only its stiffness knows."""
+    mesh, held = fi.mesh.disk(0.3), {"boundary": "hinged"}
+    found = []
+    for tension in (0.0, 3e3):
+        target = Target(mesh, fi.Plate(fi.Material(E=5e9, nu=0.3, rho=1380.0), 2.5e-4, tension=tension), held)
+        found.append(vectors.elements_for(target, 0.02, 0.03, 100.0, 1e-2))
+    assert target.wave(100.0) < 0.3 * target.wave(100.0, tense=False) and found[0] == found[1]
+
+
+def test_a_mesh_whose_outline_forbids_larger_triangles_is_compared_with_a_finer_one():
+    guitar = fi.mesh.load(MESHES / "guitar.msh")
+    target, stages = Target(guitar, fi.Plate(WOOD, thickness=3e-3), {"body": "clamped"}), Stages()
+    for body, forbids in ((target, True), (Target.of(plate({"boundary": "hinged"}), None), False)):
+        assert body.mesh is not None
+        first = vectors.Elements(2.0 * body.mesh.size if forbids else 0.5 * body.mesh.size, 8.0)
+        fine, coarse = vectors.compared(body, first, stages)
+        assert (coarse if forbids else fine) == first and fine.coarseness < coarse.coarseness
+        assert body.n_cells(fine.size, stages) >= 1.15 * body.n_cells(coarse.size, stages)
 
 
 @pytest.mark.parametrize("size", [0.05, 0.6])  # with 0.6 m, larger elements would be the same two
