@@ -365,7 +365,8 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
             try:
                 # in fine steps, because the fastest modes of two descriptions differ, and so do their step errors
                 less = _run(_joined(poorer, contacts), ran, step, pace, *last)
-                parted[cause] += max(differ(less, before), float(_may_touch(before, less, pace[0])))
+                miscounted = "n_impacts" in options.quantities and _may_join(before, less)
+                parted[cause] += max(differ(less, before), float(miscounted or _may_touch(before, less, pace[0])))
                 before = less
             except SimulationError:  # the poorer body cannot be followed, so it tells nothing
                 parted[cause] += 1.0
@@ -526,6 +527,23 @@ def _poorer(part: _Part, modes: Modes) -> _Part:
     rows[:, rigid], velocity[rigid] = turned[:-1], turned[-1]
     poorer = _part(modes, part.touched, part.points, rows, rest, part.force, velocity)
     return replace(poorer, stretching=None if part.stretching is None else stretch(modes))
+
+
+def _may_join(history: History, other: History) -> bool:
+    """Whether two impacts may be one: the gap between them is less than the difference of two descriptions there."""
+    pairs = [
+        (before.contact, 0.5 * (before.end + after.start))
+        for i in range(history.n_contacts)
+        for before, after in pairwise(touch for touch in history.impacts if touch.contact == i)
+    ]
+    if not pairs or max(time for _, time in pairs) >= other.end_time:
+        return False
+    contact, times = np.array([i for i, _ in pairs]), np.array([time for _, time in pairs])
+    one, two = (
+        (found.offset + found.states(times)[0] @ found.shape.T)[np.arange(len(times)), contact]
+        for found in (history, other)
+    )
+    return bool((-one < np.abs(one - two)).any())
 
 
 def _may_touch(history: History, other: History, duration: float) -> bool:

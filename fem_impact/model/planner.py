@@ -37,6 +37,7 @@ VERIFYING = 8.0  # [-] the verifying run divides the tolerance by this
 FINEST = 1e-10  # [-] lowest tolerance of a verifying run
 CAUTION = 2.0  # [-] safety factor on the mode error: costs a quarter more modes, but seldom needs a second run
 MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by source: takes about 2 GB and some minutes
+MANY_MODES = 10_000  # [-] above it, a plate is infinite above a frequency instead, if its contact is overdamped
 SHORT_WAVES = {  # [-] frequency error for which `find_modes` chooses the mesh
     "argyris": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
 }  # fmt: skip
@@ -633,7 +634,7 @@ def _last_resort(asked: _Asked, stages: Stages) -> Plan | None:
 def _mixed(asked: _Asked, target: str | None, stages: Stages, least: float = 0.0) -> Plan | None:
     """The plan with modes up to a frequency and an infinite plate above it; None if its mobility is not known.
 
-    Or if the damping ratio of the contact with an infinite plate is not ``least``.
+    Or if fewer modes tell the blow, or the damping ratio of the contact with an infinite plate is below ``least``.
     """
     blow, values = asked.blow, asked.values
     plain = not (blow.target.thick or blow.target.air or values["stretching"] or blow.striker.hand)
@@ -648,10 +649,13 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, least: float = 0.0
             return None
         why = _unfit(asked) if fits else "is known for thin plates in a vacuum, of which only the blow is asked for"
         raise ValueError(f"{blow.name}target = 'mixed' {why}; use target = 'modal'")
-    if 0.5 * np.pi * asked.mass * seen.mobility < least * asked.duration:
+    highest = _highest(asked, seen.mobility)
+    if least and (
+        0.5 * np.pi * asked.mass * seen.mobility < least * asked.duration
+        or blow.target.count_below(highest / blow.target.stretch) < MANY_MODES
+    ):
         return None
     frequency = mixed.first_frequency(asked.mass, seen.mobility, seen.echo, asked.duration)
-    highest = _highest(asked, seen.mobility)
     number = _mixed_count(asked, frequency)
     kept = (
         f"the target keeps its modes up to about {frequency:.3g} Hz, or higher if the echoes left out show; above, it "
@@ -852,13 +856,15 @@ def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: fl
         )
     if target.modes is not None and number > target.modes.n_modes:
         number, limit = target.modes.n_modes, target.modes.frequencies[-1]
-    if number > MOST_MODES[target.kind]:
-        plan = _mixed(asked, None, stages) if "target" not in asked.pieces and band <= needed else None
+    most = MOST_MODES[target.kind]
+    if number > min(most, MANY_MODES) and band <= needed and "target" not in asked.pieces:
+        plan = _mixed(asked, None, stages, mixed.HEAVY if number <= most else 0.0)
         if plan is not None:
             return plan
+    if number > most:
         raise check.SimulationError(
             f"{asked.blow.name}this blow needs about {number:.2g} modes, up to {limit:.2g} Hz, more than the limit of "
-            f"{MOST_MODES[target.kind]}; {_fewer(asked, modes, band > needed)}"
+            f"{most}; {_fewer(asked, modes, band > needed)}"
         )
     left = accuracy.truncation_error(modes, at, limit, mass=mass, **asked.law)
     kept = f"the target keeps its modes up to {limit:.4g} Hz, about {number}; the others act as a spring"

@@ -11,7 +11,7 @@ import fem_impact as fi
 from fem_impact.impact import accuracy
 from fem_impact.impact.response import Error
 from fem_impact.model import planner, vectors
-from fem_impact.model.target import Stages, Target
+from fem_impact.model.target import Elements, Stages, Target
 from fem_impact.modes import ritz
 from fem_impact.modes.ritz import Krylov
 
@@ -93,20 +93,20 @@ def test_damping_over_frequency_acts_on_vectors_as_on_modes():
 
 def test_mesh_is_refined_when_it_errs_more_than_too_few_vectors_explain():
     """Two meshes with as few vectors differ by what the vectors leave out, too, which no finer mesh mends."""
-    blow = np.array([0.2, 0.11]), 200.0, 1e-3, 0.06
+    blow = np.array([0.2, 0.11]), 200.0, 1e-3, Elements(0.06)
     seen = vectors.Seen(Target.of(plate({"boundary": "hinged"}), None), *blow, False, Stages(None))
-    count, size, fine = seen.count, seen.size, seen.fine
+    count, size, fine = seen.count, seen.elements.size, seen.fine
     assert seen.coarse.system.n_dofs < fine.system.n_dofs
     assert not seen.improved(Error(0.0, 4e-4, 5e-4), 1e-3) and seen.count == count
-    assert seen.improved(Error(0.0, 1e-3, 2e-3), 1e-3) and seen.count > count and seen.size == size
+    assert seen.improved(Error(0.0, 1e-3, 2e-3), 1e-3) and seen.count > count and seen.elements.size == size
     count = seen.count
-    assert seen.improved(Error(0.0, 1e-4, 2e-3), 1e-3) and seen.count == count and seen.size < size
+    assert seen.improved(Error(0.0, 1e-4, 2e-3), 1e-3) and seen.count == count and seen.elements.size < size
     assert seen.coarse is fine and seen.fine.system.n_dofs > fine.system.n_dofs
 
 
 def test_meshes_are_compared_with_all_vectors():
     """Each description is poorer than the one before in one respect only."""
-    blow = np.array([0.2, 0.11]), 200.0, 1e-3, 0.06
+    blow = np.array([0.2, 0.11]), 200.0, 1e-3, Elements(0.06)
     seen = vectors.Seen(Target.of(plate({"boundary": "hinged"}), None), *blow, False, Stages(None))
     found = seen.modes(lambda modes, margin: 1e9)
     mesh, truncation = found.poorer["mesh"], found.poorer["truncation"]
