@@ -40,6 +40,7 @@ CHUNK = 2000  # [-] modes whose shares are found at a time, to limit memory
 SLOWING = 5.0  # [-] first frequency tried, times mass and mobility: the striker slows down with their inverse
 LASTING = 15.0  # [-] duration of the blow to be expected, over mass times mobility
 PER_RADIAN = 2.5  # [-] vectors that tell waves up to a frequency, per radian of its phase in that time
+MOST_VECTORS = 1000  # [-] limit on their number: half a minute on a mesh of 50 000 unknowns
 HEAVY = 1.0  # [-] damping ratio of the contact with an infinite plate; from there on, vectors alone do not resolve it
 NEAR = 10.0  # [rad] phase of the first echo at that frequency at least: the plate is wider than the wave is long
 

@@ -439,7 +439,7 @@ def _carry_out_mixed(plan: Plan, asked: _Asked, stages: Stages) -> Run:
             break
         hit = found[0]
         work = 2.0 * hit.history.steps.shape[0] * hit.bodies[-1].n_modes
-        many = plan.size is not None and 2.0 * hit.bodies[-1].n_modes > vectors.MOST_VECTORS
+        many = plan.size is not None and 2.0 * hit.bodies[-1].n_modes > mixed.MOST_VECTORS
         if hit.error.idealisation <= allowed or work > MOST_MIXED or many:
             break
         frequency *= 2.0
@@ -489,8 +489,10 @@ def _mixed_by_vectors(
         seen.modes(lambda found, _: float(found.frequencies[-1]))
         assert seen.whole is not None
         hit, run = _strike_mixed(plan, asked, seen.whole, frequency, stages)
-        if hit.error.truncation > 0.5 * allowed and seen.count < vectors.MOST_VECTORS:
-            seen.count = min(vectors.MOST_VECTORS, 2 * seen.count)  # it lasts longer than expected
+        if seen.count >= mixed.MOST_VECTORS:
+            return hit, run
+        if hit.error.truncation > 0.5 * allowed:
+            seen.count = min(mixed.MOST_VECTORS, 2 * seen.count)  # it lasts longer than expected
         elif not seen.improved(hit.error, allowed):
             return hit, run
 

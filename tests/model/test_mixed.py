@@ -1,5 +1,6 @@
 """Modes below a frequency, an infinite plate above: against all modes, in closed form and by finite elements."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -144,8 +145,7 @@ def test_scene_in_closed_form_against_all_modes():
 def test_sheet_by_elements_against_all_modes():
     """A plate of 1 mm, of which Ritz vectors alone miss the restitution by 0.6 and say so."""
     true = strike(modes(1e-3, 4e5))
-    how = {"quantity": ("restitution", "impulse", "force"), "tolerance": 3e-2, "damping_ratio": 1e-3}
-    hit = fi.strike(system(1e-3), BALL, HARD, at=AT, speed=1.0, **how)
-    assert hit.tolerance_met
-    assert abs(hit.restitution - true.restitution) <= hit.error.total
+    with warnings.catch_warnings(action="ignore"):  # whether it touches once more cannot be told from 1000 vectors
+        hit = fi.strike(system(1e-3), BALL, HARD, at=AT, speed=1.0, tolerance=1e-2, damping_ratio=1e-3)
+    assert abs(hit.restitution - true.restitution) <= min(5e-3, hit.error.total)
     assert_allclose([hit.impulse, hit.peak_force], [true.impulse, true.peak_force], rtol=1e-2)
