@@ -39,6 +39,7 @@ RESOLVED = 1.25  # [-] finite elements resolve waves of so many times the freque
 CHUNK = 2000  # [-] modes whose shares are found at a time, to limit memory
 SLOWING = 5.0  # [-] first frequency tried, times mass and mobility: the striker slows down with their inverse
 LASTING = 15.0  # [-] duration of the blow to be expected, over mass times mobility
+LONGEST = 1e4  # [-] that duration over the contact time on a wall at most: longer blows take too many steps
 PER_RADIAN = 2.5  # [-] vectors that tell waves up to a frequency, per radian of its phase in that time
 MOST_VECTORS = 1000  # [-] limit on their number: half a minute on a mesh of 50 000 unknowns
 HEAVY = 1.0  # [-] damping ratio of the contact with an infinite plate; from there on, vectors alone do not resolve it

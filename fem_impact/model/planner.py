@@ -652,6 +652,8 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, least: float = 0.0
         why = _unfit(asked) if fits else "is known for thin plates in a vacuum, of which only the blow is asked for"
         raise ValueError(f"{blow.name}target = 'mixed' {why}; use target = 'modal'")
     highest = _highest(asked, seen.mobility)
+    if target is None and mixed.LASTING * asked.mass * seen.mobility > mixed.LONGEST * asked.duration:
+        return None
     if least and (
         0.5 * np.pi * asked.mass * seen.mobility < least * asked.duration
         or blow.target.count_below(highest / blow.target.stretch) < MANY_MODES
