@@ -132,15 +132,22 @@ class OverTime(Exception):
 def at_most(seconds: float) -> Iterator[None]:
     """Raise OverTime after so many seconds of processor time."""
 
+    late = OverTime(f"no answer within {seconds:g} s of processor time")
+    told = False
+
     def stop(*_: object) -> None:
-        raise OverTime(f"no answer within {seconds:g} s of processor time")
+        nonlocal told
+        told = True
+        raise late
 
     signal.signal(signal.SIGPROF, stop)
     signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
-    except SystemError as error:  # a kernel was being called
-        raise (error.__cause__ if isinstance(error.__cause__, OverTime) else error) from None
+    except SystemError:  # what a kernel makes of it while it is being called
+        if told:
+            raise late from None
+        raise
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
 

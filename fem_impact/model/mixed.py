@@ -32,7 +32,7 @@ import numpy as np
 
 from ..modes.modal import Modes, SampledShapes
 
-ANGLE = 0.05  # [rad] its sine is the damping ratio above the frequency; about over this fraction of it modes fade
+ANGLE = 0.05  # [rad] its sine is the damping ratio above the frequency; modes fade over about this part of it
 RATIO = ANGLE / 1.5  # [-] between neighbouring frequencies, less one: a ripple of 2e-4
 REACH = 2.0  # [-] the modes are needed up to this multiple of the frequency, where they keep 1 % of their squared shape
 RESOLVED = 1.25  # [-] finite elements resolve waves of so many times the frequency: the first mesh is finer than that
