@@ -349,7 +349,7 @@ def _read(path: Path, key: str) -> Views_ | None:
             for i, place in enumerate(file["places"]):
                 mass, notes = float(file[f"{i} mass"]), tuple(map(str, file[f"{i} notes"]))
                 found = {}
-                for cause in ("", "truncation", "mesh"):
+                for cause in ("", "mesh", "truncation"):
                     if f"{i} {cause} 0" in file:
                         omega, zeta, rows, static = (file[f"{i} {cause} {n}"] for n in range(4))
                         found[cause] = Modes(omega, zeta, SampledShapes(place[None], rows, static), mass, notes=notes)

@@ -45,7 +45,7 @@ def test_a_map_of_elements_is_that_of_the_closed_form(law, soft, hard, tolerance
     found, met = apart(table, truth), table.tolerance_met.values
     # one cell in 64 may hold a touch of 1e-5 of the impulse, which decides the number of impacts
     assert (found > (table.error + table.truncation).values).sum() <= 1
-    assert (found[met] > tolerance).sum() <= 1 and met.mean() > 0.6  # blows of several impacts may miss, and say so
+    assert (found[met] > tolerance).sum() <= 1 and met.mean() > 0.5  # blows of several impacts may miss, and say so
     assert (table.truncation > 0.0).all()
 
 
@@ -128,7 +128,7 @@ def test_kept_vectors_serve_the_same_map_only(tmp_path):
         ):
             assert_allclose(one.omega, other.omega, rtol=0.0)
             assert_allclose(one.shape_at([place]), other.shape_at([place]), rtol=0.0)
-    assert set(modes.poorer) == {"truncation", "mesh"}
+    assert list(modes.poorer) == ["mesh", "truncation"]
     before = (tmp_path / "kept.npz").read_bytes()
     found(mass=0.02)
     assert (tmp_path / "kept.npz").read_bytes() != before
