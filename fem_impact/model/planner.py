@@ -275,6 +275,11 @@ class _Asked:
         """Mass [kg] of the striker felt at its contact point."""
         return self.blow.striker.felt_mass
 
+    @cached_property
+    def seen(self) -> idealisation.Outside | None:
+        """What is known of the target without finite elements."""
+        return idealisation.from_outside(self.blow.target, self.values["at"], self.mass, self.duration)
+
     def find(self, n_modes: int, max_frequency: float | None = None, **how: Any) -> Modes:
         """Modes of the target, see `Target.find`."""
         size, limit = self.pieces.get("size"), 2.0 * MESH * self.tolerance / self.fineness
@@ -474,15 +479,21 @@ def _mixed_by_modes(
 def _mixed_by_vectors(
     plan: Plan, asked: _Asked, frequency: float, stages: Stages
 ) -> tuple[Response, Callable[..., Response]]:
-    target, reach = plan.blow.target, mixed.RESOLVED * frequency
+    target, elements = plan.blow.target, _mixed_elements(asked, frequency)
     assert target.mesh is not None
-    size = vectors.size_for(target, reach, asked.tolerance)
-    elements = vectors.elements_for(target, size, asked.mass, reach, asked.tolerance)
-    if size < refinement.smallest_size("argyris", target.mesh):
+    if elements.size < refinement.smallest_size("argyris", target.mesh):
         raise check.SimulationError("a mesh that resolves the frequency has too many unknowns")
     shift, count = 2.0 * np.pi * mixed.REACH * frequency, _mixed_vectors(asked, plan.mobility, frequency)
     seen = vectors.Seen(
-        target, asked.values["at"], reach, asked.tolerance, elements, target.size_stated, stages, shift, count
+        target,
+        asked.values["at"],
+        mixed.RESOLVED * frequency,
+        asked.tolerance,
+        elements,
+        target.size_stated,
+        stages,
+        shift,
+        count,
     )
     allowed = SHARE * asked.tolerance
     while True:
@@ -584,7 +595,7 @@ def _idealised(asked: _Asked, target: str | None, stages: Stages) -> Plan | None
     if target is None and (pressed or asked.moving or not values.get("residual", True)):
         return None
     with stages("modes"):
-        seen = idealisation.from_outside(blow.target, values["at"], asked.mass, asked.duration)
+        seen = asked.seen
     allowed = SHARE * asked.tolerance
     if target is not None:
         if seen is None or (target == "infinite" and not np.isfinite(seen.mobility)):
@@ -644,7 +655,7 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, least: float = 0.0
     stated = pressed or {"n_modes", "max_frequency"} & set(asked.pieces)
     fits = plain and not stated and not asked.moving and values.get("residual", True)
     with stages("modes"):
-        seen = idealisation.from_outside(blow.target, values["at"], asked.mass, asked.duration) if fits else None
+        seen = asked.seen if fits else None
     resolved = blow.target.kind == "analytic" or vectors.usable(blow.target)
     if not resolved or seen is None or not np.isfinite(seen.mobility) or not seen.echo:
         if target is None:
@@ -672,8 +683,8 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, least: float = 0.0
         with stages("modes"):
             first = asked.find(FIRST_LOOK, stages=stages)
     else:
-        size, element = vectors.size_for(blow.target, mixed.RESOLVED * frequency, asked.tolerance), "argyris"
-        n_dofs = blow.target.unknowns(np.atleast_2d(values["at"]), _elements(asked, size), stages)
+        elements, element = _mixed_elements(asked, frequency), "argyris"
+        size, n_dofs = elements.size, blow.target.unknowns(np.atleast_2d(values["at"]), elements, stages)
         count = _mixed_vectors(asked, seen.mobility, frequency)
         work = cost.by_vectors([n_dofs, n_dofs / vectors.COARSER**2], count, 1.0)
     return _plan(
@@ -692,6 +703,13 @@ def _highest(asked: _Asked, mobility: float) -> float:
 def _mixed_count(asked: _Asked, frequency: float) -> int:
     """About how many modes the target has up to where they fade, for the infinite plate above a frequency [Hz]."""
     return round(asked.blow.target.count_below(mixed.REACH * frequency / asked.blow.target.stretch))
+
+
+def _mixed_elements(asked: _Asked, frequency: float) -> Elements:
+    """Elements for a blow by Ritz vectors, for the infinite plate above a frequency [Hz]."""
+    target, reach = asked.blow.target, mixed.RESOLVED * frequency
+    size = vectors.size_for(target, reach, asked.tolerance)
+    return vectors.elements_for(target, size, asked.mass, reach, asked.tolerance)
 
 
 def _mixed_vectors(asked: _Asked, mobility: float, frequency: float) -> int:
@@ -814,7 +832,7 @@ def _elements(asked: _Asked, size: float) -> Elements:
 def _foreseen(asked: _Asked) -> tuple[float, int]:
     """How long the blow lasts on an infinite plate, in undisturbed contacts, and its impacts; (1, 1) if not known."""
     at, striker = np.atleast_1d(np.asarray(asked.values["at"], float)), asked.blow.striker
-    seen = idealisation.from_outside(asked.blow.target, at, asked.mass, asked.duration)
+    seen = asked.seen
     if seen is None or not np.isfinite(seen.mobility):
         return 1.0, 1
     endless = idealisation.endless(at, seen.mass, seen.mobility, asked.duration)
