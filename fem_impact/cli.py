@@ -140,7 +140,7 @@ def _prepare(environment: MutableMapping[str, str], once: bool) -> bool:
     if not once or "NUMBA_DISABLE_JIT" in environment:
         return False
     source = max(file.stat().st_mtime for file in (package / "impact" / "compiled").glob("*.py"))
-    if any(file.stat().st_mtime >= source for file in cache.rglob("energy.run_energy-*.nbi")):
+    if any(file.stat().st_mtime >= source for file in cache.rglob("energy.follow-*.nbi")):
         return False
     # A single strike takes 0.3 to 1 s in plain Python; compiling takes 15 to 30 s, and `doctor` does it once.
     environment["NUMBA_DISABLE_JIT"] = "1"

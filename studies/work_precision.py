@@ -37,6 +37,7 @@ from scipy.integrate import solve_ivp
 import fem_impact as fi
 from fem_impact.impact import collision, sensitivity
 from fem_impact.impact.compiled import collocation, energy
+from fem_impact.impact.compiled.bundles import Limits, Scene
 
 MASS, SPEED = 0.005, 1.0  # [kg], [m/s]
 BLOWS = [((0.465, 0.31), 3.0e5), ((0.465, 0.33), 2.8e5), ((0.60, 0.40), 3.1e5), ((0.50, 0.37), 3.3e5)]  # [m], [N/m]
@@ -110,19 +111,19 @@ def call(blow: Blow, scheme: str, tolerance: float) -> Answer:
 def kernel(blow: Blow, scheme: str, size: float) -> Callable[[], Answer]:
     """A run of the compiled loop with a given step (A, A4) or misfit (collocation)."""
     n = len(blow.omega)
-    state = (
+    scene = Scene(
         blow.omega, np.zeros(n), blow.shape[None], np.zeros(1), np.zeros(n),
         np.array([[blow.stiffness, 1.0, 0.0, 0.0]]),
         np.zeros(n), blow.start[n:].copy(),
     )  # fmt: skip
     nodes, contact = sensitivity.gauss(collision.NODES), np.pi * np.sqrt(MASS / blow.stiffness)
-    noise = (1e-19, 1e-12)
+    limits = Limits(1e-19, 1e-12, np.inf, 0, 10**6)
 
     def run() -> Answer:
         if scheme == "collocation":
-            out = collocation.run_collocation(*state, *nodes, contact / 2.0, SPEED, size, *noise, np.inf, 0, 10**6)
+            out = collocation.run_collocation(scene, *nodes, contact / 2.0, SPEED * size, limits)
         else:
-            out = energy.run_energy(*state, int(scheme == "A4"), contact / size, *noise, np.inf, 0, 10**6)
+            out = energy.run_energy(scene, None, int(scheme == "A4"), contact / size, limits)
         return blow.answer(np.concatenate([out[1], out[2]]))
 
     return run

@@ -340,14 +340,14 @@ def test_uncompiled_kernels_run_as_plain_python(monkeypatch, tmp_path):
     many: dict[str, str] = {}
     cli._prepare(many, once=False)
     assert "NUMBA_DISABLE_JIT" not in many
-    (home / "__pycache__" / "energy.run_energy-1.py311.nbi").write_text("")
+    (home / "__pycache__" / "energy.follow-1.py311.nbi").write_text("")
     compiled: dict[str, str] = {}
     assert not cli._prepare(compiled, once=True)
     assert "NUMBA_DISABLE_JIT" not in compiled
     elsewhere = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}  # where nothing is compiled yet
     assert cli._prepare(elsewhere, once=True)
     (tmp_path / "kept" / "compiled_0").mkdir()
-    (tmp_path / "kept" / "compiled_0" / "energy.run_energy-1.py311.nbi").write_text("")
+    (tmp_path / "kept" / "compiled_0" / "energy.follow-1.py311.nbi").write_text("")
     assert not cli._prepare({"NUMBA_CACHE_DIR": str(tmp_path / "kept")}, once=True)
 
 

@@ -14,10 +14,11 @@ from ..modes.modal import Modes, left_out
 from ..modes.stretching import Stretching, stretch
 from . import accuracy, force_spectrum, promise
 from .compiled import build, layout, record
+from .compiled.bundles import Limits, Scene
 from .compiled.collocation import run_collocation
 from .compiled.energy import run_energy
 from .compiled.law import FELT
-from .compiled.stretched import run_stretched
+from .compiled.stretched import Stretch
 from .contact import Contact, acting_stiffness, wall_time
 from .quantities import asked_for
 from .response import Dip, Error, History, Response
@@ -814,22 +815,17 @@ def _run(
     parts = (
         system.omega, system.zeta, system.shape, system.offset, system.bias, system.law, system.start_q, system.start_p
     )  # fmt: skip
-    noise = NOISE * pace[0] * pace[1], STILL * pace[1]
     most = _most_steps(system)
-    stretched = system.stretched
+    limits = Limits(float(NOISE * pace[0] * pace[1]), float(STILL * pace[1]), float(horizon), n_max, most)
+    stretched, stretch = system.stretched, None
     if stretched is not None:
         stretched = replace(stretched, base=float(size), ramp=scheme == "A4")
-        result = run_stretched(
-            *parts, stretched.forms, stretched.first, int(stretched.ramp), float(size), *noise, float(horizon), n_max,
-            most,
-        )  # fmt: skip
-    elif scheme == "collocation":
+        stretch = Stretch(stretched.forms, stretched.first)
+    if scheme == "collocation":
         nodes, powers = gauss(NODES)
-        result = run_collocation(
-            *parts, nodes, powers, pace[0] / 2.0, pace[1], float(size), *noise, float(horizon), n_max, most
-        )
+        result = run_collocation(Scene(*parts), nodes, powers, pace[0] / 2.0, float(size) * pace[1], limits)
     else:
-        result = run_energy(*parts, int(scheme == "A4"), float(size), *noise, float(horizon), n_max, most)
+        result = run_energy(Scene(*parts), stretch, int(scheme == "A4"), float(size), limits)
     history = replace(History(*parts, *result), stretched=stretched)
     time, status = result[5], result[6]
     if status == record.EXHAUSTED:

@@ -16,6 +16,7 @@ from ..modes.stretching import stretch
 from . import assumption, datasets, force_spectrum, gradient, promise
 from .assumption import Assumption
 from .compiled import law, layout, propagation, record
+from .compiled.bundles import Scene
 from .contact import Contact
 from .free_motion import swing
 from .quantities import USUAL, words
@@ -148,10 +149,10 @@ class History:
 
     def _force(self, steps: np.ndarray, contact: int, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Contact force [N] and its rate [N/s] at a fraction of each of some steps, (n,) each."""
-        force, rate = np.empty(len(steps)), np.empty(len(steps))
+        found = np.empty((2, len(steps)))
         rows, parts = np.array(steps, np.int64), np.array(part, float)
-        record.forces(self.steps, self.now, self.law, self.n_coefficients, rows, contact, parts, force, rate)
-        return force, rate
+        record.forces(self.steps, self.now, self.law, self.n_coefficients, rows, contact, parts, found)
+        return found[0], found[1]
 
     def force_at(self, times: np.ndarray, contact: int) -> tuple[np.ndarray, np.ndarray]:
         """Contact force [N] and its rate [N/s] at any times, (n_times,) each; zero after the end."""
@@ -162,6 +163,12 @@ class History:
         force, rate = self._force(rows, contact, part)
         acts = self.pressed[rows, contact] & (force > 0.0) & (times <= self.end_time)
         return np.where(acts, force, 0.0), np.where(acts, rate, 0.0)
+
+    @property
+    def scene(self) -> Scene:
+        """What the run started from."""
+        bodies = self.omega, self.zeta, self.shape, self.offset, self.bias
+        return Scene(*bodies, self.law, self.start_q, self.start_p)
 
     @cached_property
     def end_law(self) -> np.ndarray:
@@ -177,10 +184,7 @@ class History:
         if self.stretched is not None:
             return self.stretched.states(self, times)
         q, p = np.empty((len(times), len(self.omega))), np.empty((len(times), len(self.omega)))
-        propagation.replay(
-            self.omega, self.zeta, self.shape, self.bias, self.start_q, self.start_p, self.steps, self.n_coefficients,
-            times, q, p,
-        )  # fmt: skip
+        propagation.replay(self.scene, self.steps, self.n_coefficients, times, q, p)
         return q, p
 
     def motion(self, times: np.ndarray) -> np.ndarray:

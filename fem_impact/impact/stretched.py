@@ -7,7 +7,8 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
-from .compiled.stretched import energies_of_stretching, replay_stretched
+from .compiled.bundles import Scene
+from .compiled.stretched import Stretch, energies_of_stretching, replay_stretched
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,23 +31,24 @@ class Stretched:
         start, stop, _ = modes.indices(len(q))
         if not start <= self.first < stop:
             return 0.0
-        return float(energies_of_stretching(self.forms, self.first, np.array(q, float)[None])[0])
+        return float(energies_of_stretching(Stretch(self.forms, self.first), np.array(q, float)[None])[0])
 
     def states(self, history: Any, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Modal displacements and velocities (n_times, n_all) of a `History` at ascending times."""
-        q, p = np.empty((2, len(times), len(history.omega)))
+        states = np.empty((2, len(times), len(history.omega)))
         if not len(times):
-            return q, p
-        time, step, state, hint = history.reached.get("last", (np.inf, 0, None, None))
-        if times[0] < time:
-            time, step, hint = 0.0, 0, np.zeros(self.forms.shape[1])
-            state = np.stack([history.start_q, history.start_p])
-        state, hint = state.copy(), hint.copy()
-        failed, time, step = replay_stretched(
-            history.omega, history.zeta, history.shape, history.bias, history.steps, self.forms, self.first,
-            int(self.ramp), self.base, float(time), int(step), state, hint, np.array(times, float), q, p,
+            return states[0], states[1]
+        begin = history.reached.get("last", (np.inf,))
+        if times[0] < begin[0]:
+            begin = 0.0, 0, np.zeros(self.forms.shape[1]), history.start_q, history.start_p
+        bodies = history.omega, history.zeta, history.shape, history.offset, history.bias, history.law
+        for array in begin[2:]:
+            array.setflags(write=False)  # as the others; numba would compile the kernel again for writable ones
+        failed, *begin = replay_stretched(
+            Scene(*bodies, *begin[3:]), Stretch(self.forms, self.first), history.steps, int(self.ramp), self.base,
+            begin[:3], np.array(times, float), states,
         )  # fmt: skip
-        history.reached["last"] = time, step, state, hint
+        history.reached["last"] = tuple(begin)
         if failed:
-            raise SimulationError(f"the stretching of the motion did not settle at {time:.4g} s in any step")
-        return q, p
+            raise SimulationError(f"the stretching of the motion did not settle at {begin[0]:.4g} s in any step")
+        return states[0], states[1]

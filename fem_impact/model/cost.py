@@ -24,7 +24,7 @@ from .._base.files import replacing
 from ..fe.eigenvalues import factorise, one_thread
 from ..impact import collision
 from ..impact.compiled import build
-from ..impact.compiled.energy import run_energy
+from ..impact.compiled.energy import follow
 from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..modes import analytic
@@ -223,7 +223,7 @@ def keep(machine: Machine) -> bool:
 
 def place() -> Path | None:
     """File beside the compiled kernels; one for each machine that shares them. None if no kernels are kept."""
-    folder = build.folder(run_energy)
+    folder = build.folder(follow)
     return (
         None if folder is None else folder / f"speed-{hashlib.sha256(platform.node().encode()).hexdigest()[:12]}.json"
     )

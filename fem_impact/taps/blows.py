@@ -13,6 +13,7 @@ from .._base import check
 from .._base.check import SimulationError
 from ..impact.collision import rest_mode
 from ..impact.compiled import layout, record
+from ..impact.compiled.bundles import Limits, Scene
 from ..impact.compiled.energy import run_energy
 from ..impact.contact import Contact
 from ..impact.response import History
@@ -154,8 +155,9 @@ def run(bodies: Pair, speed: float, step: float, horizon: float) -> History:
     parts = (bodies.omega, bodies.zeta, bodies.shape, np.zeros(1), still, bodies.law, still, start)
     for part in parts:
         part.setflags(write=False)  # or numba would compile the kernel again for writable arrays
-    limits = ROUNDING[0] * STEPS * step * speed, ROUNDING[1] * speed
-    result = run_energy(*parts, 1, float(step), *limits, float(horizon), 0, MOST_STEPS)
+    rounding = float(ROUNDING[0] * STEPS * step * speed), float(ROUNDING[1] * speed)
+    limits = Limits(*rounding, float(horizon), 0, MOST_STEPS)
+    result = run_energy(Scene(*parts), None, 1, float(step), limits)
     if result[6] in (record.EXHAUSTED, record.FAILED):
         raise SimulationError(f"a blow at {speed:.3g} m/s did not end within {MOST_STEPS} steps of {step:.2g} s")
     return History(*parts, *result)
@@ -207,8 +209,8 @@ def _force(history: History, times: np.ndarray) -> np.ndarray:
         return np.zeros(len(times))
     rows = np.searchsorted(begun, times, side="right") - 1
     part = np.minimum((times - begun[rows]) / lengths[rows], 1.0)
-    force, rate = np.empty((2, len(times)))
+    found = np.empty((2, len(times)))
     with np.errstate(all="ignore"):  # the rate of the force, not used here, is infinite at the onset of soft laws
-        record.forces(history.steps, history.now, history.law, history.n_coefficients, rows, 0, part, force, rate)
-    force[~history.pressed[rows, 0]] = 0.0
-    return force
+        record.forces(history.steps, history.now, history.law, history.n_coefficients, rows, 0, part, found)
+    found[0][~history.pressed[rows, 0]] = 0.0
+    return found[0]

@@ -88,10 +88,7 @@ class Rig:
 def state(history: History, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Modal displacements and velocities of all bodies at ascending times, (n_times, n_modes) each."""
     q, p = np.empty((2, len(times), len(history.omega)))
-    h = history
-    propagation.replay(
-        h.omega, h.zeta, h.shape, h.bias, h.start_q, h.start_p, h.steps, h.n_coefficients, times, q, p
-    )  # fmt: skip
+    propagation.replay(history.scene, history.steps, history.n_coefficients, times, q, p)
     return q, p
 
 

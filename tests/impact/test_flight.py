@@ -7,16 +7,15 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from fem_impact.impact.compiled import flight, propagation
+from fem_impact.impact.compiled.bundles import Bodies, Flights, Limits
+from fem_impact.impact.compiled.flight import LATER, NEVER, ONSET
 
 pytestmark = pytest.mark.xdist_group("flight")  # compiled for these tests alone
-ONSET, NEVER, LATER = 0, 1, 2  # how a flight ends, see `flight.find_onset`
 
 
 @njit
-def find_onset(omega, zeta, shape, offset, bias, left, base, tables, known, q, p):
-    return flight.find_onset(
-        omega, zeta, shape, offset, bias, left, base, 1e-3 * base, 0.0, 0.0, tables, known, q, p
-    )  # fmt: skip
+def find_onset(bodies, offset, flights, limits, left):
+    return flight.find_onset(bodies, offset, flights, limits, left)
 
 
 def fly(omega, shape, q, p, *, offset=0.0, bias=None, left=np.inf, zeta=0.0, base=1e-4):
@@ -25,9 +24,10 @@ def fly(omega, shape, q, p, *, offset=0.0, bias=None, left=np.inf, zeta=0.0, bas
     n = len(omega)
     bias = np.zeros(n) if bias is None else np.array(bias, float)
     tables = np.empty((flight.GLIDES + 1, propagation.N_LANE, n))
-    known = np.zeros(flight.GLIDES + 1, bool)
+    flights = Flights(tables, np.zeros(flight.GLIDES + 1), base, 1e-3 * base)
     shape, offset = np.atleast_2d(np.array(shape, float)), np.array([offset])
-    return *find_onset(omega, np.full(n, zeta), shape, offset, bias, left, base, tables, known, q, p), q, p
+    bodies = Bodies(omega, np.full(n, zeta), 2.0 * zeta * omega, shape, bias, q, p, np.empty(n), np.empty(n))
+    return *find_onset(bodies, offset, flights, Limits(0.0, 0.0, np.inf, 0, 1), left), q, p
 
 
 @pytest.mark.parametrize("gap, speed, gravity", [(1e-3, 0.5, 0.0), (0.2, 0.0, 9.81), (0.05, -1.0, 9.81)])

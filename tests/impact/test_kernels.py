@@ -19,6 +19,7 @@ from warming import locked
 
 from fem_impact.impact.compiled import arrays, build, collocation, energy, propagation, record, schemes
 from fem_impact.impact.compiled import law as laws
+from fem_impact.impact.compiled.bundles import Limits, Scene
 from fem_impact.impact.sensitivity import gauss
 
 EPS = np.finfo(float).eps
@@ -67,11 +68,11 @@ def run(
         p[0] = speed / shape[0, 0]
     p = np.asarray(p, float)
     state = locked(omega, zeta, shape, offset, bias, law, q, p)
+    limits = Limits(*noise, horizon, n_max, max_steps)
     if scheme == "collocation":
-        tail = (*gauss(5), h, abs(speed), 1e-10, *noise, horizon, n_max, max_steps)
-        out = collocation.run_collocation(*state, *tail)
+        out = collocation.run_collocation(Scene(*state), *gauss(5), h, 1e-10 * abs(speed), limits)
     else:
-        out = energy.run_energy(*state, int(scheme == "A4"), h, *noise, horizon, n_max, max_steps)
+        out = energy.run_energy(Scene(*state), None, int(scheme == "A4"), h, limits)
     steps, q1, p1, now, done, time, status, n_fallback, n_blind = out
 
     def stored(d):
@@ -242,7 +243,9 @@ def test_long_free_flight_keeps_energy_and_phase():
     t = np.linspace(0.0, 100.0, 1001)
     out_q, out_p = np.empty((1001, 3)), np.empty((1001, 3))
     nothing = np.zeros((0, 3 + 5))
-    propagation.replay(omega, np.zeros(3), np.ones((1, 3)), np.zeros(3), q, p, nothing, 2, t, out_q, out_p)
+    law = np.zeros((1, 4))
+    scene = Scene(omega, np.zeros(3), np.ones((1, 3)), np.zeros(1), np.zeros(3), law, q, p)
+    propagation.replay(scene, nothing, 2, t, out_q, out_p)
     sine = np.where(omega > 0.0, np.sin(omega * t[:, None]) / np.maximum(omega, 1.0), t[:, None])
     wanted = q * np.cos(omega * t[:, None]) + p * sine
     assert_allclose(out_q, wanted, atol=1e6 * EPS * 1e-3)  # phase omega t rounded: 1e6 eps of the amplitude
@@ -302,9 +305,8 @@ def test_modal_damping_takes_what_its_integral_says():
     x, weight = np.polynomial.legendre.leggauss(20)
     times = (r.steps[:, :1] + 0.5 * (x + 1.0) * r.steps[:, 1:2]).ravel()
     q, p = np.empty((len(times), 2)), np.empty((len(times), 2))
-    propagation.replay(
-        omega, zeta, u, np.zeros(2), np.zeros(2), np.array([0.1, 0.0]), r.steps, 2, times, q, p
-    )  # fmt: skip
+    scene = Scene(omega, zeta, u, np.zeros(1), np.zeros(2), np.zeros((1, 4)), np.zeros(2), np.array([0.1, 0.0]))
+    propagation.replay(scene, r.steps, 2, times, q, p)
     taken = (0.5 * r.steps[:, 1:2] * weight * (2.0 * 0.2 * 3000.0 * p[:, 1] ** 2).reshape(len(r.steps), -1)).sum()
     assert_allclose(taken, r.before - r.after, rtol=1e-12)  # quadrature exact to rounding
 
@@ -678,6 +680,7 @@ import json
 import numpy as np
 from warming import locked
 from fem_impact.impact.sensitivity import gauss
+from fem_impact.impact.compiled.bundles import Limits, Scene
 from fem_impact.impact.compiled.collocation import run_collocation
 from fem_impact.impact.compiled.energy import run_energy
 from fem_impact.impact.compiled.propagation import replay
@@ -685,21 +688,21 @@ from fem_impact.impact.compiled.propagation import replay
 def after(run, n_coefficients):
     times = np.linspace(0.0, 2e-3, 9)
     q, p = np.empty((9, 3)), np.empty((9, 3))
-    replay(*body, *locked(bias, z, start, run[0]), n_coefficients, times, q, p)
+    replay(Scene(*scene), *locked(run[0]), n_coefficients, times, q, p)
     return [len(run[0]), *run[2], *(1e3 * q).ravel(), *p.ravel()]
 
 w, z = np.array([0.0, 4e3, 9e3]), np.zeros(3)
 start = np.array([0.1, 0.0, 0.0])
 shapes = np.array([[10.0, -2.0, 1.0], [10.0, 1.0, -2.0]])
 law = np.array([[1e6, 1.5, 0.0, 1e-9], [1e6, 1.2, 0.1, 0.0]])
-found = []
+found, limits = [], Limits(0.0, 0.0, 3e-3, 0, 500)
 for m, zeta, bias in (
     (1, z, z), (1, np.array([0.0, 0.95, 1.3]), z), (2, np.array([0.0, 0.01, 0.2]), np.array([0.1, 1.0, -2.0]))
 ):
     body = locked(w, zeta, shapes[:m])
     scene = *body, *locked(np.array([-1e-5, -3e-5])[:m], bias, law[:m], z, start)
-    found += after(run_energy(*scene, 1, 5e-5, 0.0, 0.0, 3e-3, 0, 500), 2)
-    found += after(run_collocation(*scene, *gauss(4), 2e-4, 1.0, 1e-4, 0.0, 0.0, 3e-3, 0, 500), 4)
+    found += after(run_energy(Scene(*scene), None, 1, 5e-5, limits), 2)
+    found += after(run_collocation(Scene(*scene), *gauss(4), 2e-4, 1e-4, limits), 4)
 print(json.dumps(list(map(float, found))))
 """
 

@@ -12,7 +12,9 @@ from scipy.special import ellipk
 import fem_impact as fi
 from fem_impact.impact import collision
 from fem_impact.impact.compiled import record
-from fem_impact.impact.compiled.stretched import energies_of_stretching, run_stretched
+from fem_impact.impact.compiled.bundles import Limits, Scene
+from fem_impact.impact.compiled.energy import run_energy
+from fem_impact.impact.compiled.stretched import Stretch, energies_of_stretching
 from fem_impact.modes.stretching import stretch
 
 H, SIDES = 1e-3, (0.2, 0.3)
@@ -147,14 +149,15 @@ def test_energy_is_kept_over_ten_thousand_steps():
     for array in arrays:
         array.setflags(write=False)
     base = 3e-5
-    result = run_stretched(*arrays, 1, 1, base, 1e-18, 1e-10, 1e4 * base, 0, 100_000)
+    scene, limits = Scene(*arrays[:-1]), Limits(1e-18, 1e-10, 1e4 * base, 0, 100_000)
+    result = run_energy(scene, Stretch(arrays[-1], 1), 1, base, limits)
     (steps, q, p, now), status = result[:4], result[6]
     for array in (steps, now):
         array.setflags(write=False)  # as a history has them
     impacts = record.find_impacts(steps, now, law, 2, 16, 0.0)
     assert len(steps) > 10_000 and status == record.HORIZON and len(impacts) > 20
     stored = 0.4 * 1e7 * max(0.0, now[0, 0]) ** 2.5
-    parts = 0.5 * (p @ p + (omega * q) @ (omega * q)), energies_of_stretching(form, 1, q[None])[0], stored
+    parts = 0.5 * (p @ p + (omega * q) @ (omega * q)), energies_of_stretching(Stretch(form, 1), q[None])[0], stored
     start = 0.5 * float(start_p @ start_p)
     assert sum(parts) - float(bias @ q) == pytest.approx(start, rel=1e-12)
     assert parts[1] > 1e-3 * start  # it stretches

@@ -175,7 +175,7 @@ def test_the_result_lies_beside_the_kernels(monkeypatch):
     if not build.COMPILED:
         assert cost.place() is None
         return
-    assert cost.place().parent == build.folder(cost.run_energy)
+    assert cost.place().parent == build.folder(cost.follow)
 
 
 @pytest.mark.skipif(not build.COMPILED, reason="the benchmark is for compiled kernels")

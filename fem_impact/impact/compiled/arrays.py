@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from .bundles import Bodies, Contacts, Tables
 from .layout import A11, A12, A21, A22, M1, M2, M3
 from .one_mode import mode_matrix, mode_moments
 
@@ -72,16 +73,12 @@ def glide(lanes: Array, h: float, bias: Array, q: Array, p: Array) -> None:
     )
 
 
-def commit(
-    shape: Array, lanes: Array, h: float, force: Array, slope: Array, free_q: Array, free_p: Array, out_q: Array,
-    out_p: Array,
-) -> None:  # fmt: skip
+def commit(shape: Array, lanes: Array, h: float, force: Array, slope: Array, q: Array, p: Array) -> None:
     """`propagation.commit`."""
-    out_q[:], out_p[:] = free_q, free_p
     for u, f, s in zip(shape, force - 0.5 * slope, slope):
         if f != 0.0 or s != 0.0:
-            out_q -= u * (h * (f * lanes[M1] + s * lanes[M2]))
-            out_p -= u * (f * lanes[A12] + s * lanes[M1])
+            q -= u * (h * (f * lanes[M1] + s * lanes[M2]))
+            p -= u * (f * lanes[A12] + s * lanes[M1])
 
 
 def approach(shape: Array, offset: Array, i: int, q: Array, p: Array) -> tuple[float, float]:
@@ -90,27 +87,23 @@ def approach(shape: Array, offset: Array, i: int, q: Array, p: Array) -> tuple[f
 
 
 def contact_sums(shape: Array, lanes: Array, h: float, out_sums: Array) -> None:
-    """`energy.contact_sums`."""
-    s1, s4, s5, s6 = ((shape * lanes[row]) @ shape.T for row in (1, 4, 5, 6))
+    """`exact.contact_sums`."""
+    s1, s4, s5, s6 = ((shape * lanes[row]) @ shape.T for row in (A12, M1, M2, M3))
     out_sums[:] = h * s4, h * (s5 - 0.5 * s4), h * s5, h * s6, s1, s4 - 0.5 * s1
 
 
-def predict(
-    shape: Array, tables: Array, slot: int, h: float, twice: Array, offset: Array, bias: Array, q: Array, p: Array,
-    out_q: Array, out_p: Array, out_end: Array,
-) -> None:  # fmt: skip
-    """`energy.predict`."""
-    lanes = tables[slot]
-    out_q[:] = lanes[A11] * q + lanes[A12] * p + h * lanes[M1] * bias
-    out_p[:] = lanes[A21] * q + lanes[A22] * p + lanes[A12] * bias
-    mean = lanes[A12] * q / h + lanes[M1] * (p + twice * q) + h * lanes[M2] * bias
-    out_end[0], out_end[1], out_end[2] = offset + shape @ out_q, offset + shape @ mean, shape @ out_p
+def predict(bodies: Bodies, contacts: Contacts, tables: Tables, slot: int, h: float) -> None:
+    """`exact.predict`."""
+    lanes, shape, q, p, bias = tables.lanes[slot], bodies.shape, bodies.q, bodies.p, bodies.bias
+    bodies.free_q[:] = lanes[A11] * q + lanes[A12] * p + h * lanes[M1] * bias
+    bodies.free_p[:] = lanes[A21] * q + lanes[A22] * p + lanes[A12] * bias
+    mean = lanes[A12] * q / h + lanes[M1] * (p + bodies.twice * q) + h * lanes[M2] * bias
+    end, offset = contacts.free, contacts.offset[: len(shape)]
+    end[0], end[1], end[2] = offset + shape @ bodies.free_q, offset + shape @ mean, shape @ bodies.free_p
 
 
-def advance(
-    shape: Array, tables: Array, slot: int, h: float, twice: Array, offset: Array, bias: Array, force: Array, slope:
-    Array, q: Array, p: Array, free_q: Array, free_p: Array, out_end: Array,
-) -> None:  # fmt: skip
-    """`energy.advance`."""
-    commit(shape, tables[slot], h, force, slope, free_q, free_p, q, p)
-    predict(shape, tables, slot, h, twice, offset, bias, q, p, free_q, free_p, out_end)
+def advance(bodies: Bodies, contacts: Contacts, tables: Tables, slot: int, h: float) -> None:
+    """`exact.advance`."""
+    restore(bodies.free_q, bodies.free_p, bodies.q, bodies.p)
+    commit(bodies.shape, tables.lanes[slot], h, contacts.force, contacts.slope, bodies.q, bodies.p)
+    predict(bodies, contacts, tables, slot, h)

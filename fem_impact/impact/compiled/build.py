@@ -20,7 +20,7 @@ if COMPILED:
     UNCOUNTED = hasattr(DefaultOptions, "_nrt")  # whether the compiler can leave out the counting of references
 LOOSE = {"reassoc", "contract"}  # sums may be reordered to run in parallel lanes; NaN and infinity keep their meaning
 # No literals: what is called with one is compiled for it and then again.
-ZERO, ONE, WHOLE = np.int64(0), np.int64(1), np.bool_(True)
+ZERO, ONE, TRUE, FALSE = np.int64(0), np.int64(1), np.bool_(True), np.bool_(False)
 
 
 def _stamp() -> str:
@@ -32,12 +32,12 @@ def _stamp() -> str:
 STAMP = _stamp()
 
 
-def outer(**options: Any) -> Any:
-    """Compile for use from Python; other threads run meanwhile."""
+def outer(allocates: bool = True, **options: Any) -> Any:
+    """Compile for use from Python; other threads run meanwhile. ``allocates`` as for `inner`."""
     if not COMPILED:
         return lambda function: function
     if UNCOUNTED:
-        options["_nrt"] = True
+        options["_nrt"] = allocates
     wrapped: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
 
     def compiled(function: Any) -> Any:
@@ -49,17 +49,20 @@ def outer(**options: Any) -> Any:
     return compiled
 
 
-def inner(allocates: bool = False, arrays: Any = None, **options: Any) -> Any:
+def inner(allocates: bool = False, arrays: Any = None, part: bool = False, **options: Any) -> Any:
     """Compile for use by other kernels only; part of them when they are cached, and cheaper to compile.
 
-    What allocates no array needs no count of references, half of the time of a step with few modes. Where nothing is
-    compiled, ``arrays`` takes the place of the kernel: the same on whole arrays.
+    What allocates no array needs no count of references, half of the time of a step with few modes. What is called in
+    one place, at every step, is compiled as ``part`` of its caller: handing over named tuples of arrays took as long as
+    a step with one mode. Where nothing is compiled, ``arrays`` takes the place of the kernel: the same on whole arrays.
     """
     if not COMPILED:
         return lambda function: arrays or function
     bare: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    own = "fastmath" in options  # which would get lost with the function itself
+    bare |= {"inline": "always" if part and not own else "never", "forceinline": part and own}
     if UNCOUNTED:
-        bare["_nrt"] = allocates  # said in both cases, as it is inherited from the caller
+        bare["_nrt"] = allocates  # this and forceinline are said in all cases, as callees inherit them
     return njit(**bare, **options)
 
 

@@ -12,30 +12,11 @@ ever before. These corners of the force are located by secants. Events that pile
 import numpy as np
 
 from .build import inner
-from .flight import approach
-from .law import FELT, LAYERS, NEAR, PLASTIC, POWER, corner_approach, dent, harden, parting, rest_of, spring_of
-from .layout import (
-    APPROACH,
-    EXPONENT,
-    HEAD,
-    HIGH,
-    KIND,
-    LENGTH,
-    LOSS,
-    LOW,
-    MEMORY,
-    MISSED,
-    RATE,
-    RELAXATION,
-    REMEMBERED,
-    SHARE,
-    SIZE,
-    SLOPE,
-    SPEED,
-    START,
-    TRIED,
-    WIDTH,
-)
+from .law import FELT, LAYERS, NEAR, PLASTIC, POWER, corner_approach, parting, spring_of
+
+from .layout import (  # isort: skip
+    APPROACH, EXPONENT, HIGH, KIND, LOSS, LOW, MEMORY, MISSED, RATE, RELAXATION, SHARE, SIZE, SLOPE, TRIED, WIDTH,
+)  # fmt: skip
 
 LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
 LET_GO = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to this
@@ -43,7 +24,6 @@ TURNED = 1e-8  # [-] of the rates about a turn: so far from zero, the approach t
 DIPPED = 1e-6  # [-] of what makes it push: a body that leaves its felt by less within a step has not left it
 AT_ONCE = 1e-3  # [-] of a step: a body that parts from its felt and meets it again within that has not parted
 LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
-CROSSING, CORNER = 0, 1  # what a step is to end at: a contact that opens or closes, or a corner of its force
 AGAIN = 4  # kind of corner: a body meets its felt again at once, and the step is to be taken pressed
 EVENT_LIMIT = 64  # [-] events within one step's time: chatter, passed with unlocated steps, each time for twice as long
 
@@ -78,7 +58,7 @@ def hermite_root(d0, v0, d1, v1, h):
     return high * h
 
 
-@inner()
+@inner(part=True)
 def crossed(pressed, d0, v0, y, depth, still):
     """Whether a contact opened (was pressed and ends apart) or closed (was apart and ends pressed) within a step."""
     if pressed:
@@ -86,13 +66,14 @@ def crossed(pressed, d0, v0, y, depth, still):
     return y > depth and (d0 < 0.0 or v0 < -still)
 
 
-@inner()
-def first_crossing(now, pressed, y, rate, h, depth, still):
+@inner(part=True)
+def first_crossing(contacts, h, limits):
     """The contact that opened or closed first within a step, and when by the cubic; -1 and h where none did."""
+    now, y, rate = contacts.now, contacts.end, contacts.rate
     target = -1
     at = h
     for i in range(y.size):
-        if crossed(pressed[i], now[APPROACH, i], now[RATE, i], y[i], depth, still):
+        if crossed(contacts.pressed[i], now[APPROACH, i], now[RATE, i], y[i], limits.depth, limits.still):
             root = hermite_root(now[APPROACH, i], now[RATE, i], y[i], rate[i], h)
             if root <= at:
                 at = root
@@ -100,20 +81,20 @@ def first_crossing(now, pressed, y, rate, h, depth, still):
     return target, at
 
 
-@inner()
-def dipped(now, pressed, y, rate, h, i):
+@inner(part=True)
+def dipped(contacts, h, i):
     """Whether contact i opened and closed again, or the other way round, within a step, by its cubic."""
-    d0 = now[APPROACH, i]
-    v0 = now[RATE, i]
-    side = 1.0 if pressed[i] else -1.0
-    if side * v0 < 0.0 < side * rate[i] and (y[i] > 0.0 if pressed[i] else y[i] <= 0.0):
-        low = lowest(side * d0, side * v0, side * y[i], side * rate[i], h)
-        return low < -1e-9 * max(side * d0, side * y[i])
+    d0, v0 = contacts.now[APPROACH, i], contacts.now[RATE, i]
+    d1, v1, pressed = contacts.end[i], contacts.rate[i], contacts.pressed[i]
+    side = 1.0 if pressed else -1.0
+    if side * v0 < 0.0 < side * v1 and (d1 > 0.0 if pressed else d1 <= 0.0):
+        low = lowest(side * d0, side * v0, side * d1, side * v1, h)
+        return low < -1e-9 * max(side * d0, side * d1)
     return False
 
 
 @inner()
-def narrow(now, pressed, y, rate, h, depth, still, target, bracket):
+def narrow(contacts, h, limits, target, bracket):
     """Next length of a step that is to end where a contact opens or closes, from a try of length h.
 
     Returns (target, length), the length zero where the try was good; the target is an earlier crossing if the try
@@ -121,12 +102,13 @@ def narrow(now, pressed, y, rate, h, depth, still, target, bracket):
     approach and rate of the last try: what the length changes in the approach is not quite the rate, as the force's
     polynomial changes too.
     """
+    now, pressed, y, rate = contacts.now, contacts.pressed, contacts.end, contacts.rate
     for i in range(y.size):
         slack = max(
-            depth, LOCATED * (abs(now[APPROACH, i]) + abs(y[i]))
+            limits.depth, LOCATED * (abs(now[APPROACH, i]) + abs(y[i]))
         )  # or contacts that open together take turns for ever
-        if i != target and crossed(pressed[i], now[APPROACH, i], now[RATE, i], y[i], slack, still):
-            enclose(now, y, rate, h, i, bracket)
+        if i != target and crossed(pressed[i], now[APPROACH, i], now[RATE, i], y[i], slack, limits.still):
+            enclose(contacts, h, i, bracket)
             guess = hermite_root(now[APPROACH, i], now[RATE, i], y[i], rate[i], h)
             return i, guess if guess < h else 0.5 * h
     miss = y[target]
@@ -155,11 +137,11 @@ def narrow(now, pressed, y, rate, h, depth, still, target, bracket):
 
 
 @inner()
-def enclose(now, y, rate, h, target, bracket):
+def enclose(contacts, h, target, bracket):
     """Set the bracket of `narrow` to a whole step."""
     bracket[LOW] = 0.0
-    bracket[SIZE] = abs(now[APPROACH, target]) + abs(y[target])
-    last_try(h, y[target], rate[target], bracket)
+    bracket[SIZE] = abs(contacts.now[APPROACH, target]) + abs(contacts.end[target])
+    last_try(h, contacts.end[target], contacts.rate[target], bracket)
 
 
 @inner()
@@ -207,12 +189,13 @@ def last_try(length, value, slope, out_bracket):
 
 
 @inner()
-def first_corner(now, law, y, rate, after, h, lossy, out_bracket):
+def first_corner(contacts, h, lossy, out_bracket):
     """The first corner within a step: contact, which (see `corner_value`), and when; -1, 0 and h where there is none.
 
     ``out_bracket`` receives two times with the corner in between and, for secants, a third time and the value there
     and at the start. ``after`` (n_contacts,) is what they remember at the end. Loss is left out unless ``lossy``.
     """
+    law, now, y, rate, after = contacts.law, contacts.now, contacts.end, contacts.rate, contacts.after
     target = -1
     kind = 0
     at = h
@@ -282,8 +265,9 @@ def first_corner(now, law, y, rate, after, h, lossy, out_bracket):
 
 
 @inner()
-def dipped_felt(law, now, y, rate, after, h, i):
+def dipped_felt(contacts, h, i):
     """Whether a body left its felt and met it again within a step, by the cubic of what makes it push."""
+    law, now, y, rate, after = contacts.law, contacts.now, contacts.end, contacts.rate, contacts.after
     share, time, z0, z1 = law[i, SHARE], law[i, RELAXATION], law[i, MEMORY], after[i]
     if z0 < 0.0 or y[i] <= 0.0 or now[APPROACH, i] <= 0.0:
         return False
@@ -297,13 +281,14 @@ def dipped_felt(law, now, y, rate, after, h, i):
 
 
 @inner()
-def strayed(law, now, y, rate, after, h, i, side):
+def strayed(contacts, h, i, side):
     """Whether contact i began its step at the corner of its law and ends it beyond (side 1) or before it (side -1).
 
     0 it stayed, 1 it left the side at once, 2 after a way in which the step must be shorter.
     """
+    law, now, y, rate = contacts.law, contacts.now, contacts.end, contacts.rate
     if law.shape[1] == WIDTH and law[i, KIND] == FELT:
-        return 2 if dipped_felt(law, now, y, rate, after, h, i) else 0
+        return 2 if dipped_felt(contacts, h, i) else 0
     if law.shape[1] < WIDTH or (law[i, KIND] != LAYERS and law[i, KIND] != PLASTIC):
         return 0
     spring = spring_of(law, i)
@@ -322,12 +307,13 @@ def strayed(law, now, y, rate, after, h, i, side):
 
 
 @inner()
-def nearer(law, i, which, h, d, v, memory, bracket):
+def nearer(contacts, i, which, h, bracket):
     """Next length of a step that is to end at a corner, from a try of length h; 0 where the try was good.
 
     By secants inside a bracket as from `first_corner`.
     """
-    miss = corner_value(law, i, which, d, v, memory)
+    law, memory = contacts.law, contacts.after[i]
+    miss = corner_value(law, i, which, contacts.end[i], contacts.rate[i], memory)
     good = 0.1 * LET_GO
     if which == 1:
         good = 0.1 * NEAR * corner_approach(spring_of(law, i))
@@ -344,69 +330,3 @@ def nearer(law, i, which, h, d, v, memory, bracket):
     if not bracket[LOW] < guess < bracket[HIGH]:
         guess = 0.5 * (bracket[LOW] + bracket[HIGH])
     return guess
-
-
-@inner()
-def settle(law, now, pressed, y, rate, target, depth, still):
-    """Take over approaches and rates at a step's end; the number of contacts that opened, but for felt left before."""
-    opened = 0
-    for i in range(y.size):
-        was = pressed[i]
-        slack = max(depth, LOCATED * abs(now[APPROACH, i])) if target >= 0 else depth  # contacts may open together
-        now[APPROACH, i] = y[i]
-        now[RATE, i] = rate[i]
-        if i == target:
-            now[APPROACH, i] = 0.0
-            pressed[i] = not was
-        elif abs(y[i]) <= slack:
-            now[APPROACH, i] = 0.0
-            pressed[i] = rate[i] > still or (was and rate[i] >= -still)
-        else:
-            pressed[i] = y[i] > 0.0
-        if was and not pressed[i] and not (law.shape[1] == WIDTH and law[i, KIND] == FELT and law[i, MEMORY] < 0.0):
-            opened += 1
-    return opened
-
-
-@inner()
-def begin(shape, offset, q, p, now, pressed):
-    """Approach and rate of every contact at the start, and whether it is pressed."""
-    for i in range(offset.size):
-        now[APPROACH, i], now[RATE, i] = approach(shape, offset, i, q, p)
-        pressed[i] = now[APPROACH, i] > 0.0 or (now[APPROACH, i] == 0.0 and now[RATE, i] > 0.0)
-
-
-@inner()
-def remember(law, i, row, stride, n_contacts, now):
-    """Write approach, rate and memory of contact i to a row of the steps; the approach counts from no dent."""
-    memory = law[i, MEMORY] if law.shape[1] == WIDTH else 0.0
-    row[HEAD + stride * i] = now[APPROACH, i] + dent(law, i, memory)
-    row[HEAD + SPEED + stride * i] = now[RATE, i]
-    row[HEAD + stride * n_contacts + i] = memory
-
-
-@inner()
-def remembered(law, now):
-    """Count the approaches at the end of a run from no dent, and add the memory: row 5 of ``now``."""
-    if law.shape[1] == WIDTH:
-        for i in range(now.shape[1]):
-            low = dent(law, i, law[i, MEMORY])  # as long as the last step: what it pressed deeper is not yet counted
-            harden(law, i, now[APPROACH, i])
-            now[REMEMBERED, i] = law[i, MEMORY]
-            now[APPROACH, i] += low
-
-
-@inner()
-def land(shape, offset, law, time, elapsed, first, found, row, stride, now, pressed, q, p):
-    """Write a free flight to a row of the steps and take over the contacts' state at its end."""
-    row[:] = 0.0
-    row[START] = time
-    row[LENGTH] = elapsed
-    for i in range(offset.size):
-        remember(law, i, row, stride, offset.size, now)
-        now[APPROACH, i], now[RATE, i] = approach(shape, offset, i, q, p)
-        now[APPROACH, i] = min(0.0, now[APPROACH, i])
-        rest_of(law, i, elapsed)
-    if found == 0:
-        now[APPROACH, first] = 0.0
-        pressed[first] = True

@@ -13,6 +13,9 @@ APPROACH, COMPRESSION, FORCE, ENERGY, RATE, REMEMBERED = range(6)
 # rows of where every contact would end if nothing pushed in the step (3, n_contacts), see `schemes.Free`
 FREE_END, FREE_MEAN, FREE_RATE = range(3)
 
+# rows of a run's contacts: where they stand, where they would end, and seven more, see `bundles.Contacts`; their work
+CONTACT_ROWS = 17
+
 # rows of what unit forces take from that (6, n_contacts, n_contacts), see `schemes.Own`
 OWN_END, OWN_END_RAMP, OWN_MEAN, OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP = range(6)
 
@@ -28,3 +31,17 @@ LOW, HIGH, SIZE, TRIED, MISSED, SLOPE = range(6)
 
 # columns of the bounds of a flight (n_contacts, 6), see `flight.motion_bounds`
 RIGID, RIGID_RATE, RIGID_ACCELERATION, REACH, FASTEST, HARDEST = range(6)
+
+# of a run (`bundles.Course`): times [s] now, until when events are passed, how long the next such time will be, since
+# when events are counted, and when the present flight began; energy [J] at which the bodies are at rest
+TIME, PAUSE, RESPITE, RESET, TAKEOFF, FAINT, CLOCKS = range(7)
+
+# and counters: steps, of them in contact, fallen back to scheme A, and blind; releases; events since RESET; halvings of
+# the step, and those that it needs; level whose table has predicted the next step, or -1; whether what the contacts
+# remember is still to be brought up to the state; steps before the present flight, or -1; tries since the last step;
+# whether the run has begun
+STEPS, LOOKS, FALLBACKS, BLINDS, RELEASED, EVENTS, LEVEL, LEAST, READY, FRESH, FLYING, FAILURES, BEGUN = range(13)
+
+# and of the search for a step's end: what is sought, the contact that opens or closes, or that has a corner of its
+# force, which corner, and how many tries there were
+SEEKS, TARGET, CORNERED, WHICH, TRIES, COUNTERS = range(13, 19)

@@ -11,29 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .build import inner, outer
-from .energy import contact_sums, keep_in_mind, predict, solve_step
+from .build import ONE, inner, outer
+from .bundles import Bodies, Contacts, Tables
 from .events import dipped
+from .exact import contact_sums, freshen, keep_in_mind, predict, solve_step
 from .flight import approach, motion_bounds, quadratic_wait
-from .law import at, harden, meet, rest_of, special_of, spring_of
-from .layout import (
-    APPROACH,
-    COMPRESSION,
-    ENERGY,
-    FASTEST,
-    FORCE,
-    FREE_END,
-    FREE_MEAN,
-    FREE_RATE,
-    HARDEST,
-    MEMORY,
-    RATE,
-    REACH,
-    RIGID,
-    RIGID_ACCELERATION,
-    RIGID_RATE,
-)
-from .propagation import commit, glide, product, restore
+from .law import at, rest_of, special_of, spring_of
+from .propagation import any_of, commit, glide, product, restore
+
+from .layout import (  # isort: skip
+    APPROACH, FASTEST, FREE_END, FREE_RATE, HARDEST, MEMORY, RATE, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE,
+)  # fmt: skip
 
 FULL = 1 << 20  # [-] ticks of a frame: the shortest step is one, 2e-11 s at 48 kHz
 LEVELS = 21  # [-] lengths of steps, from a frame to a tick
@@ -95,7 +83,7 @@ class State(NamedTuple):
     pressed: np.ndarray  # (n_sticks,)
     now: np.ndarray  # (6, n_sticks) see `schemes.point_of`
     end: np.ndarray  # (3, n_sticks)
-    found: np.ndarray  # (5, n_sticks) of a step: approach, mean force, slope, rate, memory
+    found: np.ndarray  # (5, n_sticks) of a step: approach, rate, mean force, slope, memory
     bounds: np.ndarray  # (n_sticks, 6) see `flight.motion_bounds`
     sums: np.ndarray  # (LEVELS, 6, n_sticks, n_sticks)
     known: np.ndarray  # (LEVELS,) whether those are of the present sticks
@@ -192,16 +180,34 @@ def put_on(body, pads, limits, state, pad, speed):
 
 
 @inner()
+def moving(body, state):
+    """All modes and how they move."""
+    return Bodies(
+        body.omega, body.zeta, body.twice, state.rows[: state.place[N_ON]], state.bias,
+        state.q, state.p, state.free_q, state.free_p,
+    )  # fmt: skip
+
+
+@inner()
+def touched(state):
+    """The contacts of the sticks on the body."""
+    m = state.place[N_ON]
+    return Contacts(
+        state.law[:m], state.offset[:m], state.now[:, :m], state.pressed[:m], state.end[:, :m],
+        state.found[0, :m], state.found[1, :m], state.found[2, :m], state.found[3, :m], state.found[4, :m],
+    )  # fmt: skip
+
+
+@inner()
 def flight(body, pads, limits, state, level):
     """Level of a step, no longer than the given, in which surely nothing touches; -1 if a stick left for good."""
     m = state.place[N_ON]
+    bodies = moving(body, state)
     if state.place[FORCED] == 1 or state.place[N_LOOKS] >= LOOKS:
         state.place[N_LOOKS] = 0
         state.place[FORCED] = 0
         for i in range(m - 1, -1, -1):
-            motion_bounds(
-                state.rows, state.offset, body.omega, body.zeta, state.bias, i, state.q, state.p, state.bounds
-            )
+            motion_bounds(bodies, state.offset, i, state.bounds)
             rigid, rate = state.bounds[i, RIGID], state.bounds[i, RIGID_RATE]
             receding = rate <= limits.still and state.bounds[i, RIGID_ACCELERATION] <= 0.0
             if receding and rigid + state.bounds[i, REACH] <= limits.depth:
@@ -259,72 +265,55 @@ def noted(state, time, h, force):
 @inner()
 def step(body, limits, state, level, time):
     """Go ahead by a step of at most that level; its level."""
-    m = state.place[N_ON]
-    rows, end = state.rows[:m], state.end[:, :m]
-    y, f, s = state.found[0, :m], state.found[1, :m], state.found[2, :m]
-    rate, after, pressed = state.found[3, :m], state.found[4, :m], state.pressed[:m]
-    special, _ = special_of(state.law)
-    touching = False
-    for i in range(m):
-        touching = touching or pressed[i]
-    fresh = True
+    bodies, contacts = moving(body, state), touched(state)
+    tables = Tables(body.tables, state.sums, state.known, state.work, limits.period, ONE)
+    special, _ = special_of(contacts.law)
+    touching = any_of(contacts.pressed)
+    fresh = special
     while True:
         h = limits.period * 0.5**level
-        predict(
-            rows, body.tables, level, h, body.twice, state.offset, state.bias,
-            state.q, state.p, state.free_q, state.free_p, end,
-        )  # fmt: skip
+        predict(bodies, contacts, tables, level, h)
         if not touching:
             meets = False
-            for i in range(m):
-                meets = meets or end[FREE_END, i] > 0.0
+            for i in range(contacts.end.size):
+                meets = meets or contacts.free[FREE_END, i] > 0.0
             if not meets:
-                glided(limits, state, h, end)
+                glided(limits, state, h, contacts.free)
                 return level
             if level < limits.closing:
                 level += 1
                 continue
         if state.known[level] == 0:
-            contact_sums(rows, body.tables[level], h, state.sums[level])
+            contact_sums(bodies.shape, body.tables[level], h, state.sums[level])
             state.known[level] = 1
-        for i in range(m):
-            if special and fresh:
-                meet(state.law, i, state.now[APPROACH, i], state.now[RATE, i])
-                deeper = harden(state.law, i, state.now[APPROACH, i])
-                state.offset[i] -= deeper
-                state.now[APPROACH, i] -= deeper
-                end[FREE_END, i] -= deeper
-                end[FREE_MEAN, i] -= deeper
-            point = at(state.now[APPROACH, i], spring_of(state.law, i))
-            state.now[COMPRESSION, i] = point.compression
-            state.now[FORCE, i] = point.force
-            state.now[ENERGY, i] = point.energy
+        freshen(contacts, fresh)
         fresh = False
-        fine = solve_step(1, h, state.sums, level, state.law, state.now, end, state.work, y, f, s, rate)
+        fine = solve_step(contacts, tables, level, h)
         if special:
-            keep_in_mind(h, state.law, state.now, y, f, s, rate, fine, after)
+            keep_in_mind(contacts, h, fine)
         shorter = False
-        for i in range(m):
-            if pressed[i]:
-                shorter = shorter or (y[i] <= 0.0 and level < limits.opening)
+        for i in range(contacts.end.size):
+            if contacts.pressed[i]:
+                shorter = shorter or (contacts.end[i] <= 0.0 and level < limits.opening)
             else:
-                shorter = shorter or (y[i] > 0.0 and level < limits.closing)
-            shorter = shorter or (level < limits.opening and dipped(state.now, pressed, y, rate, h, i))
+                shorter = shorter or (contacts.end[i] > 0.0 and level < limits.closing)
+            shorter = shorter or (level < limits.opening and dipped(contacts, h, i))
         if not shorter:
             break
         level += 1
-    commit(rows, body.tables[level], h, f, s, state.free_q, state.free_p, state.q, state.p)
-    for i in range(m):
-        state.now[APPROACH, i] = y[i]
-        state.now[RATE, i] = rate[i]
+    restore(bodies.free_q, bodies.free_p, bodies.q, bodies.p)
+    commit(bodies.shape, body.tables[level], h, contacts.force, contacts.slope, bodies.q, bodies.p)
+    for i in range(contacts.end.size):
+        contacts.now[APPROACH, i] = contacts.end[i]
+        contacts.now[RATE, i] = contacts.rate[i]
         if special:
-            state.law[i, MEMORY] = after[i]
-        if pressed[i] and y[i] <= 0.0:
+            contacts.law[i, MEMORY] = contacts.after[i]
+        if contacts.pressed[i] and contacts.end[i] <= 0.0:
             state.counted[TOUCHED] += 1
-        pressed[i] = y[i] > 0.0
+        contacts.pressed[i] = contacts.end[i] > 0.0
     state.place[FORCED] = 1
     state.counted[STEPS] += 1
-    noted(state, time + h, h, f)
+    noted(state, time + h, h, contacts.force)
     return level
 
 

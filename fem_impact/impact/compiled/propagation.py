@@ -14,7 +14,7 @@ import numpy as np
 
 from . import arrays
 from .arrays import ANGLE_LIMIT, LIGHT, SERIES_END
-from .build import LOOSE, WHOLE, inner, outer
+from .build import LOOSE, TRUE, inner, outer
 from .layout import A11, A12, A21, A22, HEAD, LENGTH, M1, M2, M3, PUSH, START
 from .one_mode import mode_matrix, mode_moments
 
@@ -245,7 +245,7 @@ def step_table(omega, zeta, h, out_table):
     A1, A2 and of the two forces B0, B1.
     """
     lanes = np.empty((N_LANE, omega.size))
-    lane_table(omega, zeta, h, WHOLE, lanes)
+    lane_table(omega, zeta, h, TRUE, lanes)
     for n in range(omega.size):
         for k in range(4):
             out_table[k, n] = lanes[k, n]
@@ -296,25 +296,23 @@ def glide(lanes, h, bias, q, p):
 
 
 @inner(arrays=arrays.commit, fastmath=LOOSE)
-def commit(shape, lanes, h, force, slope, free_q, free_p, out_q, out_p):
-    """Add the motion the step's forces (mean, slope) cause to the free motion."""
+def commit(shape, lanes, h, force, slope, q, p):
+    """Add the motion that a step's forces (mean, slope) cause to a free motion, in place."""
     n_contacts, n_modes = shape.shape
-    for n in range(n_modes):
-        out_q[n] = free_q[n]
-        out_p[n] = free_p[n]
     for i in range(n_contacts):
         f = force[i] - 0.5 * slope[i]
         s = slope[i]
         if force[i] != 0.0 or s != 0.0:
             for n in range(n_modes):
                 u = shape[i, n]
-                out_q[n] -= u * h * (f * lanes[M1, n] + s * lanes[M2, n])
-                out_p[n] -= u * (f * lanes[A12, n] + s * lanes[M1, n])
+                q[n] -= u * h * (f * lanes[M1, n] + s * lanes[M2, n])
+                p[n] -= u * (f * lanes[A12, n] + s * lanes[M1, n])
 
 
 @inner(allocates=True)
-def push(omega, zeta, shape, bias, row, n_coefficients, length, q, p, out_q, out_p):
+def push(scene, row, n_coefficients, length, q, p, out_q, out_p):
     """State after a part of a step, (n_modes,), from the step's start; exact for its polynomial forces."""
+    omega, zeta, shape, bias = scene.omega, scene.zeta, scene.shape, scene.bias
     restore(q, p, out_q, out_p)
     if length <= 0.0:
         return
@@ -351,15 +349,15 @@ def push(omega, zeta, shape, bias, row, n_coefficients, length, q, p, out_q, out
     if active:
         for i in range(m):
             weights[0, i] += 0.5 * weights[1, i]
-        commit(shape, lanes, length, weights[0], weights[1], out_q, out_p, out_q, out_p)
+        commit(shape, lanes, length, weights[0], weights[1], out_q, out_p)
 
 
 @outer()
-def replay(omega, zeta, shape, bias, start_q, start_p, steps, n_coefficients, times, out_q, out_p):
+def replay(scene, steps, n_coefficients, times, out_q, out_p):
     """States (n_times, n_modes) at ascending times, from the start state and the recorded forces; exact in between."""
     n_steps = steps.shape[0]
-    q = start_q.copy()
-    p = start_p.copy()
+    q = scene.q.copy()
+    p = scene.p.copy()
     flight = np.zeros(steps.shape[1])
     flight[LENGTH] = 1.0
     begin = 0.0
@@ -368,9 +366,9 @@ def replay(omega, zeta, shape, bias, start_q, start_p, steps, n_coefficients, ti
         row = flight if j == n_steps else steps[j]
         ends = np.inf if j == n_steps else begin + row[LENGTH]
         while k < times.size and times[k] < ends:
-            push(omega, zeta, shape, bias, row, n_coefficients, times[k] - begin, q, p, out_q[k], out_p[k])
+            push(scene, row, n_coefficients, times[k] - begin, q, p, out_q[k], out_p[k])
             k += 1
         if k >= times.size or j == n_steps:
             return
-        push(omega, zeta, shape, bias, row, n_coefficients, row[LENGTH], q, p, q, p)
+        push(scene, row, n_coefficients, row[LENGTH], q, p, q, p)
         begin = steps[j + 1, START] if j + 1 < n_steps else begin + row[LENGTH]

@@ -16,7 +16,8 @@ from .layout import APPROACH, CLOSED, HEAD, KIND, LENGTH, LOSS, PUSH, RATE, SPEE
 
 FEW, CLOSER = 3, 16  # [-] parts into which the search for a largest force cuts all steps, and what is left, thrice
 HIGH_ENOUGH = 0.95  # [-] of the largest force: only steps with so much are looked at more closely
-FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = 0, 1, 2, 3, 4, 5  # why a run ended
+FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = range(6)  # why a run ended
+FULL = -1  # [-] it did not: its record is full
 
 
 @inner(allocates=True)
@@ -30,12 +31,13 @@ def resized(array, n, length):
 
 
 @inner()
-def total_energy(omega, bias, law, q, p, now):
+def total_energy(bodies, contacts):
     """Kinetic and strain energy less the work of the bias force, and what the contacts store."""
+    omega, bias, q, p = bodies.omega, bodies.bias, bodies.q, bodies.p
     total = 0.0
     for n in range(q.size):
         total += 0.5 * (p[n] * p[n] + (omega[n] * q[n]) ** 2) - bias[n] * q[n]
-    return total + stored(now[APPROACH], law)
+    return total + stored(contacts.now[APPROACH], contacts.law)
 
 
 @inner()
@@ -101,10 +103,10 @@ def force_and_rate(steps, now, law, n_coefficients, row, i, part):
 
 
 @outer()
-def forces(steps, now, law, n_coefficients, rows, i, part, out_force, out_rate):
-    """Force of contact i [N] and its rate [N/s] at fractions (n,) of steps (n,)."""
+def forces(steps, now, law, n_coefficients, rows, i, part, out):
+    """Force of contact i [N] and its rate [N/s], (2, n), at fractions (n,) of steps (n,)."""
     for n in range(rows.size):
-        out_force[n], out_rate[n] = force_and_rate(steps, now, law, n_coefficients, rows[n], i, part[n])
+        out[0, n], out[1, n] = force_and_rate(steps, now, law, n_coefficients, rows[n], i, part[n])
 
 
 @inner()

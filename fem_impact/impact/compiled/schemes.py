@@ -20,33 +20,14 @@ from typing import NamedTuple
 import numpy as np
 
 from .build import inner
-from .law import (
-    FELT,
-    Point,
-    at,
-    compressed,
-    growth,
-    memory_energy,
-    power,
-    slopes,
-    soaked,
-    spring_of,
-    steepness,
-)
-from .layout import (
-    APPROACH,
-    COMPRESSION,
-    ENERGY,
-    FORCE,
-    LOSS,
-    OWN_END,
-    OWN_END_RAMP,
-    OWN_MEAN,
-    OWN_MEAN_RAMP,
-    OWN_RATE,
-    OWN_RATE_RAMP,
-    RATE,
-)
+
+from .law import (  # isort: skip
+    FELT, Point, at, compressed, growth, memory_energy, power, slopes, soaked, spring_of, steepness,
+)  # fmt: skip
+from .layout import (  # isort: skip
+    APPROACH, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE, LOSS, OWN_END, OWN_END_RAMP, OWN_MEAN,
+    OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, RATE,
+)  # fmt: skip
 
 SOLVES = 30  # [-] iterations of the equation of a step at most
 ROUNDED = 1e-14  # [-] of the elastic energies: rounding of what a step of felt loses
@@ -456,8 +437,10 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
 
 
 @inner()
-def ramp_forces(h, y, now, law, e, ea, vf, sums, work, out_f, out_s, out_r):
+def ramp_forces(h, y, contacts, sums, work, out_f, out_s, out_r):
     """Mean and slope of the forces of scheme A4 if the step ended at approaches y, and the residual in y."""
+    law, now = contacts.law, contacts.now
+    e, ea, vf = contacts.free[FREE_END], contacts.free[FREE_MEAN], contacts.free[FREE_RATE]
     m = e.size
     matrix = work[0]
     vector = work[2, 2]
@@ -489,12 +472,13 @@ def ramp_forces(h, y, now, law, e, ea, vf, sums, work, out_f, out_s, out_r):
 
 
 @inner()
-def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
-    """Scheme A4: mean and slope of the forces of one step, starting from the approaches of scheme A in out_y.
+def solve_ramps(h, contacts, sums, work):
+    """Scheme A4: mean and slope of the forces of one step, starting from the approaches of scheme A at its end.
 
     Returns False where the iteration does not settle or a force would pull; the step then belongs to scheme A.
     """
-    m = e.size
+    law, now, out_y, out_f, out_s = contacts.law, contacts.now, contacts.end, contacts.force, contacts.slope
+    m = out_y.size
     r = work[3, 0]
     r2 = work[3, 1]
     f2 = work[3, 2]
@@ -503,7 +487,7 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
     jacobian = work[1]
     settled = False
     for _ in range(20):
-        if not ramp_forces(h, out_y, now, law, e, ea, vf, sums, work, out_f, out_s, r):
+        if not ramp_forces(h, out_y, contacts, sums, work, out_f, out_s, r):
             return False
         if settled:
             break
@@ -515,7 +499,7 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
             shift = y2[j] - out_y[j]
             if not shift > 0.0:
                 return False
-            if not ramp_forces(h, y2, now, law, e, ea, vf, sums, work, f2, s2, r2):
+            if not ramp_forces(h, y2, contacts, sums, work, f2, s2, r2):
                 return False
             for i in range(m):
                 jacobian[i, j] = (r2[i] - r[i]) / shift
@@ -535,8 +519,8 @@ def solve_ramps(h, now, law, e, ea, vf, sums, work, out_y, out_f, out_s):
             return False
         spring = spring_of(law, i)
         start, end = point_of(now, i), at(out_y[i], spring)
-        mean = ea[i]
-        v1 = vf[i]
+        mean = contacts.free[FREE_MEAN, i]
+        v1 = contacts.free[FREE_RATE, i]
         for j in range(m):
             mean -= sums[OWN_MEAN, i, j] * out_f[j] + sums[OWN_MEAN_RAMP, i, j] * out_s[j]
             v1 -= sums[OWN_RATE, i, j] * out_f[j] + sums[OWN_RATE_RAMP, i, j] * out_s[j]

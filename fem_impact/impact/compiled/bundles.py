@@ -1,0 +1,101 @@
+"""What the runs share: named tuples of the arrays that their kernels pass on."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Scene(NamedTuple):
+    """What a run starts from: the modes of all bodies in one list, and their contacts."""
+
+    omega: np.ndarray  # (n_modes,) [rad/s]
+    zeta: np.ndarray  # (n_modes,) [-]
+    shape: np.ndarray  # (n_contacts, n_modes) [kg**-0.5] signed shapes at the contacts
+    offset: np.ndarray  # (n_contacts,) [m] approach at zero state
+    bias: np.ndarray  # (n_modes,) [N kg**-0.5] constant modal forces
+    law: np.ndarray  # (n_contacts, 9 or 4), see `law.spring_of`
+    q: np.ndarray  # (n_modes,) state at the start
+    p: np.ndarray  # (n_modes,)
+
+
+class Limits(NamedTuple):
+    """What is rounding, and when a run ends at the latest."""
+
+    depth: float  # [m] approaches that are rounding
+    still: float  # [m/s] speeds that are rounding
+    horizon: float  # [s]
+    max_impacts: int  # releases after which to stop, 0 for any number
+    max_steps: int
+
+
+class Run(NamedTuple):
+    """The arrays of a run, few because each one costs time to hand over; `frame` cuts the following from them."""
+
+    q: np.ndarray  # (n_modes,) state
+    p: np.ndarray  # (n_modes,)
+    modes: np.ndarray  # (3, n_modes)
+    contacts: np.ndarray  # (CONTACT_ROWS, n_contacts)
+    law: np.ndarray  # (n_contacts, 9 or 4), see `law.spring_of`
+    clock: np.ndarray  # (CLOCKS + 6,)
+    counts: np.ndarray  # (COUNTERS,)
+
+
+class Bodies(NamedTuple):
+    """All modes, each (n_modes,), and how they move."""
+
+    omega: np.ndarray
+    zeta: np.ndarray
+    twice: np.ndarray  # 2 zeta omega
+    shape: np.ndarray  # (n_contacts, n_modes)
+    bias: np.ndarray
+    q: np.ndarray
+    p: np.ndarray
+    free_q: np.ndarray  # where the step would end if nothing pushed
+    free_p: np.ndarray
+
+
+class Contacts(NamedTuple):
+    """All contacts, each (n_contacts,): at the start of a step, and as a try of it found them at its end."""
+
+    law: np.ndarray  # (n_contacts, 9 or 4), see `law.spring_of`
+    offset: np.ndarray  # [m] grows less as a contact is dented
+    now: np.ndarray  # (6, n_contacts) where they stand
+    pressed: np.ndarray  # whether they are
+    free: np.ndarray  # (3, n_contacts) where they would end if nothing pushed
+    end: np.ndarray  # [m] approach at the end
+    rate: np.ndarray  # [m/s] and its rate
+    force: np.ndarray  # [N] mean force
+    slope: np.ndarray  # [N] what it gains over the step
+    after: np.ndarray  # what is remembered at the end
+
+
+class Course(NamedTuple):
+    """How far a run is; the columns are named in `layout`."""
+
+    clock: np.ndarray  # times
+    counts: np.ndarray  # counters
+    bracket: np.ndarray  # (6,) about the end of the step that is sought
+    done: np.ndarray  # (n_contacts,) [J] integral of force times rate
+
+
+class Tables(NamedTuple):
+    """Steps base * 2**-level of the energy-exact schemes, one of any other length, and where they are worked out.
+
+    Those of a run end with its flights.
+    """
+
+    lanes: np.ndarray  # (n_tables, N_LANE, n_modes), see `propagation.lane_table`
+    sums: np.ndarray  # (n_levels, 6, n_contacts, n_contacts), see `exact.contact_sums`
+    known: np.ndarray  # (n_tables,) whether they are there
+    work: np.ndarray  # (5, n, n)
+    base: float  # [s] longest step
+    ramp: int | np.int64  # 1 for scheme A4, 0 for A
+
+
+class Flights(NamedTuple):
+    """Steps base * 2**k of free flight; `flight.find_onset`."""
+
+    lanes: np.ndarray  # (GLIDES + 1, N_LANE, n_modes)
+    known: np.ndarray  # (GLIDES + 1,)
+    base: float  # [s]
+    shortest: float  # [s] looks ahead that lead hardly on
