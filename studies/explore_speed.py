@@ -1,10 +1,12 @@
 """Measures how quickly `fem-impact explore` answers: from a slider move in a browser to the page drawn again.
 
-python studies/explore_speed.py [SCENE ...]; needs chromium, and playwright (pip install -e '.[test]')
+python studies/explore_speed.py [--no-browser] [SCENE ...]; needs chromium, and playwright (pip install -e '.[test]')
 
-First the CPU time that an answer takes without a browser, for sliders anywhere on their ways; then, in a headless
-browser, the time until force and numbers, and until everything that a slider moves has been drawn and the frame with
-it is done; then the first exact blow at a new strike point, and zooms of the map.
+First the CPU time that things take without a browser: opening the page, knowing a strike point, the first answers, maps
+and zooms of them, with how many of the last pixels a finer tolerance counts otherwise; and answers for sliders anywhere
+on their ways. Then, in a headless browser (unless --no-browser), the time until force and numbers, and until everything
+that a slider moves has been drawn and the frame with it is done; then the first exact blow at a new strike point, and
+zooms of the map.
 """
 
 import argparse
@@ -14,15 +16,17 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from playwright.sync_api import sync_playwright
+from scipy import ndimage
 
 import fem_impact as fi
-from fem_impact.pages import explore_desk, explore_model, explore_view
+from fem_impact.pages import explore_desk, explore_map, explore_model, explore_view
 
 TURNS = 30  # moves of each slider
 ZOOMS = 6
@@ -76,10 +80,86 @@ ZOOM = """async ([x0, y0, x1, y1]) => {
 }"""
 
 
-def computed(scene: str) -> np.ndarray:
+def spent(work: Callable[..., Any], *arguments: Any) -> tuple[float, Any]:
+    """CPU time [s] of all threads, and what the work gives."""
+    begin = time.process_time()
+    found = work(*arguments)
+    return time.process_time() - begin, found
+
+
+def opened(scene: str) -> explore_desk.Desk:
+    """Print what it takes until the page knows its first strike point; what is compiled has been before."""
+    opening, bench = spent(lambda: explore_model.Bench.of(fi.load_scene(scene)))
+    desk = explore_desk.Desk(bench)
+    first, _ = spent(desk.answer, bench.start)
+    known, view = spent(desk.look, bench.start.at)
+    desk.answer(bench.start), desk.judge(bench.start)
+    answer, _ = spent(desk.answer, bench.start)
+    exact, _ = spent(desk.judge, bench.start)
+    by = "modes" if view.seen is None else f"{view.seen.n_modes} vectors"
+    print(
+        f"CPU time [s]: opening {opening:.2f}, first answer {first:.3f}; strike point known by {by} {known:.2f}, "
+        f"then an answer {answer:.3f}, the exact blow {exact:.3f}"
+    )
+    return desk
+
+
+def drawn(desk: explore_desk.Desk, window: explore_map.Window) -> tuple[list[float], explore_map.Picture]:
+    """CPU times [ms] until each picture of a map, and the last of them."""
+    settings, times = desk.bench.start, []
+    seconds, first = spent(desk.picture, settings, window)
+    times.append(seconds)
+    seconds, picture = spent(desk.finer, settings, first)
+    times.append(seconds)
+    seconds, _ = spent(desk.sharp, settings, picture)
+    times.append(seconds)
+    seconds, picture = spent(desk.surer, settings, picture)
+    while not picture.finest:
+        more, picture = spent(desk.finer, settings, picture)
+        seconds += more
+    return (1e3 * np.cumsum([*times, seconds])).tolist(), picture
+
+
+def otherwise(desk: explore_desk.Desk, picture: explore_map.Picture, number: int = 400) -> tuple[int, int]:
+    """How many pixels beside borders, of some at random, a map of a tenth of the tolerance counts otherwise."""
+    count = picture.n_impacts.astype(int)
+    beside = ndimage.maximum_filter(count, 3) != ndimage.minimum_filter(count, 3)
+    i, j = np.random.default_rng(0).permutation(np.argwhere(beside))[:number].T
+    settings, seen = desk.bench.start, desk.look(desk.bench.start.at).seen
+    tolerance = 0.1 * explore_model.MAP_TOLERANCE
+    fine = explore_map.Mapper(desk.bench)._counts(settings, seen, picture.mass[j], picture.stiffness[i], tolerance)
+    return int((fine != count[i, j]).sum()), len(i)
+
+
+def windows(bench: explore_model.Bench) -> list[explore_map.Window]:
+    """Parts of a map, in logarithms a third of each axis, anywhere."""
+    rng, whole = np.random.default_rng(2), explore_map.Window.of(bench, None, None)
+    found = []
+    for _ in range(ZOOMS):
+        parts = (rng.uniform(0.2, 0.6), 0.3), (rng.uniform(0.2, 0.6), 0.35)
+        ends = [
+            (low * (high / low) ** start, low * (high / low) ** (start + size))
+            for (low, high), (start, size) in zip((whole.mass, whole.stiffness), parts)
+        ]
+        found.append(explore_map.Window.of(bench, *ends))
+    return found
+
+
+def maps(desk: explore_desk.Desk) -> None:
+    """Print the CPU time of a whole map and of zooms."""
+    whole = explore_map.Window.of(desk.bench, None, None)
+    said = "25, 49, sharp borders, each border pixel struck"
+    times, _ = drawn(desk, whole)
+    print(f"CPU time [ms] until a map of {said}: {', '.join(f'{t:.0f}' for t in times)}")
+    found = [drawn(desk, window) for window in windows(desk.bench)]
+    least, middle, most = (f([times for times, _ in found], axis=0) for f in (np.min, np.median, np.max))
+    print(f"{ZOOMS} zooms: " + "; ".join(f"{m:.0f} ({a:.0f} to {b:.0f})" for m, a, b in zip(middle, least, most)))
+    wrong, tried = np.sum([otherwise(desk, picture) for _, picture in found], axis=0)
+    print(f"pixels beside a border that a tenth of the tolerance counts otherwise: {wrong} of {tried}")
+
+
+def computed(desk: explore_desk.Desk) -> np.ndarray:
     """CPU times [ms] of answers in this process, each slider being moved anywhere in turn."""
-    desk = explore_desk.Desk(explore_model.Bench.of(fi.load_scene(scene)))
-    desk.look(desk.bench.start.at)
     rng, found, settings = np.random.default_rng(1), [], desk.bench.start
     ends = explore_view.ends(desk.bench)
     names = [name for name in ends if name not in ("x", "y", "height", "rate")]
@@ -97,12 +177,19 @@ def computed(scene: str) -> np.ndarray:
     return 1e3 * np.array(found)
 
 
-def main(scene: str) -> None:
-    """Serve the scene, move every slider and print the response times."""
-    parts = (50.0, 90.0, 99.0, 100.0)
-    for what, times in zip(("force and numbers", "everything"), computed(scene).T):
+def main(scene: str, browser: bool = True) -> None:
+    """Measure without a browser, then serve the scene, move every slider and print the response times."""
+    parts, desk = (50.0, 90.0, 99.0, 100.0), opened(scene)
+    maps(desk)
+    for what, times in zip(("force and numbers", "everything"), computed(desk).T):
         said = ", ".join(f"{part:g} %: {value:.1f}" for part, value in zip(parts, np.percentile(times, parts)))
         print(f"CPU time until {what} [ms], {ANSWERS} moves: {said}")
+    if browser:
+        served(scene)
+
+
+def served(scene: str) -> None:
+    """Serve the scene, move every slider in a browser and print the response times."""
     command = [sys.executable, "-m", "fem_impact", "explore", scene, "--no-open"]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
@@ -160,5 +247,7 @@ def zoomed(page: Any) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenes", nargs="*", default=[str(Path(__file__).parent / "scenes" / "drumstick.toml")])
-    for one in parser.parse_args().scenes:
-        main(one)
+    parser.add_argument("--no-browser", action="store_true")
+    wanted = parser.parse_args()
+    for one in wanted.scenes:
+        main(one, not wanted.no_browser)

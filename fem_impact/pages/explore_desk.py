@@ -116,6 +116,10 @@ class Desk:
         """The map up to the pixels, its borders joined by straight lines."""
         return self.mapper.sharp(settings, picture, self._seen(settings))
 
+    def surer(self, settings: Settings, picture: Picture) -> Picture:
+        """The map with the points beside its borders struck again by the tolerance of maps."""
+        return self.mapper.surer(settings, picture, self._seen(settings))
+
     def _seen(self, settings: Settings) -> Modes | None:
         """Ritz vectors of the strike point, if they are known."""
         view = self.views.get(settings.at)

@@ -10,12 +10,14 @@ from scipy import ndimage
 from .._base.check import SimulationError
 from ..impact import threshold
 from ..modes.modal import Modes
-from ..sweeps import batches, grid
+from ..sweeps import batches, grid, refined
 from .explore_model import MAP_TOLERANCE, Bench, Settings, quick
 
 FIRST = {False: (25, 17), True: (13, 9)}  # [-] points of mass and stiffness at first, with True where blows take longer
 FINEST = 385  # [-] points of mass at most: about one per pixel of the picture
 CAUTIOUS = 30  # [-] points of mass below which neighbours of these blows are struck, too
+DRAFT = 3e-2  # [-] of the blows that are drawn first: borders move by a fifth of a pixel (studies/explore_speed.py)
+LIMITS = 97  # [-] hammers whose thresholds are found; their points are among these on the whole map
 MORE = 4  # [-] impacts from which on the map makes no difference
 NARROWEST = 1.001  # [-] ratio of the ends of an axis when zoomed in
 
@@ -30,6 +32,7 @@ class Picture:
     threshold: np.ndarray  # (n,) [Hz] contact resonance above which the body stops each hammer of the first map
     limit_mass: np.ndarray  # (n,) [kg] of these hammers
     limit: np.ndarray  # (n,) [-] stiffness that gives this resonance; NaN if there is none
+    tolerance: float = DRAFT  # [-] of the blows
 
     @property
     def finest(self) -> bool:
@@ -64,6 +67,7 @@ class Mapper:
         self.bench = bench
         self.about: tuple[Settings, Modes | None] | None = None  # settings and body that the kernels are of
         self.kernels: batches.Kernels = {}
+        self.limits: np.ndarray | None = None  # (LIMITS,) [Hz] threshold of hammers all along the map
 
     def first(self, settings: Settings, window: Window, seen: Modes | None = None) -> Picture:
         """The map in its coarsest form; the settings' mass and stiffness do not matter, ``seen`` as in `Bench.case`."""
@@ -74,9 +78,9 @@ class Mapper:
             np.geomspace(*ends, count) for ends, count in zip((window.mass, window.stiffness), FIRST[slow])
         )
         x, y = (part.ravel() for part in np.meshgrid(mass, stiffness))
-        counts = self._counts(settings, seen, x, y).reshape(len(stiffness), len(mass))
+        counts = self._counts(settings, seen, x, y, DRAFT).reshape(len(stiffness), len(mass))
         felt = case.striker.felt_mass / case.striker.mass
-        found = threshold.thresholds(case.modes, case.at, felt * mass)
+        found = self._thresholds(settings, seen, felt, mass)
         there = [self.bench.case(replace(settings, mass=float(one), stiffness=1.0), seen=seen) for one in mass]
         if law.hard_stiffness or law.remembers:  # as far as the map goes
             reached = [[self.bench.case(replace(settings, mass=float(m), stiffness=float(k))).resonance
@@ -112,7 +116,7 @@ class Mapper:
             asked[1::2, 1::2] = mixed
         mass, stiffness = (np.geomspace(v[0], v[-1], 2 * len(v) - 1) for v in (picture.mass, picture.stiffness))
         y, x = asked.nonzero()
-        counts[y, x] = self._counts(settings, seen, mass[x], stiffness[y])
+        counts[y, x] = self._counts(settings, seen, mass[x], stiffness[y], picture.tolerance)
         return replace(picture, mass=mass, stiffness=stiffness, n_impacts=counts)
 
     def sharp(self, settings: Settings, picture: Picture, seen: Modes | None = None) -> Picture:
@@ -130,7 +134,8 @@ class Mapper:
         for _ in range(step.bit_length() - 1):
             middle = (near + far) // 2
             y, x = (step * start + middle[:, None] * way).T
-            same = self._counts(settings, seen, mass[x], stiffness[y]) == coarse[tuple(start.T)]
+            found = self._counts(settings, seen, mass[x], stiffness[y], picture.tolerance)
+            same = found == coarse[tuple(start.T)]
             near, far = np.where(same, middle, near), np.where(same, far, middle)
         crossed = step * start + 0.5 * (near + far)[:, None] * way  # (n_crossed, 2) [pixel]
         crossings: dict[tuple[int, int], list[np.ndarray]] = {}
@@ -151,11 +156,39 @@ class Mapper:
             block[:] = np.where(side * side[0, 0] >= 0.0, here, other)
         return replace(picture, mass=mass, stiffness=stiffness, n_impacts=counts)
 
-    def _counts(self, settings: Settings, seen: Modes | None, mass: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-        """Impacts (n,) of hammers (n,) with contacts (n,)."""
+    def surer(self, settings: Settings, picture: Picture, seen: Modes | None = None) -> Picture:
+        """The same map, its points beside another number struck again as all those of finer maps will be."""
+        counts = picture.n_impacts.copy()
+        y, x = refined.beside_change(counts).nonzero()
+        counts[y, x] = self._counts(settings, seen, picture.mass[x], picture.stiffness[y], MAP_TOLERANCE)
+        return replace(picture, n_impacts=counts, tolerance=MAP_TOLERANCE)
+
+    def _keep(self, settings: Settings, seen: Modes | None) -> Settings:
+        """The settings without their place on the map; forgets what is kept if they or the body are others."""
         settings = replace(settings, mass=self.bench.start.mass, stiffness=1.0)
         if self.about is None or self.about[0] != settings or self.about[1] is not seen:
-            self.about, self.kernels = (settings, seen), {}
+            self.about, self.kernels, self.limits = (settings, seen), {}, None
+        return settings
+
+    def _thresholds(self, settings: Settings, seen: Modes | None, felt: float, mass: np.ndarray) -> np.ndarray:
+        """Thresholds (n,) [Hz] of hammers (n,) [kg], interpolated between those found once for the whole map."""
+        settings = self._keep(settings, seen)
+        along = np.geomspace(*self.bench.range("mass"), LIMITS)
+        if self.limits is None:
+            case = self.bench.case(settings, seen=seen)
+            self.limits = threshold.thresholds(case.modes, case.at, felt * along)
+        place = np.interp(np.log(mass), np.log(along), np.arange(LIMITS))
+        low, part = place.astype(int), place % 1.0
+        near, far = self.limits[low], self.limits[np.minimum(low + 1, LIMITS - 1)]
+        some = (near > 0.0) & np.isfinite(near) & (far > 0.0) & np.isfinite(far)
+        ratio = np.divide(far, near, out=np.ones(len(mass)), where=some)
+        return np.where(some, near * ratio**part, np.where(part < 0.5, near, far))
+
+    def _counts(
+        self, settings: Settings, seen: Modes | None, mass: np.ndarray, stiffness: np.ndarray, tolerance: float
+    ) -> np.ndarray:
+        """Impacts (n,) of hammers (n,) with contacts (n,)."""
+        settings = self._keep(settings, seen)
         if not len(mass):
             return np.empty(0, np.int8)
         case = self.bench.case(settings, seen=seen)
@@ -172,8 +205,7 @@ class Mapper:
                 family, np.zeros(len(mass), int), case.modes.mass * shared, mass, hard, law.exponent * shared,
                 case.speed * shared, law.loss * shared,
             )  # fmt: skip
-            found = batches.bounce(blows, tolerance=MAP_TOLERANCE, kernels=self.kernels)
-            counts[found.done] = found.n_impacts[found.done]
+            counts = batches.count_impacts(blows, tolerance=tolerance, most=MORE, kernels=self.kernels)
         for i in np.flatnonzero(np.isnan(counts)):  # those that take long; the rest of "more" does not matter
             one = replace(case.changed("mass", mass[i]), contact=replace(law, stiffness=float(hard[i])))
             with suppress(SimulationError):

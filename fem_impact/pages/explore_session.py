@@ -151,7 +151,7 @@ class Session:
                 self.mapped = about
 
     async def _drawn(self, about: tuple[Any, ...], settings: Settings, window: Window) -> None:
-        """One map: coarse, finer, and with sharp borders; then these are checked pixel by pixel."""
+        """One map by a rough tolerance: coarse, finer, and with sharp borders; then these are struck pixel by pixel."""
 
         async def made(function: Callable[..., Picture], *arguments: Any) -> Picture:
             found: Picture = await asyncio.wrap_future(self.mapper.ask(function, settings, *arguments))
@@ -165,6 +165,7 @@ class Session:
 
         picture = sent(await made(Desk.finer, sent(await made(Desk.picture, window))))
         sent(await made(Desk.sharp, picture))
+        picture = await made(Desk.surer, picture)
         while not picture.finest:
             picture = await made(Desk.finer, picture)
         sent(picture, exact=True)

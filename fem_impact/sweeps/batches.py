@@ -224,9 +224,29 @@ def bounce(
     With ``d = v x`` the blow depends on stiffness and speed only through ``k v**(exponent - 1)``; times do not change,
     and forces scale with v.
     """
-    workers = workers or os.cpu_count() or 1
     kernels = {} if kernels is None else kernels
     follow = partial(_follow, tolerance=tolerance, band=band, kernels=kernels)
+    return Bounces(*_in_pieces(blows, follow, workers, kernels))
+
+
+def count_impacts(
+    blows: Blows, *, tolerance: float, most: int, workers: int | None = None, kernels: Kernels | None = None
+) -> np.ndarray:
+    """Only how often each blow touches (n_cases,), at most ``most``; NaN where the modal engine must count.
+
+    Two runs of different steps agree on each number. ``tolerance``, ``workers`` and ``kernels`` as in `bounce`, but
+    errors of forces and times ask for no shorter steps, and a touch in flight is missed where the two agree on that.
+    """
+    kernels = {} if kernels is None else kernels
+    (found,) = _in_pieces(blows, partial(_counted, tolerance=tolerance, most=most, kernels=kernels), workers, kernels)
+    return found
+
+
+def _in_pieces(
+    blows: Blows, follow: Callable[[Blows], tuple[np.ndarray, ...]], workers: int | None, kernels: Kernels
+) -> list[np.ndarray]:
+    """What ``follow`` finds of blows, by several threads if they are many."""
+    workers = workers or os.cpu_count() or 1
     size = min(PIECE, max(FEW, -(-blows.n_cases // (4 * workers))))
     if workers == 1 or blows.n_cases <= size:
         found = [follow(part) for part in blows.pieces(PIECE)]
@@ -235,7 +255,7 @@ def bounce(
             found = list(pool.map(follow, blows.pieces(size)))
     if sum(part.nbytes for parts in kernels.values() for part in parts) > KEPT:
         kernels.clear()
-    return Bounces(*(np.concatenate(columns) for columns in zip(*found)))
+    return [np.concatenate(columns) for columns in zip(*found)]
 
 
 def _follow(blows: Blows, tolerance: float, band: float, kernels: Kernels) -> tuple[np.ndarray, ...]:
@@ -272,6 +292,23 @@ def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarra
         finer = np.where(found[~met] < MILD * ALLOWED * tolerance, 1, 2)
         step = step[~met] + finer
     return final, error
+
+
+def _counted(blows: Blows, tolerance: float, most: int, kernels: Kernels) -> tuple[np.ndarray]:
+    """Numbers of impacts on which two runs agree, the finer one with half the step."""
+    engine = _Engine(blows, 0.0, kernels)
+    step, todo = engine.first_step(tolerance), np.arange(blows.n_cases)
+    number, before = np.full(len(todo), np.nan), None
+    for turn in range(REFINEMENTS):
+        slack = np.full(len(todo), SLACK * tolerance * 2.0 ** (-STEP_ORDER * turn))
+        now = engine.run(todo, step + 2 * turn, slack, None if before is None else 2.0 * before[7])
+        now[0] = np.where(now[5] <= many_blows.DOUBTFUL, np.minimum(now[0], most), np.nan)
+        met = np.zeros(len(todo), bool) if before is None else now[0] == before[0]
+        number[todo[met]] = now[0, met]
+        before, todo, step = now[:, ~met], todo[~met], step[~met]
+        if not todo.size:
+            break
+    return (number,)
 
 
 class _Engine:
