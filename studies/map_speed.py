@@ -4,6 +4,7 @@
     python studies/map_speed.py --cluster 10000000      threads against Dask with two workers of one thread
     python studies/map_speed.py --elements [NAME ...]   Ritz vectors against modes on plates by elements
     python studies/map_speed.py --pictures [--centroid] 400 x 400 cells, all computed and refined; borders
+    python studies/map_speed.py --decisions         draws pictures/map_of_decisions.png, the map of a Hertz contact
 
 Stick and hinged plate of *Euphonics* 12.1, 300 modes, tolerance 1e-3. Times are the best of several runs and do not
 include compilation.
@@ -29,6 +30,7 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 
+import drawing
 import numpy as np
 import scene_speed
 import source_scenes as source
@@ -36,10 +38,12 @@ from scipy.integrate import solve_ivp
 
 import fem_impact as fi
 from fem_impact.pages import explore_model
+from fem_impact.scenes import maps
 from fem_impact.sweeps import bodies, hammers
 from fem_impact.sweeps import grid as cells
 
 STICK = source.stick()
+PICTURE = Path(__file__).parent / "pictures" / "map_of_decisions.png"
 
 
 def best(repeats, work, *arguments):
@@ -278,6 +282,17 @@ def pictures(band):
             print(f"  {wrong} of {tried} points of borders farther off than 1e-3 of the axes", flush=True)
 
 
+def decisions():
+    """Draw which sticks and contacts hit the plate of 200 g once, twice or more often, and check the borders."""
+    axes = np.linspace(10e-3, 200e-3, 400), np.geomspace(1e5, 1e8, 400)
+    work = partial(source.hertz_map, 0.2, *axes, speed=1.0, max_frequency=None, refine=True, borders=True)
+    seconds, table = spent(work)
+    wrong, tried = misplaced(source.plate(0.2), source.HERTZ, table)
+    print(f"{seconds:.2f} s of processor time; {table.attrs['cells']}; {table.attrs['borders']}")
+    print(f"{wrong} of {tried} points of borders farther off than 1e-3 of the axes")
+    drawing.save(PICTURE, maps.draw(table, "n_impacts", title="Sticks on a hinged plate of 200 g, Hertz contact"))
+
+
 def main():
     """Measure and print the times."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -286,11 +301,15 @@ def main():
     parser.add_argument("--elements", nargs="*", metavar="NAME")
     parser.add_argument("--pictures", action="store_true")
     parser.add_argument("--centroid", action="store_true")
+    parser.add_argument("--decisions", action="store_true")
     wanted = parser.parse_args()
     bounces = wanted.bounces
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     if wanted.elements is not None:
         by_elements(wanted.elements)
+        return
+    if wanted.decisions:
+        decisions()
         return
     if wanted.pictures:
         pictures(source.BAND if wanted.centroid else None)
