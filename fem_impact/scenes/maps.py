@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -14,6 +14,7 @@ import xarray
 from .._base import check
 from ..fe import plausible
 from ..impact import threshold
+from ..impact.contact import acting_stiffness, wall_time
 from ..model.target import Stages
 from ..show import figures, plots
 from ..sweeps import bodies, grid, hammers, solving
@@ -167,27 +168,39 @@ def _quick_map(
 
 def with_theory(table: xarray.Dataset, case: Case, axes: Mapping[str, np.ndarray]) -> xarray.Dataset:
     """Add ``contact_resonance`` and ``threshold`` [Hz] to a map, each along the axes it depends on."""
-    striker = ("mass", "striker_frequency")
-    for name, find, needs, meaning in (
-        ("contact_resonance", lambda cell: cell.resonance, (*(set(LAW) - {"loss", "gap"}), "speed"),
-         "one over twice the contact time on a rigid wall"),
-        ("threshold", _threshold, ("at", "target_mass", "target_frequency"),
-         "contact resonance above which the struck body stops the striker"),
-    ):  # fmt: skip
-        mine = {axis: values for axis, values in axes.items() if axis in (*striker, *needs)}
-        found = np.empty([len(values) for values in mine.values()])
-        for place in np.ndindex(*found.shape):
-            cell = case
-            for (axis, values), i in zip(mine.items(), place):
-                cell = cell.changed(axis, values[i])
-            found[place] = find(cell)
-        table[name] = (tuple(mine), found, {"units": "Hz", "long_name": meaning})
+    striker = _part(axes, ("mass", "striker_frequency"))
+    felt = np.array([cell.striker.felt_mass for cell in _cells(case, striker)])
+    law, body = _part(axes, set(LAW) - {"loss", "gap"}), _part(axes, ("at", "target_mass", "target_frequency"))
+    speed = _part(axes, ("speed",))
+    speeds = speed.get("speed", np.array([case.speed]))
+    resonance = [
+        0.5 / wall_time(acting_stiffness(numbers, 1.0 / felt[:, None], speeds), exponent, 1.0 / felt[:, None], speeds)
+        for numbers, exponent in ((cell.contact.numbers, cell.contact.exponent) for cell in _cells(case, law))
+    ]
+    limit = np.array([threshold.thresholds(cell.modes, cell.at, felt) for cell in _cells(case, body)])
+    limit[~((limit > 0.0) & np.isfinite(limit))] = math.nan
+    for name, found, mine, meaning in (
+        (
+            "contact_resonance",
+            resonance,
+            {**law, **striker, **speed},
+            "one over twice the contact time on a rigid wall",
+        ),
+        ("threshold", limit, {**body, **striker}, "contact resonance above which the struck body stops the striker"),
+    ):
+        values = np.reshape(found, [len(values) for values in mine.values()])
+        layer = xarray.DataArray(values, dims=tuple(mine)).transpose(*(axis for axis in axes if axis in mine))
+        table[name] = layer.assign_attrs(units="Hz", long_name=meaning)
     return table
 
 
-def _threshold(case: Case) -> float:
-    found = threshold.threshold_frequency(case.modes, case.at, case.striker.felt_mass)
-    return math.nan if found is None or math.isinf(found) else found
+def _part(axes: Mapping[str, np.ndarray], names: Collection[str]) -> dict[str, np.ndarray]:
+    return {axis: values for axis, values in axes.items() if axis in names}
+
+
+def _cells(case: Case, axes: Mapping[str, np.ndarray]) -> list[Case]:
+    """The blow with every combination of values of some axes; the last varies fastest."""
+    return [case.with_values(dict(zip(axes, values))) for values in product(*axes.values())]
 
 
 def _joined(pieces: Sequence[xarray.Dataset], slow: Mapping[str, Sequence[Any]]) -> xarray.Dataset:
