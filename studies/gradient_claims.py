@@ -99,17 +99,22 @@ class Case:
         return np.abs(self.slopes - self.differences)
 
 
-def examine(seed):
-    """One random blow; None if it hits never or more than three times, or cannot be told to 1e-10."""
+def touched(hit):
+    """Number of impacts at each contact."""
+    return np.bincount([impact.contact for impact in hit.impacts], minlength=len(hit.contacts)).tolist()
+
+
+def examine(seed, random_numbers=random_numbers, strike=strike, most=3):
+    """One random blow; None if it misses a contact, hits more than ``most`` times, or cannot be told to 1e-10."""
     rng = np.random.default_rng(seed)
     numbers, none = random_numbers(rng), np.full(6, np.nan)
     try:
         hit = strike(numbers)
     except fi.SimulationError:
         return None
-    if not 1 <= hit.n_impacts <= 3:
+    if not all(touched(hit)) or hit.n_impacts > most:
         return None
-    lossy = numbers["contact.loss"] > 0.0
+    lossy = any(value > 0.0 for name, value in numbers.items() if name.endswith(".loss"))
     try:
         found = hit.gradient(QUANTITIES)
     except fi.SimulationError as error:
@@ -123,7 +128,7 @@ def examine(seed):
     def value(step):
         changed = {name: numbers[name] * (1.0 + step * part) for name, part in turn.items()}
         other = strike(numbers | changed)
-        if other.n_impacts != hit.n_impacts:
+        if touched(other) != touched(hit):
             raise fi.SimulationError("another count within the step")
         return told(other, frequencies)
 
@@ -153,7 +158,8 @@ def examine(seed):
 def summary(cases):
     """What became of the claims, in lines."""
     judged = [case for case in cases if not case.why]
-    lines = [f"{len(cases)} blows of one to three impacts, {len(judged)} with gradient and differences"]
+    most = max(case.n_impacts for case in cases)
+    lines = [f"{len(cases)} blows of one to {most} impacts, {len(judged)} with gradient and differences"]
     lines += [f"  {count} without: {why}" for why, count in Counter(c.why for c in cases if c.why).most_common()]
     for i, name in enumerate(QUANTITIES):
         off, doubt = np.array([case.off[i] for case in judged]), np.array([case.doubt[i] for case in judged])
@@ -164,6 +170,7 @@ def summary(cases):
         sharp = doubt < RIGHT
         lines.append(
             f"{name}: median off {np.median(off):.1e}, within 1e-6 and the doubt {np.mean(off <= RIGHT + doubt):.1%}, "
+            f"or three times the doubt {np.mean(off <= RIGHT + 3.0 * doubt):.1%}, "
             f"worst beyond the doubt {np.max(off - doubt):.1e}; of {sharp.sum()} judged more sharply than 1e-6, "
             f"{np.mean(off[sharp] <= RIGHT):.1%} within 1e-6; stated error at least a third of the true one "
             f"{np.mean(ratio > 1 / 3):.1%} of {known.sum()}"
@@ -195,9 +202,9 @@ def draw(cases):
     return figure
 
 
-def publish(cases):
+def publish(cases, name="gradient_claims"):
     """Write all cases, print the summary and draw."""
-    with (HERE / "gradient_claims.csv").open("w", newline="") as file:
+    with (HERE / f"{name}.csv").open("w", newline="") as file:
         table = csv.writer(file)
         parts = "slope", "difference", "doubt", "usual", "stated"
         table.writerow(["seed", "impacts", "lossy", "refused", *(f"{q} {part}" for q in QUANTITIES for part in parts)])
@@ -207,7 +214,7 @@ def publish(cases):
                 [case.seed, case.n_impacts, int(case.lossy), case.why, *(f"{x:.9g}" for x in columns.ravel())]
             )
     print("\n".join(summary(cases)))
-    drawing.save(HERE / "pictures" / "gradient_claims.png", draw(cases))
+    drawing.save(HERE / "pictures" / f"{name}.png", draw(cases))
 
 
 def main():

@@ -62,10 +62,9 @@ def faster(law=None, **how):
     return differ(lambda step: struck(law=law, speed=1.0 + step, tolerance=1e-8, max_impacts=1, **how))
 
 
-def in_chain(step=0.0):
-    touches = [fi.Touch(fi.Contact.linear(1e6), 0, 1), fi.Touch(fi.Contact.linear(1e6, gap=1e-3), 1, 2)]
-    speeds = [1.0 + step, 0.0, 0.0]
-    return fi.collide([fi.Modes.rigid(0.1)] * 3, touches, speeds=speeds, tolerance=1e-8)
+def in_chain(gap):
+    touches = [fi.Touch(fi.Contact.linear(1e6), 0, 1), fi.Touch(fi.Contact.linear(2e6, gap=gap), 1, 2)]
+    return fi.collide([fi.Modes.rigid(mass) for mass in (0.1, 0.11, 0.12)], touches, speeds=[1.0, 0.0, 0.0])
 
 
 def held(speed=1.0):
@@ -129,10 +128,20 @@ GRADIENTS = {  # what fails, the message, and what it advises
         "not followed; take differences of runs with the number changed, told to a smaller tolerance$",
         lambda _: differ(lambda step: held(1.0 + step)),
     ),
-    "several contacts": (
-        lambda _: in_chain().gradient("impulse"),
-        "one target; take differences of runs with the number changed, told to a smaller tolerance$",
-        lambda _: differ(in_chain),
+    "a speed of a body at rest against another": (
+        lambda _: in_chain(0.0).gradient("contact_time", "speeds.2"),
+        "a speed would press or part them; give a gap$",
+        lambda _: in_chain(1e-5).gradient("contact_time", "speeds.2"),
+    ),
+    "sections of other bodies": (
+        lambda _: in_chain(1e-5).gradient("impulse", sections={"t": (1e-3, lambda t: fi.Plate(STEEL, t))}),
+        "sections are those of the target of `strike`; leave them out$",
+        lambda _: in_chain(1e-5).gradient("impulse"),
+    ),
+    "section of other bodies": (
+        lambda _: in_chain(1e-5).gradient("impulse", "section.thickness"),
+        "only the target of `strike` has one; take the mass and first frequency of the body$",
+        lambda _: in_chain(1e-5).gradient("impulse", "bodies.1.mass"),
     ),
     "touching under a force": (
         lambda _: pushed(),

@@ -67,7 +67,7 @@ def slopes(
     found = Sensitivity.of(longer, Parameters(hit, sections).change(names), peak=False)
     scale = hit.speed * hit.impacts[0].duration
     faster = np.array([float(name == "strike.speed") for name in names])
-    change = -found.found.ends[-1, 0] / scale - gap * (times / hit.impacts[0].duration + faster / hit.speed)
+    change = -found.found.ends[-1, 0, 0] / scale - gap * (times / hit.impacts[0].duration + faster / hit.speed)
     return np.asarray(change / max(1.0, -gap))
 
 

@@ -21,7 +21,7 @@ from .compiled.law import FELT
 from .compiled.stretched import Stretch
 from .contact import Contact, acting_stiffness, wall_time
 from .quantities import asked_for
-from .response import Dip, Error, History, Response
+from .response import Ends, Error, History, Response
 from .sensitivity import gauss
 from .state import State
 from .stretched import Stretched
@@ -159,6 +159,7 @@ class _Part:
     points: np.ndarray  # (n_ends, dimension) [m] contact points
     pressed: np.ndarray  # (2, n_ends) [N], [N/s] contact forces at the start and their rates
     stretching: Stretching | None = None
+    speed: float = 0.0  # [m/s] with which it arrives in rigid motion, at its first contact
     held: int = 0  # [-] first modes that only a hand makes swing: within a contact they move like a mass
 
 
@@ -373,9 +374,9 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
                 parted[cause] += 1.0
     error = Error(step_error, **parted, resolvable=resolvable, sensitivity=_sensitivity(coarse, history))
     laws = tuple(touch.law for touch in contacts)
-    dips = tuple(_dip(part, system) for part in parts)
     return Response(
-        tuple(bodies), laws, history, speed, options.tolerance, ran, error, striker, at, dips, options.quantities,
+        tuple(bodies), laws, history, speed, options.tolerance, ran, error, striker, at, _ends(parts, system),
+        options.quantities,
         coarse=coarse,
     )  # fmt: skip
 
@@ -390,12 +391,27 @@ def _check_way(system: _System, depth: float, tolerance: float) -> None:
         )
 
 
-def _dip(part: _Part, system: _System) -> Dip | None:
-    """Where the left-out modes of a body deflect; a constant force counts only if a series spring replaces them."""
-    if not part.rest.any():
-        return None
-    series = len(part.touched) == 1 and not _rated(system.law)[part.touched[0][0]]
-    return Dip(part.points, part.touched, part.force if series else 0.0)
+def _ends(parts: Sequence[_Part], system: _System) -> tuple[Ends, ...]:
+    """Where every body is touched; a constant force makes left-out modes dip only if a series spring replaces them."""
+    found, rated = [], _rated(system.law)
+    last = sum(len(part.omega) for part in parts)
+    for part in parts:
+        forms = slice(last, last + _forms(part, rated).shape[1])
+        last = forms.stop
+        dips = part.rest.any() and forms.start == forms.stop
+        found.append(
+            Ends(part.points, part.touched, part.force, part.rest, forms, part.force if dips else 0.0, part.speed)
+        )
+    return tuple(found)
+
+
+def _forms(part: _Part, rated: np.ndarray) -> np.ndarray:
+    """Forms (n_ends, n_forms) of unit stiffness that stand for the modes left out; none where a spring does."""
+    if not part.rest.any() or (len(part.touched) == 1 and not rated[part.touched[0][0]]):
+        return np.zeros((len(part.touched), 0))
+    size, vectors = np.linalg.eigh(part.rest)
+    kept = size > REST_FLOOR * size[-1]
+    return np.asarray(vectors[:, kept] * np.sqrt(size[kept]))
 
 
 def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Part], float]:
@@ -429,7 +445,7 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[_Pa
         if speed != 0.0:
             if not ends[body] or not rows[0, modes.omega == 0.0].any():
                 raise ValueError(f"speeds must be zero for a body that cannot move rigidly, got {speed:g} m/s")
-            part = replace(part, p=part.p + speed * modes.rigid_motion(points[:1]))
+            part = replace(part, p=part.p + speed * modes.rigid_motion(points[:1]), speed=speed)
         arriving = arriving or speed
         parts.append(part)
     return parts, arriving
@@ -489,14 +505,12 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
             offset[first] += sign * part.rest[0, 0] * part.force
             continue
         above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], bool(rated.any()))
-        size, vectors = np.linalg.eigh(part.rest)
-        for value, vector in zip(size, vectors.T):
-            if value > REST_FLOOR * size[-1]:
-                column = np.zeros(len(law))
-                for (i, sign), share in zip(part.touched, vector):
-                    column[i] += sign * share * np.sqrt(value) * above
-                held = -(part.pressed @ column[[i for i, _ in part.touched]]) / above**2
-                extra.append((above, damping, column, 0.0, float(held[0]), float(held[1])))
+        for form in _forms(part, rated).T:
+            column = np.zeros(len(law))
+            for (i, sign), share in zip(part.touched, form):
+                column[i] += sign * share * above
+            held = -(part.pressed @ column[[i for i, _ in part.touched]]) / above**2
+            extra.append((above, damping, column, 0.0, float(held[0]), float(held[1])))
     lists = [[getattr(part, name) for part in parts] for name in ("omega", "zeta", "bias", "q", "p")]
     if extra:
         shape = np.ascontiguousarray(np.hstack([shape, *(mode[2][:, None] for mode in extra)]))

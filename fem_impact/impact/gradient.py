@@ -13,8 +13,8 @@ from .._base.check import SimulationError
 from ..fe.variation import SectionChange
 from .compiled import record
 from .compiled.layout import KIND
-from .parameters import POSSIBLE, UNITS, Parameters
-from .sensitivity import Sensitivity, together
+from .parameters import POSSIBLE, Parameters, unit
+from .sensitivity import Sensitivity, runs, together
 
 if TYPE_CHECKING:
     from .response import History, Response
@@ -30,6 +30,7 @@ UNIT_OF = {
 GRAZE = 1e-3  # [-] of the deepest approach: a touch or gap below it may come or go with a small change
 TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a small change may make the other the largest
 LOOKS = 16.0, 20_000  # [-] times per contact at which a flight is searched for near misses, and their largest number
+STILL = 1e-9  # [-] of the fastest approach: bodies that rest against each other turn back more slowly, by rounding
 CUBIC = np.linspace(0.0, 1.0, 9) ** np.arange(4)[:, None]  # where in a piece of time its cubic is looked at, as powers
 # halving the steps brings these no sure gain
 ROUGH = "contact_time", "peak_time", "spectral_centroid", "spectral_level"
@@ -89,12 +90,12 @@ class Gradient:
         return sum(part * self.numbers[known[name]] * self.slopes[known[name]] for name, part in relative.items())
 
     def __str__(self) -> str:
-        unit = UNIT_OF.get(self.quantity.partition("=")[0], "")
+        own = UNIT_OF.get(self.quantity.partition("=")[0], "")
         if self.slopes.ndim > 1:
-            return f"{self.quantity} of {self.slopes.shape[1]} modes [{unit}] in {', '.join(self.names)}"
-        lines = [f"{self.quantity} {self.value:.6g}{f' {unit}' if unit else ''}"]
+            return f"{self.quantity} of {self.slopes.shape[1]} modes [{own}] in {', '.join(self.names)}"
+        lines = [f"{self.quantity} {self.value:.6g}{f' {own}' if own else ''}"]
         for name, number, slope, error, part in zip(self.names, self.numbers, self.slopes, self.error, self.relative):
-            at = f"{name} = {number:.6g} {UNITS.get(name, '')}".rstrip()
+            at = f"{name} = {number:.6g} {unit(name)}".rstrip()
             lines.append(f"  {slope:+.5e} +- {error:.0e} per unit, {part:+.4f} % per %, in {at}")
         return "\n".join(lines)
 
@@ -103,7 +104,7 @@ class Gradient:
         if self.slopes.ndim > 1:
             return f"<p>{html.escape(str(self))}</p>"
         rows = [
-            (name, f"{number:.5g} {UNITS.get(name, '')}", f"{slope:.5g}", f"{error:.0e}", f"{part:.4f}")
+            (name, f"{number:.5g} {unit(name)}", f"{slope:.5g}", f"{error:.0e}", f"{part:.4f}")
             for name, number, slope, error, part in zip(
                 self.names, self.numbers, self.slopes, self.error, self.relative
             )
@@ -122,11 +123,14 @@ def gradients(
     sections = sections or {}
     several = (quantity,) if isinstance(quantity, str) else check.several("quantity", quantity, str)
     wanted = [_asked(item) for item in several]
-    if hit.striker is None or len(hit.bodies) != 2:
-        raise ValueError(f"gradient needs a blow of `strike`, with one striker and one target; {INSTEAD}")
-    if hit.history.law.shape[1] > KIND and hit.history.law[0, KIND] not in POSSIBLE:
-        raise SimulationError(f"no gradient: the contact yields or remembers, and its past is not followed; {INSTEAD}")
-    if hit.history.stretched is not None or hit.striker.hand is not None:
+    if not hit.ends:
+        raise ValueError(f"gradient needs a blow of `strike` or `collide`, not one of several strokes; {INSTEAD}")
+    if sections and hit.striker is None:
+        raise ValueError("sections are those of the target of `strike`; leave them out")
+    if hit.history.law.shape[1] > KIND and not np.isin(hit.history.law[:, KIND], POSSIBLE).all():
+        which = "the contact" if hit.history.n_contacts == 1 else "one of the contacts"
+        raise SimulationError(f"no gradient: {which} yields or remembers, and its past is not followed; {INSTEAD}")
+    if hit.history.stretched is not None or (hit.striker is not None and hit.striker.hand is not None):
         why = "the target stretches" if hit.history.stretched is not None else "a hand holds the striker"
         raise SimulationError(f"no gradient: {why}, and what that changes is not followed; {INSTEAD}")
     if not hit.n_impacts:
@@ -203,7 +207,7 @@ def _asked(item: Any) -> tuple[str, float | None]:
 def _value(hit: "Response", found: Sensitivity, name: str, band: float | None) -> tuple[Any, np.ndarray | None]:
     """Value of a quantity, and the force's spectrum [N s] that it was read from, if any."""
     if name == "modal_energy":
-        part, h = hit.body_slice(1), hit.history
+        part, h = hit.body_slice(len(hit.bodies) - 1), hit.history
         return 0.5 * (h.end_p[part] ** 2 + (h.omega[part] * h.end_q[part]) ** 2), None
     if name == "spectral_centroid":
         assert band is not None
@@ -227,11 +231,11 @@ def _slopes(
 ) -> np.ndarray:  # fmt: skip
     """Derivatives (n,) or (n, n_modes) of a quantity, of which `_value` is known."""
     if name == "restitution":
-        rigid = np.arange(hit.bodies[0].n_rigid)
-        faster = np.array([float(other == "strike.speed") for other in names])
-        return -(found.speed(rigid) + value * faster) / hit.speed
+        rigid, arriving = np.arange(hit.bodies[0].n_rigid), _arriving(hit)
+        faster = np.array([float(other == arriving) for other in names])
+        return -(found.speed(rigid, hit.ends[0].touched[0][0]) + value * faster) / hit.speed
     if name == "modal_energy":
-        return found.energies(hit.body_slice(1)).T
+        return found.energies(hit.body_slice(len(hit.bodies) - 1)).T
     if name == "spectral_centroid":
         assert band is not None and spectrum is not None
         step = band / (len(spectrum) - 1)
@@ -247,6 +251,15 @@ def _slopes(
         rates = np.real(found.spectrum(np.array([0.0, band])) / spectrum[:, None])  # (2, n) of the logarithms
         return np.asarray(20.0 / np.log(10.0) * (rates[1] - rates[0]))
     return np.asarray(getattr(found, name))
+
+
+def _arriving(hit: "Response") -> str:
+    """Name of the speed that the restitution is told by."""
+    if hit.striker is not None:
+        return "strike.speed"
+    if not hit.speed or not hit.ends[0].touched:
+        raise SimulationError("no gradient of restitution: no body arrives, or the first touches nothing")
+    return f"speeds.{next(b for b, ends in enumerate(hit.ends) if ends.speed)}"
 
 
 def level_of(spectrum: np.ndarray) -> float:
@@ -266,85 +279,105 @@ def _check_tie(apart: float) -> None:
 
 def _check_grazing(found: Sensitivity) -> None:
     """Raise SimulationError next to a contact or a separation that barely happens, or barely does not."""
-    parts = _impact_pieces(found)
-    depth = _between(found.found.way[:, 0], found.found.way[:, 1], found.pieces.length)
-    gap, miss = _nearest(found, parts)
-    nearly = (
-        ("touch", min((depth[part].max() for part in parts), default=np.inf)),
-        ("gap", min(gap, _turned(found, depth))),
-        ("miss", miss),
+    way, n_contacts = _way(found), len(found.deepest)
+    limit = GRAZE * float(found.deepest.max())  # of all, as a contact that only grazes has no depth to compare with
+    for c in range(n_contacts):
+        for what, least in _nearly(way, c):
+            if least < limit:
+                _refuse(what, least, f"contact {c}: " if n_contacts > 1 else "")
+
+
+def _refuse(what: str, least: float, where: str) -> None:
+    """Raise SimulationError that tells what barely happens, by how much [m] and at which contact."""
+    words = {
+        "touch": "an impact is only {} m deep, and would vanish",
+        "gap": "the bodies come within {} m of parting, or part by no more, and one impact would be two",
+        "miss": "the bodies pass each other at {} m, and would touch once more",
+    }[what]
+    raise SimulationError(
+        f"no gradient next to a grazing contact: {where}{words.format(f'{least:.2g}')} with a small change of some "
+        "number, at which contact time, peak and count have no derivative; take a slightly heavier or lighter "
+        "striker, or strike elsewhere"
     )
-    for what, least in nearly:
-        if least < GRAZE * found.deepest:
-            words = {
-                "touch": "an impact is only {} m deep, and would vanish",
-                "gap": "the bodies come within {} m of parting, or part by no more, and one impact would be two",
-                "miss": "the bodies pass each other at {} m, and would touch once more",
-            }[what]
-            raise SimulationError(
-                f"no gradient next to a grazing contact: {words.format(f'{least:.2g}')} with a small change of some "
-                "number, at which contact time, peak and count have no derivative; take a slightly heavier or lighter "
-                "striker, or strike elsewhere"
-            )
 
 
-def _between(d: np.ndarray, v: np.ndarray, h: np.ndarray) -> np.ndarray:
-    """Approach [m] at the places of `CUBIC` in pieces of time, (n, 9), by cubics through the ends (n + 1,)."""
-    d0, d1, v0, v1 = d[:-1], d[1:], v[:-1] * h, v[1:] * h
-    return np.stack([d0, v0, 3.0 * (d1 - d0) - 2.0 * v0 - v1, 2.0 * (d0 - d1) + v0 + v1], axis=1) @ CUBIC
+@dataclass(frozen=True, eq=False)
+class Way:
+    """Approaches over a run, and beyond it as long as the bodies might touch once more."""
+
+    time: np.ndarray  # (n + 1,) [s]
+    approach: np.ndarray  # (n + 1, n_contacts) [m]
+    rate: np.ndarray  # (n + 1, n_contacts) [m/s]
+    closed: np.ndarray  # (n, n_contacts) between these times
+
+    def __repr__(self) -> str:
+        return check.brief(self)
+
+    def between(self, c: int) -> np.ndarray:
+        """Approach c [m] at the places of `CUBIC` between the times, (n, 9), by cubics through values and rates."""
+        h, d, v = np.diff(self.time), self.approach[:, c], self.rate[:, c]
+        d0, d1, v0, v1 = d[:-1], d[1:], v[:-1] * h, v[1:] * h
+        return np.stack([d0, v0, 3.0 * (d1 - d0) - 2.0 * v0 - v1, 2.0 * (d0 - d1) + v0 + v1], axis=1) @ CUBIC
 
 
-def _impact_pieces(found: Sensitivity) -> list[slice]:
-    """The pieces of every impact."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], found.pieces.closed, [0]]))).tolist()
-    return [slice(a, b) for a, b in zip(edges[::2], edges[1::2])]
+def _nearly(way: Way, c: int) -> Iterator[tuple[str, float]]:
+    """What barely happens at contact c, or barely does not, and by how much [m]."""
+    depth, v, closed = way.between(c), way.rate[:, c], way.closed[:, c]
+    pressed, noise = runs(closed), STILL * float(np.abs(v).max())
+    yield "touch", min((float(depth[a:b].max()) for a, b in pressed), default=np.inf)
+    parts = float(np.abs(depth[closed & (v[:-1] < -noise) & (v[1:] >= -noise)]).min(initial=np.inf))
+    yield "gap", min([parts, *(float(-depth[a:b].min(initial=0.0)) for (_, a), (b, _) in pairwise(pressed) if b > a)])
+    turns = ~closed & (v[:-1] > noise) & (v[1:] <= noise)
+    yield "miss", float((-depth[turns].max(axis=1, initial=-np.inf)).min(initial=np.inf))
 
 
-def _turned(found: Sensitivity, depth: np.ndarray) -> float:
-    """Least approach at which a contact nearly opens [m]."""
-    v = found.found.way[:, 1]
-    return float(np.abs(depth[found.pieces.closed & (v[:-1] < 0.0) & (v[1:] > 0.0)]).min(initial=np.inf))
-
-
-def _nearest(found: Sensitivity, parts: list[slice]) -> tuple[float, float]:
-    """Least gap between two impacts [m], and the least at which the bodies pass each other without touching.
-
-    The latter also later if the run saw the end.
-    """
-    history = found.history
-    spans = [(one.stop, found.time[two.start]) for one, two in pairwise(parts) if two.start > one.stop]
-    n_between = len(spans)
+def _way(found: Sensitivity) -> Way:
+    """The approaches of a run; while no contact is closed, at many times, and so beyond an end that the run saw."""
+    history, pressed = found.history, found.pieces.closed
+    free = np.asarray(~pressed.any(axis=1))
+    parts = [_flight(found, a, found.time[b]) for a, b in runs(free).tolist()]
+    parts += [(found.time[a:b], found.found.way[a:b], pressed[a:b]) for a, b in runs(~free).tolist()]
+    parts.sort(key=lambda part: float(part[0][0]))
     if history.status == record.FINISHED:
-        spans.append((len(found.time) - 1, history.end_time + _ahead(history)))
-    elif parts and not found.pieces.closed[-1]:
-        spans.append((parts[-1].stop, history.end_time))
-    gap, miss = np.inf, np.inf
-    for i, (begin, end) in enumerate(spans):
-        times, d, v = _flight(found, begin, end)
-        depth = _between(d, v, np.diff(times))
-        if i < n_between:
-            gap = min(gap, float(-depth.min(initial=0.0)))
-        turns = (v[:-1] > 0.0) & (v[1:] < 0.0)
-        miss = min(miss, float((-depth[turns].max(axis=1, initial=-np.inf)).min(initial=np.inf)))
-    return gap, miss
+        parts.append(_flight(found, len(found.time) - 1, history.end_time + _ahead(found)))
+    else:
+        parts.append((found.time[-1:], found.found.way[-1:], pressed[-1:]))
+    time, way, closed = (np.concatenate(column) for column in zip(*parts))
+    return Way(time, way[:, :, 0], way[:, :, 1], closed[: len(time) - 1])
 
 
-def _ahead(history: "History") -> float:
-    """How long after the end of a run its modes together could bridge the gap between the bodies [s]."""
+def _ahead(found: Sensitivity) -> float:
+    """How long after the end of a run its modes together could nearly bridge a gap between two bodies [s]."""
+    history = found.history
     rigid, shape = history.omega == 0.0, history.shape
     size = np.hypot(history.end_q, history.end_p / np.where(rigid, 1.0, history.omega))
-    gap = -float(history.offset[0] + shape[0, rigid] @ history.end_q[rigid])
-    apart = -float(shape[0, rigid] @ history.end_p[rigid])  # [m/s]
-    return max(0.0, (float(np.abs(shape[0, ~rigid]) @ size[~rigid]) - gap) / apart) if apart > 0.0 else 0.0
+    gap = -(history.offset + shape[:, rigid] @ history.end_q[rigid]) - GRAZE * found.deepest.max()
+    apart = -shape[:, rigid] @ history.end_p[rigid]  # [m/s]
+    reach = np.abs(shape[:, ~rigid]) @ size[~rigid] - gap
+    longest = LOOKS[1] / LOOKS[0] * _duration(history)  # of bodies that swing, but do not part
+    times = np.where(apart > 0.0, reach / np.where(apart > 0.0, apart, 1.0), longest)[reach > 0.0]
+    return float(times.max(initial=0.0))
+
+
+def _duration(history: "History") -> float:
+    """Of the longest impacts of each contact, the shortest [s]."""
+    rows = history.contacts
+    return min(float(np.ptp(rows[rows[:, 4] == c, :2], axis=1).max()) for c in set(rows[:, 4].tolist()))
 
 
 def _flight(found: Sensitivity, begin: int, end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times from the end of an impact, a piece, to another time [s], approach [m] and rate [m/s] there."""
-    mark, start = found.pieces.mark[begin], found.time[begin]
-    q, p = found.found.q[mark].copy(), found.found.p[mark].copy()
-    free = replace(found.history, start_q=q, start_p=p, steps=found.history.steps[:0])
-    duration = max(impact.duration for impact in found.history.impacts)
-    count = int(np.clip(LOOKS[0] * (end - start) / max(duration, 1e-300), 16, LOOKS[1]))
-    times = np.linspace(0.0, end - start, count + 1)
+    """The way from the start of a piece on to a later time [s], in which no contact is closed, without its end.
+
+    Times (n,) [s], approaches [m] and rates [m/s] there (n, n_contacts, 2), and that all contacts are open.
+    """
+    history, mark, start = found.history, found.pieces.mark[begin], found.time[begin]
+    if mark >= 0:
+        q, p = found.found.q[mark].copy(), found.found.p[mark].copy()
+    else:
+        q, p = (x[0] for x in history.states(np.array([start])))
+    free = replace(history, start_q=q, start_p=p, steps=history.steps[:0])
+    count = int(np.clip(LOOKS[0] * (end - start) / max(_duration(history), 1e-300), 16, LOOKS[1]))
+    times = np.linspace(0.0, end - start, count + 1)[:-1]
     q, p = free.states(times)
-    return times, free.offset[0] + q @ free.shape[0], p @ free.shape[0]
+    way = np.stack([history.offset + q @ history.shape.T, p @ history.shape.T], axis=2)
+    return start + times, way, np.zeros((count, history.n_contacts), bool)

@@ -28,6 +28,7 @@ UNITS = {
     "section.thickness": "m", "section.height": "m", "section.width": "m", "section.diameter": "m",
     "material.E": "Pa", "material.rho": "kg/m^3",
 }  # fmt: skip
+INDEXED = {"contacts": "contact", "bodies": "target"}  # what has the same units as each of several
 # powers with which frequencies and mass of a thin body grow with a number of it
 PLATE = {"section.thickness": (1.0, 1.0), "material.E": (0.5, 0.0), "material.rho": (-0.5, 1.0)}
 BEAM = {"material.E": (0.5, 0.0), "material.rho": (-0.5, 1.0)}
@@ -36,12 +37,23 @@ ROD = {"section.diameter": (1.0, 2.0), **BEAM}
 # all lengths along the body, at the same thickness
 SCALE: dict[type[object], tuple[float, float]] = {Plate: (-2.0, 2.0), Beam: (-2.0, 1.0)}
 SHIFT = 1e-3  # [rad] of the shortest wave kept: distance of the points whose shapes give the slope of each shape
+STILL = 1e-12  # [-] of the terms of an approach at the start, or of its rate: what rounding leaves
 STATIC_SHIFT = 1e-3  # [-] of the body: the same for the static compliance, which has no short waves
+
+
+def unit(name: str) -> str:
+    """Unit of a number, by its name; empty for none."""
+    home, _, part = name.rpartition(".")
+    group = home.partition(".")[0]
+    return UNITS["strike.speed"] if home == "speeds" else UNITS.get(f"{INDEXED.get(group, home)}.{part}", "")
 
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """The numbers of one blow of `strike`, by the names that scene files give them."""
+    """The numbers of one blow: of `strike` by the names that scene files give them, of `collide` by its own.
+
+    The latter are as "contacts.0.stiffness", "bodies.1.mass" and "speeds.0".
+    """
 
     hit: "Response"
     sections: Mapping[str, SectionChange] = field(default_factory=dict)  # how numbers of the user's change the section
@@ -49,28 +61,48 @@ class Parameters:
     def __repr__(self) -> str:
         return check.brief(self)
 
+    @property
+    def struck(self) -> bool:
+        """Whether it is a blow of `strike`."""
+        return self.hit.striker is not None
+
+    @cached_property
+    def laws(self) -> dict[str, int]:
+        """Names of the contacts, and their indices."""
+        return {"contact": 0} if self.struck else {f"contacts.{c}": c for c in range(len(self.hit.contacts))}
+
+    @cached_property
+    def bodies(self) -> dict[str, int]:
+        """Names of the bodies, and their indices."""
+        return {"striker": 0, "target": 1} if self.struck else {f"bodies.{b}": b for b in range(len(self.hit.bodies))}
+
     @cached_property
     def values(self) -> dict[str, float]:
         """Every number in which a gradient can be taken, and its value."""
         hit = self.hit
-        law, striker, target = hit.contact, hit.striker, hit.bodies[-1]
-        assert striker is not None
-        found = {f"contact.{name}": float(getattr(law, name)) for name in ("stiffness", "exponent", "loss", "gap")}
-        if law.hard_stiffness:
-            found |= {f"contact.{name}": float(getattr(law, name)) for name in list(LAW)[3:]}
-        found["strike.speed"] = hit.speed
-        if not self.why_still:
-            found |= {f"strike.{name}": float(x) for name, x in zip("xy", hit.at if hit.at is not None else ())}
-        for name, modes in (("striker", striker.modes), ("target", target)):
+        found: dict[str, float] = {}
+        for name, c in self.laws.items():
+            law = hit.contacts[c]
+            parts = list(LAW)[: 6 if law.hard_stiffness else 3]
+            found |= {f"{name}.{part}": float(getattr(law, part)) for part in (*parts, "gap")}
+        if self.struck:
+            found["strike.speed"] = hit.speed
+            if not self.why_still:
+                found |= {f"strike.{name}": float(x) for name, x in zip("xy", hit.at if hit.at is not None else ())}
+        else:
+            moving = [b for b, ends in enumerate(hit.ends) if ends.touched and self._carried(b)]
+            found |= {f"speeds.{b}": hit.ends[b].speed for b in moving}
+        for name, b in self.bodies.items():
             if name == "target" and self.why_no_target:
                 continue
+            modes = hit.striker.modes if name == "striker" and hit.striker is not None else hit.bodies[b]
             found[f"{name}.mass"] = modes.mass
             flexible = modes.omega > 0.0
             if flexible.any():
                 found[f"{name}.first_frequency"] = float(modes.frequencies[flexible][0])
                 found[f"{name}.damping_ratio"] = float(modes.damping_ratio[flexible][0])
         if not self.why_no_section:
-            section = target.section
+            section = hit.bodies[-1].section
             assert section is not None
             for name in self._powers:
                 home, _, part = name.partition(".")
@@ -81,20 +113,49 @@ class Parameters:
             found["target.scale"] = 1.0
         return {name: value for name, value in found.items() if name not in self._barred}
 
+    def _carried(self, b: int) -> bool:
+        """Whether a body can move rigidly at its first contact."""
+        hit, part = self.hit, self.hit.body_slice(b)
+        return bool(hit.history.shape[hit.ends[b].touched[0][0], part][hit.bodies[b].omega == 0.0].any())
+
     @cached_property
     def _barred(self) -> dict[str, str]:
         """Numbers in which this blow has no gradient although it has them, and why."""
         barred, hit = {}, self.hit
-        if hit.contact.gap == 0.0:
-            barred["contact.gap"] = "the bodies touch at the start, and no gap is unlike a small one; give a gap"
-        if hit.contact.loss == 0.0 and hit.history.law[0, layout.COMPLIANCE] > 0.0:
-            barred["contact.loss"] = (
-                "without loss the modes left out act as a spring in series, with loss they cannot; give the contact a "
-                "small loss"
-            )
-        if hit.speed == 0.0:
+        for name, c in self.laws.items():
+            if hit.contacts[c].gap == 0.0:
+                barred[f"{name}.gap"] = "the bodies touch at the start, and no gap is unlike a small one; give a gap"
+            sprung = hit.history.law[c, layout.COMPLIANCE] > 0.0 or self._ringing_alone
+            if hit.contacts[c].loss == 0.0 and sprung:
+                barred[f"{name}.loss"] = (
+                    "without loss the modes left out act as a spring in series, with loss they cannot; give the "
+                    "contact a small loss"
+                )
+        if self.struck and hit.speed == 0.0:
             barred["strike.speed"] = "the speed is zero"
+        for b, ends in enumerate(hit.ends):
+            if not self.struck and any(self._rests(c) for c, _ in ends.touched):
+                barred[f"speeds.{b}"] = (
+                    "the body rests against another at the start, and a speed would press or part them; give a gap"
+                )
         return barred
+
+    def _rests(self, c: int) -> bool:
+        """Whether two bodies touch at the start without pressing or approaching each other."""
+        h = self.hit.history
+        sizes = [np.abs(h.shape[c]) @ np.abs(x) for x in (h.start_q, h.start_p)]
+        d, v = float(h.offset[c] + h.shape[c] @ h.start_q), float(h.shape[c] @ h.start_p)
+        return abs(d) <= STILL * (sizes[0] + abs(h.offset[c])) and abs(v) <= STILL * sizes[1]
+
+    @cached_property
+    def _ringing_alone(self) -> bool:
+        """Whether modes stand for those left out that would be others if any contact had a loss."""
+        return not self._lossy and any(ends.forms.start < ends.forms.stop for ends in self.hit.ends)
+
+    @property
+    def _lossy(self) -> bool:
+        """Whether any contact has a loss."""
+        return bool((self.hit.history.law[:, layout.LOSS] > 0.0).any())
 
     @cached_property
     def why_no_target(self) -> str:
@@ -114,6 +175,8 @@ class Parameters:
     @cached_property
     def why_no_section(self) -> str:
         """Why numbers of section and material have no gradient; empty if they have."""
+        if not self.struck:
+            return "only the target of `strike` has one; take the mass and first frequency of the body"
         target = self.hit.bodies[-1]
         section = target.section
         system = getattr(target.shapes, "system", None)
@@ -158,6 +221,8 @@ class Parameters:
     def _reason(self, name: str) -> str:
         """Why a number that other blows have is not among those of this one."""
         home = name.partition(".")[0]
+        if not self.struck:
+            return self.why_no_section if home in ("section", "material") or name.endswith(".scale") else ""
         if name in ("strike.x", "strike.y"):
             return self.why_still
         if home == "target" and name != "target.scale":
@@ -182,21 +247,25 @@ class Parameters:
         return found
 
     def _enter(self, found: Change, i: int, name: str) -> None:
-        home, _, part = name.partition(".")
+        home, _, part = name.rpartition(".")
         value = self.values[name]
-        if name == "contact.gap":
-            found.offset[i] = -1.0
-        elif home == "contact":
-            found.law[i, LAW[part]] = 1.0
+        if home in self.laws and part == "gap":
+            found.offset[i, self.laws[home]] = -1.0
+        elif home in self.laws:
+            found.law[i, self.laws[home], LAW[part]] = 1.0
         elif name == "strike.speed":
             striker = self.hit.striker
             assert striker is not None
-            found.start_p[i, self._bodies[0]] = striker.motion  # the target may move already, whatever that speed
+            found.start_p[i, self._modes[0]] = striker.motion  # the target may move already, whatever that speed
+        elif home == "speeds":
+            b = int(part)
+            found.start_p[i, self._modes[b]] = self.hit.bodies[b].rigid_motion(self.hit.ends[b].points[:1])
         elif part == "damping_ratio":
-            body = self._bodies[home == "target"]
-            found.zeta[i, body] = self.hit.history.omega[body] > 0.0
+            b = self.bodies[home]
+            found.zeta[i, self._modes[b]] = self.hit.history.omega[self._modes[b]] > 0.0
+            found.zeta[i, self.hit.ends[b].forms] = not self._lossy  # else they are critically damped
         else:
-            self._stretch(found, i, home, *self._growth(name), value)
+            self._stretch(found, i, self.bodies.get(home, 1), *self._growth(name), value)
 
     def _growth(self, name: str) -> tuple[float, float]:
         """Powers with which frequencies and mass of a body grow with a number."""
@@ -208,77 +277,65 @@ class Parameters:
         return SCALE[type(section)] if name == "target.scale" else self._powers[name]
 
     @cached_property
-    def _bodies(self) -> tuple[slice, slice]:
-        return self.hit.body_slice(0), self.hit.body_slice(1)
+    def _modes(self) -> tuple[slice, ...]:
+        """The modes of every body in the run."""
+        return tuple(self.hit.body_slice(b) for b in range(len(self.hit.bodies)))
 
-    @cached_property
-    def _rest(self) -> tuple[float, float]:
-        """Residual compliance of striker and target [m/N] that acts in the run."""
-        hit, found = self.hit, [0.0, 0.0]
-        dips = hit.dips or (None, None)
-        if dips[0] is not None and hit.striker is not None:
-            found[0] = float(hit.striker.left_out[0][0, 0])
-        if dips[1] is not None and hit.at is not None:
-            h, spring = hit.history, len(hit.history.omega) == self._bodies[1].stop
-            found[1] = h.law[0, layout.COMPLIANCE] - found[0] if spring else (h.shape[0, -1] / h.omega[-1]) ** 2
-        return found[0], found[1]
+    def _soften(self, found: Change, i: int, b: int, change: np.ndarray) -> None:
+        """Enter a change (n_ends, n_ends) of the compliance of modes left out [m/N]."""
+        ends, h = self.hit.ends[b], self.hit.history
+        if not ends.rest.any():
+            return
+        contacts, signs = (list(column) for column in zip(*ends.touched))
+        if ends.forms.start == ends.forms.stop:
+            found.law[i, contacts[0], layout.COMPLIANCE] += change[0, 0]
+            found.offset[i, contacts[0]] += signs[0] * ends.dip_force * change[0, 0]
+            return
+        above = h.omega[ends.forms.start]
+        forms = h.shape[contacts, ends.forms] * np.array(signs)[:, None] / above
+        inverse = np.linalg.pinv(forms)
+        # of the changes that differ by a rotation of the forms, which have one frequency: any is as good
+        changed = (np.eye(len(forms)) - 0.5 * forms @ inverse) @ change @ inverse.T
+        for c, sign, row in zip(contacts, signs, changed):
+            found.shape[i, c, ends.forms] += sign * above * row
 
-    def _extra(self, body: int) -> int | None:
-        """Index of the mode that stands for the modes left out of a body; None if a spring does, or nothing."""
-        first, n_modes = self._bodies[1].stop, len(self.hit.history.omega)
-        if n_modes == first or not self._rest[body]:
-            return None
-        return first if body == 0 else n_modes - 1
+    def _raise(self, found: Change, i: int, b: int, faster: float) -> None:
+        """Let the modes that stand for those left out of a body follow its last one, ``faster`` per unit."""
+        forms, h = self.hit.ends[b].forms, self.hit.history
+        found.omega[i, forms] = faster * h.omega[forms]
+        found.shape[i, :, forms] += faster * h.shape[:, forms]
 
-    def _soften(self, found: Change, i: int, body: int, change: float) -> None:
-        """Enter a change of a residual compliance [m/N]."""
-        extra, h = self._extra(body), self.hit.history
-        if extra is not None:
-            found.shape[i, extra] += 0.5 * change / self._rest[body] * h.shape[0, extra]
-        elif self._rest[body]:
-            found.law[i, layout.COMPLIANCE] += change
-            dip = self.hit.dips[body]
-            assert dip is not None
-            found.offset[i] += dip.touched[0][1] * dip.force * change
-
-    def _stretch(self, found: Change, i: int, home: str, faster: float, heavier: float, value: float) -> None:
+    def _stretch(self, found: Change, i: int, b: int, faster: float, heavier: float, value: float) -> None:
         """A body whose frequencies and mass grow with these powers of a number."""
-        body, h = int(home not in ("striker",)), self.hit.history
-        part, extra = self._bodies[body], self._extra(body)
+        part, h = self._modes[b], self.hit.history
         found.omega[i, part] = faster / value * h.omega[part]
-        for name in ("shape", "bias", "start_q", "start_p"):  # displacement and velocity at the start stay
-            now = getattr(h, name)
+        found.shape[i, :, part] = -0.5 * heavier / value * h.shape[:, part]
+        for name in ("bias", "start_q", "start_p"):  # displacement and velocity at the start stay
             power = 0.5 if name.startswith("start") else -0.5
-            getattr(found, name)[i, part] = power * heavier / value * (now[0] if name == "shape" else now)[part]
-        if extra is not None:
-            found.omega[i, extra] = faster / value * h.omega[extra]
-            found.shape[i, extra] = faster / value * h.shape[0, extra]
-        self._soften(found, i, body, -(heavier + 2.0 * faster) / value * self._rest[body])
+            getattr(found, name)[i, part] = power * heavier / value * getattr(h, name)[part]
+        self._raise(found, i, b, faster / value)
+        self._soften(found, i, b, -(heavier + 2.0 * faster) / value * self.hit.ends[b].rest)
 
     def _vary(self, found: Change, i: int, change: SectionChange) -> None:
         """A target whose section changes along its length or over its area."""
-        hit, target, part, h = self.hit, self.hit.bodies[1], self._bodies[1], self.hit.history
+        hit, target, part, h = self.hit, self.hit.bodies[1], self._modes[1], self.hit.history
         if self.why_no_target or hit.at is None or h.start_q[part].any() or h.start_p[part].any():
             raise check.SimulationError(
                 f"no gradient in the section: {self.why_no_target or 'the target moved before the blow'}"
             )
         seen = varied.changed(target, change, hit.at)
         found.omega[i, part] = seen.omega
-        found.shape[i, part] = -seen.shape
+        found.shape[i, 0, part] = -seen.shape
         found.bias[i, part] = hit._push * seen.shape
-        extra, flexible = self._extra(1), target.omega > 0.0
-        if extra is not None:  # it follows the last mode
-            faster = seen.omega[-1] / target.omega[-1]
-            found.omega[i, extra] = faster * h.omega[extra]
-            found.shape[i, extra] = faster * h.shape[0, extra]
-        if self._rest[1]:
-            row, omega = target.shapes.at(hit.at[None])[0, flexible], target.omega[flexible]
-            carried = 2.0 * row / omega**2 @ (seen.shape[flexible] - row * seen.omega[flexible] / omega)
-            self._soften(found, i, 1, seen.compliance - float(carried))
+        self._raise(found, i, 1, seen.omega[-1] / target.omega[-1] if target.omega[-1] else 0.0)
+        flexible = target.omega > 0.0
+        row, omega = target.shapes.at(hit.at[None])[0, flexible], target.omega[flexible]
+        carried = 2.0 * row / omega**2 @ (seen.shape[flexible] - row * seen.omega[flexible] / omega)
+        self._soften(found, i, 1, np.array([[seen.compliance - float(carried)]]))
 
     def _shift(self, found: Change, axes: Mapping[int, int]) -> None:
         """The target struck further along an axis, for each parameter its own."""
-        hit, target, part = self.hit, self.hit.bodies[1], self._bodies[1]
+        hit, target, part = self.hit, self.hit.bodies[1], self._modes[1]
         assert hit.at is not None
         span = max(float(np.ptp(column)) for column in target.shapes.grid()[0].T)
         waves = np.pi * float(len(target.omega)) ** (1.0 / target.dimension) / span  # [rad/m] of the shortest wave
@@ -286,16 +343,16 @@ class Parameters:
         flexible = target.omega > 0.0
         carried = target.shapes.at(hit.at[None])[0, flexible] / target.omega[flexible] ** 2
         rests = [None] * len(axes)
-        if self._rest[1]:
+        if hit.ends[1].rest.any():
             rests = _slopes(target, hit.at, axes.values(), STATIC_SHIFT * span, _softness(target, hit.at))
         striker = hit.striker
         assert striker is not None  # it starts at the surface, which may be displaced
         for i, slope, rest in zip(axes, slopes, rests):
-            found.shape[i, part] = -slope
+            found.shape[i, 0, part] = -slope
             found.bias[i, part] = hit._push * slope
-            found.start_q[i, self._bodies[0]] = float(slope @ hit.history.start_q[part]) * striker.motion
+            found.start_q[i, self._modes[0]] = float(slope @ hit.history.start_q[part]) * striker.motion
             if rest is not None:
-                self._soften(found, i, 1, float(rest[0] - 2.0 * carried @ slope[flexible]))
+                self._soften(found, i, 1, np.array([[float(rest[0] - 2.0 * carried @ slope[flexible])]]))
 
 
 def _softness(target: Modes, at: np.ndarray) -> Any:

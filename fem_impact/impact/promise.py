@@ -88,8 +88,8 @@ def _names(hit: "Response") -> list[str]:
 
 def _more_modes(hit: "Response") -> Iterator[str]:
     """How many modes every body that keeps too few needs; what makes them few enough if they are too many."""
-    for body, (name, modes, dip) in enumerate(zip(_names(hit), hit.bodies, hit.dips)):
-        if dip is None or modes.poorer:  # the number of Ritz vectors has been raised already
+    for body, (name, modes, ends) in enumerate(zip(_names(hit), hit.bodies, hit.ends)):
+        if not ends.rest.any() or modes.poorer:  # the number of Ritz vectors has been raised already
             continue
         needs = partial(_modes_needed, hit, body)
         number = needs(hit.tolerance)
@@ -109,14 +109,13 @@ def _few_enough(needs: Callable[[float], float], tolerance: float) -> bool:
 
 def _modes_needed(hit: "Response", body: int, tolerance: float, softer: float = 1.0) -> float:
     """Modes of a body that a tolerance needs, if the stiffness of its contacts is multiplied by ``softer``."""
-    h, modes, dip, allowed = hit.history, hit.bodies[body], hit.dips[body], SHARE * tolerance
-    assert dip is not None
+    h, modes, ends, allowed = hit.history, hit.bodies[body], hit.ends[body], SHARE * tolerance
     own = np.zeros(len(h.omega), bool)
     own[hit.body_slice(body)] = True
     if not modes.omega[-1]:
         return 0.0  # a body that only moves rigidly: nothing tells how close its other modes are
     needed = 0.0
-    for point, (i, _) in zip(dip.points, dip.touched):
+    for point, (i, _) in zip(ends.points, ends.touched):
         law = replace(hit.contacts[i], stiffness=softer * hit.contacts[i].stiffness)
         inverse = float((h.shape[i, (h.omega == 0.0) & ~own] ** 2).sum())  # of the mass that the body feels
         speed = float(np.abs(h._column(1)[:, i]).max(initial=0.0))

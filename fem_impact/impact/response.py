@@ -267,12 +267,19 @@ def mode_energy(omega: np.ndarray, q: np.ndarray, p: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Dip:
-    """Where forces act on a body whose kept modes lack part of its static compliance."""
+class Ends:
+    """Where the contacts of a blow act on a body, and what its kept modes lack of its static compliance there."""
 
     points: np.ndarray  # (n_ends, dimension) [m]
     touched: tuple[tuple[int, float], ...]  # contact, and sign: 1 for its first body, -1 for its second
     force: float  # [N] constant force at the first point
+    rest: np.ndarray  # (n_ends, n_ends) [m/N] compliance of the modes left out; zero if the modes are complete
+    forms: slice = field(default_factory=lambda: slice(0))  # modes of the run that stand for these; empty for a spring
+    dip_force: float = 0.0  # [N] that constant force if it makes a spring that stands for them deflect
+    speed: float = 0.0  # [m/s] with which the body arrives in rigid motion, at its first point
+
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)
@@ -317,7 +324,7 @@ class Response(Totals):
     error: Error
     striker: Striker | None = None
     at: np.ndarray | None = None  # (dimension,) [m] strike point
-    dips: tuple[Dip | None, ...] = ()  # one per body; None if its modes are complete
+    ends: tuple[Ends, ...] = ()  # one per body
     quantities: Mapping[str, float | None] = field(default_factory=lambda: USUAL)  # that must meet it; bands [Hz]
     ringing: Modes | None = None  # modes of the target driven by the force, see `on`
     rings: Callable[["Response"], Modes] | None = field(default=None, repr=False)  # finds them when they are needed
@@ -521,12 +528,15 @@ class Response(Totals):
         quantity : str or sequence of str
             "restitution", "impulse", "contact_time", "peak_force", "peak_time", "spectral_centroid=5000" (its band in
             Hz), "spectral_level=800" (of the force at 800 Hz, in dB re 0 Hz) or "modal_energy" (the energy left in each
-            mode of the target at the last separation).
+            mode of the target at the last separation). Of several contacts they are those of the blow as a whole:
+            impulse, contact time and spectrum add up, the peak is the largest.
         wrt : str or sequence of str, optional
             Names of numbers as in a scene file: "striker.mass", "striker.first_frequency", "striker.damping_ratio",
             "contact.stiffness", "contact.exponent", "contact.loss", "contact.gap", "strike.speed", "strike.x",
             "strike.y", "target.mass", "target.first_frequency", "target.damping_ratio", "section.thickness",
-            "material.E", "material.rho", "target.scale" and others. By default all in which this blow has a gradient.
+            "material.E", "material.rho", "target.scale" and others. Of `collide`, by its arguments: "contacts.0.stiffness"
+            and the other numbers of each contact, "bodies.1.mass", "bodies.1.first_frequency",
+            "bodies.1.damping_ratio", "speeds.0". By default all in which this blow has a gradient.
             A mass changes at fixed frequencies and damping ratios, a first frequency takes all others of its body with
             it, a damping ratio is added to all of them. Numbers of section and material change at a fixed contact law;
             the scale multiplies all lengths along the target, the strike point moves along. A body that moves already
@@ -545,8 +555,8 @@ class Response(Totals):
         Raises
         ------
         SimulationError
-            Where there is no derivative: next to a contact that barely happens or barely does not, where two maxima of
-            the force are alike, for felt and contacts that yield.
+            Where there is no derivative: next to a contact that barely happens or barely does not (of several contacts
+            it says which), where two maxima of the force are alike, for felt and contacts that yield.
 
         Notes
         -----
@@ -741,23 +751,23 @@ class Response(Totals):
 
     def _dip(self, points: Any, times: Any, body: int) -> tuple[Any, Any]:
         """Static deflection [m] of the left-out modes and its rate [m/s], (n_times, n_points); 0 if there are none."""
-        dip = self.dips[body] if self.dips else None
+        ends = self.ends[body] if self.ends and self.ends[body].rest.any() else None
         if self._moved(body) is self._ringing and self.at is not None:
-            dip = Dip(self.at[None], ((0, -1.0),), self._push)
-        if dip is None:
+            ends = Ends(self.at[None], ((0, -1.0),), self._push, np.zeros((1, 1)), dip_force=self._push)
+        if ends is None:
             return 0.0, 0.0
-        modes, n_ends = self._moved(body), len(dip.points)
+        modes, n_ends = self._moved(body), len(ends.points)
         times = check.array("times", times, (None,), "s", lift=True)
-        found = [self.history.force_at(times, i) for i, _ in dip.touched]
-        sign = np.array([sign for _, sign in dip.touched])
+        found = [self.history.force_at(times, i) for i, _ in ends.touched]
+        sign = np.array([sign for _, sign in ends.touched])
         force, rate = (-sign * np.stack([pair[k] for pair in found], axis=1) for k in (0, 1))  # (n_times, n_ends)
-        force[:, 0] += dip.force
+        force[:, 0] += ends.dip_force
         asked = modes.points("points", points)
         if not force.any() or not len(asked):
             return 0.0, 0.0
         blocks = [asked[i : i + DIP_BLOCK] for i in range(0, len(asked), DIP_BLOCK)]
         rest = np.vstack(
-            [modes.residual_compliance(np.vstack([dip.points, block]))[n_ends:, :n_ends] for block in blocks]
+            [modes.residual_compliance(np.vstack([ends.points, block]))[n_ends:, :n_ends] for block in blocks]
         )  # (n_points, n_ends)
         return force @ rest.T, rate @ rest.T
 

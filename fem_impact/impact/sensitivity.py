@@ -4,13 +4,14 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
-from .compiled import build, layout, record
+from .compiled import layout, record
 from .compiled.tangents import N_LAW, Blow, Change, Found, Pieces, follow, law_at, rate_slopes
 
 if TYPE_CHECKING:
@@ -63,13 +64,15 @@ def moments_kept(count: int, steps: int) -> np.ndarray:
 
 def no_change(history: "History", n: int) -> Change:
     """Room for the changes that ``n`` parameters make, all zero."""
-    omega, zeta, shape, bias, start_q, start_p = np.zeros((6, n, len(history.omega)))
-    return Change(omega, zeta, shape, bias, start_q, start_p, np.zeros(n), np.zeros((n, N_LAW)))
+    m = history.n_contacts
+    omega, zeta, bias, start_q, start_p = np.zeros((5, n, len(history.omega)))
+    shape = np.zeros((n, m, len(history.omega)))
+    return Change(omega, zeta, shape, bias, start_q, start_p, np.zeros((n, m)), np.zeros((n, m, N_LAW)))
 
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """A recorded blow with one contact, followed with its changes per unit of n parameters."""
+    """A recorded blow, followed with its changes per unit of n parameters."""
 
     history: "History"
     change: Change
@@ -77,7 +80,8 @@ class Sensitivity:
     pieces: Pieces
     found: Found
     peak: float  # [s] when the force is largest, nearly; NaN if it is not wanted
-    apart: float  # [-] how much smaller the next of its maxima is
+    apart: float  # [-] how much smaller the next of the maxima is
+    pressed_most: int = 0  # the contact whose force is largest
 
     def __repr__(self) -> str:
         return check.brief(self)
@@ -97,56 +101,63 @@ class Sensitivity:
                 "no gradient: the bodies chatter, and the run passed over contacts without locating them; give "
                 "max_impacts, a shorter duration or no dt"
             )
-        top, apart = _peak(history) if peak else (np.nan, np.inf)
+        top, apart, most = _peak(history) if peak else (np.nan, np.inf, 0)
         smooth = history.n_coefficients > 2
         if smooth and not np.isnan(top):
-            top = _sharper(history, top)
+            top = _sharper(history, top, most)
         wanted = [when for each in history.impacts for when in (each.start, each.end)]
         marked = [] if np.isnan(top) else [top] if smooth else list(_step_at(history, top))
-        bent = float(history.law[0, layout.EXPONENT]) != 1.0 or change.law[:, layout.EXPONENT].any()
+        bent = (history.law[:, layout.EXPONENT] != 1.0).any() or change.law[:, :, layout.EXPONENT].any()
         grades = 4.0 ** -np.arange(GRADES[smooth] - coarse, 0.0, -1.0) if bent else np.zeros(0)
         time, row, part, count = _cut(history, [*wanted, *marked], grades, together)
         wanted = [0.0, *wanted, *marked, time[-1]]
         nodes, powers = gauss(NODES[int(smooth)])
-        n, n_modes, s = len(change.offset), len(history.omega), len(powers)
+        n, n_modes, m, s = len(change.offset), len(history.omega), history.n_contacts, len(powers)
         marks = sorted({_nearest(time, when) for when in wanted})
         mark = np.full(len(time), -1)
         mark[marks] = np.arange(len(marks))
-        length, closed = _alike(np.diff(time)), history.pressed[row, 0]
+        length, closed = _alike(np.diff(time)), history.pressed[row]
         pieces = Pieces(length, closed, _recorded(history, row, part, count, length, nodes[:-1]), mark, nodes, powers)
         found = Found(
-            np.zeros((len(time), 2)), np.zeros((len(marks), 5)), np.zeros((len(marks), 4, n)),
-            np.zeros((len(marks), n_modes)), np.zeros((len(marks), n_modes)), np.zeros((len(length), s, n)),
+            np.zeros((len(time), m, 2)), np.zeros((len(marks), m, 5)), np.zeros((len(marks), m, 4, n)),
+            np.zeros((len(marks), n_modes)), np.zeros((len(marks), n_modes)), np.zeros((len(length), m, s, n)),
             np.zeros((n, n_modes)), np.zeros((n, n_modes)),
         )  # fmt: skip
         blow = Blow(
-            history.omega, history.zeta, history.shape[0], history.bias, history.start_q, history.start_p,
-            float(history.offset[0]), history.law,
+            history.omega, history.zeta, history.shape, history.bias, history.start_q, history.start_p,
+            history.offset, history.law,
         )  # fmt: skip
         follow(blow, change, pieces, found)
-        told = cls(history, change, time, pieces, found, top, apart)
-        return told if smooth or np.isnan(top) or history.law[0, layout.LOSS] else replace(told, peak=told._summit())
+        told = cls(history, change, time, pieces, found, top, apart, most)
+        return told if smooth or np.isnan(top) or told._law[0, layout.LOSS] else replace(told, peak=told._turned())
 
     @cached_property
-    def deepest(self) -> float:
-        """Largest approach in the blow [m]."""
-        return float(self.found.way[:, 0].max(initial=0.0))
+    def deepest(self) -> np.ndarray:
+        """Largest approach of each contact in the blow [m], (n_contacts,)."""
+        return np.asarray(self.found.way[:, :, 0].max(axis=0, initial=0.0))
 
     @cached_property
     def events(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
         """Changes (n,) of start and end of every impact, per unit [s]."""
-        return tuple((self._moved(each.start), self._moved(each.end)) for each in self.history.impacts)
+        return tuple(
+            (self._moved(each.start, each.contact), self._moved(each.end, each.contact))
+            for each in self.history.impacts
+        )
 
-    def _moved(self, time: float) -> np.ndarray:
-        """Change of an onset or release."""
+    def _moved(self, time: float, c: int) -> np.ndarray:
+        """Change of an onset or release of contact c."""
         k = _nearest(self.time, time)
         mark = self.pieces.mark[k]
-        d, v, a = self.found.base[mark, :3]
-        dd, dv = self.found.ends[mark, :2]
+        d, v, a = self.found.base[mark, c, :3]
+        dd, dv = self.found.ends[mark, c, :2]
         still = np.zeros(dd.shape)
-        near = abs(d) <= AT_ZERO * self.deepest
+        near = abs(d) <= AT_ZERO * self.deepest[c]
         if k == 0:
-            if near and (np.abs(dd) > CANCELS * self._start_terms).any():
+            h = self.history
+            parts = (np.abs(dd) > CANCELS * self._start_terms(c, h.start_q, self.change.start_q)).any()
+            resting = abs(v) <= CANCELS * np.abs(self.found.way[:, :, 1]).max()
+            parts |= resting and (np.abs(dv) > CANCELS * self._start_terms(c, h.start_p, self.change.start_p)).any()
+            if near and parts:
                 raise SimulationError(
                     "no gradient: the bodies touch at the start already, and a change would press or part them; "
                     "give a gap"
@@ -156,24 +167,39 @@ class Sensitivity:
             return -dd / v
         if k == 0 or (k == len(self.time) - 1 and self.history.status == record.HORIZON):
             return still
-        loss = self.history.law[0, layout.LOSS]
-        if abs(d) < abs(1.0 + loss * v) * self.deepest:
+        if k == len(self.time) - 1 and c in self._cut_off:
+            return self.end
+        loss = self.history.law[c, layout.LOSS]
+        if abs(d) < abs(1.0 + loss * v) * self.deepest[c]:
             return -dd / v
-        return -(self.change.law[:, layout.LOSS] * v + loss * dv) / (loss * a)
+        return -(self.change.law[:, c, layout.LOSS] * v + loss * dv) / (loss * a)
 
-    @property
-    def _start_terms(self) -> np.ndarray:
-        """Sum (n,) of the sizes of what changes the approach at the start [m]; all that may cancel."""
-        h, change = self.history, self.change
-        return np.abs(change.shape) @ np.abs(h.start_q) + np.abs(change.start_q) @ np.abs(h.shape[0])
+    @cached_property
+    def _last(self) -> int:
+        """The contact whose release ended the run, the one that presses least at the end."""
+        at, h = self.found.base[self.pieces.mark[-1]], self.history
+        parting = np.minimum(np.abs(at[:, 0] / self.deepest), np.abs(1.0 + h.law[:, layout.LOSS] * at[:, 1]))
+        return int(np.where(h.pressed[-1], parting, np.inf).argmin())
+
+    @cached_property
+    def _cut_off(self) -> np.ndarray:
+        """Contacts (n,) that still press where the run ends with the release of another."""
+        stopped = self.history.status == record.IMPACTS
+        return np.array([c for c in np.flatnonzero(self.history.pressed[-1]) if stopped and c != self._last], int)
+
+    def _start_terms(self, c: int, start: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Sum (n,) of the sizes of what changes approach c at the start, or its rate; all that may cancel."""
+        by_shape = np.abs(self.change.shape[:, c]) @ np.abs(start)
+        return np.asarray(by_shape + np.abs(change) @ np.abs(self.history.shape[c]))
 
     @cached_property
     def end(self) -> np.ndarray:
         """Change (n,) of the end of the run [s]; a run that was given a duration keeps it."""
-        if self.history.status == record.HORIZON or not self.events:
+        if self.history.status == record.HORIZON or not self.history.impacts:
             return np.zeros(len(self.change.offset))
-        last = max(range(len(self.events)), key=lambda i: self.history.impacts[i].end)
-        return self.events[last][1]
+        last = max(self.history.impacts, key=lambda each: each.end)
+        at_end = _nearest(self.time, last.end) == len(self.time) - 1
+        return self._moved(last.end, self._last if at_end else last.contact)
 
     @property
     def contact_time(self) -> np.ndarray:
@@ -189,17 +215,25 @@ class Sensitivity:
 
     @property
     def impulse(self) -> np.ndarray:
-        """Change (n,) of the impulse [N s]."""
-        return np.einsum("jb,jbi->i", self.weights, self.found.force)
+        """Change (n,) of the impulse of all contacts [N s]."""
+        return np.einsum("jb,jcbi->i", self.weights, self.found.force) + self._end_impulse
+
+    @property
+    def _end_impulse(self) -> np.ndarray:
+        """Change (n,) of the impulse [N s] as the end of the run moves."""
+        if not len(self._cut_off):
+            return np.zeros(len(self.change.offset))
+        return np.asarray(self.found.base[self.pieces.mark[-1], self._cut_off, 4].sum() * self.end)
 
     def spectrum(self, frequencies: np.ndarray) -> np.ndarray:
-        """Change (n_frequencies, n) of the force's Fourier transform [N s], for few frequencies."""
-        time, force = self._impulses(float(np.abs(frequencies).max(initial=0.0)), self.found.force)
+        """Change (n_frequencies, n) of the Fourier transform of all forces together [N s], for few frequencies."""
+        time, force = self._impulses(float(np.abs(frequencies).max(initial=0.0)), self.found.force.sum(axis=1))
         return np.exp(-2j * np.pi * frequencies[:, None] * time) @ force
 
     def even_spectrum(self, count: int, step: float) -> "EvenSpectrum":
         """Transform of the force and its changes at 0, step, 2 step, ... [Hz], so many frequencies."""
-        time, force = self._impulses(step * count, np.concatenate([self.pieces.force[..., None], self.found.force], 2))
+        both = np.concatenate([self.pieces.force[..., None], self.found.force], axis=3)
+        time, force = self._impulses(step * count, both.sum(axis=1))
         return EvenSpectrum(count, *_turns(count, step, time), force)
 
     def _impulses(self, highest: float, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -207,15 +241,18 @@ class Sensitivity:
 
         The forces (n_pieces, s, n) [N] are those at the nodes.
         """
-        pieces = self.pieces
-        phase = np.pi * highest * pieces.length[pieces.closed].max(initial=0.0)
+        pieces, closed = self.pieces, self.pieces.closed.any(axis=1)
+        phase = np.pi * highest * pieces.length[closed].max(initial=0.0)
         rule = len(pieces.powers) + MORE + int(3.0 * phase)
         nodes = gauss(rule)[0][:-1]
         basis = np.vander(nodes, len(pieces.powers), increasing=True) @ pieces.powers.T  # (rule, s)
-        length = pieces.length[pieces.closed, None]
-        time = (self.time[:-1][pieces.closed, None] + nodes * length).ravel()
-        values = basis @ force[pieces.closed] * (shares(rule) * length)[:, :, None]
-        return time, values.reshape(len(time), -1)
+        length = pieces.length[closed, None]
+        time = (self.time[:-1][closed, None] + nodes * length).ravel()
+        values = (basis @ force[closed] * (shares(rule) * length)[:, :, None]).reshape(len(time), -1)
+        if not len(self._cut_off):
+            return time, values
+        at_end = np.append(np.zeros(values.shape[1] - len(self.end)), self._end_impulse)
+        return np.append(time, self.time[-1]), np.vstack([values, at_end])
 
     @property
     def end_speeds(self) -> np.ndarray:
@@ -224,10 +261,10 @@ class Sensitivity:
         rate = h.bias - h.omega * (2.0 * h.zeta * found.p[-1] + h.omega * found.q[-1])
         return (found.dp + rate * self.end[:, None]).T
 
-    def speed(self, modes: np.ndarray) -> np.ndarray:
-        """Change (n,) of the final speed [m/s] of the contact point in some modes."""
-        u, p = self.history.shape[0, modes], self.found.p[-1, modes]
-        return self.change.shape[:, modes] @ p + u @ self.end_speeds[modes]
+    def speed(self, modes: np.ndarray, c: int) -> np.ndarray:
+        """Change (n,) of the final speed [m/s] of the point of contact c in some modes."""
+        u, p = self.history.shape[c, modes], self.found.p[-1, modes]
+        return np.asarray(self.change.shape[:, c, modes] @ p + u @ self.end_speeds[modes])
 
     def energies(self, modes: slice) -> np.ndarray:
         """Change (n_modes, n) of the energy left in each of some modes at the end [J]."""
@@ -244,42 +281,65 @@ class Sensitivity:
         """Change (n,) of the largest force [N]."""
         if np.isnan(self.peak):
             return np.zeros(len(self.change.offset))
-        return self._at_peak[1][3] + self._rate_change * self._late
+        top = self._top
+        return np.asarray(top.changes[3] + top.rate_change * top.late + (0.0 if top.bend else top.rate * self._edge))
 
     @property
     def peak_time(self) -> np.ndarray:
         """Change (n,) of the time of the largest force [s]."""
-        return np.zeros(len(self.change.offset)) if not self._bend else -self._rate_change / self._bend
+        return self._top.moved if self._top.bend else self._edge
+
+    @property
+    def _edge(self) -> np.ndarray:
+        """Change (n,) of the time of a peak at the start or end of the run [s]."""
+        at_end = self.peak > 0.5 * self.time[-1] and len(self._cut_off) > 0
+        return self.end if at_end else np.zeros(len(self.change.offset))
 
     @property
     def when_largest(self) -> float:
         """Time of the largest force [s]."""
-        return float(self.peak + self._late)
+        return float(self.peak + self._top.late)
 
     @property
     def largest(self) -> float:
         """Largest force [N]."""
-        d, v = self._at_peak[0][:2]
-        return float(law_at(float(d), float(v), self.history.law, np.zeros(N_LAW))[0])
+        d, v = self._top.now[:2]
+        return float(law_at(float(d), float(v), self._law, np.zeros(N_LAW))[0])
+
+    @property
+    def peak_doubt(self) -> np.ndarray:
+        """How far the cubic and the quintic through the peak disagree on the change (n,) of its time [s].
+
+        Zero unless a lossy force rings within its steps.
+        """
+        if np.isnan(self.peak) or self.history.n_coefficients > 2 or not self._law[0, layout.LOSS]:
+            return np.zeros(len(self.change.offset))
+        return np.abs(self._summit(*self._through_ends(3)).moved - self.peak_time)
+
+    @property
+    def _law(self) -> np.ndarray:
+        """The law of the contact whose force is largest, (1, 9 or 4)."""
+        return self.history.law[self.pressed_most : self.pressed_most + 1]
 
     @cached_property
-    def _at_peak(self) -> tuple[np.ndarray, np.ndarray]:
-        """Approach and its first three rates (4,) at the peak; changes (4, n) of the first three, and of the force.
+    def _top(self) -> "Summit":
+        """The blow at its largest force.
 
         A force that is linear in each step jumps between two, and the accelerations with it. There the approach is the
         polynomial through both ends of the step: the quintic or, under a loss, whose rates ring, the cubic, as in the
         force that the peak was found in.
         """
         if self.history.n_coefficients > 2:
-            at = self.pieces.mark[_nearest(self.time, self.peak)]
-            return self.found.base[at, :4], self.found.ends[at]
-        return self._through_ends(2 if self.history.law[0, layout.LOSS] else 3)
+            at = self.pieces.mark[_nearest(self.time, self.peak)], self.pressed_most
+            return self._summit(self.found.base[at][:4], self.found.ends[at])
+        return self._summit(*self._through_ends(2 if self._law[0, layout.LOSS] else 3))
 
-    def _summit(self) -> float:
+    def _turned(self) -> float:
         """When the quintic through the ends of the step with the peak turns back [s], which it was not found by."""
         start, end, ends = self._peak_step
         inside = (self.peak - start) / (end - start)
-        powers = hermite(3) @ (np.tile((end - start) ** np.arange(3.0), 2) * self.found.base[ends, :3].ravel())
+        at_ends = self.found.base[ends, self.pressed_most, :3].ravel()
+        powers = hermite(3) @ (np.tile((end - start) ** np.arange(3.0), 2) * at_ends)
         for _ in range(2):
             _, rate, bend, _ = derivatives(inside, 6) @ powers
             inside -= rate / bend if bend < 0.0 else 0.0
@@ -292,72 +352,64 @@ class Sensitivity:
         return start, end, self.pieces.mark[[_nearest(self.time, start), _nearest(self.time, end)]]
 
     def _through_ends(self, n_rates: int) -> tuple[np.ndarray, np.ndarray]:
-        """The same at the peak by the polynomial with the approach and rates, so many in all, at the ends of a step."""
-        start, end, ends = self._peak_step
+        """The motion at the peak and its changes, see `Summit`, by the polynomial with the approach and its rates, so
+        many in all, at the ends of a step.
+        """
+        (start, end, ends), c = self._peak_step, self.pressed_most
         scale = (end - start) ** np.arange(4.0)
         at_ends = np.tile(scale[:n_rates], 2)
         inside = (self.peak - start) / (end - start)
         rates = derivatives(inside, 2 * n_rates) @ hermite(n_rates) * at_ends / scale[:, None]
-        base = rates @ self.found.base[ends, :n_rates].ravel()
-        changes = rates[:3] @ self.found.ends[ends, :n_rates].reshape(2 * n_rates, -1)
+        base = rates @ self.found.base[ends, c, :n_rates].ravel()
+        changes = rates[:3] @ self.found.ends[ends, c, :n_rates].reshape(2 * n_rates, -1)
         slopes = np.zeros(N_LAW)
-        _, by_d, by_v = law_at(base[0], base[1], self.history.law, slopes)
-        return base, np.vstack([changes, by_d * changes[0] + by_v * changes[1] + self.change.law @ slopes])
+        _, by_d, by_v = law_at(base[0], base[1], self._law, slopes)
+        return base, np.vstack([changes, by_d * changes[0] + by_v * changes[1] + self.change.law[:, c] @ slopes])
 
-    @property
-    def peak_doubt(self) -> np.ndarray:
-        """How far the cubic and the quintic through the peak disagree on the change (n,) of its time [s].
-
-        Zero unless a lossy force rings within its steps.
-        """
-        if np.isnan(self.peak) or self.history.n_coefficients > 2 or not self.history.law[0, layout.LOSS]:
-            return np.zeros(len(self.change.offset))
-        other = replace(self)
-        other.__dict__["_at_peak"] = self._through_ends(3)
-        return np.asarray(np.abs(other.peak_time - self.peak_time))
-
-    @cached_property
-    def _late(self) -> float:
-        """How much later than `peak` [s] the force is largest: one step of Newton's method."""
-        return -self._turning[0] / self._bend if self._bend else 0.0
-
-    @property
-    def _bend(self) -> float:
-        """Second rate of the force at its peak [N/s^2]; zero if the force is largest at an end of the blow."""
-        return float(self._turning[1]) if EDGE < self.peak / self.time[-1] < 1.0 - EDGE else 0.0
-
-    @property
-    def _rate_change(self) -> np.ndarray:
-        """Change (n,) of the rate of the force at its peak."""
-        law = self.change.law
-        return np.asarray(self._turning[2:5] @ self._at_peak[1][:3] + law @ self._turning[5:])
-
-    @cached_property
-    def _turning(self) -> np.ndarray:
-        """Rate of the force at its peak [N/s], and its slopes along the motion, in the approach and its first two rates
-        and in the numbers of the law, (5 + N_LAW,); by central differences.
-        """
-        now, law = self._at_peak[0], self.history.law
+    def _summit(self, now: np.ndarray, changes: np.ndarray) -> "Summit":
+        """The blow at its largest force, where this is the motion; by central differences of the law."""
+        c = self.pressed_most
+        law, law_change = self._law, self.change.law[:, c]
         along = np.zeros((4 + N_LAW, 3 + N_LAW))
         along[0, :3] = now[1:]
-        used = np.flatnonzero(self.change.law.any(axis=0))
+        used = np.flatnonzero(law_change.any(axis=0))
         along[np.arange(1, 4), np.arange(3)] = 1.0
         along[4 + used, 3 + used] = 1.0
         width = min(N_LAW, law.shape[1])
         scale = np.ones(3 + N_LAW)
-        scale[:3] = np.array([1.0, *self._fast]) * now[0]
+        fastest = np.abs(self.found.base[:, c, 1:3]).max(axis=0) / self.deepest[c]
+        scale[:3] = np.append(1.0, fastest) * now[0]
         scale[3 : 3 + width] = np.where(law[0, :width], law[0, :width], 1.0)
         sizes = np.abs(along / scale).max(axis=1)
-        found = np.empty(5 + N_LAW)
-        rate_slopes(now[:3], law, along * (NUDGE / np.where(sizes, sizes, 1.0))[:, None], found)
-        found[1:] *= sizes / NUDGE
-        return found
+        turning = np.empty(5 + N_LAW)
+        rate_slopes(now[:3], law, along * (NUDGE / np.where(sizes, sizes, 1.0))[:, None], turning)
+        turning[1:] *= sizes / NUDGE
+        bend = float(turning[1]) if EDGE < self.peak / self.time[-1] < 1.0 - EDGE else 0.0
+        return Summit(now, changes, float(turning[0]), bend, turning[2:5] @ changes[:3] + law_change @ turning[5:])
+
+
+@dataclass(frozen=True, eq=False)
+class Summit:
+    """The motion where a force is largest, or nearly, and what small changes do to the force there."""
+
+    now: np.ndarray  # (4,) approach and its first three rates
+    changes: np.ndarray  # (4, n) changes of the first three, and of the force
+    rate: float  # [N/s] of the force
+    bend: float  # [N/s^2] its second rate; zero if the force is largest at an end of the blow
+    rate_change: np.ndarray  # (n,) change of the rate
+
+    def __repr__(self) -> str:
+        return check.brief(self)
 
     @property
-    def _fast(self) -> tuple[float, float]:
-        """Largest rate and acceleration of the approach over the largest approach."""
-        fastest = np.abs(self.found.base[:, 1:3]).max(axis=0) / self.deepest
-        return float(fastest[0]), float(fastest[1])
+    def late(self) -> float:
+        """How much later [s] the force is largest: one step of Newton's method."""
+        return -self.rate / self.bend if self.bend else 0.0
+
+    @property
+    def moved(self) -> np.ndarray:
+        """Change (n,) of the time of the largest force [s]."""
+        return -self.rate_change / self.bend if self.bend else np.zeros(len(self.rate_change))
 
 
 @dataclass(frozen=True, eq=False)
@@ -433,28 +485,37 @@ def _alike(length: np.ndarray) -> np.ndarray:
     return found
 
 
-def _peak(history: "History") -> tuple[float, float]:
-    """When the force is largest [s], and by how much it exceeds the next of its maxima [-]; NaN without impacts."""
+def _peak(history: "History") -> tuple[float, float, int]:
+    """When a force is largest [s], by how much it exceeds the next of the maxima [-], and of which contact it is.
+
+    NaN without impacts.
+    """
     if not history.impacts:
-        return np.nan, np.inf
-    time, top, rival = record.largest_force(history.steps, history.now, history.law, history.n_coefficients, build.ZERO)
-    return time, (top - rival) / top if top > 0.0 else np.inf
+        return np.nan, np.inf, 0
+    found = []
+    for c in range(history.n_contacts):
+        found.append(record.largest_force(history.steps, history.now, history.law, history.n_coefficients, np.int64(c)))
+    most = max(range(len(found)), key=lambda c: found[c][1])
+    time, top, rival = found[most]
+    rival = max([rival, *(other[1] for other in found[:most] + found[most + 1 :])])
+    return time, (top - rival) / top if top > 0.0 else np.inf, most
 
 
-def _sharper(history: "History", time: float) -> float:
-    """When the force is largest [s] by the motion itself, from a time nearby.
+def _sharper(history: "History", time: float, c: int) -> float:
+    """When the force of contact c is largest [s] by the motion itself, from a time nearby.
 
     The force of a long step is a polynomial through its nodes, whose largest value is a little beside that of the law.
     """
     start, end = _step_at(history, time)
-    shape, omega, zeta, beside = history.shape[0], history.omega, history.zeta, BESIDE * (end - start)
+    shape, omega, zeta, beside = history.shape, history.omega, history.zeta, BESIDE * (end - start)
     best = time
     for _ in range(2):
         rates = np.empty(2)
         for i, (q, p) in enumerate(zip(*history.states(np.array([best, best + beside])))):
-            d, v = float(history.offset[0] + shape @ q), float(shape @ p)
-            force, by_d, by_v = law_at(d, v, history.law, np.zeros(N_LAW))
-            rates[i] = by_d * v + by_v * (shape @ (history.bias - shape * force - omega * (2.0 * zeta * p + omega * q)))
+            d, v = history.offset + shape @ q, shape @ p
+            laws = [law_at(d[e], v[e], history.law[e : e + 1], np.zeros(N_LAW)) for e in range(len(d))]
+            pushed = history.bias - np.array([force for force, _, _ in laws]) @ shape
+            rates[i] = laws[c][1] * v[c] + laws[c][2] * (shape[c] @ (pushed - omega * (2.0 * zeta * p + omega * q)))
         later = best - rates[0] * beside / (rates[1] - rates[0]) if rates[1] < rates[0] else best
         if not start < later < end:
             return time
@@ -475,30 +536,39 @@ def together(history: "History") -> int:
     The changes are polynomials of higher order than the force of the record, and need fewer pieces. None are put
     together where a step's force is of high order itself.
     """
-    per_impact = history.pressed[:, 0].sum() / max(1, len(history.impacts))
-    lossy = bool(history.law[0, layout.LOSS])
-    return 1 if history.n_coefficients > 2 else 2 ** sum(per_impact >= least for least in FULL[lossy])
+    if history.n_coefficients > 2 or not len(history.contacts):
+        return 1
+    counts = np.bincount(history.contacts[:, 4].astype(int), minlength=history.n_contacts)
+    per_impact = min(history.pressed[:, c].sum() / count for c, count in enumerate(counts) if count)
+    lossy = bool(history.law[:, layout.LOSS].any())
+    return 2 ** sum(bool(per_impact >= least) for least in FULL[lossy])
 
 
 def _recorded(
     history: "History", row: np.ndarray, part: np.ndarray, count: np.ndarray, length: np.ndarray, nodes: np.ndarray
 ) -> np.ndarray:
-    """Recorded force at the nodes of all pieces, (n_pieces, s) [N].
+    """Recorded forces at the nodes of all pieces, (n_pieces, n_contacts, s) [N].
 
     That of several steps is the polynomial through the nodes with the same moments as theirs.
     """
     s = len(nodes)
-    force = np.zeros((len(row), s))
-    for n in np.unique(count):
-        own = np.flatnonzero((count == n) & history.pressed[row, 0])
+    force = np.zeros((len(row), history.n_contacts, s))
+    for n, c in product(np.unique(count), range(history.n_contacts)):
+        own = np.flatnonzero((count == n) & history.pressed[row, c])
         steps = row[own, None] + np.arange(n)
         share = length[own, None] / history.steps[row[own], 1:2] if n == 1 else np.ones((len(own), 1))
         within = part[own, None, None] + share[:, :, None] * nodes  # (n_own, 1, s), the same for all steps of a piece
         each = np.zeros((len(own), n, s))
+        first = layout.HEAD + (layout.PUSH + history.n_coefficients) * c + layout.PUSH
         for k in range(history.n_coefficients)[::-1]:
-            each = each * within + history.steps[steps, layout.HEAD + layout.PUSH + k][:, :, None]
-        force[own] = each.reshape(len(own), -1) @ moments_kept(s, int(n))
+            each = each * within + history.steps[steps, first + k][:, :, None]
+        force[own, c] = each.reshape(len(own), int(n) * s) @ moments_kept(s, int(n))
     return force
+
+
+def runs(held: np.ndarray) -> np.ndarray:
+    """First index of every run of truths (n,), and one after its last, (n_runs, 2)."""
+    return np.flatnonzero(np.diff(np.concatenate([[0], held, [0]]))).reshape(-1, 2)
 
 
 def _cut(
@@ -509,18 +579,19 @@ def _cut(
     A piece begins at each of some times and ``grades`` of the median step from where a contact starts or ends; up to
     ``most`` steps make one.
     """
-    steps, pressed = history.steps, history.pressed[:, 0]
+    steps, pressed = history.steps, history.pressed
     if not len(steps):
         return np.zeros(1), np.zeros(0, int), np.zeros(0), np.zeros(0, int)
     inside: defaultdict[int, set[float]] = defaultdict(set)
     places = np.clip(np.searchsorted(steps[:, layout.START], times, side="right") - 1, 0, len(steps) - 1)
     for i, when in zip(places.tolist(), times):
         inside[i].add(float((when - steps[i, layout.START]) / steps[i, layout.LENGTH]))
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], pressed, [False]]).astype(int)))
-    if len(edges) and len(grades):
-        grades = grades * float(np.median(steps[pressed, layout.LENGTH]))
-        for first, last in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist()):
+    edges = [runs(pressed[:, c]) for c in range(history.n_contacts)]
+    if len(grades) and pressed.any():
+        grades = grades * float(np.median(steps[pressed.any(axis=1), layout.LENGTH]))
+        for first, last in np.vstack(edges).tolist():
             inside[first].update(part for part in (grades / steps[first, layout.LENGTH]).tolist() if part < WHOLLY)
+            last -= 1
             inside[last].update(1.0 - part for part in (grades / steps[last, layout.LENGTH]).tolist() if part < WHOLLY)
     begins, rows = [np.zeros(len(steps))], [np.arange(len(steps))]
     for k, fractions in inside.items():
@@ -536,7 +607,7 @@ def _cut(
     row, part = row[order], part[order]
     count = np.ones(len(row), int)
     if most > 1:
-        row, part, count = _joined(history, row, part, edges, inside, most)
+        row, part, count = _joined(history, row, part, np.concatenate([each.ravel() for each in edges]), inside, most)
     return np.append(steps[row, layout.START] + part * steps[row, layout.LENGTH], history.end_time), row, part, count
 
 
@@ -549,7 +620,7 @@ def _joined(
     """
     length, number = history.steps[:, layout.LENGTH], np.arange(len(history.steps))
     far = np.abs(number[:, None] - edges).min(axis=1, initial=len(number)) // NEAR
-    most_here = np.where(history.pressed[:, 0], np.minimum(most, far), 0)
+    most_here = np.where(history.pressed.any(axis=1), np.minimum(most, far), 0)
     most_here[list(cut)] = 0
     new = np.append(True, np.abs(np.diff(length)) > ALIKE * length[1:])
     kept, count = [0], [1]

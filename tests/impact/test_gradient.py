@@ -9,6 +9,7 @@ import fem_impact as fi
 
 grazing = study("gradient_grazing")
 claims = study("gradient_claims")  # random blows and what is told of them, on which both are judged
+several = study("gradient_contacts")
 STEP, BAND, QUANTITIES = claims.STEP, claims.BAND, claims.QUANTITIES
 random_numbers, strike = claims.random_numbers, claims.strike
 GRAZING = 1.20025666  # [-] times the target's mass of the first family of `gradient_grazing`: where its impact is lost
@@ -94,6 +95,148 @@ def test_gradients_are_central_differences():
 @pytest.mark.parametrize("first", range(100, 700, 25))
 def test_gradients_of_many_blows_are_central_differences(first):
     assert check_seeds(range(first, first + 25)) >= 11
+
+
+def check_contacts(seed, kind):
+    """Judge a blow with several contacts as those with one."""
+    found = several.examine(seed, kind)
+    assert found is not None and not found.why
+    # the doubt is about one deviation of the differences, whose blows have steps of their own
+    off, allowed = found.off, 1e-6 + 3.0 * found.doubt
+    assert (off[:4] <= allowed[:4]).all(), (off, allowed)
+    assert off[4] <= allowed[4] + (1e-3 if found.lossy else 0.0)  # see `check_seeds`, also for the spectrum
+    assert off[5] <= allowed[5] + 5e-5
+    return found
+
+
+def test_gradients_with_two_contacts_are_central_differences():
+    check_contacts(3, "buzz")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "kind, seed", [("two sticks", 0), ("two sticks", 5), ("buzz", 0), ("over a stop", 0), ("over a stop", 4)]
+)
+def test_gradients_with_several_contacts_are_central_differences(kind, seed):
+    found = check_contacts(seed, kind)
+    wrong = np.abs(found.usual - found.slopes)[:4]
+    assert (found.stated[:4] >= wrong / 3.0 - 1e-9).all()  # 0.4 of the true error is the least of 15 blows
+
+
+def chain_of_balls(numbers):
+    """Newton's cradle of three balls that touch before the first is let go."""
+    laws = [fi.Contact.power(numbers[f"contacts.{c}.stiffness"], numbers[f"contacts.{c}.exponent"]) for c in range(2)]
+    balls = [fi.Modes.rigid(numbers[f"bodies.{b}.mass"]) for b in range(3)]
+    touches = [fi.Touch(law, c, c + 1) for c, law in enumerate(laws)]
+    return fi.collide(balls, touches, speeds=[numbers["speeds.0"], 0.0, 0.0], tolerance=1e-9)
+
+
+def resting_beam(numbers):
+    """A beam pressed on two supports and struck between them."""
+    mass, frequency, damping = (numbers[f"bodies.1.{x}"] for x in ("mass", "first_frequency", "damping_ratio"))
+    free = {"ends": ("free", "free"), "mass": mass, "first_frequency": frequency, "damping_ratio": damping}
+    beam = fi.analytic.beam(1.0, n_modes=6, **free)
+    laws = [
+        fi.Contact.power(*(numbers[f"contacts.{c}.{x}"] for x in ("stiffness", "exponent")), gap=gap)
+        for c, gap in enumerate((numbers["contacts.0.gap"], 0.0, 0.0))
+    ]
+    touches = [
+        fi.Touch(laws[0], 0, 1, None, [0.55]),
+        fi.Touch(laws[1], 1, None, [0.2]),
+        fi.Touch(laws[2], 1, None, [0.8]),
+    ]
+    still = np.zeros(1), np.zeros(1)
+    return fi.collide(
+        [fi.Modes.rigid(numbers["bodies.0.mass"]), beam], touches, speeds=[numbers["speeds.0"], 0.0],
+        states=[still, (1e-4 * beam.rigid_motion([0.5]), np.zeros(6))], forces=[0.0, 20.0], duration=0.012,
+        tolerance=1e-8,
+    )  # fmt: skip
+
+
+CRADLE = {
+    "bodies.0.mass": 0.1, "bodies.1.mass": 0.15, "bodies.2.mass": 0.12, "speeds.0": 1.0, "contacts.0.stiffness": 1e8,
+    "contacts.0.exponent": 1.5, "contacts.1.stiffness": 2e8, "contacts.1.exponent": 1.3,
+}  # fmt: skip
+BEAM = {
+    "bodies.0.mass": 0.05, "bodies.1.mass": 0.3, "bodies.1.first_frequency": 200.0, "bodies.1.damping_ratio": 0.02,
+    "speeds.0": 0.5, "contacts.0.gap": 1e-3, "contacts.0.stiffness": 1e6, "contacts.0.exponent": 1.5,
+    "contacts.1.stiffness": 1e5, "contacts.1.exponent": 1.0, "contacts.2.stiffness": 1.5e5, "contacts.2.exponent": 1.2,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("blow, numbers", [(chain_of_balls, CRADLE), (resting_beam, BEAM)], ids=["cradle", "beam"])
+@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")  # of six modes
+def test_gradients_of_bodies_that_touch_at_the_start_are_differences(blow, numbers):
+    quantities = ("impulse", "contact_time", "peak_force", "restitution")
+    found = blow(numbers).gradient(quantities, tuple(numbers))
+    assert_allclose(found["impulse"].numbers, list(numbers.values()))
+    for name, value in numbers.items():
+        near, far = (
+            [blow(numbers | {name: value * (1.0 + side * step)}) for side in (-1.0, 1.0)] for step in (2e-4, 4e-4)
+        )
+        for quantity, slopes in found.items():
+            one, two = (
+                (getattr(high, quantity) - getattr(low, quantity)) / (2.0 * step)
+                for (low, high), step in ((near, 2e-4), (far, 4e-4))
+            )
+            scale = np.abs(slopes.slopes * slopes.numbers).sum()
+            limit = 1e-6 * scale + abs(one - two)  # blows told to 1e-8 or 1e-9; most are told better by far
+            assert abs(slopes[name] * value - (4.0 * one - two) / 3.0) <= limit, f"{quantity} in {name}"
+
+
+def test_a_run_that_ends_while_another_contact_presses_ends_later_with_it():
+    """Two balls on springs of their own side by side on a third: the first release ends the run."""
+    numbers = {"contacts.0.stiffness": 2e6, "contacts.1.stiffness": 1e6, "speeds.0": 1.0, "speeds.1": 0.7}
+
+    def blow(numbers):
+        touches = [
+            fi.Touch(fi.Contact.power(numbers[f"contacts.{c}.stiffness"], 1.2, gap=1e-5), c, 2) for c in range(2)
+        ]
+        balls = [fi.Modes.rigid(mass) for mass in (0.1, 0.2, 5.0)]
+        speeds = [numbers["speeds.0"], numbers["speeds.1"], 0.0]
+        return fi.collide(balls, touches, speeds=speeds, tolerance=1e-10, max_impacts=1)
+
+    hit = blow(numbers)
+    frequency = 300.0
+    assert hit.history.force_at(np.array([hit.history.end_time * (1.0 - 1e-9)]), 1)[0] > 0.1 * hit.peak_force
+    names = ("impulse", "contact_time", "restitution", "peak_force", f"spectral_level={frequency:g}")
+    found = hit.gradient(names, tuple(numbers))
+    for name, value in numbers.items():
+        low, high = (blow(numbers | {name: value * (1.0 + side * 1e-4)}) for side in (-1.0, 1.0))
+        for quantity, slopes in found.items():
+            level = [20.0 * np.log10(np.abs(np.divide(*each.spectrum([frequency, 0.0])))) for each in (low, high)]
+            told = level if "=" in quantity else [getattr(each, quantity) for each in (low, high)]
+            scale = np.abs(slopes.slopes * slopes.numbers).sum()
+            # differences of second order; the spectrum is that of a force linear between samples, to 1e-6
+            off = abs(slopes[name] * value - (told[1] - told[0]) / 2e-4)
+            assert off <= (2e-5 if "=" in quantity else 1e-6) * scale, f"{quantity} in {name}"
+
+
+def test_what_has_no_gradient_with_several_contacts_says_where():
+    hit = chain_of_balls(CRADLE)
+    with pytest.raises(fi.SimulationError, match=r"no gradient in speeds\.2: the body rests against another"):
+        hit.gradient("impulse", "speeds.2")
+    with pytest.raises(fi.SimulationError, match=r"no gradient in contacts\.1\.gap: the bodies touch at the start"):
+        hit.gradient("impulse", "contacts.1.gap")
+    with pytest.raises(fi.SimulationError, match="only the target of `strike` has one; take the mass and first"):
+        hit.gradient("impulse", "section.thickness")
+    with pytest.raises(ValueError, match=r"wrt must be one of .*bodies\.2\.mass"):
+        hit.gradient("impulse", "striker.mass")
+    with pytest.raises(ValueError, match="sections are those of the target of `strike`"):
+        hit.gradient("impulse", sections={"t": (1e-3, lambda t: fi.Plate(fi.Material(70e9, 0.3, 2700.0), t))})
+    assert "contacts.1.stiffness = 2e+08 N/m**exponent" in str(hit.gradient("impulse"))
+
+    def near(gap):  # a beam swings towards a stop
+        beam = fi.analytic.beam(1.0, ends=("hinged", "hinged"), mass=0.3, first_frequency=40.0, n_modes=1)
+        struck = fi.Touch(fi.Contact.linear(1e6, gap=1e-4), 0, 1, None, [0.5])
+        touches = [struck, fi.Touch(fi.Contact.linear(1e6, gap=gap), 1, None, [0.5])]
+        return fi.collide([fi.Modes.rigid(0.05), beam], touches, speeds=[1.0, 0.0], duration=8e-3, residual=False)
+
+    swing = float(near(1.0).displacement([[0.5]], np.linspace(0.0, 8e-3, 4001), body=1).max())
+    assert np.isfinite(near(1.01 * swing).gradient("impulse").slopes).all()
+    for factor in (1.0 + 1e-5, 1.0 - 1e-5):
+        with pytest.raises(fi.SimulationError, match="grazing contact: contact 1: "):
+            near(factor * swing).gradient("impulse")
 
 
 def ball(law, *, mass=0.2, speed=1.3, tolerance=1e-8, **blow):
@@ -257,9 +400,6 @@ def test_what_has_no_gradient_says_why():
         ball(fi.Contact.hertz(1e6)).gradient("loudness")
     with pytest.raises(ValueError, match="needs a frequency, such as 'spectral_centroid=5000'"):
         ball(fi.Contact.hertz(1e6)).gradient("spectral_centroid")
-    chain = [fi.Touch(fi.Contact.linear(1e6), 0, 1), fi.Touch(fi.Contact.linear(1e6, gap=1e-3), 1, 2)]
-    with pytest.raises(ValueError, match="gradient needs a blow of `strike`"):
-        fi.collide([fi.Modes.rigid(0.1)] * 3, chain, speeds=[1.0, 0.0, 0.0]).gradient("impulse")
 
 
 def test_the_level_of_a_half_sine_falls_by_the_formula():

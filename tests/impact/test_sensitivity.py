@@ -116,7 +116,7 @@ def linear_blow(tolerance):
     hit = fi.collide([fi.Modes.rigid(mass)], [touch], speeds=[speed], tolerance=tolerance)
     change = no_change(hit.history, 2)
     change.shape[0], change.start_p[0] = -0.5 * hit.history.shape[0] / mass, 0.5 * hit.history.start_p / mass
-    change.law[1, 0] = 1.0
+    change.law[1, 0, 0] = 1.0
     return SimpleNamespace(mass=mass, stiffness=stiffness, speed=speed), Sensitivity.of(hit.history, change)
 
 

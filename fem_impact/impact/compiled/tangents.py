@@ -1,9 +1,10 @@
-"""Derivatives of a recorded blow with one contact in any of its numbers.
+"""Derivatives of a recorded blow in any of its numbers.
 
-A change of a number changes the motion of each mode by dq, the approach d by dd and the contact force f by df:
-``dq'' + 2 zeta omega dq' + omega**2 dq = db - f du - u df - 2 omega domega q - 2 d(zeta omega) q'``,
-``dd = doffset + sum (u dq + q du)``, ``df = f_d dd + f_v dd' + f_p dp``. These equations are linear, whatever the law:
-where the force starts and ends it is zero, so that df has no peaks there although these times move.
+A change of a number changes the motion of each mode by dq, each approach d by dd and the contact force f there by df:
+``dq'' + 2 zeta omega dq' + omega**2 dq = db - sum (f du + u df) - 2 omega domega q - 2 d(zeta omega) q'``,
+``dd = doffset + sum (u dq + q du)``, ``df = f_d dd + f_v dd' + f_p dp``; the first sum is over the contacts. These
+equations are linear, whatever the law: where a force starts and ends it is zero, so that df has no peaks there although
+these times move.
 
 The force of the record is a polynomial in each piece of time, and so is df, through s Gauss nodes. The modes follow
 both exactly: with m_k the moments of the impulse response (see `propagation`) and m_(-1) its rate,
@@ -16,13 +17,14 @@ from typing import NamedTuple
 import numpy as np
 
 from .arrays import ANGLE_LIMIT, LIGHT
-from .build import LOOSE, inner, outer
+from .build import LOOSE, ZERO, inner, outer
 from .law import at, power, spring_of, steepness
 from .layout import A12, A21, A22
 from .one_mode import mode_moments
 from .propagation import any_of, free_table, product, restore
 
 N_LAW = 8  # numbers of a law that may change, in the order of `law.spring_of`
+OMEGA, ZETA, BIAS, SHAPES = range(4)  # rows of a `Grown`; the changes of motion that they make follow the motion itself
 SLOTS = 12  # [-] lengths of pieces whose tables are kept
 SMALL = 0.5  # [rad] phase below which the recursion of the moments cancels: two orders lose a digit
 TERMS = 13  # [-] of their power series there: leave 1e-16
@@ -30,16 +32,16 @@ CRITICAL = 1e-4  # [-] this near to critical damping, derivatives in zeta are di
 
 
 class Blow(NamedTuple):
-    """The numbers of a blow with one contact, as in `History`."""
+    """The numbers of a blow, as in `History`."""
 
     omega: np.ndarray  # (n_modes,)
     zeta: np.ndarray  # (n_modes,)
-    shape: np.ndarray  # (n_modes,)
+    shape: np.ndarray  # (n_contacts, n_modes)
     bias: np.ndarray  # (n_modes,)
     start_q: np.ndarray  # (n_modes,)
     start_p: np.ndarray  # (n_modes,)
-    offset: float
-    law: np.ndarray  # (1, 9 or 4)
+    offset: np.ndarray  # (n_contacts,)
+    law: np.ndarray  # (n_contacts, 9 or 4)
 
 
 class Change(NamedTuple):
@@ -47,34 +49,34 @@ class Change(NamedTuple):
 
     omega: np.ndarray  # (n, n_modes)
     zeta: np.ndarray  # (n, n_modes)
-    shape: np.ndarray  # (n, n_modes)
+    shape: np.ndarray  # (n, n_contacts, n_modes)
     bias: np.ndarray  # (n, n_modes)
     start_q: np.ndarray  # (n, n_modes)
     start_p: np.ndarray  # (n, n_modes)
-    offset: np.ndarray  # (n,)
-    law: np.ndarray  # (n, N_LAW)
+    offset: np.ndarray  # (n, n_contacts)
+    law: np.ndarray  # (n, n_contacts, N_LAW)
 
 
 class Pieces(NamedTuple):
-    """Time in pieces without an event inside, with the recorded force at Gauss nodes; and these nodes."""
+    """Time in pieces without an event inside, with the recorded forces at Gauss nodes; and these nodes."""
 
     length: np.ndarray  # (n_pieces,) [s]
-    closed: np.ndarray  # (n_pieces,) bool, whether the contact carries force
-    force: np.ndarray  # (n_pieces, s) [N]
+    closed: np.ndarray  # (n_pieces, n_contacts) bool, whether a contact carries force
+    force: np.ndarray  # (n_pieces, n_contacts, s) [N]
     mark: np.ndarray  # (n_pieces + 1,) number of the mark at the start of a piece and at the end; -1 for none
     nodes: np.ndarray  # (s + 1,) fractions of a piece, the last one 1
     powers: np.ndarray  # (s, s) Lagrange polynomials of the first s as powers
 
 
 class Found(NamedTuple):
-    """The motion and its changes at marks, and the change of the force."""
+    """The motion and its changes at marks, and the change of the forces."""
 
-    way: np.ndarray  # (n_pieces + 1, 2) approach and rate at the ends of all pieces
-    base: np.ndarray  # (n_marks, 5) approach and its first three rates, force
-    ends: np.ndarray  # (n_marks, 4, n) changes of approach, rate, acceleration and force
+    way: np.ndarray  # (n_pieces + 1, n_contacts, 2) approach and rate at the ends of all pieces
+    base: np.ndarray  # (n_marks, n_contacts, 5) approach and its first three rates, force
+    ends: np.ndarray  # (n_marks, n_contacts, 4, n) changes of approach, rate, acceleration and force
     q: np.ndarray  # (n_marks, n_modes)
     p: np.ndarray  # (n_marks, n_modes)
-    force: np.ndarray  # (n_pieces, s, n) change of the force at the nodes
+    force: np.ndarray  # (n_pieces, n_contacts, s, n) change of the forces at the nodes
     dq: np.ndarray  # (n, n_modes) changes of the state at the end
     dp: np.ndarray  # (n, n_modes)
 
@@ -82,41 +84,45 @@ class Found(NamedTuple):
 class Grown(NamedTuple):
     """The rows of a `Change` that each parameter makes, and where they are not zero."""
 
-    rows: np.ndarray  # (n, 4, n_modes) of omega, zeta, shape and bias
-    seen: np.ndarray  # (n, 3, n_modes) the first three times the shape
-    spans: np.ndarray  # (n, 4, 2) first index of a row that is not zero, and one after the last; both zero for none
+    rows: np.ndarray  # (n, SHAPES + n_contacts, n_modes) of omega, zeta, bias and the shape of each contact
+    seen: np.ndarray  # (n, 2 + n_contacts, n_contacts, n_modes) all but the third times the shape of each contact
+    spans: (
+        np.ndarray
+    )  # (n, SHAPES + n_contacts, 2) where a row is not zero: first index, one after the last; 0 for none
 
 
 class Table(NamedTuple):
     """Coefficients of a piece of one length; a force polynomial is that of `Pieces.powers`."""
 
     free: np.ndarray  # (s + 1, 12, n_modes) a11, a12, a21, a22 up to each node, their changes per omega and per zeta
-    sight: np.ndarray  # (s, 4, n_modes) the shape times the first four at an inner node
+    sight: np.ndarray  # (s, n_contacts, 4, n_modes) the shapes times the first four at an inner node
     forced: np.ndarray  # (6, s, n_modes) displacement and velocity at the end per unit force, and their changes
-    thrust: np.ndarray  # (2, s, n_modes) the shape times the first two
-    inner: np.ndarray  # (2, s, s) approach and its rate at a node per force polynomial
-    lean: np.ndarray  # (2, s) the same by the bias
-    pushed: np.ndarray  # (n, 2, s, s) changes of minus `inner` per parameter
-    leaned: np.ndarray  # (n, 2, s) changes of `lean`
+    thrust: np.ndarray  # (n_contacts, 2, s, n_modes) the shapes times the first two
+    inner: np.ndarray  # (2, n_contacts, n_contacts, s, s) an approach and its rate at a node per force polynomial
+    lean: np.ndarray  # (2, n_contacts, s) the same by the bias
+    pushed: np.ndarray  # (n, 2, n_contacts, n_contacts, s, s) changes of minus `inner` per parameter
+    leaned: np.ndarray  # (n, 2, n_contacts, s) changes of `lean`
 
 
 class Room(NamedTuple):
     """Room for what a piece needs."""
 
-    out: np.ndarray  # (10, n_modes), see `carry`
+    out: np.ndarray  # (2 + 2 (SHAPES + n_contacts), n_modes), see `carry`
     work: np.ndarray  # (n_modes,)
-    matrix: np.ndarray  # (s, s)
+    acting: np.ndarray  # (n_contacts,) the contacts that carry force, first of all
+    matrix: np.ndarray  # (n_contacts s, n_contacts s)
+    right: np.ndarray  # (n_contacts s, n)
     slopes: np.ndarray  # (N_LAW,)
-    by_change: np.ndarray  # (s, 2, n)
+    by_change: np.ndarray  # (n_contacts, s, 2, n)
     column: np.ndarray  # (s,)
 
 
 @inner()
-def law_slopes(d, v, law, out_slopes):
-    """Force of contact 0 and its slopes in approach and rate; in out_slopes (N_LAW,) those in its numbers."""
+def law_slopes(d, v, law, c, out_slopes):
+    """Force of contact c and its slopes in approach and rate; in out_slopes (N_LAW,) those in its numbers."""
     for k in range(N_LAW):
         out_slopes[k] = 0.0
-    spring = spring_of(law, 0)
+    spring = spring_of(law, c)
     factor = 1.0 + spring.loss * v
     if d <= 0.0 or factor <= 0.0:
         return 0.0, 0.0, 0.0
@@ -306,8 +312,8 @@ def free_slopes(omega, zeta, t, moments, faster, damped, out_free):
 
 @inner(allocates=True)
 def tangent_table(blow, grown, leans, closed, h, nodes, powers, out):
-    """Coefficients of one piece of length h in ``out``, a `Table`; of an open contact only those of the end."""
-    s = nodes.size - 1
+    """Coefficients of one piece of length h in ``out``, a `Table`; without a closed contact only those of the end."""
+    s, m = nodes.size - 1, blow.offset.size
     omega, zeta = blow.omega, blow.zeta
     moments = np.empty((s + 3, omega.size))
     faster = np.empty((s + 2, omega.size))
@@ -317,21 +323,22 @@ def tangent_table(blow, grown, leans, closed, h, nodes, powers, out):
     weights = np.empty(s)
     n_critical = divisors(omega, zeta, per, own)
     for a in range(0 if closed else s, s + 1):
-        c = nodes[a]
-        t = c * h
+        part = nodes[a]
+        t = part * h
         moments_of(omega, zeta, t, moments)
         moment_slopes(omega, zeta, t, moments, per, own, n_critical, faster, damped)
         free_slopes(omega, zeta, t, moments, faster, damped, out.free[a])
         if a < s:
-            for r in range(4):
-                set_times(blow.shape, out.free[a, r], out.sight[a, r])
+            for c in range(m):
+                for r in range(4):
+                    set_times(blow.shape[c], out.free[a, r], out.sight[a, c, r])
         elif not (closed or leans):
             break
         for b in range(s):
             scale = t
             for k in range(s):
                 weights[k] = powers[b, k] * scale
-                scale *= (k + 1.0) * c
+                scale *= (k + 1.0) * part
             add_up(moments[1:], weights, out.forced[1, b])
             add_up(faster[1:], weights, out.forced[3, b])
             add_up(damped[1:], weights, out.forced[5, b])
@@ -343,8 +350,9 @@ def tangent_table(blow, grown, leans, closed, h, nodes, powers, out):
             if a < s:
                 see_forced(blow, grown, a, b, out)
             else:
-                set_times(blow.shape, out.forced[0, b], out.thrust[0, b])
-                set_times(blow.shape, out.forced[1, b], out.thrust[1, b])
+                for c in range(m):
+                    set_times(blow.shape[c], out.forced[0, b], out.thrust[c, 0, b])
+                    set_times(blow.shape[c], out.forced[1, b], out.thrust[c, 1, b])
             if a < s and leans:
                 see_steady(blow, grown, a, b, out)
 
@@ -356,36 +364,52 @@ def set_times(one, other, out):
         out[n] = one[n] * other[n]
 
 
-@inner(fastmath=LOOSE)
+@inner()
 def see_forced(blow, grown, a, b, out):
     """Enter what node a sees of the force polynomial b, whose responses there are ``out.forced``, in a `Table`."""
-    shape, forced = blow.shape, out.forced
-    for k in range(2):
-        out.inner[k, a, b] = seen_thrice(shape, shape, forced[k, b])
-        for i in range(grown.rows.shape[0]):
-            total = 0.0
-            for r in range(3):
-                lo, hi = grown.spans[i, r, 0], grown.spans[i, r, 1]
-                if hi > 0 and r < 2:
-                    total += seen_thrice(grown.seen[i, r, lo:hi], shape[lo:hi], forced[2 + 2 * r + k, b, lo:hi])
-                elif hi > 0:
-                    total += 2.0 * product(grown.seen[i, r, lo:hi], forced[k, b, lo:hi])
-            out.pushed[i, k, a, b] = total
+    for c in range(blow.offset.size):
+        for e in range(c + 1):
+            for k in range(2):
+                out.inner[k, c, e, a, b] = seen_thrice(blow.shape[c], blow.shape[e], out.forced[k, b])
+                out.inner[k, e, c, a, b] = out.inner[k, c, e, a, b]
+                for i in range(grown.rows.shape[0]):
+                    out.pushed[i, k, c, e, a, b] = seen_change(blow, grown, i, k, c, e, b, out.forced)
+                    out.pushed[i, k, e, c, a, b] = out.pushed[i, k, c, e, a, b]
+
+
+@inner(fastmath=LOOSE)
+def seen_change(blow, grown, i, k, c, e, b, forced):
+    """Change with parameter i of what contact c sees of the force polynomial b of contact e, or the reverse."""
+    total = 0.0
+    for r in range(2):
+        lo, hi = grown.spans[i, r, 0], grown.spans[i, r, 1]
+        if hi > 0:
+            total += seen_thrice(grown.seen[i, r, c, lo:hi], blow.shape[e, lo:hi], forced[2 + 2 * r + k, b, lo:hi])
+    lo, hi = grown.spans[i, SHAPES + e, 0], grown.spans[i, SHAPES + e, 1]
+    if hi > 0:
+        part = product(grown.seen[i, 2 + e, c, lo:hi], forced[k, b, lo:hi])
+        total += 2.0 * part if c == e else part
+    lo, hi = grown.spans[i, SHAPES + c, 0], grown.spans[i, SHAPES + c, 1]
+    if hi > 0 and c != e:
+        total += product(grown.seen[i, 2 + c, e, lo:hi], forced[k, b, lo:hi])
+    return total
 
 
 @inner(fastmath=LOOSE)
 def see_steady(blow, grown, a, b, out):
-    """Enter what node a sees of the bias by the force polynomial b, as `see_forced` does for the force."""
-    shape, bias, forced = blow.shape, blow.bias, out.forced
-    for k in range(2):
-        first = 0 if b == 0 else 1
-        out.lean[k, a] = first * out.lean[k, a] + seen_thrice(shape, bias, forced[k, b])
-        for i in range(grown.rows.shape[0]):
-            rows = grown.rows[i]
-            total = seen_thrice(bias, rows[2], forced[k, b]) + seen_thrice(shape, rows[3], forced[k, b])
-            for r in range(2):
-                total += seen_thrice(grown.seen[i, r], bias, forced[2 + 2 * r + k, b])
-            out.leaned[i, k, a] = first * out.leaned[i, k, a] + total
+    """Enter what node a sees of the bias by the force polynomial b, as `see_forced` does for the forces."""
+    bias, forced = blow.bias, out.forced
+    for c in range(blow.offset.size):
+        shape = blow.shape[c]
+        for k in range(2):
+            first = 0 if b == 0 else 1
+            out.lean[k, c, a] = first * out.lean[k, c, a] + seen_thrice(shape, bias, forced[k, b])
+            for i in range(grown.rows.shape[0]):
+                rows = grown.rows[i]
+                total = seen_thrice(bias, rows[SHAPES + c], forced[k, b]) + seen_thrice(shape, rows[BIAS], forced[k, b])
+                for r in range(2):
+                    total += seen_thrice(grown.seen[i, r, c], bias, forced[2 + 2 * r + k, b])
+                out.leaned[i, k, c, a] = first * out.leaned[i, k, c, a] + total
 
 
 @inner(fastmath=LOOSE)
@@ -428,26 +452,40 @@ def glide_to(free, free_also, q, p, shape, response, out):
 
 
 @inner(fastmath=LOOSE)
-def carry(blow, free, forced, force, leans, q, p, work, out):
-    """State of every mode at a node, and what changes it; ``free`` and ``forced`` are the node's parts of the table.
+def take(shape, response, out):
+    """Subtract the shape times a response from a row, all (n,)."""
+    for n in range(out.size):
+        out[n] -= shape[n] * response[n]
 
-    Rows of out (10, n_modes): q and p; their changes per omega, per zeta, per shape and per bias; the last are made
-    only if there is a bias or a change of one, which ``leans`` says. work (n_modes,) is room.
+
+@inner(fastmath=LOOSE)
+def carry(blow, free, forced, force, n_acting, leans, q, p, room):
+    """State of every mode at the end of a piece, and what changes it, in ``room.out``; ``free`` is that of the end.
+
+    Rows: q and p; their changes per omega, per zeta, per bias and per shape of each contact, those of contacts that
+    carry no force left as they are; those per bias are made only if there is a bias or a change of one, which ``leans``
+    says.
     """
-    bias, shape = blow.bias, blow.shape
+    bias, out = blow.bias, room.out
     for r in range(6):
-        response = out[6 + r] if r < 2 else work
-        add_up(forced[r], force, response)
-        glide_to(free[2 * r], free[2 * r + 1], q, p, shape, response, out[r])
-    for r in range(6, 8):
-        for n in range(q.size):
-            out[r, n] = -out[r, n]
-    if leans:
-        for r in range(6):
-            steady = out[8 + r] if r < 2 else work
+        for x in range(n_acting):
+            c = room.acting[x]
+            response = out[2 + 2 * (SHAPES + c) + r] if r < 2 else room.work
+            add_up(forced[r], force[c], response)
+            if x == 0:
+                glide_to(free[2 * r], free[2 * r + 1], q, p, blow.shape[c], response, out[r])
+            else:
+                take(blow.shape[c], response, out[r])
+            if r < 2:
+                for n in range(q.size):
+                    response[n] = -response[n]
+        if n_acting == 0:
+            glide(free[2 * r], free[2 * r + 1], q, p, out[r])
+        if leans:
+            steady = out[2 + 2 * BIAS + r] if r < 2 else room.work
             for n in range(q.size):
                 steady[n] = 0.0
-            for b in range(force.size):
+            for b in range(forced.shape[1]):
                 for n in range(q.size):
                     steady[n] += forced[r, b, n]
             for n in range(q.size):
@@ -472,20 +510,23 @@ def see_two(sight, dq, dp, i, j):
 
 
 @inner(fastmath=LOOSE)
-def see_grown(grown, i, out):
-    """Changes of the approach and of its rate at a node by what parameter i changes of the blow; ``out`` is that of
+def see_grown(grown, i, c, out):
+    """Changes of approach c and of its rate at a node by what parameter i changes of the blow; ``out`` is that of
     `move_on`.
     """
     d = 0.0
     v = 0.0
-    for r in range(3):
+    for r in range(2):
         a, b = grown.spans[i, r, 0], grown.spans[i, r, 1]
         if b > 0:
-            row = grown.seen[i, r, a:b] if r < 2 else grown.rows[i, r, a:b]
-            k = 2 + 2 * r if r < 2 else 0
-            by_d, by_v = seen(row, out[k, a:b], out[k + 1, a:b])
+            by_d, by_v = seen(grown.seen[i, r, c, a:b], out[2 + 2 * r, a:b], out[3 + 2 * r, a:b])
             d += by_d
             v += by_v
+    a, b = grown.spans[i, SHAPES + c, 0], grown.spans[i, SHAPES + c, 1]
+    if b > 0:
+        by_d, by_v = seen(grown.rows[i, SHAPES + c, a:b], out[0, a:b], out[1, a:b])
+        d += by_d
+        v += by_v
     return d, v
 
 
@@ -497,10 +538,14 @@ def lead(by_q, by_p, thrust, df, dq, dp, out):
     for n in range(out.size):  # with more arrays at once they would not run in parallel lanes
         out[n] = by_q[n] * dq[n] + by_p[n] * dp[n] - (a * x[n] + b * y[n] + c * z[n])
     for k in range(3, df.size):
-        x = thrust[k]
-        a = df[k]
-        for n in range(out.size):
-            out[n] -= a * x[n]
+        push(thrust[k], df[k], out)
+
+
+@inner(fastmath=LOOSE)
+def push(thrust, df, out):
+    """Subtract a row times a number from another, both (n,)."""
+    for n in range(out.size):
+        out[n] -= df * thrust[n]
 
 
 @inner(fastmath=LOOSE)
@@ -529,18 +574,19 @@ def seen(shape, q, p):
 
 
 @inner()
-def solve_many(matrix, right):
-    """Solve matrix (s, s) times x = right (s, n) in place by elimination with row exchange."""
-    s, n = right.shape
+def solve_many(matrix, right, s):
+    """Solve matrix x = right in place, of both the first s rows, by elimination with row exchange."""
+    n = right.shape[1]
     for i in range(s):
         best = i
         for r in range(i + 1, s):
             if abs(matrix[r, i]) > abs(matrix[best, i]):
                 best = r
-        for j in range(s):
-            matrix[i, j], matrix[best, j] = matrix[best, j], matrix[i, j]
-        for j in range(n):
-            right[i, j], right[best, j] = right[best, j], right[i, j]
+        if best != i:
+            for j in range(s):
+                matrix[i, j], matrix[best, j] = matrix[best, j], matrix[i, j]
+            for j in range(n):
+                right[i, j], right[best, j] = right[best, j], right[i, j]
         for r in range(s):
             if r != i and matrix[r, i] != 0.0:
                 factor = matrix[r, i] / matrix[i, i]
@@ -555,58 +601,64 @@ def solve_many(matrix, right):
 
 @inner(allocates=True, fastmath=LOOSE)
 def look(blow, change, q, p, dq, dp, out_base, out_ends):
-    """Approach, its three rates and the force in a state, and their changes but for that of the third; see `Found`."""
-    slopes = np.empty(N_LAW)
+    """Approaches, three rates and forces in a state, and their changes but for those of the third rate; see `Found`."""
+    m = blow.offset.size
+    slopes = np.empty((m, N_LAW))
+    steep = np.empty((m, 2))
     rate = np.empty(q.size)
-    d, v = seen(blow.shape, q, p)
-    d += blow.offset
-    f, by_d, by_v = law_slopes(d, v, blow.law, slopes)
-    u, w, z = blow.shape, blow.omega, blow.zeta
-    a = 0.0
+    more = np.empty(q.size)
+    w, z = blow.omega, blow.zeta
     for n in range(q.size):
-        rate[n] = blow.bias[n] - u[n] * f - w[n] * (2.0 * z[n] * p[n] + w[n] * q[n])
-        a += u[n] * rate[n]
-    turn = 0.0
-    grows = by_d * v + by_v * a
+        rate[n] = blow.bias[n] - w[n] * (2.0 * z[n] * p[n] + w[n] * q[n])
+    for c in range(m):
+        d, v = seen(blow.shape[c], q, p)
+        f, by_d, by_v = law_slopes(blow.offset[c] + d, v, blow.law, c, slopes[c])
+        steep[c, 0] = by_d
+        steep[c, 1] = by_v
+        out_base[c, 0] = blow.offset[c] + d
+        out_base[c, 1] = v
+        out_base[c, 4] = f
+        push(blow.shape[c], f, rate)
     for n in range(q.size):
-        turn -= u[n] * (u[n] * grows + w[n] * (2.0 * z[n] * rate[n] + w[n] * p[n]))
-    out_base[0] = d
-    out_base[1] = v
-    out_base[2] = a
-    out_base[3] = turn
-    out_base[4] = f
+        more[n] = -w[n] * (2.0 * z[n] * rate[n] + w[n] * p[n])
+    for c in range(m):
+        out_base[c, 2] = product(blow.shape[c], rate)
+        push(blow.shape[c], steep[c, 0] * out_base[c, 1] + steep[c, 1] * out_base[c, 2], more)
+    for c in range(m):
+        out_base[c, 3] = product(blow.shape[c], more)
     for i in range(dq.shape[0]):
-        du, dw, dz, db = change.shape[i], change.omega[i], change.zeta[i], change.bias[i]
+        dw, dz, db = change.omega[i], change.zeta[i], change.bias[i]
         x, y = dq[i], dp[i]
-        dd = change.offset[i]
-        dv = 0.0
         for n in range(q.size):
-            dd += u[n] * x[n] + du[n] * q[n]
-            dv += u[n] * y[n] + du[n] * p[n]
-        df = by_d * dd + by_v * dv
-        for k in range(N_LAW):
-            df += slopes[k] * change.law[i, k]
-        da = 0.0
-        for n in range(q.size):
-            more = db[n] - du[n] * f - u[n] * df - w[n] * (2.0 * z[n] * y[n] + w[n] * x[n])
-            more -= 2.0 * ((dz[n] * w[n] + z[n] * dw[n]) * p[n] + w[n] * dw[n] * q[n])
-            da += u[n] * more + du[n] * rate[n]
-        out_ends[0, i] = dd
-        out_ends[1, i] = dv
-        out_ends[2, i] = da
-        out_ends[3, i] = df
+            more[n] = db[n] - w[n] * (2.0 * z[n] * y[n] + w[n] * x[n])
+            more[n] -= 2.0 * ((dz[n] * w[n] + z[n] * dw[n]) * p[n] + w[n] * dw[n] * q[n])
+        for c in range(m):
+            u, du = blow.shape[c], change.shape[i, c]
+            dd = change.offset[i, c]
+            dv = 0.0
+            for n in range(q.size):
+                dd += u[n] * x[n] + du[n] * q[n]
+                dv += u[n] * y[n] + du[n] * p[n]
+            df = steep[c, 0] * dd + steep[c, 1] * dv + product(slopes[c], change.law[i, c])
+            push(u, df, more)
+            push(du, out_base[c, 4], more)
+            out_ends[c, 0, i] = dd
+            out_ends[c, 1, i] = dv
+            out_ends[c, 3, i] = df
+        for c in range(m):
+            out_ends[c, 2, i] = product(blow.shape[c], more) + product(change.shape[i, c], rate)
 
 
 @outer()
 def law_at(d, v, law, out_slopes):
-    """`law_slopes` for use from Python."""
-    return law_slopes(d, v, law, out_slopes)
+    """`law_slopes` of the first of some laws, for use from Python."""
+    return law_slopes(d, v, law, ZERO, out_slopes)
 
 
 @inner()
 def force_rate(d, v, a, law, slopes):
     """Rate of the force of contact 0 at an approach, rate and acceleration."""
-    _, by_d, by_v = law_slopes(d, v, law, slopes)
+    _, by_d, by_v = law_slopes(d, v, law, ZERO, slopes)
     return by_d * v + by_v * a
 
 
@@ -643,114 +695,162 @@ def span(values, out_span):
 @inner()
 def enter(shape, change, out_grown, dq, dp):
     """Rows that every parameter changes, and its change of the state at the start."""
+    m = shape.shape[0]
     for i in range(dq.shape[0]):
         for k in range(dq.shape[1]):
-            out_grown.rows[i, 0, k] = change.omega[i, k]
-            out_grown.rows[i, 1, k] = change.zeta[i, k]
-            out_grown.rows[i, 2, k] = change.shape[i, k]
-            out_grown.rows[i, 3, k] = change.bias[i, k]
+            out_grown.rows[i, OMEGA, k] = change.omega[i, k]
+            out_grown.rows[i, ZETA, k] = change.zeta[i, k]
+            out_grown.rows[i, BIAS, k] = change.bias[i, k]
+            for c in range(m):
+                out_grown.rows[i, SHAPES + c, k] = change.shape[i, c, k]
             dq[i, k] = change.start_q[i, k]
             dp[i, k] = change.start_p[i, k]
-        for r in range(4):
+        for r in range(SHAPES + m):
             span(out_grown.rows[i, r], out_grown.spans[i, r])
-        for r in range(3):
-            for k in range(dq.shape[1]):
-                out_grown.seen[i, r, k] = shape[k] * out_grown.rows[i, r, k]
+        for r in range(2 + m):
+            row = out_grown.rows[i, r if r < 2 else r + SHAPES - 2]
+            for c in range(m):
+                set_times(shape[c], row, out_grown.seen[i, r, c])
 
 
 @inner()
-def solve_forces(blow, change, grown, table, force, q, p, dq, dp, room, out_force):
-    """Change of the force at the inner nodes of a closed piece, (s, n), from the state at its start."""
-    n, s = dq.shape[0], force.size
+def solve_forces(blow, change, grown, table, n_acting, force, q, p, dq, dp, room, out_force):
+    """Change of the forces at the inner nodes of a piece, (n_contacts, s, n), from the state at its start; those of
+    contacts that carry no force are left as they are.
+    """
+    n, s = dq.shape[0], force.shape[1]
     matrix, slopes, by_change = room.matrix, room.slopes, room.by_change
     for i in range(0, n, 2):
         j = min(i + 1, n - 1)
-        for a in range(s):
-            d, v, other_d, other_v = see_two(table.sight[a], dq, dp, i, j)
-            by_change[a, 0, i] = d
-            by_change[a, 1, i] = v
-            by_change[a, 0, j] = other_d
-            by_change[a, 1, j] = other_v
+        for x in range(n_acting):
+            for a in range(s):
+                d, v, other_d, other_v = see_two(table.sight[a, room.acting[x]], dq, dp, i, j)
+                by_change[x, a, 0, i] = d
+                by_change[x, a, 1, i] = v
+                by_change[x, a, 0, j] = other_d
+                by_change[x, a, 1, j] = other_v
     for a in range(s):
         move_on(table.free[a], q, p, room.out)
-        d, v = seen(blow.shape, room.out[0], room.out[1])
-        d += table.lean[0, a]
-        v += table.lean[1, a]
-        for b in range(s):
-            d -= force[b] * table.inner[0, a, b]
-            v -= force[b] * table.inner[1, a, b]
-        _, by_d, by_v = law_slopes(blow.offset + d, v, blow.law, slopes)
-        for b in range(s):
-            matrix[a, b] = by_d * table.inner[0, a, b] + by_v * table.inner[1, a, b]
-        matrix[a, a] += 1.0
-        for i in range(n):
-            dd, dv = see_grown(grown, i, room.out)
-            dd += by_change[a, 0, i] + table.leaned[i, 0, a] + change.offset[i]
-            dv += by_change[a, 1, i] + table.leaned[i, 1, a]
-            for b in range(s):
-                dd -= force[b] * table.pushed[i, 0, a, b]
-                dv -= force[b] * table.pushed[i, 1, a, b]
-            out_force[a, i] = by_d * dd + by_v * dv + product(slopes, change.law[i])
-    solve_many(matrix, out_force)
+        for x in range(n_acting):
+            c, row = room.acting[x], x * s + a
+            d, v = seen(blow.shape[c], room.out[0], room.out[1])
+            d += table.lean[0, c, a]
+            v += table.lean[1, c, a]
+            for y in range(n_acting):
+                e = room.acting[y]
+                d -= product(force[e], table.inner[0, c, e, a])
+                v -= product(force[e], table.inner[1, c, e, a])
+            _, by_d, by_v = law_slopes(blow.offset[c] + d, v, blow.law, c, slopes)
+            for y in range(n_acting):
+                e = room.acting[y]
+                for b in range(s):
+                    matrix[row, y * s + b] = by_d * table.inner[0, c, e, a, b] + by_v * table.inner[1, c, e, a, b]
+            matrix[row, row] += 1.0
+            for i in range(n):
+                dd, dv = see_grown(grown, i, c, room.out)
+                dd += by_change[x, a, 0, i] + table.leaned[i, 0, c, a] + change.offset[i, c]
+                dv += by_change[x, a, 1, i] + table.leaned[i, 1, c, a]
+                for y in range(n_acting):
+                    e = room.acting[y]
+                    dd -= product(force[e], table.pushed[i, 0, c, e, a])
+                    dv -= product(force[e], table.pushed[i, 1, c, e, a])
+                room.right[row, i] = by_d * dd + by_v * dv + product(slopes, change.law[i, c])
+    solve_many(matrix, room.right, n_acting * s)
+    for x in range(n_acting):
+        for a in range(s):
+            for i in range(n):
+                out_force[room.acting[x], a, i] = room.right[x * s + a, i]
 
 
 @inner()
-def march(grown, table, closed, n_rows, df, room, dq, dp, out_dq, out_dp):
-    """Changes of the state at the end of a piece; ``n_rows`` of the rows of `Grown` act in it."""
-    s = df.shape[0]
+def march(grown, table, n_acting, leans, df, room, dq, dp, out_dq, out_dp):
+    """Changes of the state at the end of a piece."""
+    s = df.shape[1]
     free, column = table.free[s], room.column
     for i in range(dq.shape[0]):
-        if closed:
+        for x in range(n_acting):
+            c = room.acting[x]
             for b in range(s):
-                column[b] = df[b, i]
-            lead(free[0], free[1], table.thrust[0], column, dq[i], dp[i], out_dq[i])
-            lead(free[2], free[3], table.thrust[1], column, dq[i], dp[i], out_dp[i])
-        else:
+                column[b] = df[c, b, i]
+            if x == 0:
+                lead(free[0], free[1], table.thrust[c, 0], column, dq[i], dp[i], out_dq[i])
+                lead(free[2], free[3], table.thrust[c, 1], column, dq[i], dp[i], out_dp[i])
+                continue
+            for b in range(s):
+                push(table.thrust[c, 0, b], column[b], out_dq[i])
+                push(table.thrust[c, 1, b], column[b], out_dp[i])
+        if n_acting == 0:
             glide(free[0], free[1], dq[i], dp[i], out_dq[i])
             glide(free[2], free[3], dq[i], dp[i], out_dp[i])
-        for r in range(n_rows):
-            a, b = grown.spans[i, r, 0], grown.spans[i, r, 1]
-            if b > 0:
-                row = grown.rows[i, r, a:b]
-                add_times(row, room.out[2 + 2 * r, a:b], out_dq[i, a:b])
-                add_times(row, room.out[3 + 2 * r, a:b], out_dp[i, a:b])
+        for r in range(SHAPES if leans else BIAS):
+            grow(grown, i, r, room.out, out_dq[i], out_dp[i])
+        for x in range(n_acting):
+            grow(grown, i, SHAPES + room.acting[x], room.out, out_dq[i], out_dp[i])
+
+
+@inner()
+def grow(grown, i, r, out, out_dq, out_dp):
+    """Add what row r of parameter i changes in the state at the end of a piece; ``out`` is that of `carry`."""
+    a, b = grown.spans[i, r, 0], grown.spans[i, r, 1]
+    if b > 0:
+        row = grown.rows[i, r, a:b]
+        add_times(row, out[2 + 2 * r, a:b], out_dq[a:b])
+        add_times(row, out[3 + 2 * r, a:b], out_dp[a:b])
 
 
 @outer()
 def follow(blow, change, pieces, found):
     """Follow a recorded blow and its changes through all pieces; writes into every array of ``found``."""
-    n_modes, n, s = blow.omega.size, change.offset.size, pieces.force.shape[1]
-    grown = Grown(np.empty((n, 4, n_modes)), np.empty((n, 3, n_modes)), np.zeros((n, 4, 2), np.int64))
+    n_modes, n, m, s = blow.omega.size, change.omega.shape[0], blow.offset.size, pieces.force.shape[2]
+    grown = Grown(
+        np.empty((n, SHAPES + m, n_modes)),
+        np.empty((n, 2 + m, m, n_modes)),
+        np.zeros((n, SHAPES + m, 2), np.int64),
+    )
     dq, next_dq = np.empty((n, n_modes)), np.empty((n, n_modes))
     dp, next_dp = np.empty((n, n_modes)), np.empty((n, n_modes))
     enter(blow.shape, change, grown, dq, dp)
-    leans = any_of(blow.bias) or any_of(grown.spans[:, 3, 1])
+    leans = any_of(blow.bias) or any_of(grown.spans[:, BIAS, 1])
     q = blow.start_q.copy()
     p = blow.start_p.copy()
     known = np.zeros(SLOTS)
     last = np.zeros(SLOTS, np.int64)
     free = np.empty((SLOTS, s + 1, 12, n_modes))
-    sight = np.empty((SLOTS, s, 4, n_modes))
+    sight = np.empty((SLOTS, s, m, 4, n_modes))
     forced = np.empty((SLOTS, 6, s, n_modes))
-    thrust = np.empty((SLOTS, 2, s, n_modes))
-    inner_sums = np.empty((SLOTS, 2, s, s))
-    lean = np.zeros((SLOTS, 2, s))
-    pushed = np.empty((SLOTS, n, 2, s, s))
-    leaned = np.zeros((SLOTS, n, 2, s))
+    thrust = np.empty((SLOTS, m, 2, s, n_modes))
+    inner_sums = np.empty((SLOTS, 2, m, m, s, s))
+    lean = np.zeros((SLOTS, 2, m, s))
+    pushed = np.empty((SLOTS, n, 2, m, m, s, s))
+    leaned = np.zeros((SLOTS, n, 2, m, s))
     room = Room(
-        np.zeros((10, n_modes)), np.empty(n_modes), np.empty((s, s)), np.empty(N_LAW), np.empty((s, 2, n)), np.zeros(s)
+        np.zeros((2 + 2 * (SHAPES + m), n_modes)),
+        np.empty(n_modes),
+        np.zeros(m, np.int64),
+        np.empty((m * s, m * s)),
+        np.empty((m * s, n)),
+        np.empty(N_LAW),
+        np.empty((m, s, 2, n)),
+        np.zeros(s),
     )
     for j in range(pieces.length.size + 1):
-        d, v = seen(blow.shape, q, p)
-        found.way[j, 0] = blow.offset + d
-        found.way[j, 1] = v
+        for c in range(m):
+            d, v = seen(blow.shape[c], q, p)
+            found.way[j, c, 0] = blow.offset[c] + d
+            found.way[j, c, 1] = v
         mark = pieces.mark[j]
         if mark >= 0:
             look(blow, change, q, p, dq, dp, found.base[mark], found.ends[mark])
             restore(q, p, found.q[mark], found.p[mark])
         if j == pieces.length.size:
             break
-        h, force, closed = pieces.length[j], pieces.force[j], pieces.closed[j]
+        h, force = pieces.length[j], pieces.force[j]
+        n_acting = 0
+        for c in range(m):
+            if pieces.closed[j, c]:
+                room.acting[n_acting] = c
+                n_acting += 1
+        closed = n_acting > 0
         key = h if closed else -h
         slot = 0
         for k in range(SLOTS):
@@ -774,13 +874,12 @@ def follow(blow, change, pieces, found):
             known[slot] = key
         last[slot] = j + 1
         if closed:
-            solve_forces(blow, change, grown, table, force, q, p, dq, dp, room, found.force[j])
+            solve_forces(blow, change, grown, table, n_acting, force, q, p, dq, dp, room, found.force[j])
         if closed or leans:
-            carry(blow, table.free[s], table.forced, force, leans, q, p, room.work, room.out)
+            carry(blow, table.free[s], table.forced, force, n_acting, leans, q, p, room)
         else:
             move_on(table.free[s], q, p, room.out)
-        n_rows = 4 if leans else 3 if closed else 2
-        march(grown, table, closed, n_rows, found.force[j], room, dq, dp, next_dq, next_dp)
+        march(grown, table, n_acting, leans, found.force[j], room, dq, dp, next_dq, next_dp)
         dq, next_dq = next_dq, dq
         dp, next_dp = next_dp, dp
         restore(room.out[0], room.out[1], q, p)
