@@ -534,9 +534,9 @@ class Response(Totals):
             Names of numbers as in a scene file: "striker.mass", "striker.first_frequency", "striker.damping_ratio",
             "contact.stiffness", "contact.exponent", "contact.loss", "contact.gap", "strike.speed", "strike.x",
             "strike.y", "target.mass", "target.first_frequency", "target.damping_ratio", "section.thickness",
-            "material.E", "material.rho", "target.scale" and others. Of `collide`, by its arguments: "contacts.0.stiffness"
-            and the other numbers of each contact, "bodies.1.mass", "bodies.1.first_frequency",
-            "bodies.1.damping_ratio", "speeds.0". By default all in which this blow has a gradient.
+            "material.E", "material.rho", "target.scale" and others. Of `collide`, by its arguments: "speeds.0",
+            "contacts.0.stiffness" and the other numbers of each contact, "bodies.1.mass", "bodies.1.first_frequency",
+            "bodies.1.damping_ratio". By default all in which this blow has a gradient.
             A mass changes at fixed frequencies and damping ratios, a first frequency takes all others of its body with
             it, a damping ratio is added to all of them. Numbers of section and material change at a fixed contact law;
             the scale multiplies all lengths along the target, the strike point moves along. A body that moves already
