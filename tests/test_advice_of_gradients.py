@@ -44,7 +44,6 @@ def from_outside(wrt, target):
 pushed = partial(slopes, "contact_time", "target.mass", target_force=-1e-6, max_impacts=1)  # [N] the modes left out dip
 
 FELT = fi.Contact.felt(1e10, 2.5, hysteresis=0.4, relaxation=1e-3)
-YIELDING = fi.Contact.elastic_plastic(1e7, yield_approach=1e-5)
 HELD = fi.Striker.rigid(0.03).held(fi.Hand(stiffness=100.0))
 
 
@@ -117,11 +116,6 @@ GRADIENTS = {  # what fails, the message, and what it advises
         lambda _: slopes("impulse", law=FELT, max_impacts=1),
         "take differences of runs with the number changed, told to a smaller tolerance$",
         lambda _: faster(FELT),
-    ),
-    "a contact that yields": (
-        lambda _: slopes("impulse", law=YIELDING, max_impacts=1),
-        "its past is not followed; take differences of runs with the number changed, told to a smaller tolerance$",
-        lambda _: faster(YIELDING),
     ),
     "a hand": (
         lambda _: held().gradient("impulse"),

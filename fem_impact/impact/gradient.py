@@ -12,7 +12,7 @@ from .._base import check, markup
 from .._base.check import SimulationError
 from ..fe.variation import SectionChange
 from .compiled import record
-from .compiled.layout import KIND
+from .compiled.layout import EXPONENT, FIRST_YIELD, KIND
 from .parameters import POSSIBLE, Parameters, unit
 from .sensitivity import Sensitivity, runs, together
 
@@ -129,7 +129,7 @@ def gradients(
         raise ValueError("sections are those of the target of `strike`; leave them out")
     if hit.history.law.shape[1] > KIND and not np.isin(hit.history.law[:, KIND], POSSIBLE).all():
         which = "the contact" if hit.history.n_contacts == 1 else "one of the contacts"
-        raise SimulationError(f"no gradient: {which} yields or remembers, and its past is not followed; {INSTEAD}")
+        raise SimulationError(f"no gradient: {which} is felt, whose past is not followed; {INSTEAD}")
     if hit.history.stretched is not None or (hit.striker is not None and hit.striker.hand is not None):
         why = "the target stretches" if hit.history.stretched is not None else "a hand holds the striker"
         raise SimulationError(f"no gradient: {why}, and what that changes is not followed; {INSTEAD}")
@@ -282,7 +282,7 @@ def _check_grazing(found: Sensitivity) -> None:
     way, n_contacts = _way(found), len(found.deepest)
     limit = GRAZE * float(found.deepest.max())  # of all, as a contact that only grazes has no depth to compare with
     for c in range(n_contacts):
-        for what, least in _nearly(way, c):
+        for what, least in (*_nearly(way, c), ("yield", _yields(found, c))):
             if least < limit:
                 _refuse(what, least, f"contact {c}: " if n_contacts > 1 else "")
 
@@ -293,6 +293,7 @@ def _refuse(what: str, least: float, where: str) -> None:
         "touch": "an impact is only {} m deep, and would vanish",
         "gap": "the bodies come within {} m of parting, or part by no more, and one impact would be two",
         "miss": "the bodies pass each other at {} m, and would touch once more",
+        "yield": "a later push stops {} m from yielding further, or yields by no more, and would do otherwise",
     }[what]
     raise SimulationError(
         f"no gradient next to a grazing contact: {where}{words.format(f'{least:.2g}')} with a small change of some "
@@ -331,17 +332,49 @@ def _nearly(way: Way, c: int) -> Iterator[tuple[str, float]]:
     yield "miss", float((-depth[turns].max(axis=1, initial=-np.inf)).min(initial=np.inf))
 
 
+def _yields(found: Sensitivity, c: int) -> float:
+    """By how much a later push of plastic contact c exceeds the deepest one before, or falls short of it [m]."""
+    ends = runs(found.pieces.yields[:, c])[:, 1]
+    if not len(ends):
+        return np.inf
+    d, v = found.found.way[:, c].T
+    noise = STILL * float(np.abs(v).max())
+    turns = (v[:-1] > noise) & (v[1:] <= noise) & ~found.pieces.yields[1:, c]
+    last = np.searchsorted(ends, np.arange(len(turns)), side="right") - 1
+    deepest = Way(found.time, found.found.way[:, :, 0], found.found.way[:, :, 1], found.pieces.closed).between(c)
+    short = (d[ends[last]] - deepest.max(axis=1))[turns & found.pieces.closed[:, c] & (last >= 0)]
+    return float(min(np.abs(short).min(initial=np.inf), np.diff(d[ends]).min(initial=np.inf)))
+
+
+def _dents(found: Sensitivity) -> np.ndarray:
+    """How far plastic contacts have yielded at the ends of all pieces [m], (n_pieces + 1, n_contacts)."""
+    law, memory = found.history.law, found.pieces.memory
+    if not memory.any():
+        return memory
+    a, first = law[:, EXPONENT], law[:, FIRST_YIELD]
+    deepest = np.maximum(memory, np.where(first > 0.0, first, 1.0))
+    dents = deepest - (first / deepest) ** (a - 1.0) * (a * deepest - (a - 1.0) * first)
+    return np.asarray(np.where(memory > first, dents, 0.0))
+
+
 def _way(found: Sensitivity) -> Way:
-    """The approaches of a run; while no contact is closed, at many times, and so beyond an end that the run saw."""
-    history, pressed = found.history, found.pieces.closed
+    """The approaches of a run, from the dents where contacts yielded.
+
+    While no contact is closed, at many times, and so beyond an end that the run saw.
+    """
+    history, pressed, way = found.history, found.pieces.closed, found.found.way.copy()
+    way[:, :, 0] -= _dents(found)
     free = np.asarray(~pressed.any(axis=1))
-    parts = [_flight(found, a, found.time[b]) for a, b in runs(free).tolist()]
-    parts += [(found.time[a:b], found.found.way[a:b], pressed[a:b]) for a, b in runs(~free).tolist()]
+    still = not (history.start_q.any() or history.start_p[history.omega > 0.0].any() or history.bias.any())
+    flights = [(a, b) for a, b in runs(free).tolist() if a > 0 or not still]  # before the first impact nothing swings
+    parts = [_flight(found, a, found.time[b]) for a, b in flights]
+    free[: flights[0][0] if flights else None] = False
+    parts += [(found.time[a:b], way[a:b], pressed[a:b]) for a, b in runs(~free).tolist()]
     parts.sort(key=lambda part: float(part[0][0]))
     if history.status == record.FINISHED:
         parts.append(_flight(found, len(found.time) - 1, history.end_time + _ahead(found)))
     else:
-        parts.append((found.time[-1:], found.found.way[-1:], pressed[-1:]))
+        parts.append((found.time[-1:], way[-1:], pressed[-1:]))
     time, way, closed = (np.concatenate(column) for column in zip(*parts))
     return Way(time, way[:, :, 0], way[:, :, 1], closed[: len(time) - 1])
 
@@ -379,5 +412,5 @@ def _flight(found: Sensitivity, begin: int, end: float) -> tuple[np.ndarray, np.
     count = int(np.clip(LOOKS[0] * (end - start) / max(_duration(history), 1e-300), 16, LOOKS[1]))
     times = np.linspace(0.0, end - start, count + 1)[:-1]
     q, p = free.states(times)
-    way = np.stack([history.offset + q @ history.shape.T, p @ history.shape.T], axis=2)
+    way = np.stack([history.offset - _dents(found)[begin] + q @ history.shape.T, p @ history.shape.T], axis=2)
     return start + times, way, np.zeros((count, history.n_contacts), bool)

@@ -13,17 +13,20 @@ from ..fe.variation import DIFFERENCES, SectionChange
 from ..modes import varied
 from ..modes.modal import Modes
 from .compiled import layout
-from .compiled.law import LAYERS, POWER
+from .compiled.law import LAYERS, PLASTIC, POWER
 from .compiled.tangents import Change
 from .sensitivity import no_change
 
 if TYPE_CHECKING:
     from .response import Response
 
-LAW = {"stiffness": 0, "exponent": 1, "loss": 2, "depth": 5, "hard_stiffness": 6, "hard_exponent": 7}  # columns
+LAW = {  # columns
+    "stiffness": 0, "exponent": 1, "loss": 2, "depth": 5, "hard_stiffness": 6, "hard_exponent": 7, "yield_approach": 5,
+}  # fmt: skip
 UNITS = {
     "contact.stiffness": "N/m**exponent", "contact.loss": "s/m", "contact.gap": "m", "contact.depth": "m",
-    "contact.hard_stiffness": "N/m**hard_exponent", "strike.speed": "m/s", "strike.x": "m", "strike.y": "m",
+    "contact.hard_stiffness": "N/m**hard_exponent", "contact.yield_approach": "m",
+    "strike.speed": "m/s", "strike.x": "m", "strike.y": "m",
     "striker.mass": "kg", "striker.first_frequency": "Hz", "target.mass": "kg", "target.first_frequency": "Hz",
     "section.thickness": "m", "section.height": "m", "section.width": "m", "section.diameter": "m",
     "material.E": "Pa", "material.rho": "kg/m^3",
@@ -84,6 +87,8 @@ class Parameters:
         for name, c in self.laws.items():
             law = hit.contacts[c]
             parts = list(LAW)[: 6 if law.hard_stiffness else 3]
+            if hit.history.law.shape[1] == layout.WIDTH and hit.history.law[c, layout.KIND] == PLASTIC:
+                parts = ["stiffness", "exponent", "yield_approach"]  # it has no loss
             found |= {f"{name}.{part}": float(getattr(law, part)) for part in (*parts, "gap")}
         if self.struck:
             found["strike.speed"] = hit.speed
@@ -377,4 +382,4 @@ def _stencil(target: Modes, at: np.ndarray, axis: int, distance: float) -> tuple
     raise check.SimulationError("no gradient in the strike point: the body is too narrow there")
 
 
-POSSIBLE = POWER, LAYERS  # kinds of contact laws with a gradient: their forces depend on nothing they remember
+POSSIBLE = POWER, LAYERS, PLASTIC  # kinds of contact laws with a gradient

@@ -556,7 +556,8 @@ class Response(Totals):
         ------
         SimulationError
             Where there is no derivative: next to a contact that barely happens or barely does not (of several contacts
-            it says which), where two maxima of the force are alike, for felt and contacts that yield.
+            it says which), to a later push that barely makes a contact yield further, where two maxima of the force
+            are alike, and for felt.
 
         Notes
         -----

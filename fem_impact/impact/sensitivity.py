@@ -12,6 +12,7 @@ import numpy as np
 from .._base import check
 from .._base.check import SimulationError
 from .compiled import layout, record
+from .compiled.law import PLASTIC
 from .compiled.tangents import N_LAW, Blow, Change, Found, Pieces, follow, law_at, rate_slopes
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ EDGE = 1e-9  # [-] of a step: what lies nearer to its ends is at them
 ROUNDING = 1e-14  # [-] of the duration: the same
 ALIKE = 1e-11  # [-] difference of lengths of pieces that rounding leaves
 CANCELS = 1e-12  # [-] of the changes of the approach at the start: what they leave if they cancel
+GREW = 1e-8  # [-] of what a contact remembers: steps end at its corners to 1e-9
 AT_ZERO = 1e-7  # [-] of the deepest approach: a contact that ends deeper lets go by its loss
 
 
@@ -117,9 +119,13 @@ class Sensitivity:
         mark = np.full(len(time), -1)
         mark[marks] = np.arange(len(marks))
         length, closed = _alike(np.diff(time)), history.pressed[row]
-        pieces = Pieces(length, closed, _recorded(history, row, part, count, length, nodes[:-1]), mark, nodes, powers)
+        memory, yields = remembered(history)
+        forces = _recorded(history, row, part, count, length, nodes[:-1])
+        kept = np.append(row, len(memory) - 1)
+        pieces = Pieces(length, closed, forces, memory[kept], yields[kept], mark, nodes, powers)
         found = Found(
             np.zeros((len(time), m, 2)), np.zeros((len(marks), m, 5)), np.zeros((len(marks), m, 4, n)),
+            np.zeros((len(marks), m, 1 + n)),
             np.zeros((len(marks), n_modes)), np.zeros((len(marks), n_modes)), np.zeros((len(length), m, s, n)),
             np.zeros((n, n_modes)), np.zeros((n, n_modes)),
         )  # fmt: skip
@@ -148,8 +154,8 @@ class Sensitivity:
         """Change of an onset or release of contact c."""
         k = _nearest(self.time, time)
         mark = self.pieces.mark[k]
-        d, v, a = self.found.base[mark, c, :3]
-        dd, dv = self.found.ends[mark, c, :2]
+        d, v, a = self.found.base[mark, c, :3] - [self.found.dents[mark, c, 0], 0.0, 0.0]
+        dd, dv = self.found.ends[mark, c, :2] - [self.found.dents[mark, c, 1:], np.zeros(len(self.change.offset))]
         still = np.zeros(dd.shape)
         near = abs(d) <= AT_ZERO * self.deepest[c]
         if k == 0:
@@ -304,7 +310,7 @@ class Sensitivity:
     def largest(self) -> float:
         """Largest force [N]."""
         d, v = self._top.now[:2]
-        return float(law_at(float(d), float(v), self._law, np.zeros(N_LAW))[0])
+        return float(law_at(float(d), float(v), self._law, 0.0, self._yields, np.zeros(N_LAW))[0])
 
     @property
     def peak_doubt(self) -> np.ndarray:
@@ -320,6 +326,11 @@ class Sensitivity:
     def _law(self) -> np.ndarray:
         """The law of the contact whose force is largest, (1, 9 or 4)."""
         return self.history.law[self.pressed_most : self.pressed_most + 1]
+
+    @property
+    def _yields(self) -> bool:
+        """Whether that contact yields at its largest force: as it last turned back, if it ever yielded."""
+        return bool(self.pieces.yields[:, self.pressed_most].any())
 
     @cached_property
     def _top(self) -> "Summit":
@@ -363,7 +374,7 @@ class Sensitivity:
         base = rates @ self.found.base[ends, c, :n_rates].ravel()
         changes = rates[:3] @ self.found.ends[ends, c, :n_rates].reshape(2 * n_rates, -1)
         slopes = np.zeros(N_LAW)
-        _, by_d, by_v = law_at(base[0], base[1], self._law, slopes)
+        _, by_d, by_v, _ = law_at(base[0], base[1], self._law, 0.0, self._yields, slopes)
         return base, np.vstack([changes, by_d * changes[0] + by_v * changes[1] + self.change.law[:, c] @ slopes])
 
     def _summit(self, now: np.ndarray, changes: np.ndarray) -> "Summit":
@@ -382,7 +393,7 @@ class Sensitivity:
         scale[3 : 3 + width] = np.where(law[0, :width], law[0, :width], 1.0)
         sizes = np.abs(along / scale).max(axis=1)
         turning = np.empty(5 + N_LAW)
-        rate_slopes(now[:3], law, along * (NUDGE / np.where(sizes, sizes, 1.0))[:, None], turning)
+        rate_slopes(now[:3], law, self._yields, along * (NUDGE / np.where(sizes, sizes, 1.0))[:, None], turning)
         turning[1:] *= sizes / NUDGE
         bend = float(turning[1]) if EDGE < self.peak / self.time[-1] < 1.0 - EDGE else 0.0
         return Summit(now, changes, float(turning[0]), bend, turning[2:5] @ changes[:3] + law_change @ turning[5:])
@@ -508,13 +519,18 @@ def _sharper(history: "History", time: float, c: int) -> float:
     """
     start, end = _step_at(history, time)
     shape, omega, zeta, beside = history.shape, history.omega, history.zeta, BESIDE * (end - start)
+    row = int(np.searchsorted(history.steps[:, layout.START], start, side="right")) - 1
+    memory, yields = (each[row] for each in remembered(history))
     best = time
     for _ in range(2):
         rates = np.empty(2)
         for i, (q, p) in enumerate(zip(*history.states(np.array([best, best + beside])))):
             d, v = history.offset + shape @ q, shape @ p
-            laws = [law_at(d[e], v[e], history.law[e : e + 1], np.zeros(N_LAW)) for e in range(len(d))]
-            pushed = history.bias - np.array([force for force, _, _ in laws]) @ shape
+            laws = [
+                law_at(d[e], v[e], history.law[e : e + 1], memory[e], bool(yields[e]), np.zeros(N_LAW))
+                for e in range(len(d))
+            ]
+            pushed = history.bias - np.array([each[0] for each in laws]) @ shape
             rates[i] = laws[c][1] * v[c] + laws[c][2] * (shape[c] @ (pushed - omega * (2.0 * zeta * p + omega * q)))
         later = best - rates[0] * beside / (rates[1] - rates[0]) if rates[1] < rates[0] else best
         if not start < later < end:
@@ -566,6 +582,20 @@ def _recorded(
     return force
 
 
+def remembered(history: "History") -> tuple[np.ndarray, np.ndarray]:
+    """What contacts remember at the start of each step and at the end, (n_steps + 1, n_contacts), and if they yield."""
+    law, m = history.law, history.n_contacts
+    shape = len(history.steps) + 1, m
+    if law.shape[1] < layout.WIDTH or not (law[:, layout.KIND] == PLASTIC).any():
+        return np.zeros(shape), np.zeros(shape, bool)
+    plastic = law[:, layout.KIND] == PLASTIC
+    first = layout.HEAD + (layout.PUSH + history.n_coefficients) * m
+    memory = np.where(plastic, np.vstack([history.steps[:, first : first + m], history.now[layout.REMEMBERED]]), 0.0)
+    before = np.maximum(memory[:-1], law[:, layout.FIRST_YIELD])
+    yields = history.pressed & plastic & (memory[1:] - before > GREW * before)
+    return memory, np.vstack([yields, np.zeros((1, m), bool)])
+
+
 def runs(held: np.ndarray) -> np.ndarray:
     """First index of every run of truths (n,), and one after its last, (n_runs, 2)."""
     return np.flatnonzero(np.diff(np.concatenate([[0], held, [0]]))).reshape(-1, 2)
@@ -587,6 +617,7 @@ def _cut(
     for i, when in zip(places.tolist(), times):
         inside[i].add(float((when - steps[i, layout.START]) / steps[i, layout.LENGTH]))
     edges = [runs(pressed[:, c]) for c in range(history.n_contacts)]
+    turns = [runs(yields) for yields in remembered(history)[1][:-1].T]
     if len(grades) and pressed.any():
         grades = grades * float(np.median(steps[pressed.any(axis=1), layout.LENGTH]))
         for first, last in np.vstack(edges).tolist():
@@ -607,7 +638,9 @@ def _cut(
     row, part = row[order], part[order]
     count = np.ones(len(row), int)
     if most > 1:
-        row, part, count = _joined(history, row, part, np.concatenate([each.ravel() for each in edges]), inside, most)
+        row, part, count = _joined(
+            history, row, part, np.concatenate([each.ravel() for each in (*edges, *turns)]), inside, most
+        )
     return np.append(steps[row, layout.START] + part * steps[row, layout.LENGTH], history.end_time), row, part, count
 
 

@@ -327,6 +327,74 @@ def test_gradients_of_layers_are_differences_of_blows():
             assert_allclose(slopes[f"contact.{name}"] * value, change, atol=2e-5 * slopes.value, err_msg=name)
 
 
+YIELDING = {
+    "contact.stiffness": 1e7, "contact.exponent": 1.4, "contact.yield_approach": 5e-5, "contact.gap": 1e-4,
+    "strike.speed": 1.0, "strike.x": 0.45, "strike.y": 0.3, "target.mass": 0.4, "target.first_frequency": 90.0,
+    "target.damping_ratio": 0.01,
+}  # fmt: skip
+
+
+def yielding(numbers, tolerance):
+    """A mass on a plate whose contact yields."""
+    stiffness, exponent, first, gap = (
+        numbers[f"contact.{x}"] for x in ("stiffness", "exponent", "yield_approach", "gap")
+    )
+    law = fi.Contact.elastic_plastic(stiffness, exponent=exponent, yield_approach=first, gap=gap)
+    body = {name: numbers[f"target.{name}"] for name in ("mass", "first_frequency", "damping_ratio")}
+    plate = fi.analytic.rectangle(1.55, 1.0, n_modes=20, **body)
+    at, speed = (numbers["strike.x"], numbers["strike.y"]), numbers["strike.speed"]
+    striker = fi.Striker.rigid(numbers["striker.mass"])
+    return fi.strike(plate, striker, law, at=at, speed=speed, tolerance=tolerance, max_impacts=3)
+
+
+@pytest.mark.parametrize(
+    "mass, n_impacts, tolerance", [pytest.param(0.05, 1, 1e-9, marks=pytest.mark.slow), (0.2, 2, 1e-8)]
+)
+@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")  # of 20 modes
+def test_gradients_of_contacts_that_yield_are_differences(mass, n_impacts, tolerance):
+    """They unload from a dent, as deep as the force made it, and at the second impact they meet that dent."""
+    numbers = {**YIELDING, "striker.mass": mass}
+    quantities = ("restitution", "impulse", "contact_time", "peak_force", "peak_time")
+    hit = yielding(numbers, tolerance)
+    assert hit.n_impacts == n_impacts and hit.energies["dissipated"] > 0.1 * hit.start_energies["striker"]
+    found = hit.gradient(quantities)
+    assert set(numbers) == set(found["impulse"].names)
+    frequencies = np.linspace(0.0, BAND, 5)
+
+    def value(name, step):
+        return claims.told(yielding(numbers | {name: numbers[name] * (1.0 + step)}, tolerance), frequencies)[:5]
+
+    scale = np.array([np.abs(each.slopes * each.numbers).sum() for each in found.values()])
+    for name in numbers:
+        near, far = ((value(name, step) - value(name, -step)) / (2.0 * step) for step in (STEP, 2.0 * STEP))
+        slopes = np.array([each[name] * numbers[name] for each in found.values()])
+        off = np.abs(slopes - (4.0 * near - far) / 3.0) / scale
+        # the tightest tolerances that both blows meet; 2e-7 was measured, told to 1e-8 the first has 2e-5 in its peak
+        assert (off <= 1e-6 + np.abs(near - far) / scale).all(), (name, off)
+    rough = yielding(numbers, 1e-4).gradient(quantities)
+    for name, each in rough.items():
+        wrong = np.abs(each.slopes - found[name].slopes) * each.numbers
+        assert wrong.sum() <= 3.0 * (each.error * each.numbers).sum() + 1e-8 * scale[quantities.index(name)], name
+
+
+def test_a_push_that_barely_yields_further_has_no_gradient():
+    """A later impact presses the dent to within a hair of where it yields: the change of what is left jumps."""
+    numbers = {**YIELDING, "strike.x": 0.775, "strike.y": 0.5}
+
+    def deeper(mass):  # by how much a later push is harder than the first [N]
+        first, *later = (impact.peak_force for impact in yielding(numbers | {"striker.mass": mass}, 1e-4).impacts)
+        return max(later) - first
+
+    low, high = 0.07, 0.08
+    assert deeper(low) < 0.0 < deeper(high)
+    for _ in range(14):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if deeper(middle) < 0.0 else (low, middle)
+    for mass in (low, high):
+        with pytest.raises(fi.SimulationError, match=r"a later push stops .* m from yielding further, or yields by no"):
+            yielding(numbers | {"striker.mass": mass}, 1e-4).gradient("impulse")
+
+
 def test_energy_left_in_modes_adds_up():
     numbers = random_numbers(np.random.default_rng(4)) | {"contact.loss": 0.0, "target.damping_ratio": 0.0}
     numbers["striker.first_frequency"] = 1e6  # does not bend: all energy is the striker's motion, or in the plate
@@ -386,7 +454,7 @@ def test_a_grazing_contact_has_no_gradient():
 def test_what_has_no_gradient_says_why():
     wall, rigid = fi.Modes.rigid(1e6), fi.Striker.rigid(0.1)
     felt = fi.Contact.felt(1e10, 2.5, hysteresis=0.4, relaxation=1e-3)
-    with pytest.raises(fi.SimulationError, match="the contact yields or remembers"):
+    with pytest.raises(fi.SimulationError, match="the contact is felt, whose past is not followed"):
         fi.strike(wall, rigid, felt, at=None, speed=1.0).gradient("impulse")
     with pytest.raises(fi.SimulationError, match=r"no gradient in contact\.gap: the bodies touch at the start"):
         ball(fi.Contact.hertz(1e6)).gradient("impulse", "contact.gap")

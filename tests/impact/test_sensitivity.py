@@ -88,16 +88,18 @@ def test_slopes_of_the_law_are_its_differences(law, loss):
     d, v, slopes = 1.3e-3, -0.4, np.zeros(8)
     if law.hard_stiffness == 0.0:
         numbers[0, 3] = 1e-6  # a spring in series, as the modes left out are
-    force, by_d, by_v = tangents.law_at(d, v, numbers, slopes)
+    force, by_d, by_v, _ = tangents.law_at(d, v, numbers, 0.0, False, slopes)
 
     def change(i, step):
         near = [numbers.copy() for _ in range(2)]
         for side, each in zip((-1.0, 1.0), near):
             each[0, i] += side * step
-        return np.diff([tangents.law_at(d, v, each, np.zeros(8))[0] for each in near])[0] / (2.0 * step)
+        return np.diff([tangents.law_at(d, v, each, 0.0, False, np.zeros(8))[0] for each in near])[0] / (2.0 * step)
 
     def along(dd, dv):
-        ends = [tangents.law_at(d + side * dd, v + side * dv, numbers, np.zeros(8))[0] for side in (-1.0, 1.0)]
+        ends = [
+            tangents.law_at(d + side * dd, v + side * dv, numbers, 0.0, False, np.zeros(8))[0] for side in (-1.0, 1.0)
+        ]
         return np.diff(ends)[0] / (2.0 * max(dd, dv))
 
     scale = force * 1e-7  # differences of second order
@@ -107,6 +109,36 @@ def test_slopes_of_the_law_are_its_differences(law, loss):
         if numbers[0, i] != 0.0:
             step = 1e-5 * numbers[0, i]
             assert_allclose(slopes[i], change(i, step), atol=scale / numbers[0, i], err_msg=f"number {i}")
+
+
+@pytest.mark.parametrize("compliance", [0.0, 1e-6])
+@pytest.mark.parametrize("yields", [True, False])
+def test_slopes_of_a_yielding_law_are_its_differences(yields, compliance):
+    """Also in the deepest compression, from which it unloads; both courses meet where it turned back."""
+    numbers = np.array([fi.Contact.elastic_plastic(1e7, exponent=1.4, yield_approach=5e-5).numbers])
+    numbers[0, 3] = compliance
+    d, memory, slopes = 2e-4, 1.7e-4, np.zeros(8)
+
+    def force(d, numbers, memory):
+        return tangents.law_at(d, 0.0, numbers, memory, yields, np.zeros(8))
+
+    found = tangents.law_at(d, 0.0, numbers, memory, yields, slopes)
+    assert_allclose(found[0], force(d, numbers, memory)[0])
+    scale = found[0] * 1e-7  # differences of second order
+    ends = [force(d * (1.0 + side * 1e-5), numbers, memory)[0] for side in (-1.0, 1.0)]
+    assert_allclose(found[1] * d, np.diff(ends)[0] / 2e-5, atol=scale)
+    ends = [force(d, numbers, memory * (1.0 + side * 1e-5))[0] for side in (-1.0, 1.0)]
+    assert_allclose(found[3] * memory, np.diff(ends)[0] / 2e-5, atol=scale)
+    for i in (0, 1, 3, 5):
+        sides = [numbers.copy() for _ in range(2)]
+        for side, each in zip((-1.0, 1.0), sides):
+            each[0, i] *= 1.0 + side * 1e-5
+        ends = [force(d, each, memory)[0] for each in sides]
+        assert_allclose(slopes[i] * numbers[0, i], np.diff(ends)[0] / 2e-5, atol=scale, err_msg=f"number {i}")
+    deepest = (
+        memory + compliance * tangents.law_at(memory, 0.0, numbers * [1, 1, 1, 0, 1, 1, 1, 1, 1], 0.0, True, slopes)[0]
+    )
+    assert_allclose(*(tangents.law_at(deepest, 0.0, numbers, memory, side, slopes)[0] for side in (True, False)))
 
 
 def linear_blow(tolerance):

@@ -4,7 +4,8 @@ A change of a number changes the motion of each mode by dq, each approach d by d
 ``dq'' + 2 zeta omega dq' + omega**2 dq = db - sum (f du + u df) - 2 omega domega q - 2 d(zeta omega) q'``,
 ``dd = doffset + sum (u dq + q du)``, ``df = f_d dd + f_v dd' + f_p dp``; the first sum is over the contacts. These
 equations are linear, whatever the law: where a force starts and ends it is zero, so that df has no peaks there although
-these times move.
+these times move. What a plastic contact remembers, its deepest compression m, adds ``f_m dm``. It moves as the
+compression does until that turns back, where its rate is zero, and stays until the contact yields further.
 
 The force of the record is a polynomial in each piece of time, and so is df, through s Gauss nodes. The modes follow
 both exactly: with m_k the moments of the impulse response (see `propagation`) and m_(-1) its rate,
@@ -18,8 +19,8 @@ import numpy as np
 
 from .arrays import ANGLE_LIMIT, LIGHT
 from .build import LOOSE, ZERO, inner, outer
-from .law import at, power, spring_of, steepness
-from .layout import A12, A21, A22
+from .law import PLASTIC, at, compression, power, simple, spring_of, steepness
+from .layout import A12, A21, A22, COMPLIANCE, EXPONENT, FIRST_YIELD, KIND, STIFFNESS, WIDTH
 from .one_mode import mode_moments
 from .propagation import any_of, free_table, product, restore
 
@@ -63,6 +64,8 @@ class Pieces(NamedTuple):
     length: np.ndarray  # (n_pieces,) [s]
     closed: np.ndarray  # (n_pieces, n_contacts) bool, whether a contact carries force
     force: np.ndarray  # (n_pieces, n_contacts, s) [N]
+    memory: np.ndarray  # (n_pieces + 1, n_contacts) what a contact remembers at the start of a piece, and at the end
+    yields: np.ndarray  # (n_pieces + 1, n_contacts) bool, whether a plastic contact is pressed deeper than before
     mark: np.ndarray  # (n_pieces + 1,) number of the mark at the start of a piece and at the end; -1 for none
     nodes: np.ndarray  # (s + 1,) fractions of a piece, the last one 1
     powers: np.ndarray  # (s, s) Lagrange polynomials of the first s as powers
@@ -74,6 +77,7 @@ class Found(NamedTuple):
     way: np.ndarray  # (n_pieces + 1, n_contacts, 2) approach and rate at the ends of all pieces
     base: np.ndarray  # (n_marks, n_contacts, 5) approach and its first three rates, force
     ends: np.ndarray  # (n_marks, n_contacts, 4, n) changes of approach, rate, acceleration and force
+    dents: np.ndarray  # (n_marks, n_contacts, 1 + n) dent of a plastic contact, and its changes
     q: np.ndarray  # (n_marks, n_modes)
     p: np.ndarray  # (n_marks, n_modes)
     force: np.ndarray  # (n_pieces, n_contacts, s, n) change of the forces at the nodes
@@ -113,19 +117,22 @@ class Room(NamedTuple):
     matrix: np.ndarray  # (n_contacts s, n_contacts s)
     right: np.ndarray  # (n_contacts s, n)
     slopes: np.ndarray  # (N_LAW,)
+    deeper: np.ndarray  # (n_contacts, n) changes of what the contacts remember
     by_change: np.ndarray  # (n_contacts, s, 2, n)
     column: np.ndarray  # (s,)
 
 
 @inner()
-def law_slopes(d, v, law, c, out_slopes):
-    """Force of contact c and its slopes in approach and rate; in out_slopes (N_LAW,) those in its numbers."""
+def law_slopes(d, v, law, c, memory, yields, out_slopes):
+    """Force of contact c and its slopes in approach, rate and memory; in out_slopes (N_LAW,) those in its numbers."""
     for k in range(N_LAW):
         out_slopes[k] = 0.0
+    if law.shape[1] == WIDTH and law[c, KIND] == PLASTIC and (yields or memory > law[c, FIRST_YIELD]):
+        return plastic_slopes(d, law, c, memory, yields, out_slopes)
     spring = spring_of(law, c)
     factor = 1.0 + spring.loss * v
     if d <= 0.0 or factor <= 0.0:
-        return 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0
     point = at(d, spring)
     x = point.compression
     steep = steepness(x, point.force, spring)
@@ -135,13 +142,77 @@ def law_slopes(d, v, law, c, out_slopes):
     out_slopes[1] = soft_layer * np.log(x) * soft * factor
     out_slopes[2] = point.force * v
     out_slopes[3] = -point.force * steep * soft * factor
-    if x > spring.corner:
+    if x > spring.corner and spring.kind != PLASTIC:
         further = x - spring.corner
         more = spring.hard * power(further, spring.hard_exponent)
         out_slopes[5] = -spring.hard_exponent * more / further * soft * factor
         out_slopes[6] = more / spring.hard * soft * factor
         out_slopes[7] = more * np.log(further) * soft * factor
-    return point.force * factor, steep * soft * factor, point.force * spring.loss
+    return point.force * factor, steep * soft * factor, point.force * spring.loss, 0.0
+
+
+@inner()
+def tangent_slopes(x, law, c, out_slopes):
+    """Force of plastic contact c that yields at a compression, and its slope; in out_slopes those in its numbers."""
+    k, a, first = law[c, STIFFNESS], law[c, EXPONENT], law[c, FIRST_YIELD]
+    base = k * power(first, a - 1.0)
+    force = base * (first + a * (x - first))
+    out_slopes[STIFFNESS] = force / k
+    out_slopes[EXPONENT] = force * np.log(first) + base * (x - first)
+    out_slopes[FIRST_YIELD] = a * (a - 1.0) * base / first * (x - first)
+    return force, a * base
+
+
+@inner()
+def plastic_slopes(d, law, c, memory, yields, out_slopes):
+    """`law_slopes` of a contact that yields, or has done so and unloads from its dent or is pressed again."""
+    k, a, soft = law[c, STIFFNESS], law[c, EXPONENT], law[c, COMPLIANCE]
+    if yields:
+        force, steep = tangent_slopes(0.0, law, c, out_slopes)
+        force, _ = tangent_slopes((d - soft * force) / (1.0 + soft * steep), law, c, out_slopes)
+        share = 1.0 / (1.0 + soft * steep)
+        out_slopes[COMPLIANCE] = -force * steep
+        for n in range(N_LAW):
+            out_slopes[n] *= share
+        return force, steep * share, 0.0, 0.0
+    low, low_memory = dent_slopes(law, c, memory, out_slopes)
+    if d <= low:
+        for n in range(N_LAW):
+            out_slopes[n] = 0.0
+        return 0.0, 0.0, 0.0, 0.0
+    back = memory - low
+    most = k * power(memory, a - 1.0) * back
+    stiff = most / power(back, a)
+    x = compression(d - low, simple(stiff, a, 0.0, soft))
+    force = stiff * power(x, a)
+    steep = a * force / x
+    share = 1.0 / (1.0 + soft * steep)
+    # the force is k m**(a-1) back (x / back)**a, and a change of the dent is minus one of back and one of x
+    grows = force * (1.0 - a) / back + steep
+    for n in range(N_LAW):
+        out_slopes[n] *= -grows
+    out_slopes[STIFFNESS] += force / k
+    out_slopes[EXPONENT] += force * (np.log(memory) + np.log(x / back))
+    out_slopes[COMPLIANCE] = -force * steep
+    by_memory = force * ((1.0 - a) / back + (a - 1.0) / memory) - grows * low_memory
+    for n in range(N_LAW):
+        out_slopes[n] *= share
+    return force, steep * share, 0.0, by_memory * share
+
+
+@inner()
+def dent_slopes(law, c, memory, out_slopes):
+    """Dent of plastic contact c that yielded and its slope in the memory; in out_slopes those in its numbers."""
+    k, a = law[c, STIFFNESS], law[c, EXPONENT]
+    for n in range(N_LAW):
+        out_slopes[n] = 0.0
+    most, steep = tangent_slopes(memory, law, c, out_slopes)
+    back = most / (k * power(memory, a - 1.0))
+    for n in range(N_LAW):
+        out_slopes[n] *= -back / most
+    out_slopes[STIFFNESS] += back / k
+    out_slopes[EXPONENT] += back * np.log(memory)
+    return memory - back, 1.0 - back * (steep / most - (a - 1.0) / memory)
 
 
 @inner(allocates=True, fastmath={"contract"})
@@ -600,11 +671,11 @@ def solve_many(matrix, right, s):
 
 
 @inner(allocates=True, fastmath=LOOSE)
-def look(blow, change, q, p, dq, dp, out_base, out_ends):
+def look(blow, change, memory, yields, deeper, q, p, dq, dp, out_base, out_ends, out_dents):
     """Approaches, three rates and forces in a state, and their changes but for those of the third rate; see `Found`."""
     m = blow.offset.size
     slopes = np.empty((m, N_LAW))
-    steep = np.empty((m, 2))
+    steep = np.empty((m, 3))
     rate = np.empty(q.size)
     more = np.empty(q.size)
     w, z = blow.omega, blow.zeta
@@ -612,9 +683,17 @@ def look(blow, change, q, p, dq, dp, out_base, out_ends):
         rate[n] = blow.bias[n] - w[n] * (2.0 * z[n] * p[n] + w[n] * q[n])
     for c in range(m):
         d, v = seen(blow.shape[c], q, p)
-        f, by_d, by_v = law_slopes(blow.offset[c] + d, v, blow.law, c, slopes[c])
+        for i in range(deeper.shape[1] + 1):
+            out_dents[c, i] = 0.0
+        if blow.law.shape[1] == WIDTH and blow.law[c, KIND] == PLASTIC and memory[c] > blow.law[c, FIRST_YIELD]:
+            low, low_memory = dent_slopes(blow.law, c, memory[c], slopes[c])
+            out_dents[c, 0] = low
+            for i in range(deeper.shape[1]):
+                out_dents[c, 1 + i] = low_memory * deeper[c, i] + product(slopes[c], change.law[i, c])
+        f, by_d, by_v, by_m = law_slopes(blow.offset[c] + d, v, blow.law, c, memory[c], yields[c], slopes[c])
         steep[c, 0] = by_d
         steep[c, 1] = by_v
+        steep[c, 2] = by_m
         out_base[c, 0] = blow.offset[c] + d
         out_base[c, 1] = v
         out_base[c, 4] = f
@@ -640,6 +719,7 @@ def look(blow, change, q, p, dq, dp, out_base, out_ends):
                 dd += u[n] * x[n] + du[n] * q[n]
                 dv += u[n] * y[n] + du[n] * p[n]
             df = steep[c, 0] * dd + steep[c, 1] * dv + product(slopes[c], change.law[i, c])
+            df += steep[c, 2] * deeper[c, i]
             push(u, df, more)
             push(du, out_base[c, 4], more)
             out_ends[c, 0, i] = dd
@@ -650,20 +730,20 @@ def look(blow, change, q, p, dq, dp, out_base, out_ends):
 
 
 @outer()
-def law_at(d, v, law, out_slopes):
+def law_at(d, v, law, memory, yields, out_slopes):
     """`law_slopes` of the first of some laws, for use from Python."""
-    return law_slopes(d, v, law, ZERO, out_slopes)
+    return law_slopes(d, v, law, ZERO, memory, yields, out_slopes)
 
 
 @inner()
-def force_rate(d, v, a, law, slopes):
-    """Rate of the force of contact 0 at an approach, rate and acceleration."""
-    _, by_d, by_v = law_slopes(d, v, law, ZERO, slopes)
+def force_rate(d, v, a, law, yields, slopes):
+    """Rate of the force of contact 0 at an approach, rate and acceleration; that of a contact that never unloaded."""
+    _, by_d, by_v, _ = law_slopes(d, v, law, ZERO, 0.0, yields, slopes)
     return by_d * v + by_v * a
 
 
 @outer()
-def rate_slopes(now, law, along, out):
+def rate_slopes(now, law, yields, along, out):
     """The force's rate at an approach and its first two rates, and half its differences to both sides along others.
 
     ``now`` (3,), ``along`` (n, 3 + N_LAW) also of the law's numbers, ``out`` (1 + n,).
@@ -671,14 +751,14 @@ def rate_slopes(now, law, along, out):
     slopes = np.empty(N_LAW)
     width = min(N_LAW, law.shape[1])
     near = law.copy()
-    out[0] = force_rate(now[0], now[1], now[2], law, slopes)
+    out[0] = force_rate(now[0], now[1], now[2], law, yields, slopes)
     for i in range(along.shape[0]):
         out[1 + i] = 0.0
         for side in (-0.5, 0.5):
             for k in range(width):
                 near[0, k] = law[0, k] + 2.0 * side * along[i, 3 + k]
             d, v, a = now[0] + 2.0 * side * along[i, 0], now[1] + 2.0 * side * along[i, 1], now[2]
-            out[1 + i] += side * force_rate(d, v, a + 2.0 * side * along[i, 2], near, slopes)
+            out[1 + i] += side * force_rate(d, v, a + 2.0 * side * along[i, 2], near, yields, slopes)
 
 
 @inner()
@@ -714,7 +794,7 @@ def enter(shape, change, out_grown, dq, dp):
 
 
 @inner()
-def solve_forces(blow, change, grown, table, n_acting, force, q, p, dq, dp, room, out_force):
+def solve_forces(blow, change, grown, table, n_acting, memory, yields, force, q, p, dq, dp, room, out_force):
     """Change of the forces at the inner nodes of a piece, (n_contacts, s, n), from the state at its start; those of
     contacts that carry no force are left as they are.
     """
@@ -738,9 +818,10 @@ def solve_forces(blow, change, grown, table, n_acting, force, q, p, dq, dp, room
             v += table.lean[1, c, a]
             for y in range(n_acting):
                 e = room.acting[y]
-                d -= product(force[e], table.inner[0, c, e, a])
-                v -= product(force[e], table.inner[1, c, e, a])
-            _, by_d, by_v = law_slopes(blow.offset[c] + d, v, blow.law, c, slopes)
+                for b in range(s):
+                    d -= force[e, b] * table.inner[0, c, e, a, b]
+                    v -= force[e, b] * table.inner[1, c, e, a, b]
+            _, by_d, by_v, by_m = law_slopes(blow.offset[c] + d, v, blow.law, c, memory[c], yields[c], slopes)
             for y in range(n_acting):
                 e = room.acting[y]
                 for b in range(s):
@@ -752,9 +833,12 @@ def solve_forces(blow, change, grown, table, n_acting, force, q, p, dq, dp, room
                 dv += by_change[x, a, 1, i] + table.leaned[i, 1, c, a]
                 for y in range(n_acting):
                     e = room.acting[y]
-                    dd -= product(force[e], table.pushed[i, 0, c, e, a])
-                    dv -= product(force[e], table.pushed[i, 1, c, e, a])
-                room.right[row, i] = by_d * dd + by_v * dv + product(slopes, change.law[i, c])
+                    for b in range(s):
+                        dd -= force[e, b] * table.pushed[i, 0, c, e, a, b]
+                        dv -= force[e, b] * table.pushed[i, 1, c, e, a, b]
+                room.right[row, i] = by_d * dd + by_v * dv + by_m * room.deeper[c, i]
+                for k in range(N_LAW):
+                    room.right[row, i] += slopes[k] * change.law[i, c, k]
     solve_many(matrix, room.right, n_acting * s)
     for x in range(n_acting):
         for a in range(s):
@@ -798,6 +882,18 @@ def grow(grown, i, r, out, out_dq, out_dp):
         add_times(row, out[3 + 2 * r, a:b], out_dp[a:b])
 
 
+@inner()
+def deepen(blow, change, c, q, p, dq, room):
+    """Change of the compression of a plastic contact that yields, which it may remember."""
+    d, v = seen(blow.shape[c], q, p)
+    force, by_d, _, _ = law_slopes(blow.offset[c] + d, v, blow.law, c, 0.0, True, room.slopes)
+    soft = blow.law[c, COMPLIANCE]
+    for i in range(dq.shape[0]):
+        dd = change.offset[i, c] + product(blow.shape[c], dq[i]) + product(change.shape[i, c], q)
+        df = by_d * dd + product(room.slopes, change.law[i, c])
+        room.deeper[c, i] = dd - soft * df - force * change.law[i, c, COMPLIANCE]
+
+
 @outer()
 def follow(blow, change, pieces, found):
     """Follow a recorded blow and its changes through all pieces; writes into every array of ``found``."""
@@ -830,6 +926,7 @@ def follow(blow, change, pieces, found):
         np.empty((m * s, m * s)),
         np.empty((m * s, n)),
         np.empty(N_LAW),
+        np.zeros((m, n)),
         np.empty((m, s, 2, n)),
         np.zeros(s),
     )
@@ -840,7 +937,9 @@ def follow(blow, change, pieces, found):
             found.way[j, c, 1] = v
         mark = pieces.mark[j]
         if mark >= 0:
-            look(blow, change, q, p, dq, dp, found.base[mark], found.ends[mark])
+            memory, yields = pieces.memory[j], pieces.yields[j]
+            now, then, low = found.base[mark], found.ends[mark], found.dents[mark]
+            look(blow, change, memory, yields, room.deeper, q, p, dq, dp, now, then, low)
             restore(q, p, found.q[mark], found.p[mark])
         if j == pieces.length.size:
             break
@@ -874,7 +973,10 @@ def follow(blow, change, pieces, found):
             known[slot] = key
         last[slot] = j + 1
         if closed:
-            solve_forces(blow, change, grown, table, n_acting, force, q, p, dq, dp, room, found.force[j])
+            memory, yields = pieces.memory[j], pieces.yields[j]
+            solve_forces(
+                blow, change, grown, table, n_acting, memory, yields, force, q, p, dq, dp, room, found.force[j]
+            )
         if closed or leans:
             carry(blow, table.free[s], table.forced, force, n_acting, leans, q, p, room)
         else:
@@ -883,5 +985,8 @@ def follow(blow, change, pieces, found):
         dq, next_dq = next_dq, dq
         dp, next_dp = next_dp, dp
         restore(room.out[0], room.out[1], q, p)
+        for c in range(m):
+            if pieces.yields[j, c]:
+                deepen(blow, change, c, q, p, dq, room)
     for i in range(n):
         restore(dq[i], dp[i], found.dq[i], found.dp[i])
