@@ -334,6 +334,8 @@ def _nearly(way: Way, c: int) -> Iterator[tuple[str, float]]:
 
 def _yields(found: Sensitivity, c: int) -> float:
     """By how much a later push of plastic contact c exceeds the deepest one before, or falls short of it [m]."""
+    if not found.pieces.yields.any():
+        return np.inf
     ends = runs(found.pieces.yields[:, c])[:, 1]
     if not len(ends):
         return np.inf
@@ -371,8 +373,9 @@ def _way(found: Sensitivity) -> Way:
     free[: flights[0][0] if flights else None] = False
     parts += [(found.time[a:b], way[a:b], pressed[a:b]) for a, b in runs(~free).tolist()]
     parts.sort(key=lambda part: float(part[0][0]))
-    if history.status == record.FINISHED:
-        parts.append(_flight(found, len(found.time) - 1, history.end_time + _ahead(found)))
+    ahead = _ahead(found) if history.status == record.FINISHED else 0.0
+    if ahead > 0.0:
+        parts.append(_flight(found, len(found.time) - 1, history.end_time + ahead))
     else:
         parts.append((found.time[-1:], way[-1:], pressed[-1:]))
     time, way, closed = (np.concatenate(column) for column in zip(*parts))
@@ -387,9 +390,9 @@ def _ahead(found: Sensitivity) -> float:
     gap = -(history.offset + shape[:, rigid] @ history.end_q[rigid]) - GRAZE * found.deepest.max()
     apart = -shape[:, rigid] @ history.end_p[rigid]  # [m/s]
     reach = np.abs(shape[:, ~rigid]) @ size[~rigid] - gap
-    longest = LOOKS[1] / LOOKS[0] * _duration(history)  # of bodies that swing, but do not part
-    times = np.where(apart > 0.0, reach / np.where(apart > 0.0, apart, 1.0), longest)[reach > 0.0]
-    return float(times.max(initial=0.0))
+    if (reach[apart <= 0.0] > 0.0).any():  # bodies that swing, but do not part
+        return LOOKS[1] / LOOKS[0] * _duration(history)
+    return float((reach[apart > 0.0] / apart[apart > 0.0]).max(initial=0.0))
 
 
 def _duration(history: "History") -> float:

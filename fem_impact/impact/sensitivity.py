@@ -111,7 +111,8 @@ class Sensitivity:
         marked = [] if np.isnan(top) else [top] if smooth else list(_step_at(history, top))
         bent = (history.law[:, layout.EXPONENT] != 1.0).any() or change.law[:, :, layout.EXPONENT].any()
         grades = 4.0 ** -np.arange(GRADES[smooth] - coarse, 0.0, -1.0) if bent else np.zeros(0)
-        time, row, part, count = _cut(history, [*wanted, *marked], grades, together)
+        memory, yields = remembered(history)
+        time, row, part, count = _cut(history, [*wanted, *marked], grades, together, yields[:-1])
         wanted = [0.0, *wanted, *marked, time[-1]]
         nodes, powers = gauss(NODES[int(smooth)])
         n, n_modes, m, s = len(change.offset), len(history.omega), history.n_contacts, len(powers)
@@ -119,7 +120,6 @@ class Sensitivity:
         mark = np.full(len(time), -1)
         mark[marks] = np.arange(len(marks))
         length, closed = _alike(np.diff(time)), history.pressed[row]
-        memory, yields = remembered(history)
         forces = _recorded(history, row, part, count, length, nodes[:-1])
         kept = np.append(row, len(memory) - 1)
         pieces = Pieces(length, closed, forces, memory[kept], yields[kept], mark, nodes, powers)
@@ -190,8 +190,9 @@ class Sensitivity:
     @cached_property
     def _cut_off(self) -> np.ndarray:
         """Contacts (n,) that still press where the run ends with the release of another."""
-        stopped = self.history.status == record.IMPACTS
-        return np.array([c for c in np.flatnonzero(self.history.pressed[-1]) if stopped and c != self._last], int)
+        if self.history.n_contacts == 1 or self.history.status != record.IMPACTS:
+            return np.zeros(0, int)
+        return np.array([c for c in np.flatnonzero(self.history.pressed[-1]) if c != self._last], int)
 
     def _start_terms(self, c: int, start: np.ndarray, change: np.ndarray) -> np.ndarray:
         """Sum (n,) of the sizes of what changes approach c at the start, or its rate; all that may cancel."""
@@ -451,13 +452,20 @@ class EvenSpectrum:
         return np.asarray(summed @ self.impulses[:, 1:])
 
 
-def derivatives(x: float, count: int) -> np.ndarray:
-    """Value and first three derivatives at x of the first powers of x, (4, count)."""
+@cache
+def falling(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Factors and powers of the first three derivatives of the first powers of x, (4, count) each."""
     order, power = np.arange(4)[:, None], np.arange(count)
     rows = [np.ones(count)]
     for k in range(3):
         rows.append(rows[-1] * np.maximum(power - k, 0))
-    return np.stack(rows) * float(x) ** np.maximum(power - order, 0)
+    return np.stack(rows), np.maximum(power - order, 0)
+
+
+def derivatives(x: float, count: int) -> np.ndarray:
+    """Value and first three derivatives at x of the first powers of x, (4, count)."""
+    factors, powers = falling(count)
+    return np.asarray(factors * float(x) ** powers)
 
 
 @cache
@@ -602,12 +610,12 @@ def runs(held: np.ndarray) -> np.ndarray:
 
 
 def _cut(
-    history: "History", times: Sequence[float], grades: np.ndarray, most: int
+    history: "History", times: Sequence[float], grades: np.ndarray, most: int, yields: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Ends of all pieces [s], (n_pieces + 1,), the step each begins in, where in it [-], and of how many steps it is.
 
     A piece begins at each of some times and ``grades`` of the median step from where a contact starts or ends; up to
-    ``most`` steps make one.
+    ``most`` steps make one, in all of which a contact yields (n_steps, n_contacts) or in none.
     """
     steps, pressed = history.steps, history.pressed
     if not len(steps):
@@ -617,7 +625,6 @@ def _cut(
     for i, when in zip(places.tolist(), times):
         inside[i].add(float((when - steps[i, layout.START]) / steps[i, layout.LENGTH]))
     edges = [runs(pressed[:, c]) for c in range(history.n_contacts)]
-    turns = [runs(yields) for yields in remembered(history)[1][:-1].T]
     if len(grades) and pressed.any():
         grades = grades * float(np.median(steps[pressed.any(axis=1), layout.LENGTH]))
         for first, last in np.vstack(edges).tolist():
@@ -638,9 +645,9 @@ def _cut(
     row, part = row[order], part[order]
     count = np.ones(len(row), int)
     if most > 1:
-        row, part, count = _joined(
-            history, row, part, np.concatenate([each.ravel() for each in (*edges, *turns)]), inside, most
-        )
+        edges += [runs(column) for column in yields.T] if yields.any() else []
+        borders = np.concatenate([each.ravel() for each in edges])
+        row, part, count = _joined(history, row, part, borders, inside, most)
     return np.append(steps[row, layout.START] + part * steps[row, layout.LENGTH], history.end_time), row, part, count
 
 
