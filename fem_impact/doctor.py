@@ -21,7 +21,7 @@ from .model import cost
 from .modes.modal import Modes, find_modes
 from .show import export, figures, pictures
 
-SQUARE = 2.0 * np.pi**2  # [-] omega of a hinged unit square of unit stiffness and mass
+SQUARE = 2.0 * np.pi**2  # [-] fact: omega of a hinged unit square of unit stiffness and mass
 
 UNKEPT = "make the folder of the compiled kernels writable; else costs are predicted for another machine"
 EXTRAS: dict[str, tuple[str, ...]] = {  # extra: its purpose and the modules it needs

@@ -24,7 +24,7 @@ MOST_PATIENCE = 30.0  # [s] time limit for the largest file
 HEAD = 4096  # [byte] files whose first HEAD bytes are all zero are refused: parsing 1 GB of zeros takes minutes
 MEMORY = 2 << 30  # [byte] limit on the reader's address space; Python and numpy alone use 0.2 GB
 EXTRAS = {"svgelements": "cad", "ezdxf": "cad", "pyuff": "uff", "h5py": "hdf5"}  # library -> extra
-DONE, REFUSED, TOLD = 0, 1, 3  # [-] exit statuses; any other means the reader crashed
+DONE, REFUSED, TOLD = 0, 1, 3  # exit statuses; any other means the reader crashed
 
 
 def read(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.ndarray]:

@@ -12,13 +12,12 @@ from scipy.optimize import brentq
 
 from .._base.check import SimulationError
 from ..fe.variation import SectionChange
+from ..impact.collision import LOOKS
 from ..impact.compiled import layout, record
 from ..impact.parameters import Parameters
 from ..impact.response import History, Response
 from ..impact.sensitivity import Sensitivity
 
-LOOKS = 16  # [-] times per contact at which the flight is searched for its nearest approach
-MOST_LOOKS = 20_000  # [-] of a flight
 FAR = 1.0  # [-] clearance of bodies that never approach again, and the largest told
 
 
@@ -39,7 +38,7 @@ def _nearest(hit: Response) -> tuple[float, float | None]:
     scale = hit.speed * duration
     free = replace(history, start_q=history.end_q, start_p=history.end_p, steps=history.steps[:0])
     span = _span(history, scale)
-    count = int(np.clip(LOOKS * span / duration, LOOKS, MOST_LOOKS))
+    count = int(np.clip(LOOKS[0] * span / duration, *LOOKS))
     times = np.linspace(0.0, span, count + 1)
     d, v = _approach(free, times)
     turns = np.flatnonzero((v[:-1] > 0.0) & (v[1:] <= 0.0))

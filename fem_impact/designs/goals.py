@@ -15,7 +15,7 @@ KNOWN = (
     "n_impacts", "clearance", "mode1.frequency", "mode2.ratio",
 )  # fmt: skip
 CLEAR = 0.01  # [-] clearance of a blow that shall hit once: far beside what grazes, little beside an impact
-DECIBELS = 20.0 / math.log(10.0)  # [dB] a miss of a level is told as that of the force
+DECIBELS = 20.0 / math.log(10.0)  # [dB] fact: a miss of a level is told as that of the force
 EXAMPLE = '{"mode1.frequency": 262.0, "contact_time": (1e-3, 2e-3)}'
 
 

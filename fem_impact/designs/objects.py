@@ -10,9 +10,10 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
+from .._base.rounding import ROUNDING, SAME
 from ..fe.assembly import System
 from ..fe.section import Beam, Plate
-from ..fe.variation import DIFFERENCES, SectionChange
+from ..fe.variation import DIFFERENCES, STEP, SectionChange
 from ..impact import collision
 from ..impact.contact import Contact
 from ..impact.parameters import LAW
@@ -22,15 +23,11 @@ from ..mesh.meshes import Mesh
 from ..model.planner import Blow
 from ..model.target import Target
 from ..modes.modal import Modes
-from ..scenes.scene import Scene, load_scene
+from ..scenes.scene import SECTIONS, Scene, load_scene
 
 BODY = "mesh", "section", "supports", "theory", "point_masses", "point_supports"  # a body that is not assembled yet
 CONTACT = ("gap", *LAW)  # numbers of a contact that a gradient follows
 BODY_TABLES = "mesh", "material", "section", "supports", "target"  # of a scene
-STEP = 1e-5  # [-] of a large change of a number, for differences of what is made from it: they round to 1e-11
-LOOKS = 1001  # [-] places along a beam where two sections are compared
-SHARED = 1e-9  # [-] spread of the factors by which frequencies of one body change together
-STILL = 1e-13  # [-] a number that changes by less than this, relative to itself, stays
 Build = Callable[[dict[str, float]], Any]
 
 
@@ -159,7 +156,7 @@ class Rate:
         found = {}
         for key, value in now.numbers.items():
             column = [side.numbers.get(key, value) for side in sides]
-            if np.ptp(column) > STILL * abs(value):
+            if np.ptp(column) > ROUNDING * abs(value):
                 found[key] = float(weights @ column)
         for side in sides:
             _check_alike(name, now, side)
@@ -177,7 +174,7 @@ def _differ(one: Piece, two: Piece) -> bool:
         return one.section is not two.section
     points = np.vstack([mesh.points, mesh.points[mesh.cells].mean(axis=1)])
     if mesh.dimension == 1:
-        points = np.linspace(mesh.points.min(), mesh.points.max(), LOOKS)[:, None]
+        points = np.linspace(mesh.points.min(), mesh.points.max(), SECTIONS)[:, None]
     return any(
         not np.array_equal(getattr(one.section, name)(points), getattr(two.section, name)(points))
         for name in ("stiffness", "inertia", "shear")
@@ -227,7 +224,7 @@ def _check_scaled(name: str, body: str, one: Modes, two: Modes) -> None:
     if alike:
         flexible = one.omega > 0.0
         ratio = two.omega[flexible] / one.omega[flexible]
-        alike = not flexible.any() or bool(np.ptp(ratio) <= SHARED * ratio.max())
+        alike = not flexible.any() or bool(np.ptp(ratio) <= SAME * ratio.max())
     if not alike:
         raise SimulationError(
             f"no derivative in {name}: it changes the modes of the {body} one by one; make the body of a mesh and a "

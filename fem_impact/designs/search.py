@@ -16,10 +16,10 @@ from .._base.check import SimulationError, ToleranceWarning
 from ..fe.variation import SectionChange
 from ..impact import gradient, promise
 from ..impact.response import Response
-from ..model import planner
+from ..model import planner, target
 from ..modes import varied
 from ..modes.modal import Modes
-from ..taps import arguments
+from ..taps import arguments, solver
 from ..taps.unknowns import Unknown, bounds
 from . import clearance, goals
 from .goals import Goal
@@ -27,15 +27,11 @@ from .objects import Maker, Piece, Rate
 
 TOLERANCE = 1e-3  # [-] default miss of what is wanted: 1.7 cents of a frequency
 STRIKE = 1e-5  # [-] tolerance of the blows of a search, if they state none: small beside what is wanted
-FREQUENCY = 1e-6  # [-] largest error of the frequencies of a search
-RIGID = 3  # [-] rigid motions that a free body may have before its first flexible mode
-ENOUGH = 60  # [-] steps of one search
 CLOSE = 1e-10  # [-] relative change that ends a search
 LOST = 1e3  # [-] miss of numbers that make no blow: the search turns back
 MOST_MODES = 10_000  # [-] of a body in a blow
 MOST_TRIES = 1024  # [-] points where a search begins
 AT_END = 1e-6  # [-] of a range: nearer to its end counts as there
-FINER = 8.0  # [-] frequencies are found that much better to check a design, as blows are by `verify`
 
 
 @dataclass(frozen=True)
@@ -140,7 +136,8 @@ class Design:
         some = [each.goal for each in self.reached if each.goal.mode]
         if some:
             piece = next(iter(self.maker.pieces(self.values).values()))
-            modes = _modes_of(piece, max(goal.mode for goal in some) + RIGID, FREQUENCY / FINER)
+            count = max(goal.mode for goal in some) + target.RIGID_MOTIONS
+            modes = _modes_of(piece, count, target.CLOSE / planner.VERIFYING)
             found |= {goal.label: _of_modes(modes, goal) for goal in some}
         return Checked(MappingProxyType(found), MappingProxyType(hits), MappingProxyType(apart))
 
@@ -318,7 +315,7 @@ class _Search:
             if struck and piece.striker is None:
                 raise ValueError("wanted: a quantity of a blow needs striker, contact, at and speed; objects has none")
             if struck or name == next(iter(pieces)):
-                count = max(self._count(name, piece) if struck else 0, highest + RIGID if highest else 0)
+                count = max(self._count(name, piece) if struck else 0, highest + target.RIGID_MOTIONS if highest else 0)
                 modes[name] = self._body(piece, count)
             if struck:
                 once = any(goal.name == "clearance" for goal in self.goals if goal.blow == name)
@@ -340,7 +337,7 @@ class _Search:
     def _body(self, piece: Piece, count: int) -> Modes:
         key = (piece.key, count)
         if piece.key is None or key not in self.bodies:
-            modes = _modes_of(piece, count, FREQUENCY)
+            modes = _modes_of(piece, count, target.CLOSE)
             if piece.key is None:
                 return modes
             self.bodies[key] = modes
@@ -414,7 +411,7 @@ class _Search:
 
         found = least_squares(
             self._misses, first, slopes, (low, high), method="dogbox", x_scale=high - low, xtol=CLOSE, ftol=CLOSE,
-            gtol=CLOSE, max_nfev=ENOUGH,
+            gtol=CLOSE, max_nfev=solver.ENOUGH,
         )  # fmt: skip
         return np.asarray(found.x)
 
@@ -433,7 +430,7 @@ class _Search:
         found = minimize(
             lambda x: self.sign * (x[which] - first[which]) / (high[which] - low[which]), first,
             jac=lambda x: self.sign * unit / (high[which] - low[which]), bounds=list(zip(low, high)),
-            constraints=constraints, method="SLSQP", options={"maxiter": ENOUGH, "ftol": CLOSE},
+            constraints=constraints, method="SLSQP", options={"maxiter": solver.ENOUGH, "ftol": CLOSE},
         )  # fmt: skip
         ends = np.clip(found.x, low, high)
         points = [np.frombuffer(key) for key, state in self.seen.items() if isinstance(state, _State)]
@@ -462,7 +459,7 @@ def _twice(piece: Piece, tolerance: float) -> tuple[Response, Mapping[str, float
         return run.response, run.verified
     modes = piece.target.surrounded(piece.target.modes)
     hit = piece.strike(modes, tolerance)
-    return hit, planner.differences(hit, piece.strike(modes, hit.tolerance / FINER), hit.quantities)
+    return hit, planner.differences(hit, piece.strike(modes, hit.tolerance / planner.VERIFYING), hit.quantities)
 
 
 def _modes_of(piece: Piece, count: int, tolerance: float) -> Modes:

@@ -10,6 +10,7 @@ from scipy.linalg import qr
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, eye_array, vstack
 
 from .._base import check, markup
+from .._base.rounding import ROUNDING, SAME
 from .._base.untyped import Sparse
 from ..mesh import sketch
 from ..mesh.facets import Curves
@@ -17,7 +18,7 @@ from ..mesh.meshes import Mesh, aligned, pierced
 from . import beam_elements, plausible, shear_beam, thick
 from .beam_elements import HermiteSpace
 from .corners import around_corners
-from .elements import ArgyrisSpace, Bent, MorleySpace, numbering, quadrature, triangles
+from .elements import CHUNK, ArgyrisSpace, Bent, MorleySpace, numbering, quadrature, triangles
 from .section import KINDS, SOFT, Beam, Elastic, Plate, evaluate
 from .shear_beam import TimoshenkoSpace
 from .splitting import towards_points
@@ -31,14 +32,11 @@ ELEMENTS: dict[str, tuple[str, ...]] = {
     "kirchhoff": ("argyris", "morley"), "mindlin": ("argyris and shear",),
     "euler": ("hermite",), "timoshenko": ("hermite and shear",),
 }  # fmt: skip
-HOLDS = {"hinged": 3, "clamped": 6}  # [-] unknowns of a thin plate that a held facet and its first vertex take away
+HOLDS = {"hinged": 3, "clamped": 6}  # unknowns of a thin plate that a held facet and its first vertex take away
 MORLEY_ORDER = 4  # [-] order of the quadrature on Morley elements; exact for products of quadratics
 MASS_ORDER = 10  # [-] order of the quadrature on Argyris elements; exact for products of quintics
 UNEVEN = 20.0  # [-] above this ratio of triangle sizes, eigenvalues are computed from the strain energy
 TINY = 4e-3  # [-] the same if the smallest triangle is below this fraction of the extent
-CHUNK = 256  # [-] triangles whose strain is computed together, to limit memory
-RESTS = 1e-12  # [-] a point moves if some unknown moves it by more than this; rounding leaves 1e-15
-RIGID = 1e-9  # [-] a rigid motion is free if supports suppress less than this share of it, which is rounding
 
 
 class Attached(NamedTuple):
@@ -411,7 +409,7 @@ def _interpolation(
     if not isinstance(space, MindlinSpace):
         return rows
     radius = thick.PATCH * evaluate("thickness", section.thickness, points, "m") / frame.length
-    moves = np.flatnonzero(abs(rows @ expand).max(axis=1).toarray()[:, 0] > RESTS)
+    moves = np.flatnonzero(abs(rows @ expand).max(axis=1).toarray()[:, 0] > ROUNDING)
     found = [rows[np.setdiff1d(np.arange(len(local)), moves)]]  # on a support, so at rest
     for some in np.array_split(moves, max(1, -(-len(moves) // CHUNK))):
         if some.size:
@@ -476,7 +474,7 @@ def _on_posts(posts: list, springs: csc_matrix, expand: csr_matrix, project: csr
             continue
         moves = (row @ expand).toarray()[0]
         most = int(np.abs(moves).argmax())
-        if not abs(moves[most]) > RESTS:
+        if not abs(moves[most]) > ROUNDING:
             continue  # at rest already
         others = np.delete(np.arange(len(moves)), most)
         shares = -moves[others] / moves[most]
@@ -496,11 +494,11 @@ def _rigid(every: np.ndarray, springs: csc_matrix, expand: csr_matrix, project: 
     lost = every - expand @ left
     scale = np.abs(every).max()
     _, lengths, turn = np.linalg.svd(lost.T @ lost / scale**2)
-    kept = turn[np.sqrt(lengths) < RIGID * np.sqrt(len(every))].T  # (n_motions, n_rigid)
+    kept = turn[np.sqrt(lengths) < SAME * np.sqrt(len(every))].T  # (n_motions, n_rigid)
     if springs.nnz and kept.shape[1]:
         moving = every @ kept
         energy, turn = np.linalg.eigh(moving.T @ (springs @ moving))
-        kept = kept @ turn[:, energy <= RIGID * energy[-1]]
+        kept = kept @ turn[:, energy <= SAME * energy[-1]]
     return left @ kept
 
 

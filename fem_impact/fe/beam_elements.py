@@ -11,17 +11,15 @@ from typing import Any
 import numpy as np
 from skfem import ElementLineHermite, MeshLine
 
+from .._base.rounding import SAME
 from .._base.untyped import Cells
 from ..mesh.facets import powers
-from .elements import ON_BODY
 
 DEGREE = 32  # [-] polynomial degree of the deflection within an element
 QUADRATURE = 3 * DEGREE // 2  # [-] Gauss points of an element; exact for two shapes and a section of degree 31
 APART = 0.01  # [-] nodes closer than this fraction of the beam cause a rounding error of 1e-9 in the stiffness
 ROUNDED = 1e-15  # [-] rounding error of an element as long as the beam; grows as 1 / length**3 for shorter ones
 SMOOTH = 12  # [-] degree of the polynomial that must fit the section within an element
-RESOLVED = 1e-9  # [-] largest error of this fit, relative to the largest value in the element
-NARROW = 1e-9  # [-] accuracy of the place of a step or kink as a fraction of the beam; nearer to a held end, no node
 NARROWEST = 1e-6  # [-] smallest element made to fit the section, as a fraction of the beam
 ROUNDING = 1e-14  # [-] a smaller misfit is just rounding
 MOST_BREAKS = 2000  # [-] most places where the section may jump or kink
@@ -93,7 +91,7 @@ class HermiteSpace:
         order = np.argsort(low)
         cell = order[np.clip(np.searchsorted(low[order], points[:, 0], side="right") - 1, 0, len(low) - 1)]
         s = (points[:, 0] - self.start[cell]) / self.length[cell]
-        slack = ON_BODY / np.abs(self.length[cell])
+        slack = SAME / np.abs(self.length[cell])
         return cell, (s >= -slack) & (s <= 1.0 + slack)
 
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
@@ -118,7 +116,7 @@ def nodes(points: np.ndarray, marked: np.ndarray, held: np.ndarray) -> np.ndarra
     apart = min(APART * (points[-1] - points[0]), 0.5 * np.diff(points).min())
     for place in marked:
         off = np.abs(place - np.array(kept))
-        if off.min() > (NARROW if kept[off.argmin()] in held else apart):
+        if off.min() > (SAME if kept[off.argmin()] in held else apart):
             kept.append(place)
     between = points[np.abs(points[:, None] - kept).min(axis=1) > apart]
     return np.unique(np.append(kept, between))
@@ -153,15 +151,15 @@ def divided(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes
     """Line elements between nodes, with more nodes until a polynomial fits the section between any two neighbours.
 
     Steps and kinks of stiffness and inertia are found by halving every interval that no polynomial fits. An interval
-    that still has a bad fit when it is as narrow as NARROW contains a step or kink and gets a node.
+    that still has a bad fit when it is as narrow as SAME contains a step or kink and gets a node.
     """
     span = nodes[-1] - nodes[0]
     breaks = _breaks(fields, nodes)
-    breaks = breaks[np.abs(breaks[:, None] - nodes).min(axis=1, initial=np.inf) > 4.0 * NARROW * span]
+    breaks = breaks[np.abs(breaks[:, None] - nodes).min(axis=1, initial=np.inf) > 4.0 * SAME * span]
     every = np.sort(np.append(nodes, breaks))
-    low, high, margin = every[:-1], every[1:], NARROW * span  # skip the inexactly located kink at a node
+    low, high, margin = every[:-1], every[1:], SAME * span  # skip the inexactly located kink at a node
     while low.size:
-        rough = (_misfit(fields, low + margin, high - margin) > RESOLVED) & (high - low > NARROWEST * span)
+        rough = (_misfit(fields, low + margin, high - margin) > SAME) & (high - low > NARROWEST * span)
         middle = 0.5 * (low + high)[rough]
         every = np.append(every, middle)
         low, high = np.append(low[rough], middle), np.append(middle, high[rough])
@@ -169,21 +167,21 @@ def divided(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes
 
 
 def _breaks(fields: Callable, nodes: np.ndarray) -> np.ndarray:
-    """Places (n,) where the section jumps or kinks, each to within NARROW times the length of the beam."""
+    """Places (n,) where the section jumps or kinks, each to within SAME times the length of the beam."""
     span, low, high = nodes[-1] - nodes[0], nodes[:-1], nodes[1:]
     found: list[float] = []
     while low.size:
         # at a kink the misfit falls only in proportion to the interval; for a smooth section it falls much faster
-        rough = _misfit(fields, low, high) > np.maximum(RESOLVED * (high - low) / span, ROUNDING)
+        rough = _misfit(fields, low, high) > np.maximum(SAME * (high - low) / span, ROUNDING)
         low, high = low[rough], high[rough]
-        found += (0.5 * (low + high)[high - low < NARROW * span]).tolist()
-        low, high = low[high - low >= NARROW * span], high[high - low >= NARROW * span]
+        found += (0.5 * (low + high)[high - low < SAME * span]).tolist()
+        low, high = low[high - low >= SAME * span], high[high - low >= SAME * span]
         if len(low) + len(found) > MOST_BREAKS:
             raise ValueError(f"section must have at most {MOST_BREAKS} steps and kinks, got more; make it smoother")
         middle = 0.5 * (low + high)
         low, high = np.append(low, middle), np.append(middle, high)
     places = np.array(sorted(found))
-    return places[np.append(True, np.diff(places) > 4.0 * NARROW * span)[: len(places)]]  # drop doubles
+    return places[np.append(True, np.diff(places) > 4.0 * SAME * span)[: len(places)]]  # drop doubles
 
 
 def _misfit(fields: Callable, low: np.ndarray, high: np.ndarray) -> np.ndarray:

@@ -4,12 +4,12 @@ from functools import lru_cache
 
 import numpy as np
 
+from .._base.rounding import HALVINGS
 from ..mesh.meshes import Mesh
 from .splitting import Rim, bisected, strip
 
 SHRINK = 0.5  # [-] each ring of triangles is this fraction of the size of the ring around it
 WIDE = 0.7  # [rad] triangles at a singular corner are bisected until their angle there is below this
-ROUNDS = 3  # [-] most bisections of such a triangle
 CORNER_ERROR = 1e-7  # [-] share of the energy that the innermost ring may miss; twice the frequency error
 SMALLEST = 1e-10  # [-] smallest ring as a fraction of the extent; rounding of the coordinates spoils smaller ones
 SMALLEST_FREE = 3e-3  # [-] the same at a free corner, which moves: rounding grows with the ring's size to the -2
@@ -149,7 +149,7 @@ def _narrowed(points: list[np.ndarray], cells: list[list[int]], corners: set[int
     Rings do not divide the angle at a corner any finer, so wide triangles are bisected first. The result does not
     depend on the order of the triangles. New points are appended to ``points``.
     """
-    for _ in range(ROUNDS):
+    for _ in range(HALVINGS):
         marked = sorted({side for cell in cells for side in _wide_sides(points, cell, corners)})
         if not marked:
             break

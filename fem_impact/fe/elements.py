@@ -9,16 +9,16 @@ from scipy.spatial import cKDTree
 from skfem import Dofs, ElementTriArgyris, ElementTriMorley, MappingAffine, MeshTri
 from skfem.quadrature import get_quadrature
 
+from .._base.rounding import SAME
 from .._base.untyped import Cells
-from ..mesh.facets import Curves, powers
+from ..mesh.facets import CURVE_STEPS, Curves, powers
 from .supports import SIDES
 
 EXPONENTS = np.array([(i, j) for i in range(6) for j in range(6 - i)])  # the 21 monomials of degree 5
-ON_BODY = 1e-9  # [-] share of the size of a triangle or body by which rounding may move a point off it
 NEAR_CURVE = 1e-5  # [-] the same at curved edges: the mesh is closer to the curve than this share of a triangle
+CHUNK = 256  # [-] triangles whose shapes are computed together, to limit memory
 CANDIDATES = 8  # [-] nearest triangles searched first; if none holds the point, all are searched
 REACH = 0.5  # [-] share of a triangle's size; no curved edge bulges this far
-CURVE_STEPS = 12  # [-] fixed-point steps to find the coordinates of a point in a curved triangle
 REFERENCE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) - 1.0 / 3.0  # corners in local coordinates
 DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))  # unknowns at a vertex: orders in x and y
 
@@ -166,7 +166,7 @@ class Triangles:
         count = min(CANDIDATES, len(self.origin))
         near = self.tree.query(points, k=count)[1].reshape(len(points), count)
         cell, depth = self._deepest(points, near)
-        margin = np.full(len(self.origin), -ON_BODY)
+        margin = np.full(len(self.origin), -SAME)
         if self.curved.any():
             size = np.sqrt(np.abs(np.linalg.det(self.jacobian)))
             margin = np.minimum(margin, -NEAR_CURVE * size[self.curved].max() / size)

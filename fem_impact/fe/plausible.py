@@ -46,8 +46,8 @@ RANGES = {
     ),
 }  # fmt: skip
 NAMES = {"rho": "density", "damping_ratio": "damping_ratio =", "speed": "speed", "length": "a length of"}
-TURN = 2.0 * np.pi  # [rad]
-ROLLING = 20.0  # [-] G over the rolling shear modulus of softwood: 0.064 E over 0.003 E, Wood Handbook, table 5-1
+TURN = 2.0 * np.pi  # [rad] fact: a full one
+ROLLING = 20.0  # [-] fact: G over the rolling shear modulus of softwood: 0.064 E over 0.003 E, Wood Handbook, table 5-1
 THICK = 0.3  # [-] thickness over the shortest side above which a body is no longer thin
 
 

@@ -10,11 +10,11 @@ from ..mesh.meshes import Mesh
 from . import beam_elements, residual
 from .assembly import System, reassemble
 from .eigenvalues import Flexibility
+from .refinement import COARSER
 
 CELLS = 600  # [-] approximate number of triangles in the first mesh
-GOAL = 1e-5  # [-] refinement stops at this relative error of the compliance
+GOAL = 1e-5  # [-] refinement stops at this relative error of the compliance: a tenth of the default tolerance
 SPREAD = 4e-4  # [-] error of the points that stand for a spread force on a thick plate, times 2 pi the shear stiffness
-COARSER = 1.5  # [-] ratio of element sizes of two meshes of a thick plate, whose difference is stated as its error
 ROUNDS = 3  # [-] most meshes tried; each halves the element size
 ROUNDING = 1e-7  # [-] relative rounding error of a plate's compliance, caused by the smallest triangles
 RESTS = 1e-15  # [-] a point whose compliance in the frame is below this lies on a support

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 from .._base import check
 from .._base.files import replacing
+from .._base.rounding import EPSILON, SAME
 from ..mesh import mesh_files
 from ..mesh.meshes import MOST_CELLS, Mesh
 from . import residual, thick
@@ -33,7 +34,6 @@ ROUNDED = 3.0  # [-] factor on the rounding error of K, estimated as a random wa
 LEAST = 1e-14  # [-] smallest relative error stated for a frequency; the eigensolver leaves about this much
 MORLEY = 0.2574578  # [-] error constant of Morley interpolation, over h**2 (Carstensen and Gallistl 2014)
 MORLEY_UNKNOWNS = 20_000  # [-] unknowns of the Morley solution for the lower bounds; cheap beside the modes themselves
-ALGEBRA = 1e-9  # [-] margin added to guaranteed bounds on both sides for rounding and the eigensolver
 FINE_WAVE = 1.1  # [rad] as WAVE_PER_ELEMENT, if CHEAP_CELLS triangles suffice: error 2e-7, clamped 1e-5
 CHEAP_CELLS = 700  # [-] triangles that take little time to solve, so that fewer are not worthwhile
 LAYERS = 10.0  # [-] largest element under tension, in edge layers sqrt(D / tension): error 1e-5 on a disk
@@ -47,7 +47,6 @@ AIM = 0.9  # [-] fraction of the tolerance that the first mesh aims at
 MARGIN = 0.6  # [-] fraction of the tolerance that later meshes aim at
 ORDERS = 7.5, 5.0  # [-] powers of the element size with which the first two parts of the error fall
 LEAST_STEP = 1.05  # [-] smallest ratio of element sizes between two meshes
-MOST_STEPS = 40.0  # [-] logarithm of the largest ratio searched: beyond any mesh
 MOST_MESHES = 8  # [-] meshes tried to meet a tolerance
 SAY = 1e-3  # [-] errors at singular corners are added to the estimate above this value
 ROOMY = 8.0  # [-] unknowns per mode on a mesh that is proposed because another was too coarse
@@ -331,7 +330,7 @@ def _needed(parts: np.ndarray, goal: float) -> float:
     def excess(log: float) -> float:
         return float((np.exp(-log * np.array(ORDERS)) @ parts[:2] + parts[2]).max()) - goal
 
-    return max(LEAST_STEP, float(np.exp(brentq(excess, 0.0, MOST_STEPS)))) if excess(0.0) > 0.0 else LEAST_STEP
+    return max(LEAST_STEP, float(np.exp(brentq(excess, 0.0, -np.log(EPSILON))))) if excess(0.0) > 0.0 else LEAST_STEP
 
 
 def _start(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> System:
@@ -378,7 +377,7 @@ def enclosure(found: Spectrum) -> np.ndarray | None:
     value = (second.omega / system.frame.rate) ** 2
     lower = value / (1.0 + MORLEY**2 * value * longest**4 / (1.0 - nu))
     bounds = np.column_stack([np.sqrt(lower) * system.frame.rate, found.omega])
-    bounds *= np.array([1.0 - ALGEBRA, 1.0 + ALGEBRA])
+    bounds *= np.array([1.0 - SAME, 1.0 + SAME])  # rounding and the eigensolver
     return bounds
 
 

@@ -24,8 +24,8 @@ from .._base.untyped import Cells, Sparse
 from .beam_elements import DEGREE, HermiteSpace, quadrature, running_integral
 from .section import Elastic
 
-BENT = DEGREE + 1  # [-] shape functions of W on an element
-LOCAL = 2 * BENT  # [-] of both
+BENT = DEGREE + 1  # shape functions of W on an element
+LOCAL = 2 * BENT  # of both
 Field = Callable[[np.ndarray], np.ndarray]
 
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from . import beam_elements
 from .assembly import System
+from .elements import CHUNK
 from .section import Plate, evaluate
 
 NODES = 6  # [-] Gauss points in each direction of a triangle: exact for products of slopes of quintics
-CHUNK = 256  # [-] cells whose slopes are computed together, to limit memory
 
 
 def products(system: System, vectors: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -5,17 +5,15 @@ from typing import Any
 
 import numpy as np
 
+from .._base.rounding import SAME
 from ..mesh.facets import divided
 from ..mesh.meshes import Mesh
-from .elements import ON_BODY
 
 # [-] triangle size under a point load, as a fraction of the body's breadth or of the distance to a held edge. These
 # triangles miss 1e-6 of the compliance; rounding grows with the size to the power -2 and is smaller; test_point_load.py
 DEPTH = 2.0**-8
 GROWTH = 0.7  # [-] longest side of a triangle per distance to the point: 1.0 is ten times worse at curved edges
 STEEPEST = 1.0  # [-] largest growth; the error goes as its power eight, and as the square of the size at the point
-TIES = 1e-9  # [-] sides equal to this relative accuracy are ranked by number, so that neighbours pick the same one
-ROUNDS = 400  # [-] most passes over the mesh; about 30 reach a millionth of the extent
 
 
 def towards_points(mesh: Mesh, points: np.ndarray, held: np.ndarray, least: Any = 0.0, coarseness: Any = 1.0) -> Mesh:
@@ -30,14 +28,13 @@ def towards_points(mesh: Mesh, points: np.ndarray, held: np.ndarray, least: Any 
     growth = np.minimum(GROWTH * np.broadcast_to(coarseness, len(points)) ** 0.25, STEEPEST)
     extent = float(np.ptp(mesh.points, axis=0).max())
     breadth = mesh.area / mesh.perimeter
-    for _ in range(ROUNDS):
+    while True:  # some thirty times to a millionth of the extent
         size = np.array([_wanted(mesh, held, point, breadth, extent) for point in points])
         tall = _too_large(mesh, points, np.maximum(coarseness * size, least), growth)
         if not tall.any():
             return mesh
         mesh, parent = divided_across(mesh, tall)
         held = held[parent]
-    return mesh
 
 
 def _wanted(mesh: Mesh, held: np.ndarray, point: np.ndarray, breadth: float, extent: float) -> float:
@@ -46,7 +43,7 @@ def _wanted(mesh: Mesh, held: np.ndarray, point: np.ndarray, breadth: float, ext
         return DEPTH * breadth
     ends = np.stack([mesh.points[mesh.facets[held, 0]], mesh.middles[held], mesh.points[mesh.facets[held, 1]]], axis=1)
     away = float(distance(point, ends[:, :-1], ends[:, 1:]).min())
-    return DEPTH * (breadth if away < ON_BODY * extent else min(breadth, away))
+    return DEPTH * (breadth if away < SAME * extent else min(breadth, away))
 
 
 def distance(point: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
@@ -79,7 +76,8 @@ def divided_across(mesh: Mesh, tall: np.ndarray) -> tuple[Mesh, np.ndarray]:
     keys, number = np.unique(pairs[..., 0].astype(np.int64) * n + pairs[..., 1], return_inverse=True)
     number = number.reshape(-1, 3)
     length = np.linalg.norm(np.diff(mesh.points[pairs], axis=2)[:, :, 0], axis=2)
-    rank = np.round(length / length.max(axis=1, keepdims=True) / TIES) + number / len(keys)
+    # equal sides are ranked by number, so that neighbours pick the same one
+    rank = np.round(length / length.max(axis=1, keepdims=True) / SAME) + number / len(keys)
     longest = number[np.arange(len(cells)), rank.argmax(axis=1)]
     marked = np.zeros(len(keys), bool)
     marked[longest[tall]] = True

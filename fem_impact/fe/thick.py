@@ -59,16 +59,15 @@ from skfem.quadrature import get_quadrature
 
 from .._base import check
 from .._base.untyped import Cells, Sparse
-from ..mesh.meshes import Mesh
+from ..mesh.meshes import LONGEST, Mesh
 from . import splitting, supports
-from .elements import ArgyrisSpace, Bent, Triangles, inverses
+from .elements import CHUNK, ArgyrisSpace, Bent, Triangles, inverses
 from .section import SOFT, Plate, evaluate
 from .springs import at_facets
 
-SHEAR = 15  # [-] shape functions of one component of the shear strain on a triangle
-LOCAL = 21 + 2 * SHEAR  # [-] unknowns of a triangle: w, gamma_x, gamma_y
+SHEAR = 15  # shape functions of one component of the shear strain on a triangle
+LOCAL = 21 + 2 * SHEAR  # unknowns of a triangle: w, gamma_x, gamma_y
 PATCH = 0.325  # [-] radius over which a point force is spread, over the thickness
-CHUNK = 128  # [-] triangles whose matrices are computed together, to limit memory
 FINE, ROUGH = (6, 24), (2, 8)  # [-] points on that disk, radial and around: error 3e-5 of a compliance at h/L = 0.2
 FEW = 64  # [-] at more points, as for a picture, the rough ones do: their error is 1e-6 of a mode of h k = 1
 LOOSE = "free", SOFT  # supports with a layer
@@ -76,7 +75,6 @@ LAYER = 2.0  # [-] size of triangles in this layer over the thickness h: errors 
 MOST_LAYER = 120.0  # [-] most triangles along these edges; a plate that needs more keeps larger ones
 SEEN, UNSEEN = 4.0, 9.0  # [-] sides over the thickness below which they resolve the layer, above which they miss it
 SMALL = 0.1  # [-] longest side over the thickness below which nodes hold rotations: either choice loses two digits here
-EVEN = 1.5  # [-] longest side of a triangle over the size asked for
 
 
 def reference(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -381,19 +379,18 @@ def spread(space: MindlinSpace, points: np.ndarray, radius: np.ndarray) -> tuple
 
 def towards_edges(mesh: Mesh, loose: np.ndarray, size: float) -> Mesh:
     """Make the triangles of a mesh shrink to a ``size`` [m] towards the facets ``loose`` (n_facets,) bool."""
-    for _ in range(splitting.ROUNDS):
+    while True:
         ends = mesh.points[mesh.facets[loose]]
         steps = np.ceil(2.0 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / size).astype(int)
         along = [np.linspace(0.0, 1.0, n + 1)[:, None] * (b - a) + a for (a, b), n in zip(ends, steps)]
         corner = mesh.points[mesh.cells]
         away = cKDTree(np.concatenate(along)).query(corner)[0].min(axis=1)
         longest = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1)
-        tall = longest > np.maximum(size, splitting.GROWTH * away) * EVEN
+        tall = longest > np.maximum(size, splitting.GROWTH * away) * LONGEST
         if not tall.any():
             return mesh
         mesh, parent = splitting.divided_across(mesh, tall)
         loose = loose[parent]
-    return mesh
 
 
 def layered(mesh: Mesh, section: Plate, kinds: list[str], coarser: float) -> Mesh:

@@ -8,6 +8,7 @@ import numpy as np
 from .._base import check
 from . import slopes
 from .assembly import System, curvatures
+from .elements import CHUNK
 from .section import Beam, Plate
 
 # fourth-order differences over values at these multiples of a step: about the value, and to one side of it
@@ -17,7 +18,6 @@ DIFFERENCES = (
     ((0, -1, -2, -3, -4), (25 / 12, -4.0, 3.0, -4 / 3, 1 / 4)),
 )
 STEP = 1e-5  # [-] of a number, for these differences: they round to 1e-11
-CHUNK = 256  # [-] cells whose shapes are computed together, to limit memory
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
+from .._base.rounding import EPSILON, ROUNDING
 from ..modes.modal import Modes, left_out
 from ..modes.stretching import Stretching, stretch
 from . import accuracy, force_spectrum, promise
@@ -30,26 +31,24 @@ from .striker import Striker
 TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
 SCHEMES = ("A", "A4", "collocation")
 MAX_STEPS = 500_000  # [-] of one run: takes about one second
-MAX_WORK = 500_000_000  # [-] modes times steps of one run: takes about one second
-STRETCHED_WORK = 1_000_000_000  # [-] entries of the forms times steps of one run with stretching: some ten seconds
+MAX_WORK = 1_000_000_000  # [-] modes, or entries of the forms of stretching, times steps of one run: some seconds
 PLAIN_WORK = 300_000  # [-] modes times steps of one run, if the kernels are not compiled
 REACHED = 20.0  # [-] tolerance advised over the error reached: the steps it leads to may be twice as long
 SOONER = 0.2  # [-] of a run that was given up, what is advised: the last run of a blow halves the steps twice
-FIRST_STEPS = 24.0  # [-] with 24 steps per contact, A4 errs by less than FIRST_ERROR; cheapest first run of 12 to 32
-FIRST_ERROR = 1e-4  # [-] error of A4 with FIRST_STEPS, over many blows
+FIRST_STEPS = 24.0  # [-] steps per contact with which A4 meets TOLERANCE in most blows; cheapest first run of 12 to 32
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
 AVERAGED = 0.5  # [-] fraction of the usual steps that these quantities need
 GRAZE = 2.0  # [-] a touch or gap below 2 tolerance times the deepest approach may be a numerical error
-GRAZES = 3  # [-] step halvings to decide whether such a touch is real
+GRAZES = 3  # [-] step halvings to decide whether such a touch is real: each divides the doubt by eight
 FEW = 20  # [-] no such check after more impacts: chatter always ends with a contact that barely touches
-DOUBLINGS = 7  # [-] step halvings before the run gives up
+DOUBLINGS = 7  # [-] step halvings before the run gives up: A4 then errs 2**28 times less
 # [-] Difference of two runs over the error of the finer one: first for speeds and impulse, then for contact time and
 # peak force. These two depend on one instant, and modes faster than the step lower the order of A4 there.
 RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 4.0), "collocation": (1.0, 1.0)}
 MISFIT = 1.5, 12.0  # [-] error of the peak force over the misfit in `_force_missed`, without and with loss
 NEAR_PEAK = 0.8, 0.35  # [-] that misfit counts only above this fraction of the peak force, without and with loss
 RINGING = 0.5  # [-] modes with a damping ratio above this do not ring
-RESOLVED = 2.0  # [rad] largest phase of a ringing mode in one step of the coarser run
+RESOLVED = 2.0  # [rad] largest phase of a ringing mode in one step of the coarser run: a third of a period
 COLLOCATION_BELOW = 1e-7  # [-] below this tolerance, collocation needs less work than A4
 BAND_POINTS = 257  # [-] number of frequencies at which two spectra are compared
 NODES = 5  # [-] of collocation; more gain nothing, because the force is not smooth at onset and release
@@ -59,17 +58,13 @@ RESOLVABLE = 0.3  # [-] largest contact stiffness times residual compliance for 
 AT_LEAST = 0.3
 THINNED = 1.4, 2.0  # [-] two extra runs divide the highest kept frequency by these, to estimate the truncation error
 FALLING = 2.0, 1.0  # [-] the truncation error falls at least with this power of the highest kept frequency; overdamped
-REST_FLOOR = 1e-12  # [-] residual compliance below this fraction of the total is rounding
 # [-] by dimension: frequency of the replacement mode over the last, sqrt(sum u**2/w**2 / sum u**2/w**4) of those above
 REST_ABOVE = {1: 1.53, 2: 1.73}
 # [-] the replacement mode under a lossy contact: frequency over the last mode's, and damping ratio
 LOSSY_ABOVE, LOSSY_DAMPING = 30.0, 1.0
 LOSSY_STRIKER = 30.0  # [-] a lossy contact multiplies the truncation error of a striker by this: its modes are sparse
 STRIKER_SHARE = 0.05  # [-] fraction of the tolerance for the striker's left-out modes: keeping them is cheap
-NOISE = 1e-16  # [-] an approach below this times duration times speed is rounding: the bodies merely touch
-STILL = 1e-12  # [-] a rigid approach slower than this times the speed is rounding: no contact follows
-ROUNDING = 1e-13  # [-] smaller differences of two runs are rounding
-NEGLIGIBLE = 1e-4  # [-] mesh errors below this fraction of the tolerance need no extra run
+NEGLIGIBLE = 1e-4  # [-] mesh errors below this fraction of the tolerance need no extra run; the blow errs by as little
 LOOKS = 16.0, 20_000  # [-] times per contact at which two motions are compared, and their largest number
 LARGEST_ERROR = 0.5  # [-] frequency errors are capped at this in that run
 
@@ -410,7 +405,7 @@ def _forms(part: _Part, rated: np.ndarray) -> np.ndarray:
     if not part.rest.any() or (len(part.touched) == 1 and not rated[part.touched[0][0]]):
         return np.zeros((len(part.touched), 0))
     size, vectors = np.linalg.eigh(part.rest)
-    kept = size > REST_FLOOR * size[-1]
+    kept = size > ROUNDING * size[-1]
     return np.asarray(vectors[:, kept] * np.sqrt(size[kept]))
 
 
@@ -466,7 +461,7 @@ def _part(
     rest = 0.5 * (rest + rest.T)
     carried = np.square(rows / np.where(modes.omega > 0.0, modes.omega, np.inf)).sum()
     largest = rest[0, 0] if n_ends == 1 else np.linalg.eigvalsh(rest)[-1] if n_ends else 0.0
-    if largest <= REST_FLOOR * (np.trace(rest) + carried):
+    if largest <= ROUNDING * (np.trace(rest) + carried):
         rest = np.zeros_like(rest)
     still = np.zeros(modes.n_modes)
     bias = force * rows[0] if force else still
@@ -661,7 +656,7 @@ def _scheme_for(tolerance: float, exponent: float) -> str:
 
 def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float | None]) -> float:
     """Steps per contact in the first run."""
-    count = FIRST_STEPS * (FIRST_ERROR / tolerance) ** (0.5 if scheme == "A" else 0.25)
+    count = FIRST_STEPS * (TOLERANCE / tolerance) ** (0.5 if scheme == "A" else 0.25)
     return max(6.0, count * (AVERAGED if set(quantities) <= AVERAGES else 1.0))
 
 
@@ -817,7 +812,7 @@ def _most_steps(system: _System) -> int:
     if not build.COMPILED:
         return max(100, PLAIN_WORK // len(system.omega))
     if system.stretched is not None:
-        return min(MAX_STEPS, max(1000, STRETCHED_WORK // system.stretched.forms.size))
+        return min(MAX_STEPS, max(1000, MAX_WORK // system.stretched.forms.size))
     return min(MAX_STEPS, max(1000, MAX_WORK // len(system.omega)))
 
 
@@ -830,7 +825,7 @@ def _run(
         system.omega, system.zeta, system.shape, system.offset, system.bias, system.law, system.start_q, system.start_p
     )  # fmt: skip
     most = _most_steps(system)
-    limits = Limits(float(NOISE * pace[0] * pace[1]), float(STILL * pace[1]), float(horizon), n_max, most)
+    limits = Limits(float(EPSILON * pace[0] * pace[1]), float(ROUNDING * pace[1]), float(horizon), n_max, most)
     stretched, stretch = system.stretched, None
     if stretched is not None:
         stretched = replace(stretched, base=float(size), ramp=scheme == "A4")

@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 from scipy.special import gamma
 
 from .._base import check
+from .._base.rounding import HALVINGS
 from .compiled.law import FELT, LAYERS, PLASTIC, POWER
 from .compiled.layout import DEPTH, EXPONENT, FIRST_YIELD, HARD, HARD_EXPONENT, KIND, RELAXATION, SHARE, STIFFNESS
 
@@ -15,7 +16,7 @@ LOWEST_EXPONENT, HIGHEST_EXPONENT = 0.5, 100.0  # [-] limits: below, no longer a
 
 LEAST_FELT = 1e-3  # [-] of its stiffness that felt is taken to keep in a guess of the contact time
 MOST_LOSS = 1e12  # [s/m] far above that of a contact that swallows the slowest blow whole
-YIELDS = 1.6  # [-] largest pressure of a round contact over the yield strength at which it first yields, for nu = 0.3
+YIELDS = 1.6  # [-] fact: pressure at which a round contact first yields, over the yield strength, for nu = 0.3
 STIFFEST = 1e200  # [N/m**exponent] upper limit, 1/STIFFEST the lower: high exponents need huge stiffnesses
 
 
@@ -397,7 +398,7 @@ def acting_stiffness(law: Any, mobility: Any, speed: Any) -> np.ndarray:
     else:
         low, high = np.zeros_like(deepest), deepest
         hard, b = law[HARD], law[HARD_EXPONENT]
-        for _ in range(60):
+        for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             over = np.maximum(middle - law[DEPTH], 0.0)
             stored = k * middle ** (a + 1.0) / (a + 1.0) + hard * over ** (b + 1.0) / (b + 1.0)

@@ -16,7 +16,7 @@ MOST_PERIODS = 2.0**18  # [-] periods of the highest frequency in a blow whose c
 MOST_NODES = 2**24  # [-] nodes or cells of a transform: they take two gigabytes; above it, the direct sum
 TERMS = 14  # [-] of the series: for phases up to a half, that of a cell's end, they leave 0.5**14 / 14! = 7e-16
 WINDOW = 8  # [-] half width of the window that interpolates from twice as many even frequencies: errs by 4e-16
-BETA = 1.5 * np.pi * WINDOW  # [-] shape of the window, that of Kaiser and Bessel
+BETA = 1.5 * np.pi * WINDOW  # [-] fact: best shape of the window, that of Kaiser and Bessel
 EVEN = 1e-15  # [-] of the highest frequency: rounding of frequencies that are evenly spaced from zero on
 SERIES = 0.5  # [rad] half the phase over a piece below which the first spherical Bessel function takes its series
 # Gauss rules, and half the phase [rad] over a piece at which they err by 1e-15 of its force, by their error term

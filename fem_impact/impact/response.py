@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
+from .._base.rounding import ROUNDING, SAME
 from ..fe import plausible
 from ..modes.modal import Modes, SampledShapes, at_rest
 from ..modes.stretching import stretch
@@ -24,15 +25,12 @@ from .state import State
 from .stretched import Stretched
 from .striker import Striker
 
-CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more than this factor
-TOUCH = 1e-12  # [-] of the largest approach rate: bodies that touch and approach more slowly count as pressed
-SAME = 1e-2  # [-] two descriptions of one body may differ by this in mass and compliance
+CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more than this factor: three digits are lost
+ONE_BODY = 1e-2  # [-] two descriptions of one body may differ by this in mass and compliance
 PEAK_LOOKS = 16  # [-] samples per step in the search for the peak force; misses (pi/11/16)**2/8 before the parabola
-ENDED = 1e-9  # [-] of a run: nearer to its end, the motion is that of the end state; test_free_motion.py
 # [-] largest difference of descriptions up to which Ritz vectors tell a motion: as much as modes err that are found
 # as far as the force reaches
 MOVED = {"displacement": 1e-2, "velocity": 3e-2}
-RELEASED = 1e-9  # [-] of the peak force: a smaller one is the rounding of a release
 LASTS = 2.0  # [-] and no longer than this many times the run, as later echoes may be missing from all of them
 LOOKED_AT = 200  # [-] times at which this error is estimated
 DIP_BLOCK = 8  # [-] points per static solution: each is a load, and the cost grows with the pairs of points
@@ -192,7 +190,7 @@ class History:
 
         Needs the end state, which only the modes of the run itself have.
         """
-        n = int(np.searchsorted(times, (1.0 - ENDED) * self.end_time))
+        n = int(np.searchsorted(times, (1.0 - SAME) * self.end_time))  # nearer to it, as at the end
         found = self.offset + np.vstack(
             [self.states(times[:n])[0] @ self.shape.T, np.zeros((len(times) - n, self.n_contacts))]
         )
@@ -216,7 +214,7 @@ class History:
     def contacts(self) -> np.ndarray:
         """All impacts, (n_impacts, 5): start, end, peak force, impulse, contact index; sorted by contact."""
         rate = np.abs(self._column(1)).max(initial=0.0)
-        return record.find_impacts(self.steps, self.now, self.law, self.n_coefficients, PEAK_LOOKS, TOUCH * rate)
+        return record.find_impacts(self.steps, self.now, self.law, self.n_coefficients, PEAK_LOOKS, ROUNDING * rate)
 
     @cached_property
     def impacts(self) -> tuple[Impact, ...]:
@@ -365,8 +363,8 @@ class Response(Totals):
         point = modes.point("at", self.at)
         whole, softness = self.bodies[-1].shapes.compliance(point)[0, 0], modes.shapes.compliance(point)[0, 0]
         sampled = isinstance(modes.shapes, SampledShapes)  # it may not know the modes left out
-        if not np.isclose(modes.mass, self.bodies[-1].mass, rtol=SAME) or not (
-            sampled or np.isclose(softness, whole, rtol=SAME)
+        if not np.isclose(modes.mass, self.bodies[-1].mass, rtol=ONE_BODY) or not (
+            sampled or np.isclose(softness, whole, rtol=ONE_BODY)
         ):
             raise ValueError(
                 f"modes must be of the body struck, {self.bodies[-1].mass:g} kg that yield {whole:.4g} m/N, got "
@@ -649,7 +647,7 @@ class Response(Totals):
         bodies = tuple(self._moved(body) for body in range(len(self.bodies)))
         found = [self.modal_state([time], body=body) for body in range(len(bodies))]
         forces = np.array([self.history.force_at(np.array([time]), i) for i in range(len(self.contacts))])[:, :, 0]
-        forces[forces[:, 0] <= RELEASED * self.peak_force] = 0.0
+        forces[forces[:, 0] <= SAME * self.peak_force] = 0.0  # the rounding of a release
         remembers = any(law.remembers for law in self.contacts)
         return State(
             time,

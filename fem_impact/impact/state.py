@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from .._base import check
+from .._base.rounding import SAME
 from ..modes.modal import Modes
 from .contact import Contact
 from .striker import Striker
-
-SAME = 1e-9  # [-] two bodies are the same if masses and frequencies differ by less: rounding, but no other body
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from .accuracy import left_out_density
 from .spectra import half_sine_spectrum
 
 STEP = 1.01  # [-] ratio of neighbouring frequencies in the search: much finer than the lobes of the pulse's spectrum
-AT_ONCE = 64  # [-] of these frequencies tried together
+AT_ONCE = 64  # [-] of these frequencies tried together, to limit the work
 PIECE = 2.0  # [-] width in contact frequencies of each piece of the integral over the modes left out
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)  # [-] Gauss points of each piece
 HARDEST = np.log(1e70)  # [-] log of the highest contact frequency tried [rad/s]: above it, the threshold is infinite

@@ -13,7 +13,7 @@ from .devices import Clock, Device, Speaker
 from .player import LOUDEST, Player, Stroke
 
 FASTER = 2.0  # [-] fastest stroke over the speed of the scene
-N_POINTS = len(KEYS[0])  # [-] points to strike, one for each column of keys
+N_POINTS = len(KEYS[0])  # points to strike, one for each column of keys
 
 
 def player_of(scene: Scene, modes: Modes, options: argparse.Namespace) -> Player:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._base import check
+from .._base.rounding import EPSILON, ROUNDING
 from ..impact import collision
 from ..impact.collision import Touch
 from ..impact.compiled import live
@@ -18,11 +19,9 @@ from ..show.sound import FULL_SCALE, HIGHEST_RATE, RATE, Sound
 
 BLOCK = 64  # [-] frames computed at a time: 1.3 ms at 48 kHz
 CONTACT_STEPS = 32.0  # [-] least steps in the shortest contact; test_player.py holds the force to 1e-3
-PHASE = 2.0  # [rad] largest phase of a mode in a step in contact
 SHORTEST = 12  # [-] halvings of a frame that a step in contact may need: 5 ns at 48 kHz
 OPENING, CLOSING, FLIGHT = 5, 8, 2  # [-] halvings of that step to end at a release, at an onset, and in flight
 LASTING = 1.0  # [s] after which a stick is lifted
-TOLERANCE = 1e-4  # [-] for the modes of the stick: they cost little
 AT_ONCE = 64  # [-] strokes in one block; what comes on top waits for the next
 LOUDEST = 0.25  # [-] of full scale, reached by one stroke at full speed: four at once do not clip
 
@@ -83,7 +82,7 @@ class Player:
         self.rate = check.count("rate", rate, high=HIGHEST_RATE)
         self.block, self.fastest = check.count("block", block), check.positive("fastest", fastest, "m/s")
         check.count("sticks", sticks, high=16)
-        needed = collision.striker_modes(striker, contact=contact, speed=fastest, tolerance=TOLERANCE)[0]
+        needed = collision.striker_modes(striker, contact=contact, speed=fastest, tolerance=collision.TOLERANCE)[0]
         self.striker = striker if striker.fixed else collision.shortened(striker, needed)
         found = [
             collision.touching(
@@ -118,7 +117,8 @@ class Player:
         motion[:n_stick], push[:n_stick] = self.striker.motion, self.striker.push
         period = 1.0 / self.rate
         ringing = omega[zeta < collision.RINGING].max(initial=0.0)
-        level = max(0, int(np.ceil(np.log2(max(period * CONTACT_STEPS / duration, period * ringing / PHASE)))))
+        finer = max(period * CONTACT_STEPS / duration, period * ringing / collision.RESOLVED)
+        level = max(0, int(np.ceil(np.log2(finer))))
         if level > SHORTEST:
             raise ValueError(
                 f"contact must last at least {CONTACT_STEPS * period * 0.5**SHORTEST:.2g} s at {self.fastest:g} m/s to "
@@ -133,7 +133,7 @@ class Player:
         self._pads = live.Pads(rows, mine, laws, offsets, motion, push)
         self._limits = live.Limits(
             level, min(level + CLOSING, live.LEVELS - 1), level + OPENING, level + FLIGHT, round(LASTING * self.rate),
-            period, collision.NOISE * duration * self.fastest, collision.STILL * self.fastest,
+            period, EPSILON * duration * self.fastest, ROUNDING * self.fastest,
         )  # fmt: skip
         self._state = _state(omega.size, sticks, n_trace)
         return float(period * 0.5**level)

@@ -11,6 +11,7 @@ from xml.parsers import expat
 import numpy as np
 
 from .._base import check, isolated
+from .._base.rounding import SAME
 from .loops import (
     FARTHEST,
     LARGEST,
@@ -30,15 +31,14 @@ from .loops import (
 )
 from .smooth_edges import smooth_runs
 
-PIXEL = 0.0254 / 96.0  # [m] one SVG px: 1/96 inch by the CSS standard
+PIXEL = 0.0254 / 96.0  # [m] fact: one SVG px: 1/96 inch by the CSS standard
 DXF_UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 13: 1e-6, 14: 0.1}  # $INSUNITS code -> [m]
-CLOSED = 1e-9  # [-] gaps below this fraction of the extent are rounding and count as closed
 BRIDGED = 1e-3  # [-] gaps below this fraction of the extent are closed and noted
 LONGEST_NAME = 100  # [-] characters kept of an edge name
 SHORT = 1e-7  # [-] pieces shorter than this fraction of the extent are dropped
 MOST_NUMBERS = 100 * MOST_PIECES  # [-] most digit groups in the shapes of a drawing; an arc of long decimals has 12
 SHAPES = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon"}
-LONGEST_COMMENT = 1_000_000  # [-] characters
+LONGEST_COMMENT = 1_000_000  # [-] characters of a comment in a drawing: longer ones are none
 CORNER = 0.1  # [rad] in a drawing without names, a sharper turn than this starts a new edge
 
 
@@ -309,7 +309,7 @@ def _chained(name: str, pieces: list[Piece], notes: list[str]) -> list[Loop]:
         last = int(free.argmax())
         chain, start, stop = [left[last]], starts[last], stops[last]
         free[last] = False
-        while np.linalg.norm(stop - start) > CLOSED * span:
+        while np.linalg.norm(stop - start) > SAME * span:
             onward, back = (np.where(free, np.hypot(*(ends - stop).T), np.inf) for ends in (starts, stops))
             gaps = np.minimum(onward, back)
             best, home = int(gaps.argmin()), float(np.linalg.norm(start - stop))

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.special import comb
 
-HALVING = 12  # [-] iterations to find the middle of a facet; each gains two digits if it turns less than 0.25 rad
+CURVE_STEPS = 12  # [-] iterations to find a point of a curved facet; each gains a digit or two
 
 
 def powers(x: np.ndarray, highest: int, order: int) -> np.ndarray:
@@ -78,7 +78,7 @@ class Curves:
         a, b = self.at(low)[0], self.at(high)[0]
         chord = b - a
         share = 0.5 * (low + high)
-        for _ in range(HALVING):
+        for _ in range(CURVE_STEPS):
             short = ((self.at(share)[0] - 0.5 * (a + b)) * chord).sum(axis=1) / (chord**2).sum(axis=1)
             share = share - (high - low) * short
         return self.at(share)[0]

@@ -8,15 +8,14 @@ import numpy as np
 import shapely
 
 from .._base import check
+from .._base.rounding import HALVINGS, SAME
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "km": 1e3}
 FARTHEST = 1e12  # [-] largest coordinate accepted: products of larger ones lose digits or overflow
 LARGEST = 20.0  # [m] a plate larger than this was probably drawn in millimetres
 SLENDER = 1e4  # [-] largest area / half width**2: the mesher is fast up to 4e3 and hangs from 4e4
-FINEST = 16  # [-] half widths tested are extent / 4**k for k < FINEST; the smallest is near rounding
 TURN = 0.25  # [rad] largest turn within one facet: puts 26 facets on a circle
 MOST_PIECES = 2000  # [-] most pieces in an outline: several times what tracing programs write
-HALVINGS = 60  # [-] most iterations of the search: bisection alone then reaches the last digit
 HERE = 1e-15  # [-] the search ends when the parameter moves by no more than this: rounding
 SAMPLES = 256  # [-] intervals per piece for integrating its length and turning
 
@@ -241,7 +240,7 @@ def _slender(whole: shapely.Polygon) -> str:
     span = max(np.ptp(np.reshape(whole.bounds, (2, 2)), axis=0))
     if whole.area * SLENDER < span**2:
         return "outline must not be a thousand times longer than wide; widen it"
-    for k in range(1, FINEST):
+    for k in range(1, math.ceil(-math.log(SAME, 4.0)) + 1):  # down to rounding
         width = span * 4.0**-k
         if SLENDER * width**2 >= whole.area:  # no room for so long a strip; the test would be slow
             continue

@@ -13,12 +13,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .._base import check
+from .._base.rounding import SAME
 from . import meshio_reader
 from .loops import FARTHEST, LARGEST, UNITS
 
-SAME = 1e-9  # [-] nodes closer than this fraction of the extent are merged
 CROWD = 16  # [-] a file with more than this many nodes per point on average is refused as damaged
-THIN = 1e-9  # [-] a triangle with a smaller ratio of height to longest side has no area
 PLANE = ("triangle", "triangle6", "quad")
 NODES = {"line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4}  # nodes per cell of the types read here
 
@@ -177,7 +176,7 @@ def _mend(path: Path, points: np.ndarray, cells: np.ndarray, notes: list[str]):
     u, v = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     area = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
     longest = np.maximum(np.maximum((u**2).sum(1), (v**2).sum(1)), ((u - v) ** 2).sum(1))
-    flat = np.flatnonzero(2.0 * np.abs(area) <= THIN * longest)
+    flat = np.flatnonzero(2.0 * np.abs(area) <= SAME * longest)
     if flat.size:
         x, y = corner[flat[0]].mean(axis=0)
         raise ValueError(

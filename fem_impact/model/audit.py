@@ -32,7 +32,7 @@ EXAMINERS = (
     local_contact.slow, still_air.of_target, unstated_damping.of_both,
 )  # fmt: skip
 
-WALL = 1e-2  # [-] tolerance of the blow on a wall that tells what can be foreseen
+ROUGH = 1e-2  # [-] tolerance of blows that only tell what can be foreseen, on a wall or for the cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ def foresee(
     stiff = replace(collision.shortened(striker, striker.modes.n_rigid), hand=None)
     bare, wall = replace(contact, loss=0.0, gap=0.0), unyielding(np.zeros(1), 1.0)
     try:
-        hit = collision.strike(wall, stiff, bare, at=np.zeros(1), speed=speed, tolerance=WALL)
+        hit = collision.strike(wall, stiff, bare, at=np.zeros(1), speed=speed, tolerance=ROUGH)
     except SimulationError:
         return unexamined(how["quantity"], "the same blow on a wall cannot be computed", "strike")
     hit = replace(hit, striker=striker, contacts=(contact,), quantities=how["quantity"])

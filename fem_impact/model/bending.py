@@ -37,8 +37,7 @@ LOW = 40  # [-] flexible modes that are integrated; a blow's results depend on f
 TRUE_VECTORS = 4  # [-] of so many Ritz pairs the lowest one is a mode: those above are packets, whose shear is singular
 TOP = 4  # [-] the upper one of so many parts of the integrated modes tells how those above go on
 NODES = 3  # [-] Gauss points in each direction of a triangle: slopes to 1e-3, as modes need several triangles
-RADIAL = 160  # [-] Gauss points along the radius of a disk: 20 for each wave of its fortieth mode
-ALONG = 200  # [-] Gauss points along a beam
+ALONG = 200  # [-] Gauss points along a beam or the radius of a disk: 20 and more for each wave of its fortieth mode
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,7 +294,7 @@ def _rectangle(shapes: RectangleShapes, body: Known, amplitude: float) -> np.nda
 
 def _disk(shapes: DiskShapes, low: slice, body: Known, amplitude: float) -> np.ndarray:
     """The same of a disk, by quadrature along its radius."""
-    node, weight = np.polynomial.legendre.leggauss(RADIAL)
+    node, weight = np.polynomial.legendre.leggauss(ALONG)
     r, dr = 0.5 * (node + 1.0)[:, None], 0.25 * (weight * (node + 1.0))[:, None]  # times r
     z, n, share = shapes.z[low], shapes.order[low], shapes.weight[low]
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
+from .._base.rounding import ROUNDING
 from ..fe import membrane
 from ..fe.section import Plate
 from ..impact.assumption import Assumption
@@ -30,18 +31,17 @@ from .restrike import Struck
 
 LIMIT = 0.2  # [-] deflection over thickness at which the frequency of a hinged square rises by 2 %
 SLIPS = 0.25  # [-] stretching of a plate whose edge may move in its plane over that of one whose edge may not
-TIMES = 64  # [-] instants of the blow at which the tension is found
+TIMES = 64  # [-] instants of the blow, and of each period after it, at which tension and deflection are found
 RINGING = 1.5  # [-] tension that acts on a mode swinging alone, over the mean tension: 3/4 of its largest
 FRONT = 2.0 * np.pi  # [-] radius squared of the bent region over rate times time: where Si(r**2 / (4 rate t)) turns
 AHEAD = 1.5  # [-] power of the slopes' share within the bent region: 2 on an endless plate, least errors on others
 SLIGHT = 0.03  # [-] deflection over thickness below which the free edges of a plate are not looked at closely: 1e-3
-NOWHERE = 1e-12  # [-] least share of the body that is bent
 DENT = 0.7  # [-] stiffening of a wide plate under a point force over (deflection / thickness)**2, from the held disk
 SLOWER = 3.0  # [-] a mode that is slower or faster than bending waves by this rocks or is pulled; wood differs by less
 NUMBER = "deflection over thickness"
 GONG = 1.0  # [-] deflection over thickness beyond which no first-order estimate of the stretching helps
 FEWER = 2  # [-] the stress fields of a body that stretches over those left in the blow to compare with
-PERIODS, PER_PERIOD = 2.0, 64.0  # [-] periods of the first mode after a blow that are looked through for its deflection
+PERIODS = 2.0  # [-] periods of the first mode after a blow that are looked through for its deflection
 REMEDY = "take a softer blow or a thicker body: stretching is not modelled"
 BETTER = "let it stretch, stretching = true, or take a softer blow or a thicker body"
 OTHER = "take element 'argyris'"
@@ -129,8 +129,8 @@ def _stretched(struck: Struck, body: Known, integrals: Bending) -> tuple[float, 
     flexible = history.omega[mine] > 0.0
     period = 2.0 * np.pi / float(history.omega[mine][flexible][0])
     after = PERIODS * period
-    times = np.append(np.linspace(0.0, end, TIMES + 1)[1:], np.linspace(end, end + after, int(PERIODS * PER_PERIOD)))
-    longest = max(history.stretched.base, period / PER_PERIOD)
+    times = np.append(np.linspace(0.0, end, TIMES + 1)[1:], np.linspace(end, end + after, int(PERIODS * TIMES)))
+    longest = max(history.stretched.base, period / TIMES)
     states = replace(history, stretched=replace(history.stretched, base=longest)).states(times)[0]
     moved = states[:, mine]
     value = float(np.abs(moved @ (flexible * history.shape[0, mine])).max(initial=0.0)) / body.thickness
@@ -233,7 +233,7 @@ def _within(body: Known, area: np.ndarray) -> np.ndarray:
     """
     if body.modes.dimension == 1:
         return np.ones(len(area))
-    whole = np.pi * body.extent / np.maximum(area, NOWHERE * body.extent)  # 2 x at the edge
+    whole = np.pi * body.extent / np.maximum(area, ROUNDING * body.extent)  # 2 x at the edge
     near, far = (np.euler_gamma + np.log(x) - special.sici(x)[1] for x in (np.pi, whole))
     return near / far
 

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.special import ellipkm1
 
 from .._base import check
+from .._base.rounding import ROUNDING, SAME
 from ..fe.assembly import support_of_facets
 from ..fe.section import Material, Plate
 from ..fe.splitting import distance
@@ -15,18 +16,16 @@ from ..mesh.meshes import Mesh
 from ..modes.modal import Modes, SampledShapes, at_rest
 from .target import FIRST_LOOK, Target
 
-PULSE = 1.77  # [-] peak response of an oscillator to a half sine, over its static response
-SOFTEST = 10.2158  # [-] first eigenvalue (k r)**2 of a clamped disk; any body that contains the disk has a lower one
+PULSE = 1.77  # [-] fact: peak response of an oscillator to a half sine, over its static response
+SOFTEST = 10.2158  # [-] fact: first eigenvalue (k r)**2 of a clamped disk; a body around the disk has a lower one
 LIVELY = {False: 4.0, True: 16.0}  # [-] largest squared shape times mass; False: no free edge, True: some edge is free
 RIM = 2.0  # [-] factor on Weyl's edge term, an upper bound: free edges need 1.7
 HEAVIEST = 0.3  # [-] damping ratio of the contact with an infinite plate; below it, the striker always rebounds
 NEAREST = 2.0  # [-] least clearance**2 / (rate contact time); below it, the echo returns during the contact
 ECHO = 1.2  # [-] error of one straight edge over ratio / nearness**2; measured 0.1 to 0.4, at a disk's centre 4
-FADED = 1e-12  # [-] fraction of its deflection that the infinite plate's mode loses during a contact
 LOOK = 20.0  # [-] closed-form modes up to this multiple of the contact frequency decide if a body counts as rigid
 MOST_LOOKED_AT = 5000  # [-] upper limit on the number of these modes
 DIRECTIONS = 1001  # [-] in an eighth of a turn, among which the fastest wave of an orthotropic plate is sought
-INSTANT = 1e9  # [-] relaxation rate of that mode times the contact time; the error is a third of the inverse
 
 
 @dataclass(frozen=True)
@@ -161,8 +160,8 @@ def endless(point: np.ndarray, mass: float, mobility: float, duration: float) ->
     ----------
     Cremer, Heckl and Petersson, Structure-Borne Sound, 3rd ed. (2005), section 5.3; Zener (1941), Phys. Rev. 59, 669.
     """
-    rate = INSTANT / duration  # 2 zeta omega
-    omega = np.sqrt(FADED / duration * rate)
+    rate = 1.0 / (SAME * duration)  # 2 zeta omega
+    omega = np.sqrt(ROUNDING / duration * rate)
     shape = np.sqrt(mobility * rate)
     shapes = SampledShapes(point[None], np.array([[shape]]), np.array([[(shape / omega) ** 2]]))
     return Modes(np.array([omega]), np.array([0.5 * rate / omega]), shapes, mass)

@@ -12,6 +12,7 @@ Lamb (1882), Proc. London Math. Soc. 13, 189-212 (modes of a sphere).
 
 import numpy as np
 
+from .._base.rounding import SAME
 from ..fe.section import Material
 from ..impact.assumption import Assumption
 from ..impact.compiled import layout
@@ -22,12 +23,10 @@ from .restrike import Struck, softer
 from .thinness import wavenumber
 
 SMALL = 0.5  # [-] contact radius over half the thickness, over a wavelength / (2 pi) or over the distance to an edge
-NEAREST = 1e-6  # [-] least distance to an edge over the thickness
 SLOW = 0.2  # [-] longest period of the striker's own vibration over the contact time
-HARDLY = 1e-6  # [-] loss times speed of a contact that loses nothing
-LAMB = 2.64  # [-] lowest spheroidal mode of a sphere, omega R / c_s, for nu = 0.25; 2.65 for 0.33
+LAMB = 2.64  # [-] fact: lowest spheroidal mode of a sphere, omega R / c_s, for nu = 0.25; 2.65 for 0.33
 INERT = 10.0  # [-] frequency over that of this mode from which on it does not swing: it leaves 1 % of the effect
-LIVELY = 2.5  # [-] squared shape of that mode at its pole times the mass of the sphere
+LIVELY = 2.5  # [-] fact: squared shape of that mode at its pole times the mass of the sphere
 EDGE = "contact radius over the distance to the edge"
 SPHERE = "give the striker as a sphere with its material, and the contact between the two"
 PLASTIC = "take a contact that yields (yield_strength of `Contact.between`, or elastic_plastic), or a slower blow"
@@ -80,7 +79,7 @@ def yielding(struck: Struck) -> Assumption:
     k, a = law[0, layout.STIFFNESS], law[0, layout.EXPONENT]
     stored = hit.peak_force * (hit.peak_force / k) ** (1.0 / a) / (a + 1.0)  # [J]
     speed = abs(hit.speed) or np.sqrt(2.0 * stored / hit.bodies[0].mass)  # at rest, a constant force presses it
-    bare[0, 2] += HARDLY / speed  # a lossy contact has no compliance in series: both blows are to lack it
+    bare[0, 2] += SAME / speed  # a lossy contact has no compliance in series: both blows are to lack it
     law[0, layout.LOSS] += loss_number(restitution(value ** (-2.5))) / speed  # pressure goes as speed**0.4 on a wall
     effect = dict(struck.between({"law": bare}, {"law": law}))
     return Assumption("no yielding", value, 1.0, effect, quantities, remedy, number)
@@ -124,7 +123,7 @@ def small(struck: Struck) -> Assumption:
     compliance = (1.0 + nu) * (3.0 - 2.0 * nu) / (np.pi * E * h)
     ratios = {number: 2.0 * a / h}
     if struck.clearance is not None:
-        away = max(struck.clearance, a, NEAREST * h)
+        away = max(struck.clearance, a, SAME * h)
         compliance += (1.0 - nu**2) / (2.0 * np.pi * E * away)  # of the image beyond the edge
         ratios[EDGE] = a / away
     history, integrals = hit.history, struck.bending

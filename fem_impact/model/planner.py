@@ -19,7 +19,7 @@ from ..impact.assumption import Assumption
 from ..impact.collision import BAND_POINTS
 from ..impact.contact import Contact
 from ..impact.quantities import words
-from ..impact.response import Response
+from ..impact.response import LOOKED_AT, Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, FieldShapes, Modes, at_rest
 from . import audit, cost, idealisation, mixed, vectors
@@ -27,9 +27,8 @@ from .target import FIRST_LOOK, Elements, Stages, Target, Watch
 
 SHARE = 0.45  # [-] of the tolerance for left-out modes, as much for the time steps; the mesh gets the rest
 STEPS = 0.1  # [-] of the tolerance for the time steps of a blow by Ritz vectors: finer steps cost nothing there
-ATTEMPTS = 3  # [-] runs with ever more modes or finer meshes, until the tolerance is met
-NOTCH = 4.0  # [-] each attempt divides what the modes left out or the mesh may err by this
 MESH = 0.1  # [-] of the tolerance for the mesh, whose frequencies may err twice as much as the blow then does
+ATTEMPTS = 3  # [-] runs with ever more modes or finer meshes, until the tolerance is met
 AUDIBLE, AUDIBLE_POINTS = 20e3, 2001  # [Hz], [-] no mode above is asked for unless a band of the sound is
 FAINT = 1e-3  # [-] modes ring up to the last frequency where the force has this fraction (-60 dB) of its impulse
 MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: some seconds
@@ -49,12 +48,11 @@ RINGING = ("modal", "vectors")  # those of a target that rings
 DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow
 THICK_DOFS_AT_BLOW = 7500  # [-] the same of a thick plate
 MANY = 2  # [-] impacts up to which the first two meshes suffice; each multiplies the error that a mesh makes before it
-ROUGH, LONGEST = 1e-2, 100.0  # [-] tolerance and length, in undisturbed contacts, of the blow that foresees the cost
+LONGEST = 100.0  # [-] length of the blow that foresees the cost, in undisturbed contacts
 FAINTEST = 8.0  # [-] frequency up to which a force has the fraction FAINT of its impulse, times the contact's duration
-TOLD_AT = 200  # [-] times at which the motion of Ritz vectors is judged
 PER_MODE = 65.0  # [-] unknowns per mode found for motion and sound
 MOST_MIXED = 2e8  # [-] modes times steps of one run of a plate that is infinite above a frequency: takes ten seconds
-COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced
+COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced: longer than one likes to wait
 
 
 @dataclass(frozen=True, eq=False)
@@ -360,8 +358,8 @@ def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:
         coarse = not given and response.error.total > asked.tolerance and response.error.mesh > MESH * asked.tolerance
         if plan.target != "modal" or fixed or not (short or coarse) or attempt == ATTEMPTS - 1:
             break
-        margin *= NOTCH if short else 1.0
-        asked = replace(asked, fineness=asked.fineness * (NOTCH if coarse else 1.0))
+        margin *= vectors.NOTCH if short else 1.0
+        asked = replace(asked, fineness=asked.fineness * (vectors.NOTCH if coarse else 1.0))
         try:
             plan = _modal(asked, stages, None if coarse else plan.first, margin)
         except check.SimulationError:  # too many modes or too fine a mesh: what there is has missed the tolerance
@@ -517,7 +515,7 @@ def _in_fine_steps(run: Callable[..., Response], asked: _Asked) -> Response:
 
 def _told(points: tuple, response: Response) -> bool:
     """Whether Ritz vectors tell the motion of all points as long as the blow lasts."""
-    times = np.linspace(0.0, response.history.end_time, TOLD_AT)
+    times = np.linspace(0.0, response.history.end_time, LOOKED_AT)
     return all(np.isfinite(response.motion_error([point], times)) for point in points)
 
 
@@ -686,7 +684,7 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, least: float = 0.0
         elements, element = _mixed_elements(asked, frequency), "argyris"
         size, n_dofs = elements.size, blow.target.unknowns(np.atleast_2d(values["at"]), elements, stages)
         count = _mixed_vectors(asked, seen.mobility, frequency)
-        work = cost.by_vectors([n_dofs, n_dofs / vectors.COARSER**2], count, 1.0)
+        work = cost.by_vectors([n_dofs, n_dofs / refinement.COARSER**2], count, 1.0)
     return _plan(
         asked, target="mixed", errors={"echoes left out": SHARE * asked.tolerance}, reasons=(why, kept),
         mass=seen.mass, mobility=seen.mobility, n_modes=number, max_frequency=frequency, first=first, size=size,
@@ -746,7 +744,7 @@ def _fewer(asked: _Asked, first: Modes, banded: bool) -> str:
     loss = accuracy.LOSSY if contact.rated else 1.0
 
     def fits(tolerance: float, contact: Contact = contact) -> bool:
-        allowed = SHARE * tolerance / (CAUTION * NOTCH * loss)  # with room for a second, finer run
+        allowed = SHARE * tolerance / (CAUTION * vectors.NOTCH * loss)  # with room for a second, finer run
         law = {"contact": contact, "speed": asked.values["speed"], "mass": asked.mass}
         return accuracy.cutoff_frequency(first, asked.values["at"], tolerance=allowed, **law) <= reach
 
@@ -816,7 +814,7 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     if asked.moving:
         rings = _ringing_count(asked)
         work += cost.by_modes(PER_MODE * FIRST_LOOK, FIRST_LOOK) + cost.by_modes(PER_MODE * rings, rings)
-    shares = dict.fromkeys(("Ritz vectors", "mesh"), 0.45 * (1.0 - STEPS) * asked.tolerance)
+    shares = dict.fromkeys(("Ritz vectors", "mesh"), SHARE * (1.0 - STEPS) * asked.tolerance)
     why = f"the contact lasts about {asked.duration:.3g} s"
     return _plan(
         asked, target="vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
@@ -839,7 +837,7 @@ def _foreseen(asked: _Asked) -> tuple[float, int]:
     with suppress(check.SimulationError):
         hit = collision.strike(
             endless, collision.shortened(striker, _striker_modes(asked, 1.0)[0]), asked.blow.contact, at=at,
-            speed=asked.values["speed"], tolerance=ROUGH, duration=LONGEST * asked.duration,
+            speed=asked.values["speed"], tolerance=audit.ROUGH, duration=LONGEST * asked.duration,
         )  # fmt: skip
         return max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, hit.n_impacts
     return 1.0, 1

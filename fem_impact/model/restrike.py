@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 
 from .._base.check import SimulationError
+from .._base.rounding import SAME
 from ..impact import accuracy, collision
 from ..impact.compiled import layout
 from ..impact.response import History, Response
 from ..modes.modal import Modes
 from .bending import Bending, Known, bending, known
-
-BAND_POINTS = 129  # [-] frequencies at which two spectra are compared
-LEAST = 1e-9  # [-] smaller relative changes of what is struck are not struck again
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +91,7 @@ class Struck:
         """As `changes`, between two blows with other fields of the history, if the first is not the one found."""
         h = self.hit.history
         same = (
-            name != "stretched" and np.allclose(x, getattr(h, name), rtol=LEAST, atol=0.0) for name, x in end.items()
+            name != "stretched" and np.allclose(x, getattr(h, name), rtol=SAME, atol=0.0) for name, x in end.items()
         )
         if self.foreseen or (not start and all(same)):
             return dict.fromkeys(self.quantities, 0.0)
@@ -141,7 +139,7 @@ def _change(name: str, band: float | None, one: Response, two: Response) -> floa
         return abs(one.n_impacts - two.n_impacts) / max(1, one.n_impacts)
     if name == "spectrum":
         assert band is not None
-        frequencies = np.linspace(0.0, band, BAND_POINTS)
+        frequencies = np.linspace(0.0, band, collision.BAND_POINTS)
         first, second = one.spectrum(frequencies), two.spectrum(frequencies)
         return float(np.abs(first - second).max() / (np.abs(first).max() or 1.0))
     if name == "sound":

@@ -12,6 +12,7 @@ import numpy as np
 
 from .._base import check
 from .._base.remembered import Remembered
+from .._base.rounding import SAME
 from ..fe import plausible, refinement
 from ..fe.assembly import (
     THEORIES,
@@ -36,11 +37,10 @@ MODELS = ("stated", "auto")  # whether the theory and the air of a target are ch
 BOTH = "both sides"
 AIR = {"one side": 1, BOTH: 2}  # sides of a plate in open air
 FIRST_LOOK = 20  # [-] modes found first: enough to scale the body and to predict the density of the others
-FIRST_FLEXIBLE = 4  # [-] modes that hold a flexible one: a plate has at most three rigid motions
-CLOSE = 1e-6  # [-] error of the first frequency to which a body is scaled: that of a blow is less
-WORST_FREQUENCY = 0.1  # [-] largest frequency error that `find_modes` accepts as a tolerance
+RIGID_MOTIONS = 3  # [-] fact: most that a free body has before its first flexible mode
+FIRST_FLEXIBLE = RIGID_MOTIONS + 1  # [-] fact: modes that hold a flexible one
+CLOSE = 1e-6  # [-] error of a frequency to which a body is scaled or designed: those of a blow are larger
 MESHES = 4  # [-] meshes that are remembered: a plan counts the unknowns of two or three, which its run then uses
-COARSEST = 1e-30  # [-] own element size over a stated one: beyond, the mesh of an outline does not change
 
 Watch = Callable[[str], AbstractContextManager[Any]]
 # Says where an error comes from; takes "mesh", "supports" or another part of a scene, and the names of what was changed
@@ -303,7 +303,7 @@ class Target:
             body = None
         elif first is None:
             body = self.assembled(stages or Stages(), size)
-            wanted = None if insisted else min(tolerance, WORST_FREQUENCY)
+            wanted = None if insisted else min(tolerance, refinement.LOOSEST)
         else:  # start from the mesh of the first modes and refine it if it cannot resolve the shortest wave
             assert isinstance(first.shapes, FieldShapes)
             body = first.shapes.system
@@ -334,7 +334,7 @@ class Target:
         mesh = self.mesh
         if size is not None:
             with stages("mesh"), self.blame("mesh"):
-                mesh = mesh.refined(max(COARSEST, mesh.size / check.positive("size", size, "m")))
+                mesh = mesh.refined(max(SAME, mesh.size / check.positive("size", size, "m")))
         if self.system is not None:
             return self.system if size is None else reassemble(self.system, mesh)
         with stages("assembly"), self.blame("supports"), np.errstate(all="ignore"):

@@ -18,22 +18,21 @@ from ..modes.modal import Modes
 from ..modes.ritz import Krylov
 from .target import Elements, Stages, Target
 
-# [-] value at a tolerance of 1e-2 or more, and power of 1e-2 / tolerance with which it grows
-WAVES = 1.6, 0.37  # highest frequency that the first mesh resolves, over that of the contact
-SHIFT = 6.0, 1.0 / 6.0  # shift over the angular frequency of the contact
-FIRST = 84, 0.22  # vectors tried first: they resolve one undisturbed contact
-FOLDED = 4.0, 0.6  # what modes left out may err, over what the highest pairs may that act as a spring
-EXCITED = 12.0, 0.25  # highest frequency of a mode that matters, over that of the contact
+# the next five: value at a tolerance of 1e-2 or more, and power of 1e-2 / tolerance with which it grows
+WAVES = 1.6, 0.37  # [-] highest frequency that the first mesh resolves, over that of the contact
+SHIFT = 6.0, 1.0 / 6.0  # [-] shift over the angular frequency of the contact
+FIRST = 84, 0.22  # [-] vectors tried first: they resolve one undisturbed contact
+FOLDED = 4.0, 0.6  # [-] what modes left out may err, over what the highest pairs may that act as a spring
+EXCITED = 12.0, 0.25  # [-] highest frequency of a mode that matters, over that of the contact
 FEWEST = 30  # [-] vectors besides those that stand for modes: for the dip under the load
 MORE = 1.2, 1.4  # [-] smallest and largest factor on the number of vectors as long as they are too few
 FALLING = 3.0  # [-] power of the number of vectors with which their error falls, once they resolve the contact
 LESS_FOLDED = 16.0  # [-] divides what those of poorer descriptions may err
-NOTCH = 4.0  # [-] divides what the highest Ritz pairs, which act as a spring, may err, each time
+NOTCH = 4.0  # [-] each attempt divides what modes left out, highest Ritz pairs or the mesh may err by this
 PATIENCE, LEAST_GAIN = 3, 0.7  # [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7
 TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before
 AIM = 0.5  # [-] of what the steps leave of the tolerance: errors that more vectors are to reach, without ever more runs
 AT_FAULT = 3.0  # [-] the mesh is refined if it errs so many times more than too few vectors, which its error contains
-COARSER = 1.5  # [-] element size of the comparison over that of the blow
 ALIKE = 0.85  # [-] a mesh with more than this fraction of the elements of another is no coarser: its outline forbids
 FLATTER = 2.0  # [-] the same at the blow, where triangles halve
 # [-] largest (size wave)**2 mass wave**2 / inertia of the triangles at the blow over the tolerance, see `elements_for`:
@@ -95,7 +94,7 @@ def finer(target: Target, elements: Elements, stages: Stages) -> Elements:
     """The next smaller elements: more of them, and smaller at the blow."""
     size, before = elements.size, target.n_cells(elements.size, stages)
     for _ in range(TRIES):
-        size /= COARSER
+        size /= refinement.COARSER
         if ALIKE * target.n_cells(size, stages) >= before:
             break
     return Elements(size, elements.coarseness / FLATTER)
@@ -103,7 +102,7 @@ def finer(target: Target, elements: Elements, stages: Stages) -> Elements:
 
 def compared(target: Target, elements: Elements, stages: Stages) -> tuple[Elements, Elements]:
     """Elements of the first two meshes that are compared: finer ones if the outline allows no larger ones."""
-    coarser = Elements(COARSER * elements.size, FLATTER * elements.coarseness)
+    coarser = Elements(refinement.COARSER * elements.size, FLATTER * elements.coarseness)
     if target.n_cells(coarser.size, stages) <= ALIKE * target.n_cells(elements.size, stages):
         return elements, coarser
     return finer(target, elements, stages), elements
@@ -216,7 +215,7 @@ class Seen:
             more = np.clip((much / AIM) ** (1.0 / FALLING), *MORE)
             self.count, self.margin = min(MOST_VECTORS, round(more * self.count)), NOTCH * self.margin
             return True
-        more = self.fine.system.n_dofs * COARSER**2
+        more = self.fine.system.n_dofs * refinement.COARSER**2
         useless = self.spent and error.truncation > allowed
         if error.mesh <= 0.5 * allowed or self.fixed or useless or more > refinement.MOST_UNKNOWNS:
             return False

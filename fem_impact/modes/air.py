@@ -31,19 +31,18 @@ from scipy.fft import irfft2, next_fast_len, rfft2
 from scipy.linalg import block_diag, eigh
 
 from .._base import check
+from .._base.rounding import SAME
 from ..fe import plausible
 from ..mesh.meshes import measure
 from .modal import Modes, Shapes
 
-DENSITY, SPEED = 1.204, 343.2  # [kg/m^3], [m/s] of air at 20 degrees C and 1013 hPa
-PER_WAVE = 8.0  # [-] cells per wavelength of the highest mode
+DENSITY, SPEED = 1.204, 343.2  # [kg/m^3], [m/s] fact: of air at 20 degrees C and 1013 hPa
+PER_WAVE = 8.0  # [-] cells per wavelength, of the highest mode and, in `free_air`, of its sound
 FEWEST = 24.0  # [-] cells across a square as large as the plate, at least
 SAMPLES = 2, 3  # [-] points across a cell over which a shape is averaged, in a fine and a coarse grid
 COARSER = SAMPLES[1] / SAMPLES[0]  # [-] cell size of the coarse grid, which tells the error, over that of the fine one
-BLOCK = 24  # [-] modes solved at the same few frequencies
-NEIGHBOURS = 24  # [-] modes on either side that air may mix into a block
+BLOCK = 24  # [-] modes solved at the same few frequencies, and modes on either side that air may mix into them
 NODES = 4  # [-] frequencies per block between which the integrals are interpolated
-SAME = 1e-9  # [-] relative difference of frequencies between which nothing is interpolated
 TURNS = 3  # [-] the frequencies of a block are chosen anew from its modes in air so many times
 FAR = 100.0  # [-] cells from which 1 / R between two cells is taken at their centres: errs by 1e-5
 
@@ -213,7 +212,7 @@ class _Air:
         omega, vectors = self.old.copy(), np.zeros((count, count))
         for first in range(0, count, BLOCK):
             block = slice(first, min(first + BLOCK, count))
-            window = slice(max(0, first - NEIGHBOURS), min(count, block.stop + NEIGHBOURS))
+            window = slice(max(0, first - BLOCK), min(count, block.stop + BLOCK))
             for _ in range(TURNS):
                 self._solve(block, window, omega, vectors)
         return omega, vectors

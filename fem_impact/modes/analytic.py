@@ -16,10 +16,11 @@ from ..fe.section import KINDS, Beam, Plate
 from ..mesh.meshes import Mesh
 from . import timoshenko
 from .modal import BeamlikeShapes, Damping, Modes, Shapes, damping_ratios
+from .timoshenko import ENDS
 
 IMAGES = 6  # [-] image forces beyond each shorter side of a hinged plate; the n-th contributes exp(-2 pi n)
 NEAR_POLE = 1.0  # [-] distance x below which polylogarithms are summed as power series, which converge up to 2 pi
-POWERS = np.append(2, np.arange(3, 60, 2))  # [-] exponents of these series; all other coefficients are zero
+POWERS = np.append(2, np.arange(3, 60, 2))  # [-] fact: exponents of these series; all other coefficients are zero
 SERIES: np.ndarray = (
     (-1.0) ** POWERS * special.bernoulli(60)[POWERS - 1] / (POWERS - 1.0) / special.factorial(POWERS)
 )  # zeta(2-k)/k!
@@ -29,7 +30,7 @@ DISK_TERMS = 100_000  # [-] most terms summed at the edge of a disk, where they 
 MOST_MODES = 1_000_000  # [-] largest number of modes of a rectangle or beam; they take a few seconds
 MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a root search
 MOST_PAIRS = 4 * MOST_MODES  # [-] half-wave number pairs tried on a rectangle; MOST_MODES never needs half of them
-SHEAR_RATIO = 2.6  # [-] E / G of an isotropic material with nu = 0.3
+SHEAR_RATIO = 2.6  # [-] fact: E / G of an isotropic material with nu = 0.3
 ROUND = 0.886  # [-] shear coefficient of a round section, nu = 0.3 (Cowper 1966); 0.857 at nu = 0, 0.9 at 0.5
 LIMIT = 1e5  # [-] largest slenderness of a Timoshenko beam: beyond, shear is below rounding
 DISK_SCAN = 0.5  # [-] step in z = k radius when scanning for roots; roots of one order are about pi apart
@@ -375,9 +376,6 @@ class BeamShapes(BeamlikeShapes):
         return _beam_green(self.ends, load)(x)
 
 
-VANISHING = {"clamped": (0, 1), "hinged": (0, 2), "free": (2, 3)}  # orders of the derivatives that are zero at an end
-
-
 def _beam_rigid(ends: tuple[str, str]) -> np.ndarray:
     """Rigid shapes c0 + c1 x of a beam of unit mass and length, (n_rigid, 2)."""
     if ends == ("free", "free"):
@@ -408,9 +406,9 @@ def _beam_green(ends: tuple[str, str], load: float) -> Callable[[np.ndarray], np
     def slopes(coefficients: np.ndarray) -> np.ndarray:
         """Derivatives of the polynomial at the right end that must vanish there."""
         whole = np.polynomial.Polynomial(coefficients)
-        return np.array([whole.deriv(k)(1.0) if k else whole(1.0) for k in VANISHING[ends[1]]])
+        return np.array([whole.deriv(k)(1.0) if k else whole(1.0) for k in ENDS[ends[1]]])
 
-    free = np.setdiff1d(np.arange(4), VANISHING[ends[0]])
+    free = np.setdiff1d(np.arange(4), ENDS[ends[0]])
     matrix = np.column_stack([slopes(np.eye(4)[k]) for k in free])
     powers[free] = np.linalg.lstsq(matrix, -slopes(powers) - slopes(beyond.coef), rcond=None)[0]
     poly = np.polynomial.Polynomial(powers)
@@ -557,7 +555,7 @@ def _beam_weights(ends: tuple[str, str], k: np.ndarray) -> np.ndarray:
         [nought, -one, -one, far],
     ]
     right = [[c, s, far, one], [-s, c, -far, one], [-c, -s, far, one], [s, -c, -far, one]]
-    rows = [left[i] for i in VANISHING[ends[0]]] + [right[i] for i in VANISHING[ends[1]]]
+    rows = [left[i] for i in ENDS[ends[0]]] + [right[i] for i in ENDS[ends[1]]]
     matrix = np.moveaxis(np.array(rows), 2, 0)  # (n, 4, 4)
     weights = np.linalg.svd(matrix)[2][:, 3, :]
     value, slope, curve, shear = (np.einsum("in,ni->n", np.array(r), weights) for r in right)

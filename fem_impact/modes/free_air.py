@@ -30,11 +30,10 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from .._base.check import SimulationError
 from ..mesh.meshes import measure
-from .air import mean_inverse_distance
+from .air import PER_WAVE, mean_inverse_distance
 from .modal import Modes, Shapes
 
 LOG = logging.getLogger(__name__)
-PER_WAVE = 8.0  # [-] cells per wavelength, both of the mode and of its sound
 ACROSS = 48.0, 64.0, 96.0, 128.0  # [-] cells across a square as large as the plate, in the lattices to choose of
 RESIDUAL = 3e-3  # [-] relative, of the solved equations: far below LEAST
 DIRECTIONS = 12  # [-] over the half space in front, in which the two lattices are compared besides the listener's

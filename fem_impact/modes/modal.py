@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from .._base import check, markup
 from .._base.remembered import Remembered
+from .._base.rounding import ROUNDING, SAME
 from ..fe import plausible, point_load, refinement
 from ..fe.assembly import THICK, System
 from ..fe.eigenvalues import Flexibility
@@ -23,8 +24,6 @@ LOG = logging.getLogger(__name__)
 HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 2 pi times it must stay in reach
 SHOWN = 10  # [-] modes listed in a notebook: a table without scrolling
 REMEMBERED = 16  # [-] points whose shapes and static deflections a body keeps, because one blow needs them many times
-ROUNDING = 1e-12  # [-] rounding error of a compliance, relative to itself and to that of the first mode
-STILL = 1e-9  # [-] a point whose shapes times the root of the mass stay below this is at rest; rounding leaves 1e-12
 SHAPE_ERROR = 10.0  # [-] relative error of a mode's compliance divided by the relative error of its frequency
 
 
@@ -492,12 +491,12 @@ class Modes:
 
 def at_rest(modes: "Modes", point: np.ndarray) -> tuple[str, ...]:
     """A note if a point (1, dimension) [m] of a body that vibrates cannot move itself."""
-    flexible, typical = modes.omega[modes.omega > 0.0], STILL * modes.mass**-0.5
+    flexible, typical = modes.omega[modes.omega > 0.0], SAME * modes.mass**-0.5
     if not modes.dimension or not len(flexible) or np.abs(modes.shapes.at(point)).max() > typical:
         return ()
     everywhere = modes.shapes.at(modes.shapes.grid()[0])  # zero for a body treated as rigid
     softness = modes.shapes.compliance(point)[0, 0] * modes.mass * flexible[0] ** 2
-    if np.abs(everywhere).max() <= typical or softness > STILL:
+    if np.abs(everywhere).max() <= typical or softness > SAME:
         return ()
     where = ", ".join(f"{x:g}" for x in point[0])
     return (f"the point struck, ({where}) m, cannot move: it lies on a support, and the blow is that on a wall",)

@@ -21,13 +21,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._base import check
+from .._base.rounding import HALVINGS
 from .modal import BeamlikeShapes
 
-HALVINGS = 62  # [-] bisections of a bracket of five modes; 55 reach rounding
 STEEP = 1.0  # [-] q above which exponentials replace cosh and sinh, which are bounded below
 ENDS = {"clamped": (0, 1), "hinged": (0, 2), "free": (2, 3)}  # what vanishes there: w, beta, moment, shear force
 MOST = 5000  # [-] largest number of modes; their shapes are integrated point by point
-BLOCK = 64  # [-] modes whose shapes are integrated together
+BLOCK = 64  # [-] modes whose shapes are integrated together, to limit memory
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
+from ..fe.eigenvalues import CLUSTER
 from ..fe.variation import SectionChange, energies
 from .modal import FieldShapes, Modes
 
-SAME = 1e-6  # [-] modes whose frequencies are nearer than this and their errors count as one frequency
 TERMS = 10  # [-] static solutions that stand for the modes left out; the error falls as (f / f_left_out)**(2 TERMS)
 
 
@@ -54,7 +54,7 @@ def frequency_slopes(modes: Modes, change: SectionChange, which: np.ndarray) -> 
         split = stiffer[np.ix_(own, own)] - (omega[i] / rate) ** 2 * heavier[np.ix_(own, own)]
         mean = float(np.trace(split)) / len(own)
         scale = np.abs(np.diag(stiffer)[own]).max() + (omega[i] / rate) ** 2 * np.abs(np.diag(heavier)[own]).max()
-        if np.abs(split - mean * np.eye(len(own))).max() > np.sqrt(SAME) * scale:
+        if np.abs(split - mean * np.eye(len(own))).max() > np.sqrt(CLUSTER) * scale:
             raise SimulationError(
                 f"no derivative of the frequency {omega[i] / (2.0 * np.pi):.6g} Hz: {len(own)} modes share it, and a "
                 "change splits it; want another frequency, or start from a body without this symmetry"
@@ -65,7 +65,7 @@ def frequency_slopes(modes: Modes, change: SectionChange, which: np.ndarray) -> 
 
 def _alike(modes: Modes) -> np.ndarray:
     """Whether each two modes share one frequency, as far as the elements tell, (n_modes, n_modes)."""
-    omega, doubt = modes.omega, SAME if modes.frequency_error is None else SAME + modes.frequency_error
+    omega, doubt = modes.omega, CLUSTER if modes.frequency_error is None else CLUSTER + modes.frequency_error
     unsure = doubt * omega
     return np.abs(omega - omega[:, None]) <= np.maximum(unsure, np.reshape(unsure, (-1, 1)))
 
@@ -122,7 +122,7 @@ def _tail(shapes: FieldShapes, rest: list[np.ndarray], square: np.ndarray) -> np
     heavy = shapes.system.M @ rest[-2]
     size = float(rest[-2] @ heavy)
     ratio = float(rest[-1] @ heavy) / size if size > 0.0 else 0.0
-    return 1.0 / np.maximum(1.0 - ratio * square, SAME)
+    return 1.0 / np.maximum(1.0 - ratio * square, CLUSTER)
 
 
 def _softer(shapes: FieldShapes, change: SectionChange, at: np.ndarray) -> float:

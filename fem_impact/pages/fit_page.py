@@ -19,7 +19,7 @@ from ..taps.unknowns import unit_of
 from . import report
 
 TIMES = 10.0  # [-] residuals are drawn this much larger
-MOST_TAPS = 10  # [-] shown
+MOST_TAPS = 10  # [-] whose records are drawn: a screen holds no more
 MASSES, TIPS = (0.5, 1.0, 2.0), (0.1, 0.3, 1.0, 3.0, 10.0)  # [-] of the double-hit table, over those found
 WIDE = 4.0  # [-] last over first value of a profile from which on its axis is logarithmic
 AROUND = 0.8  # [-] of an interval, shown on either side of it

@@ -12,7 +12,7 @@ from ..model.playing import Strokes
 from ..show import export, sound
 from .scene import Scene
 
-EARS = 2  # [-] listeners whose sounds make one stereo file
+EARS = 2  # listeners whose sounds make one stereo file
 BOUNDS: dict[int, tuple[str, ...]] = {1: ("",), 2: ("low", "high")}  # number of sounds of a listener: what they are
 
 

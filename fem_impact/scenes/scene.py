@@ -42,7 +42,7 @@ from .schema import (
     target_values,
 )  # fmt: skip
 
-SECTIONS = 200  # [-] places along a beam where its largest width is looked for
+SECTIONS = 1001  # [-] places along a beam where its section is looked at: it may change within a hundredth of it
 NOTHING = Part()  # stands for a missing table
 
 

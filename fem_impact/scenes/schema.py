@@ -18,7 +18,7 @@ from ..fe.assembly import THEORIES, assemble
 from ..fe.section import KINDS, SOFT, Beam, Elastic, Material, Plate
 from ..impact import collision
 from ..impact.contact import Contact
-from ..impact.striker import Hand, Striker
+from ..impact.striker import STICK_MODES, Hand, Striker
 from ..model.target import AIR, MODELS
 from ..modes.analytic import closed_form
 from ..modes.modal import find_modes
@@ -63,7 +63,7 @@ def _bar(
     body, held = mesh.line(length), {"left": left, "right": right}
     known = closed_form(body, section, held, check.one_of("theory", theory, THEORIES[1]))
     find = known or partial(find_modes, assemble(body, section, held, theory=theory))
-    return replace(Striker.flexible(find(n_modes=BAR_MODES), at=at), fixed=False)
+    return replace(Striker.flexible(find(n_modes=STICK_MODES), at=at), fixed=False)
 
 
 def _held(maker: Any) -> Callable[..., Striker]:
@@ -188,7 +188,6 @@ def map_values(*, over: Any, max_frequency: Any = None) -> dict[str, Any]:
 
 
 MOST_LISTENERS = 100  # [-] each costs a sound
-BAR_MODES = 96  # [-] modes of a bar that strikes; each blow keeps as many of them as it needs
 LOWEST_NU = -0.99  # [-] closer to -1, the rigidity of a plate is beyond all numbers
 SOURCES = ("auto", "fe", "analytic")
 # Functions that build each part of a scene; their arguments are the keys of its table.

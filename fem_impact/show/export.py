@@ -15,9 +15,10 @@ import numpy as np
 
 from .._base import check
 from .._base.files import replacing, staged
+from .._base.rounding import SAME
 from ..impact.assumption import table
 from ..impact.response import Response
-from ..model.planner import Run
+from ..model.planner import AUDIBLE, Run
 from ..model.playing import Strokes
 from ..modes import universal_files, viewing
 from ..modes.modal import Modes
@@ -28,12 +29,10 @@ __all__ = [
     "write_json", "write_sound", "write_uff", "write_vtk", "write_wav",
 ]  # fmt: skip
 
-CENTROID_BAND = 20e3  # [Hz] upper end of the spectral centroid's band: about the limit of hearing
 PACKAGES = ("fem-impact", "numpy", "scipy", "scikit-fem", "netgen-mesher", "numba")
 WARP = 0.1  # [-] largest deflection of the warp vector over the body's extent
 CELL_TYPE = {1: 1, 2: 3, 3: 5}  # number of points: VTK's code for a vertex, line or triangle
 KIND = {"f": "Float64", "i": "Int64", "u": "UInt8"}
-DISTINCT = 1e-9  # [-] relative spacing given to equal frequencies, because a collection drops equal times
 
 
 @check.typed
@@ -236,7 +235,7 @@ def numbers(response: Response) -> dict[str, Any]:
     0.818
     """
     data = {name: getattr(response, name) for name in SCALARS} | {
-        "spectral_centroid": {"value": _centroid(response), "max_frequency": CENTROID_BAND},
+        "spectral_centroid": {"value": _centroid(response), "max_frequency": AUDIBLE},
         "error": {name: getattr(response.error, name) for name in ERROR_PARTS},
         "model_error": response.model_error,
         "assumptions": table(response.assumptions),
@@ -250,9 +249,9 @@ def numbers(response: Response) -> dict[str, Any]:
 
 
 def _centroid(response: Response) -> float | None:
-    """Spectral centroid; None without contact, or if the blow is too long for a band up to CENTROID_BAND."""
+    """Spectral centroid; None without contact, or if the blow is too long for a band up to AUDIBLE."""
     try:
-        return response.spectral_centroid(CENTROID_BAND)
+        return response.spectral_centroid(AUDIBLE)
     except ValueError:
         return None
 
@@ -336,7 +335,7 @@ def _motion_parts(response: Response, points: np.ndarray, times: np.ndarray) -> 
 def _distinct(stamps: np.ndarray) -> np.ndarray:
     result = np.array(stamps, float)
     for i in range(1, len(result)):
-        result[i] = max(result[i], result[i - 1] + DISTINCT * max(result[i - 1], 1.0))
+        result[i] = max(result[i], result[i - 1] + SAME * max(result[i - 1], 1.0))
     return result
 
 

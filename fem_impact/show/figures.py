@@ -16,6 +16,7 @@ from matplotlib.tri import Triangulation
 
 from .._base import check
 from .._base.files import replacing
+from .._base.rounding import SAME
 from ..impact import spectra
 from ..impact.response import Response
 from ..mesh import edge_table
@@ -55,7 +56,6 @@ TIMES = 800  # [-] instants in the plot of energies
 SAND = 1e-3  # [-] the same for lines alone: along a clamped edge the elements err by less
 FINER = 1  # [-] times the triangles are split in four to draw nodal lines, which then look smooth
 MODE_DEPTH = 1e-8  # [-] bottom of the energy axis: 80 dB below the most energetic mode
-FLAT = 1e-9  # [-] a shape below this share of its largest deflection is zero up to rounding
 BINS = 60  # [-] of a histogram
 STRIPES = 16  # [-] groups of equally many blows along an input, whose medians are drawn
 TICKS = 4  # [-] most intervals between numbers below a narrow panel
@@ -333,7 +333,7 @@ def in_hertz(value: float) -> str:
     return f"{value:.4g} Hz" if value < 1e4 else f"{value * 1e-3:.4g} kHz"
 
 
-def _unflattened(shape: np.ndarray, cells: np.ndarray, flat: float = FLAT) -> np.ndarray:
+def _unflattened(shape: np.ndarray, cells: np.ndarray, flat: float = SAME) -> np.ndarray:
     """The shape (n_points,), with zeros replaced by a tiny share of the neighbouring values.
 
     A supported edge is zero up to rounding; without this, parts of it would be drawn as nodal lines.
@@ -342,7 +342,7 @@ def _unflattened(shape: np.ndarray, cells: np.ndarray, flat: float = FLAT) -> np
     for i in range(3):
         np.add.at(total, cells[:, i], shape[cells].sum(axis=1))
         np.add.at(count, cells[:, i], 3.0)
-    return np.where(np.abs(shape) < flat, FLAT * total / np.maximum(count, 1.0), shape)
+    return np.where(np.abs(shape) < flat, SAME * total / np.maximum(count, 1.0), shape)
 
 
 @check.typed

@@ -11,6 +11,7 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
+from .._base.rounding import EPSILON, ROUNDING
 from ..impact.collision import rest_mode
 from ..impact.compiled import layout, record
 from ..impact.compiled.bundles import Limits, Scene
@@ -25,9 +26,7 @@ from .rig import FINE, MARGIN, Rig
 STEPS = 40.0  # [-] steps of a contact: the force is then exact to 1e-5 of its peak
 FASTEST = 12.0  # [-] steps per period of the fastest mode that the contact sees
 MOST_STEPS = 50_000  # [-] of one blow
-ROUNDING = 1e-16, 1e-12  # [-] of depth and speed: smaller approaches and speeds are rounding
 SEEN = 1e-6  # [-] modes with less than this share of the compliance do not set the step
-REST_FLOOR = 1e-12  # [-] residual compliance below this part of the whole is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +104,7 @@ def of_target(modes: Modes, at: Any, points: Any = None, softness: float | None 
 
 def _body(modes: Modes, row: np.ndarray, motion: np.ndarray, rows: np.ndarray, rest: float) -> Body:
     carried = np.square(row[modes.omega > 0.0] / modes.omega[modes.omega > 0.0]).sum()
-    rest = rest if rest > REST_FLOOR * (rest + carried) else 0.0
+    rest = rest if rest > ROUNDING * (rest + carried) else 0.0
     return Body(modes.omega, modes.damping_ratio, row, motion, rows, rest, modes.dimension, modes.mass)
 
 
@@ -155,7 +154,7 @@ def run(bodies: Pair, speed: float, step: float, horizon: float) -> History:
     parts = (bodies.omega, bodies.zeta, bodies.shape, np.zeros(1), still, bodies.law, still, start)
     for part in parts:
         part.setflags(write=False)  # or numba would compile the kernel again for writable arrays
-    rounding = float(ROUNDING[0] * STEPS * step * speed), float(ROUNDING[1] * speed)
+    rounding = float(EPSILON * STEPS * step * speed), float(ROUNDING * speed)
     limits = Limits(*rounding, float(horizon), 0, MOST_STEPS)
     result = run_energy(Scene(*parts), None, 1, float(step), limits)
     if result[6] in (record.EXHAUSTED, record.FAILED):

@@ -19,14 +19,13 @@ from .solver import Problem
 from .unknowns import TIME, Setting, Unknown, checked
 
 STARTS = 5  # [-] searches, from the best of `solver.SCREENED` points
-QUICK = 12  # [-] iterations of every search before the best two go on
 POORER = 4.0  # [-] ratio of sums of squares from which the second of them does not go on
 POOR = 0.06  # [-] rms of the residual over that of the records: after a poorer fit the search goes on
 PATIENCE = 3  # [-] times the number of starts, at most
 OUTLIER = 4.0  # [-] a tap that the others predict worse than this times the median of their own errors does not agree
 UNEQUAL = 1.5  # [-] ratio of noise over peak from which taps count differently: less is how well noise is known
-MOST_OUTLIERS = 0.34  # [-] of the taps may disagree
-FEWEST = 3  # [-] taps, to tell which one disagrees
+MOST_OUTLIERS = 0.34  # [-] of the taps may disagree: with more, nobody knows which ones are right
+FEWEST = 3  # [-] taps, to tell which one disagrees: of two, either may be wrong
 
 
 @check.typed
@@ -247,7 +246,7 @@ def _search(problem: Problem, taps: Taps, length: float, starts: int, rng: Any, 
         if i >= starts and found and min(one.cost for one in found) < poor:
             break
         try:
-            found.append(solver.solve(common, x, QUICK, 1e-5))
+            found.append(solver.solve(common, x, solver.QUICK, solver.NEARLY))
         except SimulationError:
             continue
         finally:

@@ -21,7 +21,7 @@ from .scatter import Scatter, scatter
 from .solver import Problem, Solution
 from .unknowns import changed, unit_of
 
-LUCK = 0.05  # [-] probability of a spread by noise alone, above which taps do not count as different
+LUCK = 0.05  # [-] probability of a spread by noise alone, above which taps do not count as different: the usual level
 REPEATS = 3  # [-] times that profiles may find a better fit and begin again
 
 Watch = Callable[[int, int], Any]
@@ -393,7 +393,7 @@ def profiled(found: Found) -> Found:
             made[name], met = profiles.follow(problem, replace(found.best, x=x), j, noise, freedom, name)
             if found.watch is not None:
                 found.watch(i + 1, len(found.names))
-            if met.cost < found.best.cost - profiles.BETTER * noise:
+            if met.cost < found.best.cost - solver.SMALL * noise:
                 better = problem, met
                 break
         if better is None:

@@ -11,9 +11,6 @@ from .records import Taps
 from .solver import HALF_LOST, Problem
 from .unknowns import TIME
 
-CLOSE = 1e-5  # [-] change of the sum of squares that ends a fit without one tap: what is left counts by its root
-QUICK = 12  # [-] iterations for speed, onset and what else a tap has of its own
-
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
@@ -65,7 +62,7 @@ def predicted(problem: Problem, values: Mapping[str, float], tap: Taps, rise_onl
     own = [float(each.inside(values[each.name])) for each in free]
     momentum = np.log(HALF_LOST * tap.impulse[0])
     x = seen.aligned(np.array([*own, momentum, tap.onset[0] * tap.rate - data.lead - 1.0]))
-    x = solver.solve(seen, x, QUICK).x
+    x = solver.solve(seen, x, solver.QUICK).x
     made = single.sampled(single.spectra(x), single.onsets(x))[0, 0] * data.scale[0, 0]
     onset = (data.lead + float(single.onsets(x)[0])) / tap.rate
     found = single.values(x)
@@ -85,6 +82,6 @@ def left_out(problem: Problem, x: np.ndarray, taps: Taps, rise_only: bool = Fals
     for tap in range(n_taps):
         others = [i for i in range(n_taps) if i != tap]
         part = replace(problem, data=problem.data.pick(others), _last={})
-        without = solver.solve(part, x[problem.kept(others)], close=CLOSE)
+        without = solver.solve(part, x[problem.kept(others)], close=solver.NEARLY)
         found.append(predicted(part, part.values(without.x), taps.pick(tap), rise_only))
     return tuple(found)

@@ -10,8 +10,9 @@ from scipy.stats import chi2, t
 
 from .._base import check
 from .._base.check import SimulationError
+from .._base.rounding import SAME
 from .ridges import way
-from .solver import Problem, Solution, chord, solve
+from .solver import ENOUGH, NEARLY, QUICK, SMALL, Problem, Solution, chord, solve
 from .unknowns import Unknown
 
 SURE = 0.95  # [-] the widest interval that a profile is followed to
@@ -19,17 +20,11 @@ FIRST = 0.8  # [-] of the distance to that interval's end by curvature: the firs
 FARTHEST = 0.25  # [-] of its range: the first step at most
 GROWTH = (1.25, 3.0)  # [-] of the next step over the last
 TOO_STEEP, BACK = 1.6, 0.2  # [-] a rise beyond the target by the first is tried again with a step shorter by the second
-SHORTEST = 1e-9  # [-] step over the coordinate
 MOST_POINTS = 16  # [-] to each side
-ITERATIONS = 12  # [-] of the readjustment at each point
-MORE = 50  # [-] iterations if those did not suffice and the rise would count
-CLOSE = 1e-6  # [-] change of the sum of squares or the values that ends it
-BETTER = 0.05  # [-] of the noise variance: a profile that falls by more has found a better fit
 AT_BOUND = 0.02  # [-] of a range: a value this close to its bound may be held by it
 WIDE = 0.5  # [-] of its range (by its coordinate): an interval open at one end and wider than this tells nothing
 LAGS = 10  # [-] of the test for whiteness
 DOUBTED = 0.01  # [-] probability below which residuals do not count as white
-TINY = 1e-9  # [-] slope of a flat profile, to invert it
 MOVES = 0.05  # [-] smallest exponent of a ridge that is named
 
 
@@ -62,7 +57,7 @@ class Profile:
         root = np.sqrt(np.maximum(self.rise, 0.0)) * np.where(self.values < self.value, -1.0, 1.0)
         x = self._coordinate(self.values)
         order = np.argsort(x)
-        x, root = x[order], np.maximum.accumulate(root[order]) + TINY * np.arange(len(x))
+        x, root = x[order], np.maximum.accumulate(root[order]) + SAME * np.arange(len(x))
         ends = []
         for sign, limit in ((-1.0, self.low), (1.0, self.high)):
             if abs(root[0 if sign < 0 else -1]) <= threshold:
@@ -162,7 +157,7 @@ def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int,
                 step = reach
             at = float(trail.x[j])
             last = at + sign * step
-            if step < SHORTEST * max(1.0, abs(at)):
+            if step < SAME * max(1.0, abs(at)):
                 if not touches:
                     break
                 trail = way(problem, trail.x, j, (low, high), noise, farthest / target, trail.stopped | meets)
@@ -172,18 +167,18 @@ def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int,
             last = float(bound) if ended else last
             step = abs(last - at)
             try:
-                moved, sure = chord(problem, trail.to(last), trail.jacobian, (j,), CLOSE)
+                moved, sure = chord(problem, trail.to(last), trail.jacobian, (j,), NEARLY)
                 if not sure:
-                    moved = solve(problem, moved.x, ITERATIONS, CLOSE, held=(j,))
+                    moved = solve(problem, moved.x, QUICK, NEARLY, held=(j,))
                     trail = replace(trail, jacobian=moved.jacobian)
                 if not moved.ended and moved.cost - best.cost > target**2 * noise:
-                    moved = solve(problem, moved.x, MORE, CLOSE, held=(j,), method="dogbox")  # quicker trail a ridge
+                    moved = solve(problem, moved.x, ENOUGH, NEARLY, held=(j,), method="dogbox")  # quicker trail a ridge
             except SimulationError:
                 held[side] = "the simulation"
                 break
             rise = (moved.cost - best.cost) / noise
             rows.append((last, rise, moved.x))
-            if moved.cost < found.cost - BETTER * noise:
+            if moved.cost < found.cost - SMALL * noise:
                 found = moved
             steep = float(np.sqrt(max(rise, 0.0)))
             if steep > TOO_STEEP * target:

@@ -18,12 +18,12 @@ from .found import Found, Watch
 from .records import Taps, read_taps
 from .rig import measure
 
-RATE = 51200.0  # [Hz] at which a scene is measured
-HAMMER = 0.1  # [kg] of a hammer of which nothing is said
+RATE = 51200.0  # [Hz] at which a scene is measured: 2.56 times 20 kHz, usual for analysers
+HAMMER = 0.1  # [kg] of a hammer of which nothing is said: a usual modal hammer
 UNKNOWN = {"contact.stiffness": (1e2, 1e16), "contact.exponent": (1.0, 4.0), "contact.loss": (0.0, 10.0)}
 STEEP = 1.5  # [-] logarithm of a peak over its surroundings: lower ones are noise
-MOST_PEAKS = 20  # [-] listed
-DURATION = 1.0  # [s] of the record of a scene
+MOST_PEAKS = 20  # [-] listed: more do not fit a screen
+DURATION = 1.0  # [s] of the record of a scene: resolves peaks 1 Hz apart
 
 
 def _taps(options: Any) -> Taps:

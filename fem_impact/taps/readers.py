@@ -26,7 +26,7 @@ TIME_NAMES = ("time", "t", "times", "x_value", "zeit", "time_s")
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 EXCITATION, ACCELERATION, VELOCITY, DISPLACEMENT = 13, 12, 11, 8  # codes of quantities in data set 58
 UFF_UNITS = {EXCITATION: "N", 9: "N", ACCELERATION: "m/s^2", VELOCITY: "m/s", DISPLACEMENT: "m"}
-UFF_HEAD = 13  # [-] lines of a data set 58 before its numbers
+UFF_HEAD = 13  # lines of a data set 58 before its numbers
 UFF_END = re.compile(rb" {4}-1(?=\r|\n|\Z| {74})")  # begins and ends a data set, also right behind binary numbers
 TIME_RESPONSE = 1  # function type of data set 58
 

@@ -13,7 +13,7 @@ from .._base import check, markup
 from . import arguments, channels, readers, triggers
 
 TOGETHER = 0.05  # [s] pulses closer than this belong to one tap: nobody taps twice within a twentieth of a second
-RATES = (1.0, 1e9)  # [Hz] allowed
+RATES = (1.0, 1e9)  # [Hz] sampling rates allowed: beyond, the unit is a mistake
 
 
 @dataclass(frozen=True, eq=False)

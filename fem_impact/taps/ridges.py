@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .._base import check
+from .._base.rounding import SAME
 from .solver import Problem, directions
 
 NEAR_ZERO = 1e-3  # [-] of its range: below this, what begins at zero does not go by factors
-TOUCHES = 1e-9  # [-] of a coordinate: closer to its bound it is there
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +48,11 @@ class Way:
         ahead = np.where(sign * self.slope > 0.0, high, low)
         with np.errstate(all="ignore"):
             far = np.where(self.factors, np.log(ahead / self.x), ahead - self.x)
-            far = np.where(np.abs(ahead - self.x) <= TOUCHES * (high - low), 0.0, far) / (sign * self.slope)
+            far = np.where(np.abs(ahead - self.x) <= SAME * (high - low), 0.0, far) / (sign * self.slope)
         far[(self.slope == 0.0) | self.stopped | ~np.isfinite(far)] = np.inf
         far[self.j] = np.inf
         nearest = float(far.min())
-        meets = far <= nearest * (1.0 + TOUCHES)
+        meets = far <= nearest * (1.0 + SAME)
         here = self.x[self.j]
         return abs(here * np.expm1(sign * nearest)) if self.factors[self.j] else nearest, meets
 

@@ -13,7 +13,7 @@ from .._base.check import SimulationError
 from .._base.files import replacing
 from ..fe.assembly import System
 from ..impact import accuracy, spectra
-from ..impact.collision import strike
+from ..impact.collision import BAND_POINTS, strike
 from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..model import vectors
@@ -21,6 +21,7 @@ from ..model.target import FIRST_LOOK, Stages, Target
 from ..modes.modal import Damping, Modes
 from ..scenes.scene import Scene
 from ..show import export, plots
+from ..show.sound import DECAY
 from ..sweeps import bodies
 from ..sweeps import hammers as chooser
 from ..sweeps.cells import Case
@@ -30,10 +31,8 @@ RATE, FILTER = 2.56, "2.56"  # [-] sampling rate over bandwidth, as analysers ha
 CLOSE = 1e-3  # [-] tolerance of the frequencies of a system's modes
 BEYOND = 1.5  # [-] modes are found up to this many times the bandwidth; the residual compliance stands for the others
 TIPS = np.geomspace(1.0, 30.0, 6)  # [-] tips of a hammer known by its mass, over that whose half sine has the bandwidth
-DECAY = np.log(1e3)  # [-] a record ends when the slowest mode of the band has lost 60 dB
-SHORTEST, LONGEST = 0.1, 10.0  # [s] limits of the default record
+SHORTEST, LONGEST = 0.1, 10.0  # [s] limits of the default record: lines are at most 10 Hz apart, at least 0.1 Hz
 MOST_LINES = 100_000  # [-] of a record
-LOOKS = 129  # [-] frequencies at which the spectrum of a single hit is computed; it is smooth in between
 NOISE = 1e-3  # [-] of each channel over its peak, by default: some 60 dB
 SPEED = 1.0  # [m/s] of every blow; with linear tips the answer is the same at any speed
 MOST_BLOWS = 20_000  # [-] points times tips: some minutes
@@ -382,7 +381,7 @@ class _Rig:
 
     def coherence(self, hit: Any, answer: np.ndarray) -> tuple[float, float]:
         """Mean expected coherence over the band, from its first mode on, and at its natural frequencies."""
-        looks = np.linspace(0.0, self.frequencies[-1], LOOKS)
+        looks = np.linspace(0.0, self.frequencies[-1], BAND_POINTS)
         middle = 0.5 * (hit.impacts[0].start + hit.impacts[0].end)
         about = hit.spectrum(looks) * np.exp(2j * np.pi * middle * looks)  # smooth: it has no delay
         force = np.interp(self.frequencies, looks, about)

@@ -6,9 +6,8 @@ import numpy as np
 from scipy.stats import f
 
 from .._base import check
+from .._base.rounding import ROUNDING
 from .solver import Problem
-
-NONE = 1e-12  # [-] singular values below this part of the largest are directions that the data do not see
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +43,7 @@ def scatter(problem: Problem, x: np.ndarray, i: int, noise: float, freedom: int)
     n_taps, unknown = problem.data.n_taps, problem.free[i]
     place = [each.name for each in problem.free if each.name in problem.own].index(unknown.name)
     columns = problem.n_shared + (2 + place) * n_taps + np.arange(n_taps)
-    answers = np.linalg.pinv(problem.jacobian(x), rcond=NONE)[columns]  # (n_taps, n_residuals) to the noise
+    answers = np.linalg.pinv(problem.jacobian(x), rcond=ROUNDING)[columns]  # (n_taps, n_residuals) to the noise
     answers -= answers.mean(axis=0)  # apart from the mean of all taps
     variance = noise * float(np.square(answers).sum()) / (n_taps - 1)
     size = 1.0 if unknown.log else unknown.high - unknown.low

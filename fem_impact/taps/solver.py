@@ -24,13 +24,14 @@ FELT = 0.1, 5.0  # [-] frequency times contact time of modes that shape a pulse:
 LOOKS = 3  # [-] Gauss-Newton steps in speed and onset while looking
 ENOUGH = 60  # [-] iterations of one search
 CLOSE = 1e-8  # [-] relative change of the sum of squares or of the values that ends a search
+QUICK = 12  # [-] iterations of a search that begins close to its end, or that only shows whether to go on
+NEARLY = 1e-6  # [-] change that ends a search of which only the sum of squares counts: it errs by the square
 CHORDS = 8  # [-] steps with derivatives of a point nearby
 KEPT = 0.3  # [-] of the promised gain, with which a step by such derivatives is good enough
 SMALL = 0.05  # [-] of the noise variance: a gain that is not sought
 LONG = 1e6  # [-] longest way along a ridge
 FLAT = 3e-5  # [-] of the largest singular value of scaled derivatives: a direction flatter than this may be a ridge
-MOMENTA = 5.0  # [-] the logarithm of the momentum is sought this far from that of the measured impulse
-SPEEDS = 25.0  # [-] the logarithm of a speed in m/s is sought this far from zero
+REACH = 25.0  # [-] logarithms of speeds in m/s and of momenta over measured impulses are sought this far from zero
 LATEST = 60.0  # [samples] the onset is sought this far from the trigger
 SHIFT = 3.0  # [samples] the onset may move by at a single look
 
@@ -85,10 +86,9 @@ class Problem:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         low, high = map(list, zip(*[each.bounds for each in self.free])) if self.free else ([], [])
         centre = np.log(self.data.impulse) if self.momentum else np.zeros(self.data.n_taps)
-        reach = MOMENTA if self.momentum else SPEEDS
         slide = np.full(self.data.n_taps, LATEST)
         wide = np.repeat([high[i] - low[i] for i in self._own], self.data.n_taps)
-        return np.concatenate([low, centre - reach, -slide, -wide]), np.concatenate([high, centre + reach, slide, wide])
+        return np.concatenate([low, centre - REACH, -slide, -wide]), np.concatenate([high, centre + REACH, slide, wide])
 
     @property
     def _own(self) -> list[int]:

@@ -7,18 +7,18 @@ import numpy as np
 from scipy.interpolate import interp1d
 
 from .._base import check
+from .._base.rounding import SAME
 
 LEVEL = 0.05  # [-] of the largest force: a tap begins where the force rises above this
 LOW = 0.25  # [-] quantile of a record of one tap that is at rest: no pulse fills three quarters of it
 NOISE = 8.0  # [-] standard deviations of the noise that the trigger stays above at least
-GAUSS = 1.4826  # [-] standard deviation over median absolute deviation of Gaussian noise
-PULSE = 0.1, 0.05  # [-] of a tap's largest force: a pulse rises above the first and ends below the second
-CLEAR = 6.0, 3.0  # [-] standard deviations of the noise: the same, if they are larger
-MOST = 0.5, 0.25  # [-] of the largest force: what a pulse rises above and ends below at most
+GAUSS = 1.4826  # [-] fact: standard deviation over median absolute deviation of Gaussian noise
+PULSE = 0.1  # [-] of a tap's largest force: a pulse rises above this and ends below half of it; filters ring less
+CLEAR = 6.0  # [-] standard deviations of the noise: the same, if they are larger
+MOST = 0.5  # [-] of a tap's largest force: the same at most, so that a tap in strong noise has a pulse
 DRIFT = 0.2  # [-] of the trigger: less drift within a record is not mentioned
 REST = 0.2  # [s] over which the force is at rest for more than half the time: slower changes are drift
-CLIPPED = 3  # [-] equal largest samples in a row that count as clipped
-SAME = 1e-9  # [-] relative difference of samples that count as equal
+CLIPPED = 3  # [-] equal largest samples in a row that count as clipped: two may be equal by chance
 BEFORE = 0.02  # [s] longest record before a tap
 LONGEST = 10.0  # [s] longest record of one tap
 FEWEST = 8  # [-] samples before a tap from which an offset is estimated
@@ -61,7 +61,8 @@ def pulses(force: np.ndarray, noise: float = 0.0) -> list[tuple[int, int]]:
     peak = float(force.max(initial=0.0))
     if peak <= 0.0:
         return []
-    up, down = (min(max(part * peak, wide * noise), most * peak) for part, wide, most in zip(PULSE, CLEAR, MOST))
+    up = min(max(PULSE * peak, CLEAR * noise), MOST * peak)
+    down = 0.5 * up
     state = np.where(force > up, 1, np.where(force < down, -1, 0))
     last = np.maximum.accumulate(np.where(state != 0, np.arange(len(force)), 0))
     inside = state[last] == 1

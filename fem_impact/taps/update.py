@@ -15,12 +15,12 @@ from ..fe.assembly import System
 from ..modes.modal import Modes, find_modes
 from ..scenes.scene import Scene, load_scene
 from . import arguments, transfer
+from .solver import CLOSE
 from .transfer import Pair
 from .unknowns import Unknown
 
 STEP = 0.01  # [-] of logarithms, for derivatives by differences: frequencies go with powers of the constants
 MOST_SOLVES = 200  # [-] of the body
-CLOSE = 1e-7  # [-] relative change that ends the search
 MORE = 2  # [-] modes computed beyond those measured, so that one may be missed in the measurement
 TABLES = ("mesh", "material", "section", "target", "supports")  # of a scene: what its modes depend on
 POOR = 0.1  # [-] half width of an interval, in logarithms: wider constants are not told

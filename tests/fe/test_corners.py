@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
+from fem_impact.fe import corners
 from fem_impact.fe.corners import around_corners, exponent
 
 
@@ -31,3 +32,40 @@ def test_only_the_notch_of_an_l_is_graded():
     side = np.linalg.norm(fine.points[fine.cells] - np.roll(fine.points[fine.cells], 1, axis=1), axis=2).max(axis=1)
     near = np.linalg.norm(fine.points[fine.cells] - [1.0, 1.0], axis=2).min(axis=1) < 1e-12
     assert side[near].max() < 1e-3 < 0.05 < side[~near].max()
+
+
+@pytest.mark.parametrize(("degrees", "kind"), [(270.0, "clamped"), (300.0, "clamped"), (110.0, "hinged")])
+def test_the_innermost_ring_misses_a_ten_millionth_of_the_energy(degrees, kind):
+    """The energy within r goes as r**(2 z - 2); half as large a ring would miss less than it may."""
+    power = 2.0 * (exponent(np.radians(degrees), (kind, kind), 0.3) - 1.0)
+    n = corners.rings(np.radians(degrees), (kind, kind), 0.3)
+    assert 0.5 ** (power * n) <= 1e-7 < 0.5 ** (power * (n - 1))
+
+
+def test_rings_stop_where_rounding_takes_over():
+    """Coordinates keep six digits of a ring of 1e-10; at a free corner, rounding goes as its size to the -2: 1e-11."""
+    hinged, free = (corners.rings(np.radians(172.5), (kind, kind), 0.3) for kind in ("hinged", "free"))
+    assert 0.5**hinged <= 1e-10 < 0.5 ** (hinged - 1)
+    assert 0.5**free <= 3e-3 < 0.5 ** (free - 1)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "kind", "rings"),
+    [(130, "clamped", False), (135, "clamped", True), (105, "free", False), (110, "free", True)],
+)
+def test_corners_that_quintics_resolve_get_no_rings(degrees, kind, rings):
+    """Exponents of 2.96, 2.89, 2.54 and 2.48: what is left of the first and third is below 1e-6."""
+    assert bool(corners.rings(np.radians(degrees), (kind, kind), 0.3)) == rings
+
+
+def test_triangles_at_a_singular_corner_are_narrow_and_not_narrower():
+    mesh = fi.mesh.polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
+    fine = around_corners(mesh, ["clamped"] * len(mesh.facets), 0.3)[-1]
+    corner = fine.points[fine.cells]
+    first = np.linalg.norm(corner - [1.0, 1.0], axis=2).argmin(axis=1)
+    at, a, b = (corner[np.arange(len(corner)), (first + i) % 3] for i in range(3))
+    there = np.linalg.norm(at - [1.0, 1.0], axis=1) < 1e-12
+    angles = [
+        np.arccos(u @ v / np.linalg.norm(u) / np.linalg.norm(v)) for u, v in zip((a - at)[there], (b - at)[there])
+    ]
+    assert 0.4 < max(angles) < 0.7

@@ -50,10 +50,11 @@ def test_lowest_values_and_their_vectors(search, repeated):
 
 def test_where_a_pivot_vanishes_another_number_of_modes_is_counted(monkeypatch):
     """A pair of equal unknowns has no pivot midway between its eigenvalues 4 and 6, only beside."""
-    monkeypatch.setattr(eigenvalues, "NUDGES", (0.0,))  # which else step beside
     values = np.array([1.0, 2.0, 3.0, 7.0, 8.0, 9.0])
     K = csc_matrix(linalg.block_diag([[5.0, 1.0], [1.0, 5.0]], np.diag(values)))
     M = csc_matrix(np.eye(8))
+    assert count_below(K, M, 5.0) == 4  # a nudge steps beside
+    monkeypatch.setattr(eigenvalues, "NUDGES", (0.0,))
     with pytest.raises(SimulationError, match=r"a pivot vanished .*; change the number of modes"):
         count_below(K, M, 5.0)  # after four modes
     assert count_below(K, M, 6.5) == 5  # after five

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.fe.splitting import DEPTH, towards_points
+from fem_impact.fe.splitting import DEPTH, distance, towards_points
 
 BODIES = {
     "square": (fi.mesh.rectangle(1.0, 1.0), 1.0),
@@ -46,3 +46,16 @@ def test_triangles_shrink_towards_a_point(name, place):
     outer = {tuple(sorted(facet)) for facet in fine.facets.tolist()}
     assert all(count == (1 if side in outer else 2) for side, count in sides.items())  # no hanging node
     assert {name: len(facets) for name, facets in fine.edges.items()}.keys() == mesh.edges.keys()
+
+
+@pytest.mark.parametrize(("coarseness", "growth"), [(1.0, 0.7), (64.0, 1.0)])
+def test_triangles_grow_with_the_distance_to_the_point(coarseness, growth):
+    """The error goes as the power eight of the growth: 0.7 leaves a millionth, and 1 is enough for coarse blows."""
+    mesh, place = fi.mesh.rectangle(1.0, 1.0, size=0.5), np.array([[0.31, 0.47]])
+    fine = towards_points(mesh, place, np.zeros(len(mesh.facets), bool), coarseness=coarseness)
+    corner = fine.points[fine.cells]
+    after = np.roll(corner, -1, axis=1)
+    longest = np.linalg.norm(after - corner, axis=2).max(axis=1)
+    away = distance(place[0], corner, after).min(axis=1)
+    far = longest > 1.01 * coarseness * 2.0**-8 * 0.25  # beyond the smallest, of a 256th of area over perimeter
+    assert 0.8 * growth < (longest[far] / away[far]).max() <= growth * (1.0 + 1e-12)

@@ -5,7 +5,7 @@ from scipy.special import sici
 
 import fem_impact as fi
 from fem_impact.model import audit, bending
-from fem_impact.model.deflection import FRONT, RINGING, SLIPS, _bends, _crude, _tension, _within
+from fem_impact.model.deflection import FRONT, LIMIT, RINGING, SLIPS, _bends, _crude, _tension, _within
 
 E, NU, RHO, H, SIDE = 210e9, 0.3, 7850.0, 1e-3, 0.2
 STEEL = fi.Material(E=E, nu=NU, rho=RHO)
@@ -36,6 +36,10 @@ def test_frequency_of_a_hinged_square_rises_as_chu_and_herrmann_say(amplitude):
     # Berger's tension stiffens by 1.5 where von Karman's stresses give 0.341 + 0.975 = 1.316: 14 % more of 1.316
     true = CHU_HERRMANN[amplitude] - 1.0
     assert 0.95 * true < rise(square(), amplitude * H) - 1.0 < 1.25 * true
+
+
+def test_frequencies_rise_by_two_hundredths_at_the_limit():
+    assert CHU_HERRMANN[LIMIT] - 1.0 == pytest.approx(0.02, abs=1e-3)  # as told to the user
 
 
 def test_a_slipping_edge_is_a_quarter_as_stiff():

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy import special
+from scipy.optimize import brentq
 
 from fem_impact import mesh
 from fem_impact.fe.assembly import assemble
@@ -262,3 +264,18 @@ def test_what_an_orthotropic_plate_under_tension_answers_is_not_known():
     plate = Plate(SPRUCE, THICKNESS, tension=100.0)
     target = Target(mesh.rectangle(0.4, 0.3), plate, {"boundary": "clamped"})
     assert idealisation.from_outside(target, (0.2, 0.15), 1e-3, 1e-4).mobility == np.inf
+
+
+def test_an_oscillator_answers_a_half_sine_at_most_as_stated():
+    """After the pulse it rings with 2 a cos(pi / (2 a)) / (a**2 - 1) of its static response, a half periods in it."""
+    t, found = np.linspace(0.0, 3.0, 3001), []
+    for ratio in np.linspace(0.2, 3.0, 281):  # angular frequency of the pulse over the oscillator's
+        force = np.where(t < 1.0, np.sin(np.pi * t), 0.0)
+        kernel = np.sin(np.pi / ratio * t) * np.pi / ratio
+        found.append(np.convolve(force, kernel)[: len(t)].max() * t[1])
+    assert pytest.approx(max(found), rel=2e-3) == idealisation.PULSE
+
+
+def test_the_softest_disk_is_clamped():
+    root = brentq(lambda z: special.jv(0, z) * special.iv(1, z) + special.iv(0, z) * special.jv(1, z), 3.0, 3.4)
+    assert pytest.approx(root**2, rel=1e-5) == idealisation.SOFTEST

@@ -160,3 +160,7 @@ def test_slopes_in_air_are_those_of_the_mixed_shapes():
     for name in ("slope", "rotary", "shear"):  # 1 mm of spruce: modes mix by some percent in amplitude
         np.testing.assert_allclose(getattr(found, name), getattr(true, name), rtol=1e-2)
     assert (found.slope[0] < 0.7 * bending.bending(bending.known(dry)).slope[0]) and (wet.shapes.mix**2).sum() < 16.0
+
+
+def test_frequencies_drop_by_a_hundredth_at_the_limit():
+    assert pytest.approx(0.01, rel=0.05) == 1.0 - (1.0 + still_air.LIMIT) ** -0.5

@@ -3,7 +3,7 @@ import pytest
 import thick_references as thick
 
 import fem_impact as fi
-from fem_impact.model import audit
+from fem_impact.model import audit, thinness
 
 E, NU, RHO = 210e9, 0.3, 7850.0
 STEEL = fi.Material(E=E, nu=NU, rho=RHO)
@@ -169,3 +169,8 @@ def test_a_stick_that_is_told_slender_or_stout_has_its_shear_and_a_hammer_has_no
     for striker in (stick, fi.Striker.hammer(head=0.03, handle=0.06, stiffness=2e4, damping=5.0)):
         hit = fi.strike(plate, striker, fi.Contact.hertz(1e8), at=(0.1, 0.1), speed=1.0, tolerance=1e-2)
         assert found(hit, "thin striker").known and found(hit, "thin striker").worst == 0.0
+
+
+def test_waves_are_a_hundredth_too_fast_at_the_limit():
+    """Mindlin's plate to second order in h k: rotation adds 1 / 12, shear 1 / (5 (1 - nu)), each to 1 / omega**2."""
+    assert pytest.approx(0.01, rel=0.05) == 0.5 * (1.0 / 12.0 + 0.2 / (1.0 - 0.3)) * thinness.LIMIT**2

@@ -1,6 +1,7 @@
 """Where taps begin, how many pulses they have, and whether they are cut off."""
 
 import numpy as np
+import pytest
 
 from fem_impact.taps import triggers
 
@@ -43,7 +44,7 @@ def test_noise_is_no_pulse_and_drift_no_rest():
 def test_a_ceiling_is_reached_by_several_samples_two_of_them_neighbours():
     pulse = np.sin(np.pi * np.arange(11) / 10)
     low = np.minimum(pulse, 0.95)  # three samples at the top of each
-    assert triggers.ceiling([low, 0.5 * pulse, low]) == 0.95
+    assert triggers.ceiling([low, 0.5 * pulse, low]) == triggers.ceiling([low]) == 0.95
     assert triggers.ceiling([pulse, pulse, pulse]) == np.inf  # three taps of the same peak
 
 
@@ -52,3 +53,57 @@ def test_a_flat_top_is_clipping_and_a_round_one_is_not():
     assert not triggers.clipped(pulse) and triggers.clipped(np.minimum(pulse, 0.9))
     assert triggers.clipped(-np.minimum(pulse, 0.9)) and not triggers.clipped(np.zeros(9))
     assert triggers.clipped(pulse, full_scale=1.0)
+
+
+def test_a_tap_begins_at_a_twentieth_of_its_peak_whatever_its_offset():
+    pulse = np.sin(np.pi * np.arange(701) / 700)
+    assert triggers.onset(np.repeat([0.0, 0.03, 0.08, 1.0, 0.0, 0.0], 100)) == 200
+    assert abs(triggers.onset(5.0 + np.pad(pulse, (290, 10))) - 302) <= 2  # a pulse over seven tenths of the record
+
+
+def test_a_second_hit_is_found_in_strong_noise():
+    pulse = np.sin(np.pi * np.arange(101) / 100)
+    force = np.concatenate([np.zeros(900), pulse, np.zeros(100), 0.53 * pulse, np.zeros(900)])
+    noisy = force + 0.1 * np.random.default_rng(4).standard_normal(len(force))  # six deviations are 0.6
+    assert triggers.n_pulses(np.convolve(noisy, np.ones(16) / 16.0, mode="same"), 0.1) == 2
+
+
+def cut(force, *, rate=1000.0, **options):
+    """The taps of a record without responses."""
+    given = dict.fromkeys(("trigger", "before", "length")) | {"together": 0.05} | options
+    return triggers.cut([(force, np.zeros((len(force), 0)))], rate, "here", **given)
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.15, False), (0.3, True)])
+def test_drift_is_told_from_a_fifth_of_the_trigger_on(share, told):
+    force = np.zeros(4000)
+    force[2000:2010] = 10.0
+    drift = share * 1.0 / 0.12 * np.arange(4000) / 1000.0  # [N] in the 0.12 s of a record with a trigger of 1 N
+    notes = cut(force + drift, trigger=1.0, length=0.12)[3:][1]
+    assert told == any("drift" in note for note in notes)
+
+
+def test_a_pulse_of_a_tenth_of_a_second_is_no_drift():
+    force = np.zeros(4000)
+    force[2010:2100] = 10.0
+    assert cut(force)[0].max() > 9.99
+
+
+@pytest.mark.parametrize(("lead", "told"), [(6, True), (10, False)])
+def test_fewer_than_eight_samples_before_a_tap_give_no_offset(lead, told):
+    force = np.zeros(3000)
+    force[lead : lead + 5] = 10.0
+    assert told == any("offsets are not removed" in note for note in cut(force)[4])
+
+
+def test_a_record_lasts_ten_seconds_at_most():
+    force = np.zeros(30_000)
+    force[100:105] = 10.0
+    assert cut(force)[0].shape[1] == 10_000 + 20  # and 0.02 s before the tap
+
+
+def test_noise_alone_is_no_tap_and_one_of_ten_deviations_is():
+    force = np.random.default_rng(5).normal(size=100_000)  # up to 4.3 deviations
+    assert not triggers.starts(force, triggers.level(force), 100).size
+    force[50_000:50_005] += 12.0
+    assert len(triggers.starts(force, triggers.level(force), 100)) == 1
