@@ -27,11 +27,13 @@ from .objects import Maker, Piece, Rate
 
 TOLERANCE = 1e-3  # [-] default miss of what is wanted: 1.7 cents of a frequency
 STRIKE = 1e-5  # [-] tolerance of the blows of a search, if they state none: small beside what is wanted
-CLOSE = 1e-10  # [-] relative change that ends a search
-LOST = 1e3  # [-] miss of numbers that make no blow: the search turns back
+# [-] relative change that ends a search: its last steps gain several digits each, so a looser end hardly saves any
+CLOSE = 1e-10
+LOST = 1e3  # [-] miss of numbers that make no blow: any that is far above the miss of a blow makes the search turn back
 MOST_MODES = 10_000  # [-] of a body in a blow
 MOST_TRIES = 1024  # [-] points where a search begins
-AT_END = 1e-6  # [-] of a range: nearer to its end counts as there
+# [-] of a range: nearer to its end counts as there; a search ends at its bounds to CLOSE, so anything above would do
+AT_END = 1e-6
 
 
 @dataclass(frozen=True)

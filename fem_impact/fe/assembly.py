@@ -35,8 +35,10 @@ ELEMENTS: dict[str, tuple[str, ...]] = {
 HOLDS = {"hinged": 3, "clamped": 6}  # unknowns of a thin plate that a held facet and its first vertex take away
 MORLEY_ORDER = 4  # [-] order of the quadrature on Morley elements; exact for products of quadratics
 MASS_ORDER = 10  # [-] order of the quadrature on Argyris elements; exact for products of quintics
-UNEVEN = 20.0  # [-] above this ratio of triangle sizes, eigenvalues are computed from the strain energy
-TINY = 4e-3  # [-] the same if the smallest triangle is below this fraction of the extent
+# [-] ratio of triangle sizes above which eigenvalues come from the strain energy: rounding in K grows as its square
+UNEVEN = 20.0
+# [-] the same if the smallest triangle is below this fraction of the extent; larger ones keep digits enough in K
+TINY = 4e-3
 
 
 class Attached(NamedTuple):

@@ -8,12 +8,15 @@ from .._base.rounding import HALVINGS
 from ..mesh.meshes import Mesh
 from .splitting import Rim, bisected, strip
 
-SHRINK = 0.5  # [-] each ring of triangles is this fraction of the size of the ring around it
-WIDE = 0.7  # [rad] triangles at a singular corner are bisected until their angle there is below this
-CORNER_ERROR = 1e-7  # [-] share of the energy that the innermost ring may miss; twice the frequency error
+# [-] size of each ring of triangles over that of the ring around it: 0.7 takes twice the rings, 0.35 slimmer cells
+SHRINK = 0.5
+# [rad] triangles at a singular corner are bisected until narrower: usual angles of 45 to 60 degrees are halved once
+WIDE = 0.7
+# [-] share of the energy that the innermost ring may miss; twice the frequency error, far below usual tolerances
+CORNER_ERROR = 1e-7
 SMALLEST = 1e-10  # [-] smallest ring as a fraction of the extent; rounding of the coordinates spoils smaller ones
 SMALLEST_FREE = 3e-3  # [-] the same at a free corner, which moves: rounding grows with the ring's size to the -2
-MILD = 2.95  # [-] corners with a larger exponent get no rings; quintic triangles handle them well enough
+MILD = 2.95  # [-] corners with a larger exponent get no rings: there rings cost quintic triangles more than they gain
 MILD_FREE = 2.5  # [-] the same between free edges, where the singular part is small
 
 

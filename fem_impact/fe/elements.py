@@ -17,8 +17,10 @@ from .supports import SIDES
 EXPONENTS = np.array([(i, j) for i in range(6) for j in range(6 - i)])  # the 21 monomials of degree 5
 NEAR_CURVE = 1e-5  # [-] the same at curved edges: the mesh is closer to the curve than this share of a triangle
 CHUNK = 256  # [-] triangles whose shapes are computed together, to limit memory
-CANDIDATES = 8  # [-] nearest triangles searched first; if none holds the point, all are searched
-REACH = 0.5  # [-] share of a triangle's size; no curved edge bulges this far
+# [-] nearest triangles searched first: about those around a vertex; if none holds the point, all are searched
+CANDIDATES = 8
+# [-] share of a triangle's size; no curved edge bulges this far: facets bulge by an eighth of their turn, below 0.1
+REACH = 0.5
 REFERENCE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) - 1.0 / 3.0  # corners in local coordinates
 DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))  # unknowns at a vertex: orders in x and y
 

@@ -31,11 +31,13 @@ from .section import Plate, evaluate
 from .supports import SIDES, cells_of_facets
 
 NODES = 4  # [-] Gauss points in each direction of a triangle: exact for the stiffness of quartic elements
-SWINGING = 16  # [-] lowest modes whose stresses choose the fields that are kept
+# [-] lowest modes whose stresses choose the fields that are kept: large swings are those of the lowest modes
+SWINGING = 16
 ENTRIES = 500_000  # [-] of an array of pairs of modes, to limit memory
 MOST = 32  # [-] fields kept at most: they have 99 % of the energy of 16 modes with equal energies
 WORK = 30_000  # [-] entries of all forms together, to limit the work of a step: 18 fields of 40 modes
-LEFT_OUT = 1e-6  # [-] of that energy, in fields that are not kept
+# [-] of that energy, in fields that are not kept: stiffens the body by a millionth less, below any tolerance
+LEFT_OUT = 1e-6
 
 Steep = Callable[[np.ndarray, np.ndarray], np.ndarray]
 

@@ -48,7 +48,8 @@ RANGES = {
 NAMES = {"rho": "density", "damping_ratio": "damping_ratio =", "speed": "speed", "length": "a length of"}
 TURN = 2.0 * np.pi  # [rad] fact: a full one
 ROLLING = 20.0  # [-] fact: G over the rolling shear modulus of softwood: 0.064 E over 0.003 E, Wood Handbook, table 5-1
-THICK = 0.3  # [-] thickness over the shortest side above which a body is no longer thin
+# [-] thickness over the shortest side above which a remark is made: thin theory then errs by tens of per cent
+THICK = 0.3
 
 
 def number(name: str, value: Any) -> Iterator[str]:

@@ -26,7 +26,7 @@ from .supports import SIDES, cells_of_facets
 
 CALIBRATION = 33.0  # [-] weighted squares over the energy error: 20 to 45 for 20 kinds of plates; test_residual.py
 DEGREE = 5  # polynomial degree of the elements
-POINTS = 3  # [-] Gauss points on a side, and in each direction of a triangle; CALIBRATION holds for this number
+POINTS = 3  # [-] Gauss points on a side, and in each direction of a triangle: CALIBRATION was measured with this number
 BLOCK = 128  # [-] solutions processed together, to limit memory
 POWERS = np.array([(i, j) for i in range(4) for j in range(4 - i)])  # a quintic deflection has cubic moments
 NODES = 0.8 / 3.0 * POWERS + 0.2 / 3.0 - 1.0 / 3.0  # ten points inside the triangle, enough to define a cubic

@@ -72,7 +72,8 @@ FINE, ROUGH = (6, 24), (2, 8)  # [-] points on that disk, radial and around: err
 FEW = 64  # [-] at more points, as for a picture, the rough ones do: their error is 1e-6 of a mode of h k = 1
 LOOSE = "free", SOFT  # supports with a layer
 LAYER = 2.0  # [-] size of triangles in this layer over the thickness h: errors of some 2e-4 h / L of a frequency
-MOST_LAYER = 120.0  # [-] most triangles along these edges; a plate that needs more keeps larger ones
+# [-] most triangles along these edges, to bound the size of the mesh; a plate that needs more keeps larger ones
+MOST_LAYER = 120.0
 SEEN, UNSEEN = 4.0, 9.0  # [-] sides over the thickness below which they resolve the layer, above which they miss it
 SMALL = 0.1  # [-] longest side over the thickness below which nodes hold rotations: either choice loses two digits here
 

@@ -7,9 +7,11 @@ from typing import Any
 
 from .quantities import NAMES as QUANTITY_NAMES
 
-BEYOND = 0.2  # [-] a larger effect is beyond what a first-order estimate can tell
+# [-] a larger effect is beyond a first-order estimate: its square, what such an estimate leaves out, is then 4 %
+BEYOND = 0.2
 SILENT = 1e-4  # [-] effects that are never worth a line of their own
-SHARE = 0.1  # [-] of the tolerance: an assumption that changes the blow by less gets no line
+# [-] of the tolerance: an assumption that changes the blow by less gets no line, as several may still add up
+SHARE = 0.1
 ALL = (
     "thin target", "thin striker", "small deflections", "no yielding", "local contact", "quasi-static contact",
     "still air", "stated damping",

@@ -32,13 +32,16 @@ TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials
 SCHEMES = ("A", "A4", "collocation")
 MAX_STEPS = 500_000  # [-] of one run: takes about one second
 MAX_WORK = 1_000_000_000  # [-] modes, or entries of the forms of stretching, times steps of one run: some seconds
-PLAIN_WORK = 300_000  # [-] modes times steps of one run, if the kernels are not compiled
+# [-] modes times steps of one run in plain Python: 3 000 times less than with kernels, so that it ends as soon
+PLAIN_WORK = 300_000
 REACHED = 20.0  # [-] tolerance advised over the error reached: the steps it leads to may be twice as long
 SOONER = 0.2  # [-] of a run that was given up, what is advised: the last run of a blow halves the steps twice
 FIRST_STEPS = 24.0  # [-] steps per contact with which A4 meets TOLERANCE in most blows; cheapest first run of 12 to 32
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
-AVERAGED = 0.5  # [-] fraction of the usual steps that these quantities need
-GRAZE = 2.0  # [-] a touch or gap below 2 tolerance times the deepest approach may be a numerical error
+# [-] fraction of the usual steps that averages over the blow need: errors of single instants cancel in them
+AVERAGED = 0.5
+# [-] a touch or gap below 2 tolerance times the deepest approach may be an error: twice what a run may err by
+GRAZE = 2.0
 GRAZES = 3  # [-] step halvings to decide whether such a touch is real: each divides the doubt by eight
 FEW = 20  # [-] no such check after more impacts: chatter always ends with a contact that barely touches
 DOUBLINGS = 7  # [-] step halvings before the run gives up: A4 then errs 2**28 times less
@@ -47,26 +50,32 @@ DOUBLINGS = 7  # [-] step halvings before the run gives up: A4 then errs 2**28 t
 RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 4.0), "collocation": (1.0, 1.0)}
 MISFIT = 1.5, 12.0  # [-] error of the peak force over the misfit in `_force_missed`, without and with loss
 NEAR_PEAK = 0.8, 0.35  # [-] that misfit counts only above this fraction of the peak force, without and with loss
-RINGING = 0.5  # [-] modes with a damping ratio above this do not ring
+RINGING = 0.5  # [-] modes with a damping ratio above this do not ring: a swing is down to 3 % of the one before
 RESOLVED = 2.0  # [rad] largest phase of a ringing mode in one step of the coarser run: a third of a period
 COLLOCATION_BELOW = 1e-7  # [-] below this tolerance, collocation needs less work than A4
-BAND_POINTS = 257  # [-] number of frequencies at which two spectra are compared
+# [-] number of frequencies at which two spectra are compared: several per lobe of a single pulse are enough
+BAND_POINTS = 257
 NODES = 5  # [-] of collocation; more gain nothing, because the force is not smooth at onset and release
 RESOLVABLE = 0.3  # [-] largest contact stiffness times residual compliance for which the error estimate holds
 # [-] An error estimate below 30 % of the predicted one is replaced by that 30 %, because two runs can agree by chance;
 # 30 % is the median over many blows.
 AT_LEAST = 0.3
-THINNED = 1.4, 2.0  # [-] two extra runs divide the highest kept frequency by these, to estimate the truncation error
+# [-] two extra runs divide the highest kept frequency by these: near enough to foretell, far enough to differ
+THINNED = 1.4, 2.0
 FALLING = 2.0, 1.0  # [-] the truncation error falls at least with this power of the highest kept frequency; overdamped
-# [-] by dimension: frequency of the replacement mode over the last, sqrt(sum u**2/w**2 / sum u**2/w**4) of those above
+# [-] by dimension: frequency of the replacement mode over the last, fact: sqrt(sum u**2/w**2 / sum u**2/w**4) of
+# those above is sqrt(7/3) on a beam, whose n-th frequency goes as n**2, and sqrt(3) on a plate, where it goes as n
 REST_ABOVE = {1: 1.53, 2: 1.73}
-# [-] the replacement mode under a lossy contact: frequency over the last mode's, and damping ratio
+# [-] the replacement mode under a lossy contact, frequency over the last mode's and damping ratio: so far above that
+# it follows as a spring, so damped that it does not ring
 LOSSY_ABOVE, LOSSY_DAMPING = 30.0, 1.0
 LOSSY_STRIKER = 30.0  # [-] a lossy contact multiplies the truncation error of a striker by this: its modes are sparse
 STRIKER_SHARE = 0.05  # [-] fraction of the tolerance for the striker's left-out modes: keeping them is cheap
 NEGLIGIBLE = 1e-4  # [-] mesh errors below this fraction of the tolerance need no extra run; the blow errs by as little
-LOOKS = 16.0, 20_000  # [-] times per contact at which two motions are compared, and their largest number
-LARGEST_ERROR = 0.5  # [-] frequency errors are capped at this in that run
+# [-] times per contact at which two motions are compared, several per turn, and their largest number
+LOOKS = 16.0, 20_000
+# [-] frequency errors are capped at this in that run, so that frequencies stay positive: no tolerance is met then
+LARGEST_ERROR = 0.5
 
 
 @dataclass(frozen=True)

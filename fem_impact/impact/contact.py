@@ -14,7 +14,8 @@ from .compiled.layout import DEPTH, EXPONENT, FIRST_YIELD, HARD, HARD_EXPONENT, 
 
 LOWEST_EXPONENT, HIGHEST_EXPONENT = 0.5, 100.0  # [-] limits: below, no longer a spring; above, a wall
 
-LEAST_FELT = 1e-3  # [-] of its stiffness that felt is taken to keep in a guess of the contact time
+# [-] of its stiffness that felt is taken to keep in a guess of the contact time: otherwise all may relax
+LEAST_FELT = 1e-3
 MOST_LOSS = 1e12  # [s/m] far above that of a contact that swallows the slowest blow whole
 YIELDS = 1.6  # [-] fact: pressure at which a round contact first yields, over the yield strength, for nu = 0.3
 STIFFEST = 1e200  # [N/m**exponent] upper limit, 1/STIFFEST the lower: high exponents need huge stiffnesses

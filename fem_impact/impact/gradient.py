@@ -27,9 +27,10 @@ UNIT_OF = {
     "impulse": "N s", "contact_time": "s", "peak_force": "N", "peak_time": "s", "spectral_centroid": "Hz",
     "spectral_level": "dB", "modal_energy": "J",
 }  # fmt: skip
-GRAZE = 1e-3  # [-] of the deepest approach: a touch or gap below it may come or go with a small change
-TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a small change may make the other the largest
-LOOKS = 16.0, 20_000  # [-] times per contact at which a flight is searched for near misses, and their largest number
+GRAZE = 1e-3  # [-] of the deepest approach: a touch or gap below it may come or go with a change of a thousandth
+TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a change of 1e-4 may make the other the largest
+# [-] times per contact at which a flight is searched for near misses, and their largest number, as in `collision`
+LOOKS = 16.0, 20_000
 STILL = 1e-9  # [-] of the fastest approach: bodies that rest against each other turn back more slowly, by rounding
 CUBIC = np.linspace(0.0, 1.0, 9) ** np.arange(4)[:, None]  # where in a piece of time its cubic is looked at, as powers
 # halving the steps brings these no sure gain

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from .response import Response
 
 PACKAGE = str(Path(__file__).parents[1]) + os.sep  # where our own lines are
-SHARE = 0.4  # [-] of the tolerance that the advice leaves to one kind of error
-SPARE = 1.1  # [-] modes advised over modes estimated: Weyl's law counts them only on average
+# [-] of the tolerance that the advice leaves to one kind of error: two of them fit, and a fifth is left for the rest
+SHARE = 0.4
+SPARE = 1.1  # [-] modes advised over modes estimated: Weyl's law counts them only on average, so a tenth is added
 CAUTION = 0.5, 0.05  # [-] of that share for the estimate from few modes: if they resolve the contact, and if not
 MOST_ADVISED = 20_000  # [-] advice of more modes than this is no help
 

@@ -26,14 +26,16 @@ from .stretched import Stretched
 from .striker import Striker
 
 CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more than this factor: three digits are lost
-ONE_BODY = 1e-2  # [-] two descriptions of one body may differ by this in mass and compliance
+# [-] two descriptions of one body may differ by this in mass and compliance: meshes do by less, other bodies by more
+ONE_BODY = 1e-2
 PEAK_LOOKS = 16  # [-] samples per step in the search for the peak force; misses (pi/11/16)**2/8 before the parabola
 # [-] largest difference of descriptions up to which Ritz vectors tell a motion: as much as modes err that are found
 # as far as the force reaches
 MOVED = {"displacement": 1e-2, "velocity": 3e-2}
 LASTS = 2.0  # [-] and no longer than this many times the run, as later echoes may be missing from all of them
-LOOKED_AT = 200  # [-] times at which this error is estimated
-DIP_BLOCK = 8  # [-] points per static solution: each is a load, and the cost grows with the pairs of points
+LOOKED_AT = 200  # [-] times at which this error is estimated, evenly among those asked for; more only cost time
+# [-] points per static solution: each is a load, and the cost grows with the pairs of points; fewer solve more often
+DIP_BLOCK = 8
 
 
 @dataclass(frozen=True)

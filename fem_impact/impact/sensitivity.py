@@ -23,8 +23,10 @@ NODES = 3, 5  # [-] Gauss nodes per piece: for a force that is linear in each st
 # the last, for a force that is linear in each step and for one of higher order, whose steps are long for their error:
 # there the slope of a power law goes as (exponent - 1) powers of time, that in the exponent as its logarithm
 GRADES = 3, 6
-WHOLLY = 0.9  # [-] of such a step: what is left beyond goes to the last of them
-NEAR = 4  # [-] steps from the start or end of a contact, per step that a piece may hold there
+# [-] of such a step: what is left beyond goes to the last of them, as a sliver would cost as much as a piece
+WHOLLY = 0.9
+# [-] steps from the start or end of a contact, per step that a piece may hold there: pieces grow away from the kinks
+NEAR = 4
 # [-] steps of a contact from which on pieces are of two steps, and of four; a lossy force rings with every mode
 FULL = {False: (24, 128), True: (64, 128)}
 BESIDE = 1e-4  # [-] of a step: distance of two rates of the force from which its peak is told; leaves 1e-12 of the step

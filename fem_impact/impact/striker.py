@@ -13,7 +13,7 @@ from ..modes.analytic import SHEAR_RATIO, beam
 from ..modes.modal import Modes, Shapes, left_out
 
 SPHERES = 1e-9, 1e9  # [m] radius, from a few atoms to a star
-STICK_MODES = 96  # [-] bending modes of a stick; each blow keeps as many of them as it needs
+STICK_MODES = 96  # [-] bending modes of a stick, known in closed form; each blow keeps as many of them as it needs
 MOST_MODES = 1000  # [-] of a stick: higher modes have wavelengths as short as its thickness, where beam theory fails
 
 

@@ -11,11 +11,15 @@ from ..modes.modal import Modes
 from .accuracy import left_out_density
 from .spectra import half_sine_spectrum
 
-STEP = 1.01  # [-] ratio of neighbouring frequencies in the search: much finer than the lobes of the pulse's spectrum
+# [-] ratio of frequencies in the search: only from the hundredth on is a lobe of the pulse's spectrum narrower
+STEP = 1.01
 AT_ONCE = 64  # [-] of these frequencies tried together, to limit the work
-PIECE = 2.0  # [-] width in contact frequencies of each piece of the integral over the modes left out
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)  # [-] Gauss points of each piece
-HARDEST = np.log(1e70)  # [-] log of the highest contact frequency tried [rad/s]: above it, the threshold is infinite
+# [-] width in contact frequencies of each piece of the integral over the modes left out: one lobe of the spectrum
+PIECE = 2.0
+# [-] Gauss points of each piece: integrate cos**2 over a lobe to 1e-18
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
+# [-] log of the highest contact frequency tried [rad/s]: its fourth power is still finite; no threshold above
+HARDEST = np.log(1e70)
 SETTLED = 40.0  # [-] above this many contact frequencies, cos**2 is replaced by its mean: changes the sum by 1e-7
 
 

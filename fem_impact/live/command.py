@@ -12,7 +12,7 @@ from .controllers import KEYS, Hands, Score, Source, keys, port, read_midi, spre
 from .devices import Clock, Device, Speaker
 from .player import LOUDEST, Player, Stroke
 
-FASTER = 2.0  # [-] fastest stroke over the speed of the scene
+FASTER = 2.0  # [-] fastest stroke over the speed of the scene, which then is a stroke of half strength
 N_POINTS = len(KEYS[0])  # points to strike, one for each column of keys
 
 

@@ -17,11 +17,13 @@ from ..modes.modal import Modes
 from ..modes.viewing import grid
 from .player import AT_ONCE, Stroke
 
-FIRST_NOTE = 60  # [-] the note (middle C) of the first point; each semitone up is the next one, round and round
+# [-] the note of the first point, the middle of a keyboard; each semitone up is the next one, round and round
+FIRST_NOTE = 60
 LOUDEST_NOTE = 127  # [-] fact: the MIDI velocity of the fastest stroke; speeds go with it
 LARGEST_FILE = 10_000_000  # [byte] of a MIDI file: days of music
 KEYS = ("zxcvbnm,./", "asdfghjkl;", "qwertyuiop", "1234567890")  # a column strikes one point, a row up is louder
-SOFTEST = 0.125  # [-] of the fastest stroke, by the lowest row; each row up is twice as fast
+# [-] of the fastest stroke, by the lowest row; each row up is twice as fast, so that the fourth is the fastest
+SOFTEST = 0.125
 ENDS = ("\x1b", "\x04", "\x03")  # Escape, Ctrl-D and Ctrl-C end the playing
 PATIENCE = 0.05  # [s] between looks whether the playing has ended: nobody hears such a delay at the end
 

@@ -12,8 +12,9 @@ from ..show.sound import DECAY, LONGEST, SHORTEST, Sound
 from .controllers import Source
 from .player import Player
 
-AHEAD = 4  # [-] blocks computed ahead of what is played: 5 ms at 48 kHz
-SLOW = 0.2  # [-] of a block's length, between looks for room
+# [-] blocks computed ahead of what is played: 5 ms at 48 kHz, which nobody hears; fewer are late on a busy machine
+AHEAD = 4
+SLOW = 0.2  # [-] of a block's length, between looks for room: more often costs time, less often uses up what is ahead
 
 
 class Feed:

@@ -17,12 +17,13 @@ from ..impact.striker import Striker
 from ..modes.modal import Modes
 from ..show.sound import FULL_SCALE, HIGHEST_RATE, RATE, Sound
 
-BLOCK = 64  # [-] frames computed at a time: 1.3 ms at 48 kHz
+# [-] frames computed at a time: 1.3 ms at 48 kHz, as usual; longer ones delay strokes, shorter ones cost more calls
+BLOCK = 64
 CONTACT_STEPS = 32.0  # [-] least steps in the shortest contact; test_player.py holds the force to 1e-3
 SHORTEST = 12  # [-] halvings of a frame that a step in contact may need: 5 ns at 48 kHz
 OPENING, CLOSING, FLIGHT = 5, 8, 2  # [-] halvings of that step to end at a release, at an onset, and in flight
-LASTING = 1.0  # [s] after which a stick is lifted
-AT_ONCE = 64  # [-] strokes in one block; what comes on top waits for the next
+LASTING = 1.0  # [s] after which a stick that still rests on the body is lifted: a blow lasts some milliseconds
+AT_ONCE = 64  # [-] strokes in one block, far more than hands or a keyboard make; what comes on top waits for the next
 LOUDEST = 0.25  # [-] of full scale, reached by one stroke at full speed: four at once do not clip
 
 

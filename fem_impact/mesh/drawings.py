@@ -33,13 +33,16 @@ from .smooth_edges import smooth_runs
 
 PIXEL = 0.0254 / 96.0  # [m] fact: one SVG px: 1/96 inch by the CSS standard
 DXF_UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 13: 1e-6, 14: 0.1}  # $INSUNITS code -> [m]
-BRIDGED = 1e-3  # [-] gaps below this fraction of the extent are closed and noted
+# [-] gaps below this fraction of the extent are closed and noted: a line's width on paper, no hole anybody means
+BRIDGED = 1e-3
 LONGEST_NAME = 100  # [-] characters kept of an edge name
-SHORT = 1e-7  # [-] pieces shorter than this fraction of the extent are dropped
+# [-] pieces shorter than this fraction of the extent are dropped: single precision of drawing programs leaves as much
+SHORT = 1e-7
 MOST_NUMBERS = 100 * MOST_PIECES  # [-] most digit groups in the shapes of a drawing; an arc of long decimals has 12
 SHAPES = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon"}
 LONGEST_COMMENT = 1_000_000  # [-] characters of a comment in a drawing: longer ones are none
-CORNER = 0.1  # [rad] in a drawing without names, a sharper turn than this starts a new edge
+# [rad] in a drawing without names, a sharper turn, of some 6 degrees, starts a new edge; smooth joints turn by less
+CORNER = 0.1
 
 
 def read(source: Any, unit: str | None) -> tuple[Outline, list[str]]:

@@ -14,10 +14,12 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "km": 1e3}
 FARTHEST = 1e12  # [-] largest coordinate accepted: products of larger ones lose digits or overflow
 LARGEST = 20.0  # [m] a plate larger than this was probably drawn in millimetres
 SLENDER = 1e4  # [-] largest area / half width**2: the mesher is fast up to 4e3 and hangs from 4e4
-TURN = 0.25  # [rad] largest turn within one facet: puts 26 facets on a circle
+# [rad] largest turn within one facet: puts 26 facets on a circle; half of it doubles the triangles at curved edges
+TURN = 0.25
 MOST_PIECES = 2000  # [-] most pieces in an outline: several times what tracing programs write
 HERE = 1e-15  # [-] the search ends when the parameter moves by no more than this: rounding
-SAMPLES = 256  # [-] intervals per piece for integrating its length and turning
+# [-] intervals per piece for integrating its length and turning: some ten for each facet of a whole circle
+SAMPLES = 256
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,8 @@ from .._base.rounding import SAME
 from . import meshio_reader
 from .loops import FARTHEST, LARGEST, UNITS
 
-CROWD = 16  # [-] a file with more than this many nodes per point on average is refused as damaged
+# [-] nodes per point on average above which a file is refused as damaged: parts that touch share a point by few
+CROWD = 16
 PLANE = ("triangle", "triangle6", "quad")
 NODES = {"line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4}  # nodes per cell of the types read here
 

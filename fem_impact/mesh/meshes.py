@@ -14,12 +14,15 @@ from .facets import Curves, divided
 from .loops import Bezier, Outline, circle, crossed, extent, polyline, segment, signed_area, straight_loop
 from .triangulation import triangulate
 
-LONG_DIVISIONS = 64  # [-] at most this many along a rectangle, however slender it is
+# [-] at most this many along a rectangle, however slender: the default mesh then has 1 200 triangles at most
+LONG_DIVISIONS = 64
 MOST_CELLS = 200_000  # [-] most triangles allowed: several times what `find_modes` can solve
 SMALLEST_HOLE = 1e-6  # [-] smallest hole radius over disk radius: a smaller hole is lost in rounding
-OVERSHOOT = 1.45  # [-] split a loaded mesh if its triangles end up less than this factor too small, else mesh anew
+# [-] split a loaded mesh if its triangles end up less than this factor too small (twice as many), else mesh anew
+OVERSHOOT = 1.45
 LONGEST = 1.5  # [-] longest side of a triangle over the requested size: 1.4 to 1.6 on rectangles, disks and a guitar
-DEFAULT_DIVISIONS = 8  # [-] default elements across a rectangle or any other outline; `find_modes` refines them
+# [-] default elements across a rectangle or any other outline: a first mesh only, which `find_modes` refines
+DEFAULT_DIVISIONS = 8
 BEAM_DIVISIONS = 4  # [-] default elements along a beam: few, because their degree is high
 MOST_BEAM_CELLS = 5000  # [-] most beam elements allowed: more are never needed at that degree
 

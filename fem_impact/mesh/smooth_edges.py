@@ -4,11 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-CORNER = np.radians(35.0)  # [rad] a vertex where the rim turns by more than this is a corner
+# [rad] a vertex where the rim turns by more is a corner: ten facets of a circle turn by 36 degrees each
+CORNER = np.radians(35.0)
 STRAIGHT = 1e-6  # [rad] a smaller turn is rounding: the rim is straight there
-ALIKE = 4.0  # [-] a turn is part of a curve if a neighbour turns the same way, by at least 1 / ALIKE as much
-ROUND = 2e-6  # [-] points closer to a circle than this fraction of its radius lie on it
-JOINT = 0.05  # [rad] a curve meets its neighbour smoothly if their tangents differ by less than this
+# [-] a turn is part of a curve if a neighbour turns the same way, by 1 / ALIKE as much: facets differ in length
+ALIKE = 4.0
+ROUND = 2e-6  # [-] points closer to a circle than this fraction of its radius lie on it: files write six digits
+# [rad] a curve meets its neighbour smoothly if their tangents differ by less, some 3 degrees, as fits leave
+JOINT = 0.05
 ARM = 2  # [-] points used on each side of a vertex to fit curves other than circles
 
 
