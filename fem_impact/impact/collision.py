@@ -63,11 +63,11 @@ AT_LEAST = 0.3
 # [-] two extra runs divide the highest kept frequency by these: near enough to foretell, far enough to differ
 THINNED = 1.4, 2.0
 FALLING = 2.0, 1.0  # [-] the truncation error falls at least with this power of the highest kept frequency; overdamped
-# [-] by dimension: frequency of the replacement mode over the last, fact: sqrt(sum u**2/w**2 / sum u**2/w**4) of
-# those above is sqrt(7/3) on a beam, whose n-th frequency goes as n**2, and sqrt(3) on a plate, where it goes as n
+# [-] by dimension: frequency of the replacement mode over the last, fact: sqrt(sum u**2/w**2 / sum u**2/w**4) of those
+# above is sqrt(7/3) on a beam, whose n-th frequency goes as n**2, and sqrt(3) on a plate, where it goes as n
 REST_ABOVE = {1: 1.53, 2: 1.73}
-# [-] the replacement mode under a lossy contact, frequency over the last mode's and damping ratio: so far above that
-# it follows as a spring, so damped that it does not ring
+# [-] the replacement mode under a lossy contact, frequency over the last mode's and damping ratio: so far above that it
+# follows as a spring, so damped that it does not ring
 LOSSY_ABOVE, LOSSY_DAMPING = 30.0, 1.0
 LOSSY_STRIKER = 30.0  # [-] a lossy contact multiplies the truncation error of a striker by this: its modes are sparse
 STRIKER_SHARE = 0.05  # [-] fraction of the tolerance for the striker's left-out modes: keeping them is cheap

@@ -32,7 +32,8 @@ EXAMINERS = (
     local_contact.slow, still_air.of_target, unstated_damping.of_both,
 )  # fmt: skip
 
-ROUGH = 1e-2  # [-] tolerance of blows that only tell what can be foreseen, on a wall or for the cost
+# [-] tolerance of blows that only tell what can be foreseen, on a wall or for the cost: estimates err more
+ROUGH = 1e-2
 
 
 @dataclass(frozen=True, eq=False)

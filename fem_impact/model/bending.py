@@ -35,8 +35,8 @@ from ..modes.timoshenko import TimoshenkoShapes
 
 LOW = 40  # [-] flexible modes that are integrated; a blow's results depend on few others one by one
 TRUE_VECTORS = 4  # [-] of so many Ritz pairs the lowest one is a mode: those above are packets, whose shear is singular
-TOP = 4  # [-] the upper one of so many parts of the integrated modes tells how those above go on
-NODES = 3  # [-] Gauss points in each direction of a triangle: slopes to 1e-3, as modes need several triangles
+TOP = 4  # [-] the upper one of so many parts of the integrated modes tells how those above go on: ten modes, of LOW
+NODES = 3  # [-] Gauss points in each direction of a triangle: slopes to 1e-3, as a mode's wave spans several triangles
 ALONG = 200  # [-] Gauss points along a beam or the radius of a disk: 20 and more for each wave of its fortieth mode
 
 

@@ -18,14 +18,17 @@ from .target import FIRST_LOOK, Target
 
 PULSE = 1.77  # [-] fact: peak response of an oscillator to a half sine, over its static response
 SOFTEST = 10.2158  # [-] fact: first eigenvalue (k r)**2 of a clamped disk; a body around the disk has a lower one
-LIVELY = {False: 4.0, True: 16.0}  # [-] largest squared shape times mass; False: no free edge, True: some edge is free
-RIM = 2.0  # [-] factor on Weyl's edge term, an upper bound: free edges need 1.7
+# [-] largest squared shape times mass; fact: 2 for each pair of hinged edges, 4 at a free beam's end, both ways
+LIVELY = {False: 4.0, True: 16.0}
+RIM = 2.0  # [-] factor on Weyl's edge term, an upper bound: free edges need 1.71 (refinement.EDGE_TERM)
 HEAVIEST = 0.3  # [-] damping ratio of the contact with an infinite plate; below it, the striker always rebounds
 NEAREST = 2.0  # [-] least clearance**2 / (rate contact time); below it, the echo returns during the contact
 ECHO = 1.2  # [-] error of one straight edge over ratio / nearness**2; measured 0.1 to 0.4, at a disk's centre 4
-LOOK = 20.0  # [-] closed-form modes up to this multiple of the contact frequency decide if a body counts as rigid
-MOST_LOOKED_AT = 5000  # [-] upper limit on the number of these modes
-DIRECTIONS = 1001  # [-] in an eighth of a turn, among which the fastest wave of an orthotropic plate is sought
+# [-] modes up to this multiple of the contact frequency decide if a body is rigid: one there gives 1 / 400 as much
+LOOK = 20.0
+MOST_LOOKED_AT = 5000  # [-] upper limit on the number of these modes, as a plan should take no time
+# [-] in an eighth of a turn, where the fastest wave of an orthotropic plate is sought: missed by the square of 1e-3
+DIRECTIONS = 1001
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,9 @@ from ..modes.modal import SampledShapes
 from .restrike import Struck, softer
 from .thinness import wavenumber
 
-SMALL = 0.5  # [-] contact radius over half the thickness, over a wavelength / (2 pi) or over the distance to an edge
-SLOW = 0.2  # [-] longest period of the striker's own vibration over the contact time
+# [-] contact radius over half the thickness, a wavelength / (2 pi) or the edge's distance, small for Hertz: a choice
+SMALL = 0.5
+SLOW = 0.2  # [-] longest period of the striker's own vibration over the contact time: five swings within the contact
 LAMB = 2.64  # [-] fact: lowest spheroidal mode of a sphere, omega R / c_s, for nu = 0.25; 2.65 for 0.33
 INERT = 10.0  # [-] frequency over that of this mode from which on it does not swing: it leaves 1 % of the effect
 LIVELY = 2.5  # [-] fact: squared shape of that mode at its pole times the mass of the sphere

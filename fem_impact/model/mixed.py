@@ -32,18 +32,26 @@ import numpy as np
 
 from ..modes.modal import Modes, SampledShapes
 
-ANGLE = 0.05  # [rad] its sine is the damping ratio above the frequency; modes fade over about this part of it
+# [rad] its sine is the damping ratio above the frequency; modes fade over so much: half takes twice the oscillators
+ANGLE = 0.05
 RATIO = ANGLE / 1.5  # [-] between neighbouring frequencies, less one: a ripple of 2e-4
 REACH = 2.0  # [-] the modes are needed up to this multiple of the frequency, where they keep 1 % of their squared shape
-RESOLVED = 1.25  # [-] finite elements resolve waves of so many times the frequency: the first mesh is finer than that
+# [-] finite elements resolve waves of so many times the frequency: room for a second, higher frequency on that mesh
+RESOLVED = 1.25
 CHUNK = 2000  # [-] modes whose shares are found at a time, to limit memory
-SLOWING = 5.0  # [-] first frequency tried, times mass and mobility: the striker slows down with their inverse
-LASTING = 15.0  # [-] duration of the blow to be expected, over mass times mobility
-LONGEST = 1e4  # [-] that duration over the contact time on a wall at most: longer blows take too many steps
-PER_RADIAN = 2.5  # [-] vectors that tell waves up to a frequency, per radian of its phase in that time
+# [-] first frequency tried, times mass and mobility, the time in which the striker slows down: five times its rate
+SLOWING = 5.0
+# [-] duration of the blow to be expected, over mass times mobility: exp(-15) = 3e-7 of the speed is left then
+LASTING = 15.0
+# [-] that duration over the contact time on a wall at most: longer blows take too many steps, some 24 for each
+LONGEST = 1e4
+# [-] vectors that tell waves up to a frequency, per radian of its phase in that time: eight for each half turn
+PER_RADIAN = 2.5
 MOST_VECTORS = 1000  # [-] limit on their number: half a minute on a mesh of 50 000 unknowns
-HEAVY = 1.0  # [-] damping ratio of the contact with an infinite plate; from there on, vectors alone do not resolve it
-NEAR = 10.0  # [rad] phase of the first echo at that frequency at least: the plate is wider than the wave is long
+# [-] damping ratio of the contact with an infinite plate, critical, from which vectors alone do not resolve it
+HEAVY = 1.0
+# [rad] phase of the first echo at that frequency at least, a turn and a half: the plate is wider than the wave is long
+NEAR = 10.0
 
 
 def first_frequency(mass: float, mobility: float, echo: float, duration: float) -> float:

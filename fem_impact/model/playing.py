@@ -23,8 +23,9 @@ from ..modes.modal import Modes
 from . import audit, planner
 
 LOG = logging.getLogger(__name__)
-EACH = 0.5  # [-] of the tolerance for each blow by itself; the rest is for what it inherits from those before
-FEW_MODES = 0.1  # [-] of the tolerance at which the modes of a striker are chosen that meets others on the body
+EACH = 0.5  # [-] of the tolerance for each blow by itself; as much is left for what it inherits from those before
+# [-] of the tolerance at which a striker's modes are chosen that meets others on the body, for all their blows
+FEW_MODES = 0.1
 MOST_BLOWS = 100_000  # [-] above a day of drumming; more are a mistake
 LISTED = 20  # [-] impacts listed in a summary
 

@@ -24,7 +24,8 @@ from .restrike import Struck
 from .thinness import plane_wave, wavenumber
 
 LIMIT = 0.02  # [-] mass of the air over that of the body at which frequencies drop by 1 %
-ROUNDED = 0.1  # [-] of k**2: k**2 - k_0**2 does not get smaller, as the waves of a finite plate are not straight
+# [-] of k**2: k**2 - k_0**2 does not get smaller, as the waves of a finite plate are not straight; a choice
+ROUNDED = 0.1
 RIM = 0.5  # [-] of perimeter / (k area): the air that a finite plate moves beside its waves; with SWELL within 11 %
 SWELL = 0.6  # [-] of (int w)**2 / (area int w**2): what its volume adds (`fi.in_air`, five rectangles and two disks)
 NUMBER = "mass of the air moved over that of the body"

@@ -39,7 +39,7 @@ AIR = {"one side": 1, BOTH: 2}  # sides of a plate in open air
 FIRST_LOOK = 20  # [-] modes found first: enough to scale the body and to predict the density of the others
 RIGID_MOTIONS = 3  # [-] fact: most that a free body has before its first flexible mode
 FIRST_FLEXIBLE = RIGID_MOTIONS + 1  # [-] fact: modes that hold a flexible one
-CLOSE = 1e-6  # [-] error of a frequency to which a body is scaled or designed: those of a blow are larger
+CLOSE = 1e-6  # [-] error of a frequency to which a body is scaled or designed: far below the tolerance of usual blows
 MESHES = 4  # [-] meshes that are remembered: a plan counts the unknowns of two or three, which its run then uses
 
 Watch = Callable[[str], AbstractContextManager[Any]]

@@ -20,9 +20,10 @@ from .deflection import OTHER
 from .restrike import Struck, softer
 
 LIMIT = 0.23  # [-] thickness times wavenumber at which a wave is 1 % too fast for nu = 0.3
-DENT = 2.0  # [-] thickness times wavenumber beyond which a force is local to the contact
-DOUBT = 0.2  # [-] drop of all frequencies by which a striker of unknown thickness is tried
-NEAR = 10  # [-] modes next to a frequency that tell its wavenumber: few of them swing as its waves do
+# [-] thickness times wavenumber beyond which a force is local to the contact: waves shorter than three thicknesses
+DENT = 2.0
+DOUBT = 0.2  # [-] drop of all frequencies by which a striker of unknown thickness is tried: a choice for a stout one
+NEAR = 10  # [-] modes next to a frequency that tell its wavenumber: some of them swing unlike waves, hardly all of ten
 NUMBER = "thickness times wavenumber"
 THICKER = 'take a thick plate, theory = "mindlin", or a softer contact'
 SLENDER = 'take a thick beam, theory = "timoshenko", or a softer contact'

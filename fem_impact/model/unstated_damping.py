@@ -5,7 +5,8 @@ import numpy as np
 from ..impact.assumption import Assumption
 from .restrike import Struck
 
-PLAUSIBLE = 0.01  # [-] damping ratio tried: bare metal has a hundredth of it, wood as much, felt and rubber more
+# [-] damping ratio tried, on the side of caution: bare metal has a hundredth of it, wood as much, felt more
+PLAUSIBLE = 0.01
 NUMBER = "damping ratio tried"
 
 

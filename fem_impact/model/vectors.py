@@ -22,19 +22,26 @@ from .target import Elements, Stages, Target
 WAVES = 1.6, 0.37  # [-] highest frequency that the first mesh resolves, over that of the contact
 SHIFT = 6.0, 1.0 / 6.0  # [-] shift over the angular frequency of the contact
 FIRST = 84, 0.22  # [-] vectors tried first: they resolve one undisturbed contact
-FOLDED = 4.0, 0.6  # [-] what modes left out may err, over what the highest pairs may that act as a spring
+# [-] what modes left out may err, over what the highest pairs may that act as a spring: these err in every blow
+FOLDED = 4.0, 0.6
 EXCITED = 12.0, 0.25  # [-] highest frequency of a mode that matters, over that of the contact
-FEWEST = 30  # [-] vectors besides those that stand for modes: for the dip under the load
-MORE = 1.2, 1.4  # [-] smallest and largest factor on the number of vectors as long as they are too few
+# [-] vectors besides those that stand for modes: the dip under the load has no wavelength and takes its own
+FEWEST = 30
+# [-] smallest and largest factor on the number of vectors: less gains too little for a run, more may overshoot
+MORE = 1.2, 1.4
 FALLING = 3.0  # [-] power of the number of vectors with which their error falls, once they resolve the contact
-LESS_FOLDED = 16.0  # [-] divides what those of poorer descriptions may err
-NOTCH = 4.0  # [-] each attempt divides what modes left out, highest Ritz pairs or the mesh may err by this
+# [-] divides what those of poorer descriptions may err: so far apart that two blows differ by the error of the poorer
+LESS_FOLDED = 16.0
+# [-] each attempt divides by this what modes left out, highest pairs or the mesh may err: less may need one more
+NOTCH = 4.0
 PATIENCE, LEAST_GAIN = 3, 0.7  # [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7
-TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before
+TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before: five times smaller in all
 AIM = 0.5  # [-] of what the steps leave of the tolerance: errors that more vectors are to reach, without ever more runs
 AT_FAULT = 3.0  # [-] the mesh is refined if it errs so many times more than too few vectors, which its error contains
-ALIKE = 0.85  # [-] a mesh with more than this fraction of the elements of another is no coarser: its outline forbids
-FLATTER = 2.0  # [-] the same at the blow, where triangles halve
+# [-] a mesh with more than this part of the elements of another is no coarser: sizes 1.5 apart should leave 0.44
+ALIKE = 0.85
+# [-] ratio of the sizes at the blow of two meshes that are compared, where triangles halve: one halving more
+FLATTER = 2.0
 # [-] largest (size wave)**2 mass wave**2 / inertia of the triangles at the blow over the tolerance, see `elements_for`:
 # a blow on a hinged plate then errs by 2 % of it, whatever its other elements; test_vectors.py
 DIP = 60.0

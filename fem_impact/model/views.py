@@ -14,7 +14,8 @@ from ..modes.ritz import Krylov
 from .target import Elements
 from .vectors import Seen
 
-TOGETHER = 8  # [-] points that share a mesh: each adds elements that shrink towards it
+# [-] points that share a mesh: each adds elements that shrink towards it; fewer find the body's modes more often
+TOGETHER = 8
 
 
 class Krylovs(Krylov):

@@ -37,13 +37,16 @@ from ..mesh.meshes import measure
 from .modal import Modes, Shapes
 
 DENSITY, SPEED = 1.204, 343.2  # [kg/m^3], [m/s] fact: of air at 20 degrees C and 1013 hPa
-PER_WAVE = 8.0  # [-] cells per wavelength, of the highest mode and, in `free_air`, of its sound
-FEWEST = 24.0  # [-] cells across a square as large as the plate, at least
-SAMPLES = 2, 3  # [-] points across a cell over which a shape is averaged, in a fine and a coarse grid
+# [-] cells per wavelength of the highest mode and, in `free_air`, of its sound; two sizes are extrapolated
+PER_WAVE = 8.0
+FEWEST = 24.0  # [-] cells across a square as large as the plate, at least: cells at the rim cover a sixth of it
+SAMPLES = 2, 3  # [-] points across a cell over which a shape is averaged, fine and coarse: both use one set of points
 COARSER = SAMPLES[1] / SAMPLES[0]  # [-] cell size of the coarse grid, which tells the error, over that of the fine one
-BLOCK = 24  # [-] modes solved at the same few frequencies, and modes on either side that air may mix into them
-NODES = 4  # [-] frequencies per block between which the integrals are interpolated
-TURNS = 3  # [-] the frequencies of a block are chosen anew from its modes in air so many times
+# [-] modes solved at the same few frequencies, and modes beside it that air may mix in: far ones swing too differently
+BLOCK = 24
+NODES = 4  # [-] frequencies per block between which the integrals, smooth in frequency, are interpolated by a cubic
+# [-] the frequencies of a block are chosen anew from its modes in air so many times: they move less each time
+TURNS = 3
 FAR = 100.0  # [-] cells from which 1 / R between two cells is taken at their centres: errs by 1e-5
 
 

@@ -18,22 +18,25 @@ from . import timoshenko
 from .modal import BeamlikeShapes, Damping, Modes, Shapes, damping_ratios
 from .timoshenko import ENDS
 
-IMAGES = 6  # [-] image forces beyond each shorter side of a hinged plate; the n-th contributes exp(-2 pi n)
-NEAR_POLE = 1.0  # [-] distance x below which polylogarithms are summed as power series, which converge up to 2 pi
+# [-] image forces beyond each shorter side of a hinged plate; the n-th contributes exp(-2 pi n), the seventh 8e-20
+IMAGES = 6
+# [-] distance x below which polylogarithms are summed as power series, as (x / 2 pi)**n, beyond as exp(-n x)
+NEAR_POLE = 1.0
 POWERS = np.append(2, np.arange(3, 60, 2))  # [-] fact: exponents of these series; all other coefficients are zero
 SERIES: np.ndarray = (
     (-1.0) ** POWERS * special.bernoulli(60)[POWERS - 1] / (POWERS - 1.0) / special.factorial(POWERS)
 )  # zeta(2-k)/k!
 POLYLOG_TERMS = 40  # [-] terms of the direct sum used beyond NEAR_POLE; the next one is about exp(-40)
-FAR = 4.0  # [-] distance x beyond which so many fewer of them do
+FAR = 4.0  # [-] distance x from which a quarter of the terms is summed: the eleventh is exp(-44), too
 DISK_TERMS = 100_000  # [-] most terms summed at the edge of a disk, where they only fall as n**-3; error 5e-11
 MOST_MODES = 1_000_000  # [-] largest number of modes of a rectangle or beam; they take a few seconds
 MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a root search
-MOST_PAIRS = 4 * MOST_MODES  # [-] half-wave number pairs tried on a rectangle; MOST_MODES never needs half of them
+# [-] half-wave number pairs tried on a rectangle; pi / 4 of them lie in the ellipse of modes, so MOST_MODES fit twice
+MOST_PAIRS = 4 * MOST_MODES
 SHEAR_RATIO = 2.6  # [-] fact: E / G of an isotropic material with nu = 0.3
 ROUND = 0.886  # [-] shear coefficient of a round section, nu = 0.3 (Cowper 1966); 0.857 at nu = 0, 0.9 at 0.5
 LIMIT = 1e5  # [-] largest slenderness of a Timoshenko beam: beyond, shear is below rounding
-DISK_SCAN = 0.5  # [-] step in z = k radius when scanning for roots; roots of one order are about pi apart
+DISK_SCAN = 0.5  # [-] step in z = k radius when scanning for roots; roots of one order are about pi apart, six steps
 
 
 def closed_form(

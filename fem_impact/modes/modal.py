@@ -24,7 +24,8 @@ LOG = logging.getLogger(__name__)
 HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 2 pi times it must stay in reach
 SHOWN = 10  # [-] modes listed in a notebook: a table without scrolling
 REMEMBERED = 16  # [-] points whose shapes and static deflections a body keeps, because one blow needs them many times
-SHAPE_ERROR = 10.0  # [-] relative error of a mode's compliance divided by the relative error of its frequency
+# [-] error of a mode's compliance over that of its frequency, cautious: 2 by omega**-2, the rest for its shape
+SHAPE_ERROR = 10.0
 
 
 class Shapes(Protocol):

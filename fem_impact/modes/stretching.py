@@ -33,9 +33,10 @@ from .ritz import RitzShapes
 from .timoshenko import TimoshenkoShapes
 
 HELD = "clamped", "hinged", SOFT  # supports that hold an edge in the plane, too
-MOST = 40  # [-] modes that stretch
+# [-] modes that stretch: entries of its forms grow with their square, and high modes swing too little to matter
+MOST = 40
 COARSEST = 0.25  # [-] triangles of a plate known by formulas over its shorter side: 1e-4 too stiff in its first mode
-NODES = 40  # [-] Gauss points along a radius or a beam, and so many more for each mode
+NODES = 40  # [-] Gauss points along a radius or a beam, and one more for each radian of the highest mode: six per wave
 CANNOT = "stretching=True is known for plates, held or free along their edges, and beams held at both ends"
 ELASTIC = "its edge is elastic, which does not say how its plane is held"
 

@@ -13,7 +13,7 @@ WANTED = (15, 55, 2411)  # data sets to read: nodes, shapes, nodes in double pre
 LINES, SHELLS = (11, 21, 22), range(41, 97)  # codes of elements: rods and beams, plane and shell elements
 # nodes of a shell element -> its corners
 CORNERS: dict[int, tuple[int, ...]] = {3: (0, 1, 2), 4: (0, 1, 2, 3), 6: (0, 2, 4), 8: (0, 2, 4, 6)}
-PHASE = 0.3  # [-] largest imaginary over largest real part, at the best phase, of a complex shape taken as real
+PHASE = 0.3  # [-] imaginary over real part, at the best phase, up to which a complex shape is taken as real: 17 degrees
 DIRECTIONS = {"x": "r1", "y": "r2", "z": "r3"}
 
 

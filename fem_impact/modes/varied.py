@@ -10,7 +10,8 @@ from ..fe.eigenvalues import CLUSTER
 from ..fe.variation import SectionChange, energies
 from .modal import FieldShapes, Modes
 
-TERMS = 10  # [-] static solutions that stand for the modes left out; the error falls as (f / f_left_out)**(2 TERMS)
+# [-] static solutions that stand for the modes left out; the error falls as (f / f_left_out)**20, 1e-6 at a half
+TERMS = 10
 
 
 @dataclass(frozen=True, eq=False)

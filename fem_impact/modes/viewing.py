@@ -9,8 +9,9 @@ from ..mesh.mesh_files import quartered
 if TYPE_CHECKING:
     from .modal import Modes
 
-ENOUGH = 2500  # [-] points on a plate: several per half wave in the first hundred modes
-HALVINGS = 5  # [-] most refinements; each splits a triangle into four
+ENOUGH = 2500  # [-] points on a plate: several per half wave in the first hundred modes, 5 across each of ten
+# [-] most refinements, each splitting a triangle into four: a thousand of each, where two triangles become 2 048
+HALVINGS = 5
 
 
 def grid(modes: "Modes") -> tuple[np.ndarray, np.ndarray]:

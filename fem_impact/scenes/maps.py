@@ -35,7 +35,8 @@ PICTURED = {  # layers drawn for a map with two axes: name in the picture
     "peak_force": "peak force",
     "centroid": "spectral centroid",
 }
-RESONANCES = tuple(m * 10.0**e for e in range(6) for m in (1, 2, 5))  # [Hz] contours drawn: three per decade
+# [Hz] contours drawn, three per decade, from 1 Hz up to 500 kHz: fewer lines say too little, more hide the map
+RESONANCES = tuple(m * 10.0**e for e in range(6) for m in (1, 2, 5))
 
 
 @check.typed

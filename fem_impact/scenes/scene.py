@@ -42,7 +42,8 @@ from .schema import (
     target_values,
 )  # fmt: skip
 
-SECTIONS = 1001  # [-] places along a beam where its section is looked at: it may change within a hundredth of it
+# [-] places along a beam where its section is looked at: ten in each hundredth of it, where it may change
+SECTIONS = 1001
 NOTHING = Part()  # stands for a missing table
 
 

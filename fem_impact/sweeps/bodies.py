@@ -28,10 +28,14 @@ from ..modes.modal import FieldShapes, Modes, SampledShapes, damping_ratios
 from .batches import ALLOWED
 from .cells import REACH, Case, checked_axes, sampled
 
-FIRST_LOOK = 40  # [-] modes found first, to estimate how many a map needs
-STRUCK = 10, 4  # [-] cells in all, and at each strike point at least, by which the vectors are judged
-SPARED = 0.2  # [-] of these may miss the tolerance: beside a cell with another number of impacts no error is small
-SOFTER, MUCH_SOFTER = 0.5, 60  # [-] factor between contact stiffnesses tried in advice, and number of tries
+# [-] modes found first, to estimate how many a map needs: twice those of one blow, as a map has harder ones
+FIRST_LOOK = 40
+# [-] cells in all, and at each strike point at least, by which vectors are judged: each costs several whole blows
+STRUCK = 10, 4
+# [-] of these may miss the tolerance: two of ten, as beside a cell with another number of impacts no error is small
+SPARED = 0.2
+# [-] factor between contact stiffnesses tried in advice, and number of tries: down to 2e-18 of the hardest
+SOFTER, MUCH_SOFTER = 0.5, 60
 SEED = 0  # [-] of the choice of cells: the same map gives the same vectors
 
 Axes = Mapping[str, np.ndarray]

@@ -17,7 +17,8 @@ from .refined import beside_change
 
 WIDTH = 1.5e-3  # [-] widest bracket of a border, a share of the axis: half of it and FINER together stay below 1e-3
 FINER = 0.3  # [-] of the map's tolerance: that of blows beside a border; 0.01 moved those of 400 x 400 cells by 2.4e-4
-MOST_BLOWS = 200_000  # [-] beside borders: where the motion is chaotic, borders are told to the cell; some 20 s
+# [-] beside borders, to limit work to some 20 s: where the motion is chaotic, borders are told to the cell
+MOST_BLOWS = 200_000
 PREFIX = "border"  # of the dimension and the variables in a map
 MEANINGS = {
     "impacts": "number of impacts on one side of the border; there are more on the other side",

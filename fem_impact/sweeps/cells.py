@@ -36,9 +36,10 @@ LAW = [field.name for field in fields(Contact)]  # the axes that change the cont
 ALIASES = {alias: name for name, (_, _, alias) in AXES.items()}
 ALONE = {"hard_stiffness", "yield_approach", "hysteresis"}  # axes of contacts whose cells are computed alone
 FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  # each value needs new kernels
-SIDE = {True: 400, False: 100}  # [-] values along an axis that has no count, if cells are computed together or alone
+# [-] values along an axis that has no count: 160 000 cells together take some 2 s, 10 000 alone some 20 s
+SIDE = {True: 400, False: 100}
 MOST_VALUES = 10**6  # [-] most values along one axis of a map
-EVEN = 1e-3  # [-] relative difference of steps that count as equal
+EVEN = 1e-3  # [-] relative difference of steps that count as equal: values typed with four digits do
 REACH = 1e30  # [SI] speeds, masses and frequencies lie between 1/REACH and REACH: beyond, the kernels never finish
 
 

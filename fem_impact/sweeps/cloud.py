@@ -13,7 +13,7 @@ from .cells import FAMILY_AXES, Case
 from .store import Texts
 
 FAMILIES = 256  # [-] most pairs of bodies of a cloud that need kernels of their own: some 5 ms each
-BANDS = 64  # [-] most upper ends of the centroid's band: blows on bodies of other frequencies share theirs
+BANDS = 64  # [-] most upper ends of the centroid's band; blows between share them, so that few kernels are needed
 SAME = 1e-12  # [-] relative difference of numbers that rounding may have made
 
 

@@ -32,11 +32,12 @@ from .solving import LAYERS, alone, plain, solve_all, struck_alone, together
 from .store import Texts, Watch, not_free
 
 TOLERANCE = 1e-3  # [-] default error limit of a map
-DOUBTED = {True: 10_000, False: 100}  # [-] cells struck again for the error of vectors, in a batch or alone
+# [-] cells struck again for the error of vectors, in a batch or alone: some 0.1 and 0.2 s
+DOUBTED = {True: 10_000, False: 100}
 MOST_CELLS = 10**8  # [-] default limit of a map: half an hour to two hours of work, 8 GB
 SECONDS = {True: 1e-5, False: 2e-3}  # [s] per blow, in a batch or alone: the slower plates of studies/map_speed.py
 DENSE = 1.0  # [s] a map of our cells that takes less is computed in all of them
-MOST_MIDDLES = 4  # [-] axes whose middle is examined, too: 81 blows
+MOST_MIDDLES = 4  # [-] axes whose middle is examined, too: 3**4 = 81 blows, where five would take 243
 LEAST_MODEL_ERROR = 1e-12  # [-] smaller ones are rounding
 Tell = Callable[[str], Any]
 

@@ -22,19 +22,24 @@ from ..modes.modal import Damping, Modes
 from . import bodies, grid
 from .cells import Case
 
-TOLERANCE = 1e-2  # [-] error limit of the blows that are looked at first
-DECIDED = 1e-4  # [-] error limit of the blows that decide where a range of tips ends
+# [-] error limit of the blows that are looked at first: only to find where ranges end, which DECIDED then tells
+TOLERANCE = 1e-2
+DECIDED = 1e-4  # [-] error limit of the blows that decide where a range of tips ends, a tenth of its WIDTH
 WIDTH = 1e-3  # [-] relative width to which the ends of a range are found
-HARDEST = 10.0  # [-] hardest tip on a body of Ritz vectors, over that whose half sine has the bandwidth
-VECTORS = 6e-3  # [-] error limit of vectors and mesh in the blows of all tips
+# [-] hardest tip on a body of Ritz vectors, over that whose half sine has the bandwidth: three times its frequency
+HARDEST = 10.0
+# [-] error limit of vectors and mesh in the blows of all tips: the rest of TOLERANCE is for the time steps
+VECTORS = 6e-3
 MOST_MODES = 300  # [-] modes used otherwise, whatever the bandwidth; residual compliance replaces the others
 SOFTEST = 0.03  # [-] softest tip tried, over the one with the bandwidth and over the one tuned to the first mode
-PER_DECADE = 100, 12  # [-] tips per decade at which impacts are counted, and at which the bandwidth is found
-STIFFEST = 100.0  # [-] hardest tip tried, over the one for which the modes are complete
-ROUGHLY = 0.05  # [-] relative width to which the hardest tip that the modes resolve is found
+# [-] tips per decade at which impacts are counted, 2 % apart, and at which the bandwidth is found: it is smooth
+PER_DECADE = 100, 12
+STIFFEST = 100.0  # [-] hardest tip tried, over the one for which the modes are complete: ten times its frequency
+ROUGHLY = 0.05  # [-] relative width to which the hardest tip that the modes resolve is found, itself an estimate
 MASSES = (1e-6, 1e4)  # [kg] allowed: outside, a blow takes too long to compute or overflows
 BANDWIDTHS = (1e-3, 1e9)  # [Hz] allowed, for the same reason as the masses
-LOOKS = 400  # [-] frequencies at which the spectrum is evaluated to find where it falls
+# [-] frequencies where the spectrum is evaluated to find where it falls: 100 per inverse of the contact time
+LOOKS = 400
 
 
 Ranges = tuple[tuple[float, float], ...]  # [N/m] softest and hardest tip of each

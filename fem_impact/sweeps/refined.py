@@ -9,7 +9,7 @@ import numpy as np
 from .store import Texts
 
 BLOCK = 16  # [-] cells along the sides of the first blocks; islands narrower than a quarter of it can be missed
-SHARE = 0.5  # [-] of the tolerance that interpolation may take; the time steps of the cells take the other half
+SHARE = 0.5  # [-] of the tolerance that interpolation may take; the time steps of the cells take as much
 LINEAR = ("restitution",)  # layers whose errors are absolute; those of the others are relative
 ROUGH = {"centroid": 0.1}  # [-] weight of what is missed: its lobes change it by 1e-3, which no picture shows
 COUNTED = ("n_impacts", "error")  # layers that are not interpolated
