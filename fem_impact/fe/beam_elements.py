@@ -15,8 +15,7 @@ from .._base.rounding import SAME
 from .._base.untyped import Cells
 from ..mesh.facets import powers
 
-# [-] polynomial degree of the deflection within an element: errs by 1e-12 of a wave of 30 rad; few elements round
-# little
+# [-] polynomial degree of the deflection within an element: errs by 1e-12 of a wave of 30 rad; few elements round less
 DEGREE = 32
 QUADRATURE = 3 * DEGREE // 2  # [-] Gauss points of an element; exact for two shapes and a section of degree 31
 APART = 0.01  # [-] nodes closer than this fraction of the beam cause a rounding error of 1e-9 in the stiffness

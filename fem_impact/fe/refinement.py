@@ -19,8 +19,7 @@ from .eigenvalues import FIRST_SLICE, RESIDUAL, SPARE, STRICT, Flexibility, by_s
 from .section import Plate
 
 ARGYRIS = "argyris", "argyris and shear"
-# [-] ratio of element sizes whose frequencies are compared, and order: less than half the unknowns, five times the
-# error
+# [-] ratio of element sizes whose frequencies are compared, and order: less than half the unknowns, errors times five
 COARSER, COMPARED = 1.5, 4.0
 APART = 1.3  # [-] least ratio of sizes found on the two meshes: errors then differ by 2.9; closer ones agree by chance
 # [rad] largest k h: error 1e-5, 1e-12 on beams
@@ -48,11 +47,9 @@ DOFS_PER_AREA = {  # [-] unknowns per square, or length, of the element size
     "argyris": 10.4, "hermite": 2.0, "argyris and shear": 47.0, "hermite and shear": 4.0,
 }  # fmt: skip
 AIM = 0.9  # [-] fraction of the tolerance that the first mesh aims at: nearly all, as ERROR_OF_WAVE is an upper bound
-# [-] fraction of the tolerance that later meshes aim at: with less they are finer than needed, with more one more
-# follows
+# [-] fraction of the tolerance that later meshes aim at: less makes them finer than needed, more often takes another
 MARGIN = 0.6
-# [-] powers of the size with which the two parts of the error fall: the 8 of smooth shapes less a reserve, at curved
-# edges
+# [-] powers of the size with which both parts of the error fall: 8 of smooth shapes less a reserve, and at curved rims
 ORDERS = 7.5, 5.0
 # [-] smallest ratio of element sizes between two meshes: a tenth more triangles; with less the mesh may not change
 LEAST_STEP = 1.05

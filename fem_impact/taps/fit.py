@@ -18,11 +18,13 @@ from .rig import Rig
 from .solver import Problem
 from .unknowns import TIME, Setting, Unknown, checked
 
-STARTS = 5  # [-] searches, from the best of `solver.SCREENED` points
-POORER = 4.0  # [-] ratio of sums of squares from which the second of them does not go on
-POOR = 0.06  # [-] rms of the residual over that of the records: after a poorer fit the search goes on
-PATIENCE = 3  # [-] times the number of starts, at most
-OUTLIER = 4.0  # [-] a tap that the others predict worse than this times the median of their own errors does not agree
+STARTS = 5  # [-] searches, from the best of `solver.SCREENED` points; where all end poorly, more follow
+POORER = 4.0  # [-] ratio of sums of squares from which the second of them does not go on: residuals twice as large
+# [-] rms of the residual over that of the records, above the noise of usual ones: after a poorer fit the search goes on
+POOR = 0.06
+PATIENCE = 3  # [-] times the number of starts, at most: where fifteen fail, the model is wrong rather than the start
+# [-] a tap that the others predict worse than this times the median of their own errors does not agree: rare by chance
+OUTLIER = 4.0
 UNEQUAL = 1.5  # [-] ratio of noise over peak from which taps count differently: less is how well noise is known
 MOST_OUTLIERS = 0.34  # [-] of the taps may disagree: with more, nobody knows which ones are right
 FEWEST = 3  # [-] taps, to tell which one disagrees: of two, either may be wrong

@@ -22,7 +22,7 @@ from .solver import Problem, Solution
 from .unknowns import changed, unit_of
 
 LUCK = 0.05  # [-] probability of a spread by noise alone, above which taps do not count as different: the usual level
-REPEATS = 3  # [-] times that profiles may find a better fit and begin again
+REPEATS = 3  # [-] times that profiles may find a better fit and begin again; a sound fit needs none
 
 Watch = Callable[[int, int], Any]
 

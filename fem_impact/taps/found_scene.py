@@ -11,8 +11,8 @@ from ..scenes.scene import Scene
 from ..scenes.schema import written
 from .found import Found
 
-HEAVY = 1e6  # [-] mass of the plate that stands for a wall, over the hammer's
-STIFF = 1e6  # [Hz] its first frequency
+HEAVY = 1e6  # [-] mass of the plate that stands for a wall, over the hammer's: it gains two millionths of its speed
+STIFF = 1e6  # [Hz] its first frequency, some two hundred times that of contacts of 0.1 ms
 
 
 def tables(found: Found, scene: Scene | None = None) -> tuple[dict[str, Any], list[str]]:

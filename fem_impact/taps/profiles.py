@@ -16,16 +16,22 @@ from .solver import ENOUGH, NEARLY, QUICK, SMALL, Problem, Solution, chord, solv
 from .unknowns import Unknown
 
 SURE = 0.95  # [-] the widest interval that a profile is followed to
-FIRST = 0.8  # [-] of the distance to that interval's end by curvature: the first step
-FARTHEST = 0.25  # [-] of its range: the first step at most
-GROWTH = (1.25, 3.0)  # [-] of the next step over the last
-TOO_STEEP, BACK = 1.6, 0.2  # [-] a rise beyond the target by the first is tried again with a step shorter by the second
-MOST_POINTS = 16  # [-] to each side
+# [-] of the distance to that interval's end by curvature: the first step, a little short, as the second tells the rest
+FIRST = 0.8
+FARTHEST = 0.25  # [-] of its range: the first step at most, so that four steps see all of it
+# [-] of the next step over the last: longer even where the rise stalls, never so long as to leap over a bend
+GROWTH = (1.25, 3.0)
+# [-] a rise beyond the target by the first is tried again with a step shorter by the second, at most: 1.6**2 in squares
+TOO_STEEP, BACK = 1.6, 0.2
+MOST_POINTS = 16  # [-] to each side: with steps that grow by a quarter at least, they reach 140 times the first
 AT_BOUND = 0.02  # [-] of a range: a value this close to its bound may be held by it
-WIDE = 0.5  # [-] of its range (by its coordinate): an interval open at one end and wider than this tells nothing
-LAGS = 10  # [-] of the test for whiteness
-DOUBTED = 0.01  # [-] probability below which residuals do not count as white
-MOVES = 0.05  # [-] smallest exponent of a ridge that is named
+# [-] of its range (by its coordinate): an interval open at one end and wider than this tells less than half of it
+WIDE = 0.5
+LAGS = 10  # [-] of the test for whiteness: filters of rigs ring over some ten samples
+# [-] probability below which residuals do not count as white: one fit of a hundred is doubted without need
+DOUBTED = 0.01
+# [-] smallest exponent of a ridge that is named: twice the one value then moves the other by less than 4 %
+MOVES = 0.05
 
 
 @dataclass(frozen=True, eq=False)

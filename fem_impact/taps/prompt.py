@@ -21,7 +21,7 @@ from .rig import measure
 RATE = 51200.0  # [Hz] at which a scene is measured: 2.56 times 20 kHz, usual for analysers
 HAMMER = 0.1  # [kg] of a hammer of which nothing is said: a usual modal hammer
 UNKNOWN = {"contact.stiffness": (1e2, 1e16), "contact.exponent": (1.0, 4.0), "contact.loss": (0.0, 10.0)}
-STEEP = 1.5  # [-] logarithm of a peak over its surroundings: lower ones are noise
+STEEP = 1.5  # [-] logarithm of a peak over its surroundings: lower ones, of less than a factor of 4.5, may be noise
 MOST_PEAKS = 20  # [-] listed: more do not fit a screen
 DURATION = 1.0  # [s] of the record of a scene: resolves peaks 1 Hz apart
 

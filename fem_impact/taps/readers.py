@@ -15,9 +15,11 @@ from . import units
 END_OF_HEADER = "***End_of_Header***"
 COMMENTS = ("#", "%", "//")  # begin lines that are no data
 HEADER_LINES = 200  # [-] of a text table at most, before its numbers begin
-UNEVEN = 0.02, 0.3  # [-] of the step: times may deviate from an even grid by the first, and by the second if rounded
+# [-] of the step: times may deviate from an even grid by the first, by the second if rounded; a gap does by a whole one
+UNEVEN = 0.02, 0.3
 FEWEST = 8  # [-] samples of a channel
-FEW_TAPS = 16  # [-] a table with fewer rows than this is longer in time, without a doubt
+# [-] a table with fewer rows than this is longer in time, without a doubt: few records have as many taps or channels
+FEW_TAPS = 16
 AGREE = 0.01  # [-] two statements of the rate may differ by this, as written with few digits
 MOST_CHANNELS = 256  # [-] of a file; an array with more rows holds something else
 RATE_NAMES = ("rate", "fs", "sampling_rate", "samplerate", "sample_rate", "sampling_frequency", "frequency")

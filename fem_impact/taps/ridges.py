@@ -8,7 +8,8 @@ from .._base import check
 from .._base.rounding import SAME
 from .solver import Problem, directions
 
-NEAR_ZERO = 1e-3  # [-] of its range: below this, what begins at zero does not go by factors
+# [-] of its range: below this, what begins at zero does not go by factors, or steps to zero would never end
+NEAR_ZERO = 1e-3
 
 
 @dataclass(frozen=True, eq=False)

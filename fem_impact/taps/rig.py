@@ -21,7 +21,8 @@ FILTERS: dict[str, tuple[float, float] | None] = {
     "none": None,
 }
 FINE = 16  # [-] samples of the simulation per sample of the rig: aliasing of a half sine stays below 2e-5
-MARGIN = 32  # [-] samples of the rig around a record, in which its filter may ring
+# [-] samples of the rig around a record, in which its filter may ring: more than twice those of `windows.BEFORE`
+MARGIN = 32
 ORDERS = (1, 20)  # [-] of a Butterworth filter
 MOST_SAMPLES = 4_000_000  # [-] of a simulated record, before it is thinned
 

@@ -28,12 +28,14 @@ from ..sweeps.cells import Case
 from .rig import Rig
 
 RATE, FILTER = 2.56, "2.56"  # [-] sampling rate over bandwidth, as analysers have it, and their filter
-CLOSE = 1e-3  # [-] tolerance of the frequencies of a system's modes
-BEYOND = 1.5  # [-] modes are found up to this many times the bandwidth; the residual compliance stands for the others
-TIPS = np.geomspace(1.0, 30.0, 6)  # [-] tips of a hammer known by its mass, over that whose half sine has the bandwidth
+CLOSE = 1e-3  # [-] tolerance of the frequencies of a system's modes, far below their spacing
+# [-] modes are found up to this many times the bandwidth: fewer bend the top of the band, more only cost time
+BEYOND = 1.5
+# [-] tips of a hammer known by its mass, over that whose half sine has the bandwidth: each twice as stiff, to 5.5 times
+TIPS = np.geomspace(1.0, 30.0, 6)
 SHORTEST, LONGEST = 0.1, 10.0  # [s] limits of the default record: lines are at most 10 Hz apart, at least 0.1 Hz
 MOST_LINES = 100_000  # [-] of a record
-NOISE = 1e-3  # [-] of each channel over its peak, by default: some 60 dB
+NOISE = 1e-3  # [-] of each channel over its peak, by default: some 60 dB, a choice
 SPEED = 1.0  # [m/s] of every blow; with linear tips the answer is the same at any speed
 MOST_BLOWS = 20_000  # [-] points times tips: some minutes
 WORKS, NO_BAND, DOUBLE, UNKNOWN = "works", "no tip reaches the band", "double hit", "too hard for the modes"

@@ -17,23 +17,34 @@ from .unknowns import TIME, Setting, Unknown
 
 HALF_LOST = 0.6  # [-] momentum over impulse of a blow that comes back with two thirds of its speed
 STEP = 1e-4  # [-] of coordinates, for derivatives by differences: blows with a fixed step are smooth to 1e-6
-TIMES = 30.0  # [-] the contact time is sought within this factor of the measured one
-SCREENED = 64  # [-] starting points that are looked at
-NEIGHBOURS = 0.25  # [-] of the ranges: starting points nearer than this often lead to the same minimum
-FELT = 0.1, 5.0  # [-] frequency times contact time of modes that shape a pulse: where their searches begin
-LOOKS = 3  # [-] Gauss-Newton steps in speed and onset while looking
-ENOUGH = 60  # [-] iterations of one search
-CLOSE = 1e-8  # [-] relative change of the sum of squares or of the values that ends a search
-QUICK = 12  # [-] iterations of a search that begins close to its end, or that only shows whether to go on
+# [-] the contact time is sought within this factor of the measured one: half and twice of it pass the tests
+TIMES = 30.0
+SCREENED = 64  # [-] starting points that are looked at: four along each of three unknowns
+# [-] of the ranges: starting points nearer than this often lead to the same minimum; half and twice pass the tests
+NEIGHBOURS = 0.25
+# [-] frequency times contact time of modes that shape a pulse, where searches begin: half and twice pass the tests
+FELT = 0.1, 5.0
+LOOKS = 3  # [-] Gauss-Newton steps in speed and onset while looking: nearly linear in both, so that three find them
+ENOUGH = 60  # [-] iterations of one search: ten times more or fewer pass the tests
+# [-] relative change of the sum of squares or of the values that ends a search; ten times more or less passes the tests
+CLOSE = 1e-8
+# [-] iterations of a search that begins close to its end, or only shows whether to go on; half and twice pass the tests
+QUICK = 12
 NEARLY = 1e-6  # [-] change that ends a search of which only the sum of squares counts: it errs by the square
-CHORDS = 8  # [-] steps with derivatives of a point nearby
-KEPT = 0.3  # [-] of the promised gain, with which a step by such derivatives is good enough
-SMALL = 0.05  # [-] of the noise variance: a gain that is not sought
-LONG = 1e6  # [-] longest way along a ridge
-FLAT = 3e-5  # [-] of the largest singular value of scaled derivatives: a direction flatter than this may be a ridge
-REACH = 25.0  # [-] logarithms of speeds in m/s and of momenta over measured impulses are sought this far from zero
-LATEST = 60.0  # [samples] the onset is sought this far from the trigger
-SHIFT = 3.0  # [samples] the onset may move by at a single look
+CHORDS = 8  # [-] steps with derivatives of a point nearby; half and twice pass the tests
+# [-] of the promised gain, with which a step by such derivatives is good enough; half and twice pass the tests
+KEPT = 0.3
+# [-] of the noise variance: a gain that is not sought, as luck makes as much; half and twice pass the tests
+SMALL = 0.05
+LONG = 1e6  # [-] longest way along a ridge, only to divide by; ten times more or less passes the tests
+# [-] of the largest singular value of scaled derivatives: flatter directions may be ridges; ten times passes the tests
+FLAT = 3e-5
+# [-] logarithms of speeds in m/s and of momenta over measured impulses are sought this far from zero: all there are
+REACH = 25.0
+# [samples] the onset is sought this far from the trigger, which is set at 5 % of the peak; ten times passes the tests
+LATEST = 60.0
+# [samples] the onset may move by at a single look: pulses are linear in it so far; half and twice pass the tests
+SHIFT = 3.0
 
 
 @dataclass(frozen=True, eq=False)

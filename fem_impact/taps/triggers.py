@@ -9,21 +9,24 @@ from scipy.interpolate import interp1d
 from .._base import check
 from .._base.rounding import SAME
 
-LEVEL = 0.05  # [-] of the largest force: a tap begins where the force rises above this
+# [-] of the largest force: a tap begins where the force rises above this; lower would meet ringing, higher lose taps
+LEVEL = 0.05
 LOW = 0.25  # [-] quantile of a record of one tap that is at rest: no pulse fills three quarters of it
-NOISE = 8.0  # [-] standard deviations of the noise that the trigger stays above at least
+# [-] standard deviations of the noise that the trigger stays above at least: never by chance, in any record
+NOISE = 8.0
 GAUSS = 1.4826  # [-] fact: standard deviation over median absolute deviation of Gaussian noise
 PULSE = 0.1  # [-] of a tap's largest force: a pulse rises above this and ends below half of it; filters ring less
-CLEAR = 6.0  # [-] standard deviations of the noise: the same, if they are larger
+CLEAR = 6.0  # [-] standard deviations of the noise: the same, if they are larger; two fewer, as a pulse is already sure
 MOST = 0.5  # [-] of a tap's largest force: the same at most, so that a tap in strong noise has a pulse
-DRIFT = 0.2  # [-] of the trigger: less drift within a record is not mentioned
+DRIFT = 0.2  # [-] of the trigger: less drift within a record is not mentioned, as it moves no tap
 REST = 0.2  # [s] over which the force is at rest for more than half the time: slower changes are drift
 CLIPPED = 3  # [-] equal largest samples in a row that count as clipped: two may be equal by chance
-BEFORE = 0.02  # [s] longest record before a tap
-LONGEST = 10.0  # [s] longest record of one tap
-FEWEST = 8  # [-] samples before a tap from which an offset is estimated
+BEFORE = 0.02  # [s] longest record before a tap: 20 ms tell the offset, more may reach back to the last tap's ringing
+LONGEST = 10.0  # [s] longest record of one tap: lines 0.1 Hz apart
+FEWEST = 8  # [-] samples before a tap from which an offset is estimated: to a third of the noise, fewer make it worse
 MOST_TAPS = 10_000  # [-] of one file: more are noise
-ENDS = 0.3  # [-] of a pulse's peak: a record that begins or ends above this cuts the pulse
+# [-] of a pulse's peak: a record that begins or ends above this cuts the pulse; half and twice of it pass the tests
+ENDS = 0.3
 
 
 def noise(force: np.ndarray) -> float:

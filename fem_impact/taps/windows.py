@@ -9,11 +9,14 @@ from . import triggers
 from .records import Taps
 from .solver import Data
 
-GUARD = 3  # [samples] before the onset, where a tap may have begun
-UNSURE = 6.0  # [-] standard deviations of a mean: an offset of less is noise
-SLIGHT = 0.002  # [-] of the largest force: a smaller offset is left
-BEFORE = 12  # [samples] before the tap that are compared: the filter rings there
-AFTER = 1.5  # [-] of the length from the first to the last pulse: what is compared after it, at least BEFORE samples
+GUARD = 3  # [samples] before the onset, where a tap may have begun: half and twice of it pass the tests
+# [-] standard deviations of a mean: an offset of less is noise, surely; half and twice of it pass the tests
+UNSURE = 6.0
+# [-] of the largest force: a smaller offset is left, as it hardly moves a fit; ten times passes the tests
+SLIGHT = 0.002
+BEFORE = 12  # [samples] before the tap that are compared: the filter rings there; half and twice of it pass the tests
+# [-] of the length from the first to the last pulse: what is compared after it, where the body's answer is still heard
+AFTER = 1.5
 
 
 def joined(taps: Any, name: str = "taps") -> Taps:
