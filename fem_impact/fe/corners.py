@@ -17,7 +17,7 @@ CORNER_ERROR = 1e-7
 SMALLEST = 1e-10  # [-] smallest ring as a fraction of the extent; rounding of the coordinates spoils smaller ones
 SMALLEST_FREE = 3e-3  # [-] the same at a free corner, which moves: rounding grows with the ring's size to the -2
 MILD = 2.95  # [-] corners with a larger exponent get no rings: there rings cost quintic triangles more than they gain
-MILD_FREE = 2.5  # [-] the same between free edges, where the singular part is small
+MILD_FREE = 2.5  # [-] the same between free edges, where the singular part is small, so that rings pay off later
 
 
 def _rows(kind: str, z: np.ndarray, angle: float, nu: float) -> list[np.ndarray]:

@@ -24,8 +24,10 @@ STRICT = 1e-11  # [-] relative residual allowed when the first search missed mod
 SPARE = 6  # [-] extra modes computed to find a gap after the last one wanted: a cluster of more takes a second search
 FIRST_SLICE = 24  # [-] modes found with shift zero; their eigenvalues span five decades and keep ten digits
 SLICE = 50  # [-] modes found with each further shift: 30 were 10 % slower, 80 were 40 % slower
-NUDGES = 0.0, SAME, -SAME  # [-] relative changes of a shift, tried in turn if the factorisation fails
-CLUSTER = 1e-6  # [-] eigenvalues with a smaller relative distance count as equal: far above their errors
+# [-] relative changes of a shift, tried in turn where the factorisation fails: far below CLUSTER, far above rounding
+NUDGES = 0.0, SAME, -SAME
+# [-] eigenvalues with a smaller relative distance count as equal: far above their errors, below what meshes tell apart
+CLUSTER = 1e-6
 
 
 @cache

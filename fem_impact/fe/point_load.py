@@ -18,7 +18,8 @@ GOAL = 1e-5  # [-] refinement stops at this relative error of the compliance: a 
 SPREAD = 4e-4  # [-] error of the points that stand for a spread force on a thick plate, times 2 pi the shear stiffness
 ROUNDS = 3  # [-] most meshes tried, each with half the element size: 600, 2 400 and 9 600 triangles; more would be slow
 ROUNDING = 1e-7  # [-] relative rounding error of a plate's compliance, caused by the smallest triangles
-RESTS = 1e-15  # [-] a point whose compliance in the frame is below this lies on a support
+# [-] a point whose compliance in the frame is below this lies on a support: rounding of the solution leaves as much
+RESTS = 1e-15
 
 
 @dataclass(frozen=True, eq=False)

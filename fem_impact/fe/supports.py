@@ -8,7 +8,8 @@ from scipy.sparse import csr_matrix
 
 from .._base.untyped import Sparse
 
-SMOOTH = 1e-5  # [-] two facets join smoothly if tangents [rad] and curvatures times length differ by less
+# [-] two facets join smoothly if tangents [rad] and curvatures times length differ by less: arcs from files do
+SMOOTH = 1e-5
 RANK = 1e-5  # [-] singular values below this count as zero; directions in the smallest triangles are no more accurate
 SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in scikit-fem's order
 

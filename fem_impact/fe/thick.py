@@ -67,14 +67,16 @@ from .springs import at_facets
 
 SHEAR = 15  # shape functions of one component of the shear strain on a triangle
 LOCAL = 21 + 2 * SHEAR  # unknowns of a triangle: w, gamma_x, gamma_y
-PATCH = 0.325  # [-] radius over which a point force is spread, over the thickness
+# [-] radius over which a point force is spread, over the thickness: right stress below a small load (Westergaard 1926)
+PATCH = 0.325
 FINE, ROUGH = (6, 24), (2, 8)  # [-] points on that disk, radial and around: error 3e-5 of a compliance at h/L = 0.2
 FEW = 64  # [-] at more points, as for a picture, the rough ones do: their error is 1e-6 of a mode of h k = 1
 LOOSE = "free", SOFT  # supports with a layer
 LAYER = 2.0  # [-] size of triangles in this layer over the thickness h: errors of some 2e-4 h / L of a frequency
 # [-] most triangles along these edges, to bound the size of the mesh; a plate that needs more keeps larger ones
 MOST_LAYER = 120.0
-SEEN, UNSEEN = 4.0, 9.0  # [-] sides over the thickness below which they resolve the layer, above which they miss it
+# [-] sides over the thickness below which they resolve the layer, above which they miss it; in between as the square
+SEEN, UNSEEN = 4.0, 9.0
 SMALL = 0.1  # [-] longest side over the thickness below which nodes hold rotations: either choice loses two digits here
 
 

@@ -34,7 +34,8 @@ MAX_STEPS = 500_000  # [-] of one run: takes about one second
 MAX_WORK = 1_000_000_000  # [-] modes, or entries of the forms of stretching, times steps of one run: some seconds
 # [-] modes times steps of one run in plain Python: 3 000 times less than with kernels, so that it ends as soon
 PLAIN_WORK = 300_000
-REACHED = 20.0  # [-] tolerance advised over the error reached: the steps it leads to may be twice as long
+# [-] tolerance advised over the error reached: steps twice as long, to which it may lead, err 16 times more
+REACHED = 20.0
 SOONER = 0.2  # [-] of a run that was given up, what is advised: the last run of a blow halves the steps twice
 FIRST_STEPS = 24.0  # [-] steps per contact with which A4 meets TOLERANCE in most blows; cheapest first run of 12 to 32
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
@@ -51,7 +52,8 @@ RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 4.0), "collocation": (1.0, 1.0)}
 MISFIT = 1.5, 12.0  # [-] error of the peak force over the misfit in `_force_missed`, without and with loss
 NEAR_PEAK = 0.8, 0.35  # [-] that misfit counts only above this fraction of the peak force, without and with loss
 RINGING = 0.5  # [-] modes with a damping ratio above this do not ring: a swing is down to 3 % of the one before
-RESOLVED = 2.0  # [rad] largest phase of a ringing mode in one step of the coarser run: a third of a period
+# [rad] largest phase of a ringing mode in a step of the coarser run: a third of a period, seen before it comes again
+RESOLVED = 2.0
 COLLOCATION_BELOW = 1e-7  # [-] below this tolerance, collocation needs less work than A4
 # [-] number of frequencies at which two spectra are compared: several per lobe of a single pulse are enough
 BAND_POINTS = 257

@@ -35,7 +35,7 @@ STILL = 1e-9  # [-] of the fastest approach: bodies that rest against each other
 CUBIC = np.linspace(0.0, 1.0, 9) ** np.arange(4)[:, None]  # where in a piece of time its cubic is looked at, as powers
 # halving the steps brings these no sure gain
 ROUGH = "contact_time", "peak_time", "spectral_centroid", "spectral_level"
-# [-] difference of two runs over the error of the finer one, for schemes A, A4 and collocation, of all others
+# [-] difference of two runs over the error of the finer one, as order 2 leaves; order 1 for collocation, cautious
 RICHARDSON = {"A": 3.0, "A4": 3.0, "collocation": 1.0}
 INSTEAD = "take differences of runs with the number changed, told to a smaller tolerance"
 LEAST = 1e-9  # [-] of a derivative: what is left of differences of shapes, and two runs may agree by chance

@@ -23,8 +23,10 @@ PACKAGE = str(Path(__file__).parents[1]) + os.sep  # where our own lines are
 # [-] of the tolerance that the advice leaves to one kind of error: two of them fit, and a fifth is left for the rest
 SHARE = 0.4
 SPARE = 1.1  # [-] modes advised over modes estimated: Weyl's law counts them only on average, so a tenth is added
-CAUTION = 0.5, 0.05  # [-] of that share for the estimate from few modes: if they resolve the contact, and if not
-MOST_ADVISED = 20_000  # [-] advice of more modes than this is no help
+# [-] of that share for the estimate from few modes, which errs: twice if they resolve the contact, 20 times if not
+CAUTION = 0.5, 0.05
+# [-] modes above which other ways out are told: ten times as many as the planner finds by elements
+MOST_ADVISED = 20_000
 
 
 def verdict(hit: "Response") -> str:

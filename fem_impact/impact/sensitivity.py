@@ -18,7 +18,8 @@ from .compiled.tangents import N_LAW, Blow, Change, Found, Pieces, follow, law_a
 if TYPE_CHECKING:
     from .response import History
 
-NODES = 3, 5  # [-] Gauss nodes per piece: for a force that is linear in each step, and for one of higher order
+# [-] Gauss nodes per piece: exact to degree 5 for a force linear in each step, to 9 for one of higher order
+NODES = 3, 5
 # [-] how often the first step of a contact is cut, each time to a quarter of the median step in contact, and mirrored
 # the last, for a force that is linear in each step and for one of higher order, whose steps are long for their error:
 # there the slope of a power law goes as (exponent - 1) powers of time, that in the exponent as its logarithm

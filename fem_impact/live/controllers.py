@@ -25,7 +25,8 @@ KEYS = ("zxcvbnm,./", "asdfghjkl;", "qwertyuiop", "1234567890")  # a column stri
 # [-] of the fastest stroke, by the lowest row; each row up is twice as fast, so that the fourth is the fastest
 SOFTEST = 0.125
 ENDS = ("\x1b", "\x04", "\x03")  # Escape, Ctrl-D and Ctrl-C end the playing
-PATIENCE = 0.05  # [s] between looks whether the playing has ended: nobody hears such a delay at the end
+# [s] between looks whether the playing has ended: nobody notices such a delay at the end, and it costs nothing
+PATIENCE = 0.05
 
 
 class Source(Protocol):

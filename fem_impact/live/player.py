@@ -24,7 +24,7 @@ SHORTEST = 12  # [-] halvings of a frame that a step in contact may need: 5 ns a
 OPENING, CLOSING, FLIGHT = 5, 8, 2  # [-] halvings of that step to end at a release, at an onset, and in flight
 LASTING = 1.0  # [s] after which a stick that still rests on the body is lifted: a blow lasts some milliseconds
 AT_ONCE = 64  # [-] strokes in one block, far more than hands or a keyboard make; what comes on top waits for the next
-LOUDEST = 0.25  # [-] of full scale, reached by one stroke at full speed: four at once do not clip
+LOUDEST = 0.25  # [-] of full scale, reached by one stroke at full speed: four at once, one by each stick, do not clip
 
 
 class Stroke(NamedTuple):

@@ -12,7 +12,7 @@ from .._base.rounding import HALVINGS, SAME
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "km": 1e3}
 FARTHEST = 1e12  # [-] largest coordinate accepted: products of larger ones lose digits or overflow
-LARGEST = 20.0  # [m] a plate larger than this was probably drawn in millimetres
+LARGEST = 20.0  # [m] a plate larger than this was probably drawn in millimetres, where 20 mm make 20 m
 SLENDER = 1e4  # [-] largest area / half width**2: the mesher is fast up to 4e3 and hangs from 4e4
 # [rad] largest turn within one facet: puts 26 facets on a circle; half of it doubles the triangles at curved edges
 TURN = 0.25

@@ -12,7 +12,7 @@ ALIKE = 4.0
 ROUND = 2e-6  # [-] points closer to a circle than this fraction of its radius lie on it: files write six digits
 # [rad] a curve meets its neighbour smoothly if their tangents differ by less, some 3 degrees, as fits leave
 JOINT = 0.05
-ARM = 2  # [-] points used on each side of a vertex to fit curves other than circles
+ARM = 2  # [-] points used on each side of a vertex to fit curves other than circles: a quartic through five, order 4
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,8 @@ from ..modes.modal import FieldShapes, Modes, ScaledShapes, Shapes
 from ..modes.ritz import RitzShapes
 from ..modes.timoshenko import TimoshenkoShapes
 
-LOW = 40  # [-] flexible modes that are integrated; a blow's results depend on few others one by one
+# [-] flexible modes that are integrated: a blow depends on few others one by one, which follow from TOP of them
+LOW = 40
 TRUE_VECTORS = 4  # [-] of so many Ritz pairs the lowest one is a mode: those above are packets, whose shear is singular
 TOP = 4  # [-] the upper one of so many parts of the integrated modes tells how those above go on: ten modes, of LOW
 NODES = 3  # [-] Gauss points in each direction of a triangle: slopes to 1e-3, as a mode's wave spans several triangles

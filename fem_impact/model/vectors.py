@@ -20,11 +20,12 @@ from .target import Elements, Stages, Target
 
 # the next five: value at a tolerance of 1e-2 or more, and power of 1e-2 / tolerance with which it grows
 WAVES = 1.6, 0.37  # [-] highest frequency that the first mesh resolves, over that of the contact
-SHIFT = 6.0, 1.0 / 6.0  # [-] shift over the angular frequency of the contact
+SHIFT = 6.0, 1.0 / 6.0  # [-] shift over the angular frequency of the contact: half and twice of it pass the same tests
 FIRST = 84, 0.22  # [-] vectors tried first: they resolve one undisturbed contact
 # [-] what modes left out may err, over what the highest pairs may that act as a spring: these err in every blow
 FOLDED = 4.0, 0.6
-EXCITED = 12.0, 0.25  # [-] highest frequency of a mode that matters, over that of the contact
+# [-] highest frequency of a mode that matters, over that of the contact: a half sine has 1 / 143 of its impulse there
+EXCITED = 12.0, 0.25
 # [-] vectors besides those that stand for modes: the dip under the load has no wavelength and takes its own
 FEWEST = 30
 # [-] smallest and largest factor on the number of vectors: less gains too little for a run, more may overshoot

@@ -36,7 +36,7 @@ STRUCK = 10, 4
 SPARED = 0.2
 # [-] factor between contact stiffnesses tried in advice, and number of tries: down to 2e-18 of the hardest
 SOFTER, MUCH_SOFTER = 0.5, 60
-SEED = 0  # [-] of the choice of cells: the same map gives the same vectors
+SEED = 0  # [-] of the choice of cells, any: the same map gives the same vectors
 
 Axes = Mapping[str, np.ndarray]
 Views_ = Mapping[tuple[float, ...], Modes]

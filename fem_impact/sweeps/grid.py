@@ -36,7 +36,8 @@ TOLERANCE = 1e-3  # [-] default error limit of a map
 DOUBTED = {True: 10_000, False: 100}
 MOST_CELLS = 10**8  # [-] default limit of a map: half an hour to two hours of work, 8 GB
 SECONDS = {True: 1e-5, False: 2e-3}  # [s] per blow, in a batch or alone: the slower plates of studies/map_speed.py
-DENSE = 1.0  # [s] a map of our cells that takes less is computed in all of them
+# [s] a map with default axes that takes less is computed in all its cells: refining it would gain nothing to notice
+DENSE = 1.0
 MOST_MIDDLES = 4  # [-] axes whose middle is examined, too: 3**4 = 81 blows, where five would take 243
 LEAST_MODEL_ERROR = 1e-12  # [-] smaller ones are rounding
 Tell = Callable[[str], Any]

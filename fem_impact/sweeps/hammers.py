@@ -25,13 +25,15 @@ from .cells import Case
 # [-] error limit of the blows that are looked at first: only to find where ranges end, which DECIDED then tells
 TOLERANCE = 1e-2
 DECIDED = 1e-4  # [-] error limit of the blows that decide where a range of tips ends, a tenth of its WIDTH
-WIDTH = 1e-3  # [-] relative width to which the ends of a range are found
+WIDTH = 1e-3  # [-] relative width to which the ends of a range are found: finer than any tip is known
 # [-] hardest tip on a body of Ritz vectors, over that whose half sine has the bandwidth: three times its frequency
 HARDEST = 10.0
 # [-] error limit of vectors and mesh in the blows of all tips: the rest of TOLERANCE is for the time steps
 VECTORS = 6e-3
-MOST_MODES = 300  # [-] modes used otherwise, whatever the bandwidth; residual compliance replaces the others
-SOFTEST = 0.03  # [-] softest tip tried, over the one with the bandwidth and over the one tuned to the first mode
+# [-] modes used otherwise, whatever the bandwidth, to bound the time; residual compliance replaces the others
+MOST_MODES = 300
+# [-] softest tip tried, over those with the bandwidth and tuned to the first mode: a sixth of their frequency
+SOFTEST = 0.03
 # [-] tips per decade at which impacts are counted, 2 % apart, and at which the bandwidth is found: it is smooth
 PER_DECADE = 100, 12
 STIFFEST = 100.0  # [-] hardest tip tried, over the one for which the modes are complete: ten times its frequency

@@ -11,7 +11,7 @@ from scipy.stats import qmc
 
 from .._base import check
 
-BITS = 30  # [-] of each coordinate of a point: its resolution is 2**-30
+BITS = 30  # [-] of each coordinate of a point: its resolution is 2**-30, scipy's default
 MOST_INPUTS = 64  # [-] inputs that may vary together
 REACH = 1e30  # [SI] largest number in a distribution, and largest value
 

@@ -27,7 +27,8 @@ STEPS = 40.0  # [-] steps of a contact: the force is then exact to 1e-5 of its p
 # [-] steps per period of the fastest mode that the contact sees: a cubic over one of them misses 2e-4 of its swing
 FASTEST = 12.0
 MOST_STEPS = 50_000  # [-] of one blow
-SEEN = 1e-6  # [-] modes with less than this share of the compliance do not set the step
+# [-] modes with less than this share of the compliance do not set the step: they change the force by as little
+SEEN = 1e-6
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,8 @@ POOR = 0.06
 PATIENCE = 3  # [-] times the number of starts, at most: where fifteen fail, the model is wrong rather than the start
 # [-] a tap that the others predict worse than this times the median of their own errors does not agree: rare by chance
 OUTLIER = 4.0
-UNEQUAL = 1.5  # [-] ratio of noise over peak from which taps count differently: less is how well noise is known
+# [-] ratio of noise over peak from which taps count differently: less is how well the noise of short rests is known
+UNEQUAL = 1.5
 MOST_OUTLIERS = 0.34  # [-] of the taps may disagree: with more, nobody knows which ones are right
 FEWEST = 3  # [-] taps, to tell which one disagrees: of two, either may be wrong
 

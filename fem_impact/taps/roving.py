@@ -33,7 +33,8 @@ CLOSE = 1e-3  # [-] tolerance of the frequencies of a system's modes, far below 
 BEYOND = 1.5
 # [-] tips of a hammer known by its mass, over that whose half sine has the bandwidth: each twice as stiff, to 5.5 times
 TIPS = np.geomspace(1.0, 30.0, 6)
-SHORTEST, LONGEST = 0.1, 10.0  # [s] limits of the default record: lines are at most 10 Hz apart, at least 0.1 Hz
+# [s] limits of the default record: lines at most 10 Hz apart, to part modes, at least 0.1 Hz, as nobody waits longer
+SHORTEST, LONGEST = 0.1, 10.0
 MOST_LINES = 100_000  # [-] of a record
 NOISE = 1e-3  # [-] of each channel over its peak, by default: some 60 dB, a choice
 SPEED = 1.0  # [m/s] of every blow; with linear tips the answer is the same at any speed

@@ -15,7 +15,8 @@ from . import blows
 from .rig import FINE, MARGIN
 from .unknowns import TIME, Setting, Unknown
 
-HALF_LOST = 0.6  # [-] momentum over impulse of a blow that comes back with two thirds of its speed
+# [-] momentum over impulse of a blow that returns with two thirds of its speed, fact: 1 / (1 + 2 / 3): usual taps
+HALF_LOST = 0.6
 STEP = 1e-4  # [-] of coordinates, for derivatives by differences: blows with a fixed step are smooth to 1e-6
 # [-] the contact time is sought within this factor of the measured one: half and twice of it pass the tests
 TIMES = 30.0

@@ -19,7 +19,8 @@ PULSE = 0.1  # [-] of a tap's largest force: a pulse rises above this and ends b
 CLEAR = 6.0  # [-] standard deviations of the noise: the same, if they are larger; two fewer, as a pulse is already sure
 MOST = 0.5  # [-] of a tap's largest force: the same at most, so that a tap in strong noise has a pulse
 DRIFT = 0.2  # [-] of the trigger: less drift within a record is not mentioned, as it moves no tap
-REST = 0.2  # [s] over which the force is at rest for more than half the time: slower changes are drift
+# [s] over which the force is at rest for more than half the time: slower changes are drift, a tap lasts some ms
+REST = 0.2
 CLIPPED = 3  # [-] equal largest samples in a row that count as clipped: two may be equal by chance
 BEFORE = 0.02  # [s] longest record before a tap: 20 ms tell the offset, more may reach back to the last tap's ringing
 LONGEST = 10.0  # [s] longest record of one tap: lines 0.1 Hz apart
