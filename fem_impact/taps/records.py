@@ -188,7 +188,7 @@ class Taps:
     @property
     def noise(self) -> np.ndarray:
         """Standard deviation of each force before its tap or, if that is short, of its differences, (n_taps,) [N]."""
-        begins = np.maximum(0, (self.onset * self.rate).astype(int) - 3)
+        begins = np.maximum(0, (self.onset * self.rate).astype(int) - triggers.GUARD)
         return np.array([
             np.std(row[:n]) if n >= triggers.FEWEST else triggers.noise(row) for row, n in zip(self.force, begins)
         ])  # fmt: skip

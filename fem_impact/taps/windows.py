@@ -9,11 +9,8 @@ from . import triggers
 from .records import Taps
 from .solver import Data
 
-GUARD = 3  # [samples] before the onset, where a tap may have begun: half and twice of it pass the tests
-# [-] standard deviations of a mean: an offset of less is noise, surely; half and twice of it pass the tests
-UNSURE = 6.0
-# [-] of the largest force: a smaller offset is left, as it hardly moves a fit; ten times passes the tests
-SLIGHT = 0.002
+UNSURE = 6.0  # [-] standard deviations of a mean: an offset of less is noise, surely
+SLIGHT = 0.002  # [-] of the largest force: a smaller offset is left, as it hardly moves a fit
 BEFORE = 12  # [samples] before the tap that are compared: the filter rings there; half and twice of it pass the tests
 # [-] of the length from the first to the last pulse: what is compared after it, where the body's answer is still heard
 AFTER = 1.5
@@ -44,7 +41,7 @@ def levelled(taps: Taps) -> Taps:
     """The taps without offsets of their force that are more than noise, each with a note of what was done."""
     rates, moved = taps.rate, np.zeros(taps.n_taps)
     for i, (row, onset) in enumerate(zip(taps.force, taps.onset)):
-        rest = row[: max(0, round(onset * rates) - GUARD)]
+        rest = row[: max(0, round(onset * rates) - triggers.GUARD)]
         rest = rest if len(rest) >= triggers.FEWEST else row[-(len(row) // 3) :]
         middle, sure = float(np.median(rest)), UNSURE * triggers.noise(row) / np.sqrt(len(rest))
         if abs(middle) > max(sure, SLIGHT * float(np.ptp(row))):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fem_impact.mesh.smooth_edges import _corners, follow, smooth_runs
+from fem_impact.mesh.smooth_edges import _corners, follow, join, smooth_runs
 
 
 def loop_of(place):
@@ -97,3 +97,29 @@ def test_a_polygon_of_few_sides_stays_one():
         angle = 2.0 * np.pi * np.arange(n) / n
         place = np.column_stack([np.cos(angle), np.sin(angle)])
         assert n_corners_of(place) == n_corners
+
+
+@pytest.mark.parametrize(("off", "round"), [(1e-6, True), (4e-6, False)])
+def test_points_within_two_millionths_of_a_circle_lie_on_it(off, round):
+    """Six digits of a file keep points that near; an ellipse of this flatness is followed as well by its fit."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    radius = 2.0 * (1.0 + off * np.cos(2.0 * angle))
+    (_, _, _, circle), *others = smooth_runs(radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
+    assert not others and (circle is not None) == round
+
+
+@pytest.mark.parametrize(("ratio", "corner"), [(3.0, False), (6.0, True)])
+def test_a_turn_far_larger_than_its_neighbours_is_a_corner(ratio, corner):
+    turn = np.full(9, 0.08)
+    turn[4] *= ratio
+    heading = np.concatenate([[0.0], np.cumsum(turn)])
+    place = np.concatenate([np.zeros((1, 2)), np.cumsum(np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)])
+    assert _corners(place)[5] == corner  # the middle one; the loop is closed by a straight side between two corners
+
+
+@pytest.mark.parametrize(("angle", "smooth"), [(0.035, True), (0.07, False)])
+def test_curves_that_nearly_share_a_tangent_are_joined(angle, smooth):
+    tangents = np.tile([1.0, 0.0], (2, 2, 1))
+    tangents[1] = np.cos(angle), np.sin(angle)
+    join(np.array([[0, 1]]), tangents, np.full((2, 2), 0.5))
+    assert np.array_equal(tangents[0, 1], tangents[1, 0]) == smooth

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fem_impact as fi
-from fem_impact.taps import windows
+from fem_impact.taps import triggers, windows
 
 PULSE = 100.0 * np.sin(np.linspace(0.0, np.pi, 14)) ** 2
 
@@ -49,3 +49,18 @@ def test_offsets_beyond_the_noise_are_removed_and_said():
     assert np.array_equal(made.force[0], taps.force[0])  # noise is no offset
     assert made.notes == ("as given", "offsets of the force were removed, up to 20 N: tap 2, tap 3, tap 4")
     assert windows.levelled(taps.pick([0])).notes == ("as given",)
+
+
+@pytest.mark.parametrize(("offset", "removed"), [(0.1, False), (0.4, True)])
+def test_an_offset_of_less_than_two_thousandths_of_the_peak_is_left(offset, removed):
+    taps = tap(50)
+    moved = fi.Taps.from_arrays(taps.force + offset, rate=25600.0)
+    assert bool(windows.levelled(moved).notes) == removed
+
+
+@pytest.mark.parametrize(("deviations", "removed"), [(4.0, False), (9.0, True)])
+def test_an_offset_of_less_than_six_standard_deviations_of_its_mean_is_left(deviations, removed):
+    row = tap(50).force[0] + 2.0 * np.random.default_rng(3).standard_normal(400)
+    rest = row[: 50 - triggers.GUARD]
+    row += deviations * triggers.noise(row) / np.sqrt(len(rest)) - np.median(rest)
+    assert bool(windows.levelled(fi.Taps.from_arrays(row, rate=25600.0)).notes) == removed
