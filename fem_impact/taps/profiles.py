@@ -25,7 +25,7 @@ GROWTH = (1.25, 3.0)
 TOO_STEEP, BACK = 1.6, 0.2
 MOST_POINTS = 16  # [-] to each side: with steps that grow by a quarter at least, they reach 140 times the first
 AT_BOUND = 0.02  # [-] of a range: a value this close to its bound may be held by it
-# [-] of its range (by its coordinate): an interval open at one end and wider than this tells less than half of it
+# [-] of its range (by its coordinate): an interval open at one end and wider than this tells nothing; a choice
 WIDE = 0.5
 LAGS = 10  # [-] of the test for whiteness: filters of rigs ring over some ten samples
 # [-] probability below which residuals do not count as white: one fit of a hundred is doubted without need

@@ -17,7 +17,7 @@ from .windows import joined
 METHODS = ("H1", "H2")
 MOST_TIMES = 2**24  # [-] samples of a transform
 TAPER = 0.25  # [-] of the force window that falls as a cosine, so that no edge is heard
-# [-] of a relative frequency difference of 100 % beside 1 - MAC when modes are paired: shapes tell more
+# [-] of a relative frequency difference of 100 % beside 1 - MAC when modes are paired: mostly shapes decide
 FREQUENCY_WEIGHT = 1.0
 UNITS = {"m/s^2": "accelerance", "m/s": "mobility", "m": "receptance"}
 FUNCTION, RESPONSE_CODE = 4, {"m/s^2": 12, "m/s": 11, "m": 8}  # codes of data set 58

@@ -28,8 +28,7 @@ FEWEST = 8  # [-] samples before a tap from which an offset is estimated: to a t
 # [samples] before the onset that do not count as rest, as pulses start flat; half and twice of it pass the tests
 GUARD = 3
 MOST_TAPS = 10_000  # [-] of one file: more are noise
-# [-] of a pulse's peak: a record that begins or ends above this cuts the pulse; half and twice of it pass the tests
-ENDS = 0.3
+ENDS = 0.3  # [-] of a pulse's peak: a record that begins or ends above this cuts the pulse; less is left by filters
 
 
 def noise(force: np.ndarray) -> float:

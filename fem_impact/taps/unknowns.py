@@ -22,9 +22,8 @@ from .rig import Rig
 STRIKER = ("mass", "first_frequency", "mode_ratio", "damping", "tip_mass")
 TARGET = ("mass", "first_frequency", "damping", "x", "y")
 MODE = ("frequency", "mass", "damping", "gain")
-MOST_MODES = 6  # [-] of an unknown target: a pulse tells few, and each has three unknowns
-# [-] of unknown modes, unless it is unknown too: takes an eighth of each swing, hardly more than a pulse can tell
-DAMPING = 0.02
+MOST_MODES = 6  # [-] of an unknown target: a pulse tells few, and each has several unknowns
+DAMPING = 0.02  # [-] of unknown modes, unless it is unknown too: takes an eighth of each swing; a choice
 RATIO = 1.0  # [-] mode ratio of a striker, unless it is unknown too: two equal masses and a spring, as nothing is known
 # [-] along each unknown coordinate of the strike point at which the compliance is computed: a quartic between
 PLACES = 5

@@ -99,13 +99,13 @@ def test_a_polygon_of_few_sides_stays_one():
         assert n_corners_of(place) == n_corners
 
 
-@pytest.mark.parametrize(("off", "round"), [(1e-6, True), (4e-6, False)])
-def test_points_within_two_millionths_of_a_circle_lie_on_it(off, round):
+@pytest.mark.parametrize(("off", "found"), [(1e-6, True), (4e-6, False)])
+def test_points_within_two_millionths_of_a_circle_lie_on_it(off, found):
     """Six digits of a file keep points that near; an ellipse of this flatness is followed as well by its fit."""
     angle = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
     radius = 2.0 * (1.0 + off * np.cos(2.0 * angle))
     (_, _, _, circle), *others = smooth_runs(radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
-    assert not others and (circle is not None) == round
+    assert not others and (circle is not None) == found
 
 
 @pytest.mark.parametrize(("ratio", "corner"), [(3.0, False), (6.0, True)])

@@ -250,3 +250,13 @@ def test_modes_of_a_costly_plan_are_kept_and_taken_up_again(tmp_path, monkeypatc
     assert difference(hit, scene.strike(tolerance=1e-2, target="modal")) == 0.0
     keep.write_bytes(keep.read_bytes()[:1000])  # damaged: found anew
     assert difference(scene.run(keep=keep, tolerance=1e-2, target="modal").response, hit) == 0.0
+
+
+def test_the_modes_that_ring_reach_to_where_the_force_is_sixty_decibels_down(scene):
+    response = scene(PLATE, mass=20.0).run(tolerance=1e-2).response
+    last = response.target.frequencies[-1]  # 113 modes up to 7.2 kHz
+    frequencies = np.linspace(0.0, 4.0 * last, 2000)
+    force = np.abs(response.spectrum(frequencies))
+    beyond = frequencies > 1.1 * last
+    assert force[beyond].max() < 2e-3 * force[0]
+    assert force[(frequencies > 0.8 * last) & ~beyond].max() > 5e-4 * force[0]  # and no farther

@@ -100,3 +100,10 @@ def test_parts_of_a_table():
     cut = taps.between(5e-4, 2e-3)
     assert cut.time[0] == 0.0 and np.allclose(cut.onset, taps.onset - 5e-4, atol=1 / RATE)
     assert np.allclose(cut.peak, taps.peak)
+
+
+@pytest.mark.parametrize(("first", "cut"), [(0.22, False), (0.45, True)])
+def test_a_record_that_begins_well_within_a_pulse_cuts_it(first, cut):
+    """A rest of less than 0.3 of the peak is left by a filter or a late trigger; one that lacks more has no time."""
+    pulse = 100.0 * np.sin(np.linspace(np.arcsin(first**0.5), np.pi, 14)) ** 2
+    assert fi.Taps.from_arrays(np.append(pulse, np.zeros(100)), rate=RATE).cut_short[0] == cut
