@@ -21,7 +21,9 @@ NARROW = 4  # [-] the same for a beam, which has no multiple modes: 8 was 20 % s
 # [-] relative residual allowed for a Ritz vector; the eigenvalue's error is its square, 1e-14, which is near rounding
 RESIDUAL = 1e-7
 STRICT = 1e-11  # [-] relative residual allowed when the first search missed modes: rounding leaves 1e-12
-SPARE = 6  # [-] extra modes computed to find a gap after the last one wanted: a cluster of more takes a second search
+# [-] extra modes computed to find a gap after the last one wanted: a cluster of more takes a second search; half and
+# twice pass the tests
+SPARE = 6
 FIRST_SLICE = 24  # [-] modes found with shift zero; their eigenvalues span five decades and keep ten digits
 SLICE = 50  # [-] modes found with each further shift: 30 were 10 % slower, 80 were 40 % slower
 # [-] relative changes of a shift, tried in turn where the factorisation fails: far below CLUSTER, far above rounding

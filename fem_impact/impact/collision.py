@@ -32,9 +32,11 @@ TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials
 SCHEMES = ("A", "A4", "collocation")
 MAX_STEPS = 500_000  # [-] of one run: takes about one second
 MAX_WORK = 1_000_000_000  # [-] modes, or entries of the forms of stretching, times steps of one run: some seconds
-# [-] modes times steps of one run in plain Python: 3 000 times less than with kernels, so that it ends as soon
+# [-] modes times steps of one run in plain Python: 3 000 times less than with kernels, so that it ends as soon; ten
+# times more or less passes the tests
 PLAIN_WORK = 300_000
-# [-] tolerance advised over the error reached: steps twice as long, to which it may lead, err 16 times more
+# [-] tolerance advised over the error reached: steps twice as long, to which it may lead, err 16 times more; half and
+# twice pass the tests
 REACHED = 20.0
 SOONER = 0.2  # [-] of a run that was given up, what is advised: the last run of a blow halves the steps twice
 FIRST_STEPS = 24.0  # [-] steps per contact with which A4 meets TOLERANCE in most blows; cheapest first run of 12 to 32

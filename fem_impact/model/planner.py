@@ -27,23 +27,33 @@ from .target import FIRST_LOOK, Elements, Stages, Target, Watch
 
 # [-] of the tolerance for left-out modes, as much for the time steps, as neither is cheap; the mesh gets the rest
 SHARE = 0.45
-STEPS = 0.1  # [-] of the tolerance for the time steps of a blow by Ritz vectors: finer steps cost nothing there
-MESH = 0.1  # [-] of the tolerance for the mesh, whose frequencies may err twice as much as the blow then does
-# [-] runs with ever more modes or finer meshes, until the tolerance is met: CAUTION makes even a second one rare
+# [-] of the tolerance for the time steps of a blow by Ritz vectors: finer steps cost nothing there; half and twice pass
+# the tests
+STEPS = 0.1
+# [-] of the tolerance for the mesh, whose frequencies may err twice as much as the blow then does; half and twice pass
+# the tests
+MESH = 0.1
+# [-] runs with ever more modes or finer meshes, until the tolerance is met: CAUTION makes even a second one rare; half
+# and twice pass the tests
 ATTEMPTS = 3
 # [Hz], [-] the ear's limit: no mode above is asked for unless a band of the sound is; the force looked at every 10 Hz
 AUDIBLE, AUDIBLE_POINTS = 20e3, 2001
 # [-] modes ring up to the last frequency where the force has this part of its impulse: -60 dB, which is not heard
 FAINT = 1e-3
 MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: some seconds
-# [-] the verifying run divides the tolerance by this: its own error is then an eighth of what it judges
+# [-] the verifying run divides the tolerance by this: its own error is then an eighth of what it judges; half and twice
+# pass the tests
 VERIFYING = 8.0
 FINEST = 1e-10  # [-] lowest tolerance of a verifying run: below, rounding of long runs begins to show
-CAUTION = 2.0  # [-] safety factor on the mode error: costs a quarter more modes, but seldom needs a second run
+# [-] safety factor on the mode error: costs a quarter more modes, but seldom needs a second run; half and twice pass
+# the tests
+CAUTION = 2.0
 MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by source: takes about 2 GB and some minutes
-# [-] above it, a plate is infinite above a frequency, if its contact overdamps: 4 100 modes for 15 190 of a steel sheet
+# [-] above it, a plate is infinite above a frequency, if its contact overdamps: 4 100 modes for 15 190 of a steel
+# sheet; ten times more or less passes the tests
 MANY_MODES = 10_000
-# [-] frequency error for which `find_modes` chooses the mesh, as for its `WAVE_PER_ELEMENT`; beams also round
+# [-] frequency error for which `find_modes` chooses the mesh, as for its `WAVE_PER_ELEMENT`; beams also round; ten
+# times more or less passes the tests
 SHORT_WAVES = {
     "argyris": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
 }  # fmt: skip
@@ -52,16 +62,22 @@ PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_st
 ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
 TARGETS = ("rigid", "infinite", "vectors", "mixed", "modal")
 RINGING = ("modal", "vectors")  # those of a target that rings
-DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow, on average; only foretells the cost
+DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow; only foretells the cost
 THICK_DOFS_AT_BLOW = 7500  # [-] the same of a thick plate, whose triangles have more unknowns; only foretells the cost
-MANY = 2  # [-] impacts up to which the first two meshes suffice; each multiplies the error that a mesh makes before it
-# [-] length of the blow that foresees the cost, in undisturbed contacts; the cost of longer ones is told too low
+# [-] impacts up to which the first two meshes suffice; each multiplies the error that a mesh makes before it; half and
+# twice pass the tests
+MANY = 2
+# [-] length of the blow that foresees the cost, in undisturbed contacts; the cost of longer ones is told too low; ten
+# times more or less passes the tests
 LONGEST = 100.0
-# [-] frequency times duration up to which a force has FAINT of its impulse: 16 of a half sine, less of smoother ones
+# [-] frequency times duration up to which a force has FAINT of its impulse: 16 of a half sine, less of smoother ones;
+# half and twice pass the tests
 FAINTEST = 8.0
 # [-] unknowns per mode found for motion and sound: 40 at 1.8 rad per triangle, 108 at 1.1; only foretells the cost
 PER_MODE = 65.0
-MOST_MIXED = 2e8  # [-] modes times steps of one run of a plate that is infinite above a frequency: takes ten seconds
+# [-] modes times steps of one run of a plate that is infinite above a frequency: takes ten seconds; ten times more or
+# less passes the tests
+MOST_MIXED = 2e8
 COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced: longer than one likes to wait
 
 

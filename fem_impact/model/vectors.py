@@ -24,14 +24,19 @@ SHIFT = 6.0, 1.0 / 6.0  # [-] shift over the angular frequency of the contact: h
 FIRST = 84, 0.22  # [-] vectors tried first: they resolve one undisturbed contact
 # [-] what modes left out may err, over what the highest pairs may that act as a spring: these err in every blow
 FOLDED = 4.0, 0.6
-# [-] highest frequency of a mode that matters, over that of the contact: a half sine has 1 / 143 of its impulse there
+# [-] highest frequency of a mode that matters, over that of the contact: a half sine has 1 / 143 of its impulse there;
+# half and twice pass the tests
 EXCITED = 12.0, 0.25
-# [-] vectors besides those that stand for modes: the dip under the load has no wavelength and takes its own
+# [-] vectors besides those that stand for modes: the dip under the load has no wavelength and takes its own; half and
+# twice pass the tests
 FEWEST = 30
 # [-] smallest and largest factor on the number of vectors: less gains too little for a run, more may overshoot
 MORE = 1.2, 1.4
-FALLING = 3.0  # [-] power of the number of vectors with which their error falls, once they resolve the contact
-# [-] divides what those of poorer descriptions may err: so far apart that two blows differ by the error of the poorer
+# [-] power of the number of vectors with which their error falls, once they resolve the contact; half and twice pass
+# the tests
+FALLING = 3.0
+# [-] divides what those of poorer descriptions may err: so far apart that two blows differ by the error of the poorer;
+# half and twice pass the tests
 LESS_FOLDED = 16.0
 # [-] each attempt divides by this what modes left out, highest pairs or the mesh may err: less may need one more
 NOTCH = 4.0

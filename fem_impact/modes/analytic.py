@@ -31,7 +31,7 @@ FAR = 4.0  # [-] distance x from which a quarter of the terms is summed: the ele
 DISK_TERMS = 100_000  # [-] most terms summed at the edge of a disk, where they only fall as n**-3; error 5e-11
 MOST_MODES = 1_000_000  # [-] largest number of modes of a rectangle or beam; they take a few seconds
 MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a root search
-# [-] half-wave number pairs tried on a rectangle; pi / 4 of them lie in the ellipse of modes, so MOST_MODES fit twice
+# [-] half-wave number pairs tried on a rectangle; pi / 4 of them lie in the ellipse of modes, three times MOST_MODES
 MOST_PAIRS = 4 * MOST_MODES
 SHEAR_RATIO = 2.6  # [-] fact: E / G of an isotropic material with nu = 0.3
 ROUND = 0.886  # [-] shear coefficient of a round section, nu = 0.3 (Cowper 1966); 0.857 at nu = 0, 0.9 at 0.5

@@ -16,7 +16,8 @@ from .solver import ENOUGH, NEARLY, QUICK, SMALL, Problem, Solution, chord, solv
 from .unknowns import Unknown
 
 SURE = 0.95  # [-] the widest interval that a profile is followed to
-# [-] of the distance to that interval's end by curvature: the first step, a little short, as the second tells the rest
+# [-] of the distance to that interval's end by curvature: the first step, a little short, as the second tells the rest;
+# half and twice pass the tests
 FIRST = 0.8
 FARTHEST = 0.25  # [-] of its range: the first step at most, so that four steps see all of it
 # [-] of the next step over the last: longer even where the rise stalls, never so long as to leap over a bend

@@ -31,7 +31,9 @@ ENOUGH = 60  # [-] iterations of one search: ten times more or fewer pass the te
 CLOSE = 1e-8
 # [-] iterations of a search that begins close to its end, or only shows whether to go on; half and twice pass the tests
 QUICK = 12
-NEARLY = 1e-6  # [-] change that ends a search of which only the sum of squares counts: it errs by the square
+# [-] change that ends a search of which only the sum of squares counts: it errs by the square; ten times more or less
+# passes the tests
+NEARLY = 1e-6
 CHORDS = 8  # [-] steps with derivatives of a point nearby; half and twice pass the tests
 # [-] of the promised gain, with which a step by such derivatives is good enough; half and twice pass the tests
 KEPT = 0.3
