@@ -40,7 +40,8 @@ FALLING = 3.0
 LESS_FOLDED = 16.0
 # [-] each attempt divides by this what modes left out, highest pairs or the mesh may err: less may need one more
 NOTCH = 4.0
-PATIENCE, LEAST_GAIN = 3, 0.7  # [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7
+# [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7, as one or two may fail by chance
+PATIENCE, LEAST_GAIN = 3, 0.7
 TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before: five times smaller in all
 AIM = 0.5  # [-] of what the steps leave of the tolerance: errors that more vectors are to reach, without ever more runs
 AT_FAULT = 3.0  # [-] the mesh is refined if it errs so many times more than too few vectors, which its error contains
