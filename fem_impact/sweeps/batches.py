@@ -10,10 +10,15 @@ from functools import partial
 import numpy as np
 
 from ..impact.collision import RESOLVED, rest_mode
-from ..impact.compiled import many_blows, propagation
+from ..impact.compiled import bundles, convolution, many_blows, propagation
 from ..impact.contact import wall_time
 from ..impact.striker import Striker
 from ..modes.modal import Modes
+
+from ..impact.compiled.layout import (  # isort: skip
+    FOUND_CENTROID, FOUND_IMPACTS, FOUND_IMPULSE, FOUND_MISFIT, FOUND_PEAK, FOUND_STATUS, FOUND_STEPS, FOUND_SWING,
+    FOUND_TIME, N_FOUND,
+)  # fmt: skip
 
 STEPS = 12.0  # [-] steps per contact at tolerance 1e-3, rounded up by at most sqrt(2); the first run takes half as many
 STEP_ORDER = 3.5  # [-] order of the error in the step: between 3 (linear contact) and 4 (Hertz)
@@ -88,14 +93,14 @@ class Family:
         """Kernels of both bodies at unit mass, (6, n_steps) each, and bounds of their motion in flight."""
         found = []
         for omega, zeta, squared in zip(self.omega, self.zeta, self.squared):
-            bounds = np.empty((many_blows.SPLITS + many_blows.LEVELS, 2, 2))
-            many_blows.flight_bounds(omega, zeta, squared, h, bounds)
+            bounds = np.empty((convolution.SPLITS + convolution.LEVELS, 2, 2))
+            convolution.flight_bounds(omega, zeta, squared, h, bounds)
             found.append((kernel_rows(omega, zeta, squared, h, n_steps)[0], bounds))
         return found[0][0], found[1][0], found[0][1], found[1][1]
 
     def later(self, h: float, n_steps: int) -> tuple[np.ndarray, np.ndarray]:
         """The same kernels without the means, 1/4, 2/4, ... of a step later, (2**SPLITS - 1, 4, n_steps) each."""
-        parts = np.arange(1, 2**many_blows.SPLITS) / 2**many_blows.SPLITS
+        parts = np.arange(1, 2**convolution.SPLITS) / 2**convolution.SPLITS
         first, second = (kernel_rows(*body, h, n_steps, parts) for body in zip(self.omega, self.zeta, self.squared))
         return first, second
 
@@ -137,14 +142,14 @@ def kernel_rows(
         propagation.step_table(w, z, stride * h, many)
         seen = np.empty((looks, stride, 2, len(w)))
         for look, (q, p) in zip(seen, ((u, 0.0 * u), (0.0 * u, u), (u * one[8], u * one[9]))):
-            many_blows.orbit(one[[0, 2, 1, 3]], q, p, look)
+            convolution.orbit(one[[0, 2, 1, 3]], q, p, look)
         states = np.empty((len(rows), 2, n_strides, 2, len(w)))
         for i, places in enumerate(states):
             for place, q, p in zip(places, one[4:8:2], one[5:8:2]):
                 if parts is not None:
                     propagation.step_table(w, z, parts[i] * h, part)
                     q, p = part[0] * q + part[1] * p, part[2] * q + part[3] * p
-                many_blows.orbit(many, q, p, place)
+                convolution.orbit(many, q, p, place)
         product = seen.reshape(looks * stride, -1) @ states.reshape(-1, 2 * len(w)).T
         product = product.reshape(looks, stride, len(rows), 2, n_strides).transpose(2, 0, 3, 4, 1)
         if parts is None:
@@ -264,8 +269,8 @@ def _follow(blows: Blows, tolerance: float, band: float, kernels: Kernels) -> tu
     final, error = _refined(engine, tolerance)
     v = blows.speed
     return (
-        final[0], final[1], final[2] * engine.own_rigid - 1.0, final[2] * v, final[3] * v, error, final[4],
-        ~np.isnan(error),
+        final[FOUND_IMPACTS], final[FOUND_TIME], final[FOUND_IMPULSE] * engine.own_rigid - 1.0,
+        final[FOUND_IMPULSE] * v, final[FOUND_PEAK] * v, error, final[FOUND_CENTROID], ~np.isnan(error),
     )  # fmt: skip
 
 
@@ -281,7 +286,7 @@ def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarra
     for _ in range(REFINEMENTS):
         ratio = 2.0 ** (0.5 * finer)
         slack = SLACK * tolerance * 2.0 ** (0.5 * STEP_ORDER * (first[todo] - step))
-        fine = engine.run(todo, step, slack, ratio * coarse[7])
+        fine = engine.run(todo, step, slack, ratio * coarse[FOUND_STEPS])
         found = engine.error(coarse, fine, todo, ratio)
         met = found <= ALLOWED * tolerance
         final[:, todo[met]] = fine[:, met]
@@ -301,10 +306,11 @@ def _counted(blows: Blows, tolerance: float, most: int, kernels: Kernels) -> tup
     number, before = np.full(len(todo), np.nan), None
     for turn in range(REFINEMENTS):
         slack = np.full(len(todo), SLACK * tolerance * 2.0 ** (-STEP_ORDER * turn))
-        now = engine.run(todo, step + 2 * turn, slack, None if before is None else 2.0 * before[7])
-        now[0] = np.where(now[5] <= many_blows.DOUBTFUL, np.minimum(now[0], most), np.nan)
-        met = np.zeros(len(todo), bool) if before is None else now[0] == before[0]
-        number[todo[met]] = now[0, met]
+        now = engine.run(todo, step + 2 * turn, slack, None if before is None else 2.0 * before[FOUND_STEPS])
+        counted = now[FOUND_STATUS] <= many_blows.DOUBTFUL
+        now[FOUND_IMPACTS] = np.where(counted, np.minimum(now[FOUND_IMPACTS], most), np.nan)
+        met = np.zeros(len(todo), bool) if before is None else now[FOUND_IMPACTS] == before[FOUND_IMPACTS]
+        number[todo[met]] = now[FOUND_IMPACTS, met]
         before, todo, step = now[:, ~met], todo[~met], step[~met]
         if not todo.size:
             break
@@ -324,7 +330,7 @@ class _Engine:
         )
         self.own_rigid, self.rigid, self.static = rigid[1], rigid.sum(axis=0), static.sum(axis=0)
         stiffness = blows.stiffness * blows.speed ** (blows.exponent - 1.0)
-        self.law = np.array([stiffness, blows.exponent, rest.sum(axis=0), blows.loss * blows.speed])
+        self.law = np.array([stiffness, blows.exponent, blows.loss * blows.speed, rest.sum(axis=0)])
 
     def of_family(self, number: Callable[[Family, int], float], body: int) -> np.ndarray:
         """One number of one body for every blow, (n_cases,)."""
@@ -337,7 +343,7 @@ class _Engine:
         then shorter if these modes contribute enough to matter. A contact with loss also needs shorter steps: its
         force depends on the rate of approach, so that more modes ring in it.
         """
-        stiffness, exponent, rest, loss = self.law
+        stiffness, exponent, loss, rest = self.law
         duration = wall_time(stiffness, exponent, self.rigid, 1.0, rest)
         count = STEPS * (1e-3 / tolerance) ** (1.0 / STEP_ORDER)
         step = np.ceil(2.0 * np.log2(np.maximum(count / duration, PER_PERIOD * self.band))).astype(int)
@@ -363,12 +369,12 @@ class _Engine:
     def run(
         self, cells: np.ndarray, step: np.ndarray, slack: np.ndarray | None = None, length: np.ndarray | None = None
     ) -> np.ndarray:
-        """Compute blows with the given steps; return what `many_blows.run` writes, (9, n_cells).
+        """Compute blows with the given steps; return what `many_blows.run` writes, (N_FOUND, n_cells).
 
         Without ``slack``, flights are only sampled and a short touch can be missed: good enough for the coarse run of a
         comparison. ``length`` is the expected number of steps of each blow.
         """
-        out = np.full((9, self.blows.n_cases), np.nan)
+        out = np.full((N_FOUND, self.blows.n_cases), np.nan)
         slacks = np.zeros(self.blows.n_cases)
         if slack is not None:
             slacks[cells] = slack
@@ -376,7 +382,7 @@ class _Engine:
         for limit in LENGTHS:
             now = todo if length is None or limit == LENGTHS[-1] else todo & (length < limit)
             self._run(cells[now], step[now], slacks, slack is not None, limit, out)
-            todo &= ~(now & (out[5, cells] != many_blows.LONG))
+            todo &= ~(now & (out[FOUND_STATUS, cells] != many_blows.LONG))
             if not todo.any():
                 break
         return out[:, cells]
@@ -392,15 +398,17 @@ class _Engine:
     def _run(
         self, cells: np.ndarray, step: np.ndarray, slack: np.ndarray, sure: bool, length: int, out: np.ndarray
     ) -> None:
+        pairs = bundles.Pairs(self.shares, self.law, self.rigid, self.static, slack)
+        track = many_blows.made_track(length)
         group = np.stack([self.blows.family[cells], step])
         order = np.lexsort(group)
         edges = np.flatnonzero(np.any(np.diff(group[:, order], axis=1) != 0, axis=0)) + 1
         for part in np.split(order, edges) if cells.size else ():
             family, exponent = int(group[0, part[0]]), int(step[part[0]])
-            kernels = self.kernel(family, exponent, length, False)
+            target, striker, *bounds = self.kernel(family, exponent, length, False)
             later = self.kernel(family, exponent, length, True) if sure and length > LENGTHS[0] else NO_KERNELS
-            about = self.shares, self.law, self.rigid, self.static, slack, self.band
-            many_blows.run(*(cells[part], 2.0 ** (-0.5 * exponent), *kernels, *later, sure, *about, out))
+            of_bodies = bundles.Kernels((target, striker), (bounds[0], bounds[1]), (later[0], later[1]))
+            many_blows.run(cells[part], pairs, of_bodies, 2.0 ** (-0.5 * exponent), sure, self.band, track, out)
 
     def error(self, coarse: np.ndarray, fine: np.ndarray, cells: np.ndarray, ratio: np.ndarray) -> np.ndarray:
         """Largest error of the finer run in the quantities under tolerance; infinite if the two runs ended differently.
@@ -408,12 +416,14 @@ class _Engine:
         The error in the time of contact is that of the approach divided by its rate there.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
-            relative = np.abs(coarse[1:4] / fine[1:4] - 1.0)
+            held = [FOUND_TIME, FOUND_IMPULSE, FOUND_PEAK]
+            relative = np.abs(coarse[held] / fine[held] - 1.0)
             change = relative.max(axis=0)
-            change = np.maximum(change, fine[8] * relative[1:].max(axis=0))
+            change = np.maximum(change, fine[FOUND_SWING] * relative[1:].max(axis=0))
             if self.band:
-                change = np.maximum(change, np.abs(coarse[4] / fine[4] - 1.0))
-        absolute = np.abs(coarse[2] - fine[2]) * self.own_rigid[cells]
-        same = (coarse[0] == fine[0]) & (coarse[5] <= many_blows.DOUBTFUL) & (fine[5] == many_blows.DONE)
-        found = np.maximum(np.fmax(change, absolute) / (ratio**ORDER - 1.0), MENDED * fine[6])
+                change = np.maximum(change, np.abs(coarse[FOUND_CENTROID] / fine[FOUND_CENTROID] - 1.0))
+        absolute = np.abs(coarse[FOUND_IMPULSE] - fine[FOUND_IMPULSE]) * self.own_rigid[cells]
+        same = coarse[FOUND_IMPACTS] == fine[FOUND_IMPACTS]
+        same &= (coarse[FOUND_STATUS] <= many_blows.DOUBTFUL) & (fine[FOUND_STATUS] == many_blows.DONE)
+        found = np.maximum(np.fmax(change, absolute) / (ratio**ORDER - 1.0), MENDED * fine[FOUND_MISFIT])
         return np.where(same, found, np.inf)

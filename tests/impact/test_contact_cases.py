@@ -12,7 +12,7 @@ from warming import locked
 import fem_impact as fi
 from fem_impact.impact import accuracy
 from fem_impact.impact.collision import Touch, collide
-from fem_impact.impact.compiled import energy, many_blows, propagation, record
+from fem_impact.impact.compiled import bundles, energy, layout, many_blows, propagation, record
 from fem_impact.impact.compiled import law as laws
 from fem_impact.impact.compiled.bundles import Limits, Scene
 from fem_impact.sweeps import batches
@@ -266,17 +266,18 @@ def test_kernel_form_is_the_modal_form(exponent, n_steps, damping_ratio):
     modes = np.array(plate.omega), np.array(plate.damping_ratio)
     impulse = modal_blow(*modes, squared, mass, stiffness, exponent, h, 3 * n_steps)
     family = batches.Family.of(plate, np.array([0.465, 0.3]), fi.Striker.rigid(mass), False)
-    out = np.empty((9, 1))
+    out = np.empty((layout.N_FOUND, 1))
     column = np.ones(1)
-    many_blows.run(
-        np.zeros(1, int), h, *family.kernels(h, 512), *family.later(h, 512), True,
-        np.array([column / 2.0, column / mass]),
-        np.array([column * stiffness, column * exponent, 0.0 * column, 0.0 * column]), column / mass,
-        column * family.static(0) / 2.0, 0.0 * column, 0.0, out,
-    )  # fmt: skip
-    assert out[5, 0] == many_blows.DONE
-    assert out[0, 0] == 1
-    assert_allclose(out[2, 0], impulse, rtol=1e-13)  # rounding of some 40 steps of 200 sums: 1e-15 was measured
+    shares, law = np.array([column / 2.0, column / mass]), np.array([[stiffness], [exponent], [0.0], [0.0]])
+    pairs = bundles.Pairs(shares, law, column / mass, column * family.static(0) / 2.0, 0.0 * column)
+    target, striker, *bounds = family.kernels(h, 512)
+    kernels = bundles.Kernels((target, striker), (bounds[0], bounds[1]), family.later(h, 512))
+    many_blows.run(np.zeros(1, int), pairs, kernels, h, True, 0.0, many_blows.made_track(512), out)
+    assert out[layout.FOUND_STATUS, 0] == many_blows.DONE
+    assert out[layout.FOUND_IMPACTS, 0] == 1
+    assert_allclose(
+        out[layout.FOUND_IMPULSE, 0], impulse, rtol=1e-13
+    )  # rounding of some 40 steps of 200 sums: 1e-15 was measured
 
 
 def many(n_cases, seed=3, mass=2.0):

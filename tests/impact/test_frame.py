@@ -17,8 +17,6 @@ from fem_impact.impact.sensitivity import gauss
 
 LINES, PARAMETERS = 100, 8  # of a kernel: what fits on two pages, and what a reader keeps in mind
 LONGER = {
-    "many_blows.run": "one loop over columns of blows, without the calls that would keep it from running in lanes",
-    "many_blows.cleared": "part of that loop",
     "live.play": "called once for each block of sound, from one place",
 }
 OTHERS = "tangents.py"  # differentiates these kernels, and is being cut on its own

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.impact import accuracy
-from fem_impact.impact.compiled import law, many_blows, propagation
+from fem_impact.impact.compiled import centroids, cubics, law, propagation
 from fem_impact.sweeps import batches
 
 AT = np.array([0.465, 0.3])
@@ -15,18 +15,18 @@ AT = np.array([0.465, 0.3])
 
 @njit
 def cubic(d0, v0, d1, v1, t):
-    return many_blows.cubic(d0, v0, d1, v1, t)
+    return cubics.cubic(d0, v0, d1, v1, t)
 
 
 @njit
 def parted(d0, v0, d1, v1, error, rate_error):
-    return many_blows.parted(d0, v0, d1, v1, error, rate_error)
+    return cubics.parted(d0, v0, d1, v1, error, rate_error)
 
 
 @njit
 def centroid(contacts, n_steps, h, ends, rates, stiffness, limit):
     spring = law.simple(stiffness, 1.0, 0.0, 0.0)
-    return many_blows.centroid(contacts, len(contacts), n_steps, h, ends, rates, spring, limit)
+    return centroids.centroid(contacts, len(contacts), n_steps, h, ends, rates, spring, limit)
 
 
 def plate(mass=0.2, **wanted):

@@ -99,3 +99,39 @@ class Flights(NamedTuple):
     known: np.ndarray  # (GLIDES + 1,)
     base: float  # [s]
     shortest: float  # [s] looks ahead that lead hardly on
+
+
+class Pairs(NamedTuple):
+    """Many blows at unit speed, each between two bodies."""
+
+    shares: np.ndarray  # (2, n_cells) [-] of the kernels of target and striker
+    law: np.ndarray  # (4, n_cells) rows as the columns of a power law
+    rigid: np.ndarray  # (n_cells,) [1/kg] squared shapes of all rigid motions
+    static: np.ndarray  # (n_cells,) [m/N] static compliance of all flexible ones
+    slack: np.ndarray  # (n_cells,) [-] part of the deepest approach that a touch or a gap must exceed to be sure
+
+
+class Kernels(NamedTuple):
+    """What forces do to target and striker of unit mass, for steps of one length."""
+
+    rows: tuple[np.ndarray, np.ndarray]  # (6, n_steps) each, see `convolution`
+    # (SPLITS + LEVELS, 2, 2) what a unit of the force's jumps and of its bends adds at most to the errors of
+    # `cubics.parted` for looks of 1/4, 1/2, 1, 2, 4, ... steps
+    bounds: tuple[np.ndarray, np.ndarray]
+    # (2**SPLITS - 1, 4, n_steps) the kernels without means 1/4, 2/4, ... of a step later; or without steps, where a
+    # doubt in flight ends a blow as if it were too long
+    later: tuple[np.ndarray, np.ndarray]
+
+
+class Track(NamedTuple):
+    """One blow as far as it is followed."""
+
+    rows: np.ndarray  # (6, n_steps) kernel of both bodies, reversed in time, as far as it is known
+    force: np.ndarray  # (n_steps,) [N] mean of each step
+    ramp: np.ndarray  # (n_steps,) [N] what it gains over the step
+    ends: np.ndarray  # (n_steps + 1,) [m] approach at the end of each step, mended
+    rates: np.ndarray  # (n_steps + 1,) [m/s]
+    segments: np.ndarray  # (n_steps + 1, 2) first step of each contact, and the one after its last
+    contacts: np.ndarray  # (n_steps + 1, 2) [s] when each contact began and ended
+    state: np.ndarray  # (BLOW_STATES,) the columns are named in `layout`
+    counts: np.ndarray  # (BLOW_COUNTS,)

@@ -1,0 +1,124 @@
+"""What a contact force does to the approach later: kernels of both bodies, and their convolution with past forces.
+
+A kernel holds what a unit force on a body of unit mass, constant or a ramp over one step, does to the approach at the
+end of that step and of all later ones, to its rate there and to its mean over each step.
+"""
+
+import numpy as np
+
+from .build import LOOSE, inner, outer
+from .propagation import restore
+
+END, END_RAMP, RATE, RATE_RAMP, MEAN, MEAN_RAMP = (np.uintp(row) for row in range(6))  # rows of a kernel
+N_ROWS = 6
+LEVELS = 5  # [-] lengths of a look ahead in flight: 1, 2, 4, 8 and 16 steps
+SPLITS = 2  # [-] halvings of a step in flight where the whole leaves a doubt
+
+
+@outer()
+def orbit(table, q, p, out_states):
+    """States after 0, 1, 2, ... steps, (n_steps, 2, n_modes), of modes that start from q and p and move freely.
+
+    Parameters: table (4 or more, n_modes): a11, a12, a21, a22 of one step as in `propagation.step_table`.
+    """
+    restore(q, p, out_states[0, 0], out_states[0, 1])
+    for m in range(1, out_states.shape[0]):
+        x, y = out_states[m - 1, 0], out_states[m - 1, 1]
+        for n in range(q.size):
+            out_states[m, 0, n] = table[0, n] * x[n] + table[1, n] * y[n]
+            out_states[m, 1, n] = table[2, n] * x[n] + table[3, n] * y[n]
+
+
+@outer()
+def flight_bounds(omega, zeta, squared, h, out_bounds):
+    """What cubics through both ends of a look ahead miss of a body's free motion, at unit mass.
+
+    Parameters: out_bounds (SPLITS + LEVELS, 2, 2), for looks of 1/4, 1/2, 1, 2, 4, ... steps: of the approach and of
+    its slope over the look H, after a force of unit jumps and one of unit bends (changes of its slope). A jump leaves
+    a mode with the velocity u**2 / omega at most, a bend with u**2 / omega**2. The cubic misses H**4 / 384 and
+    sqrt(3) / 216 H**4 times the fourth derivative, or no more than the motion itself.
+    """
+    out_bounds[:] = 0.0
+    for n in range(omega.size):
+        w, z = omega[n], zeta[n]
+        if w == 0.0:
+            continue
+        size = squared[n] * np.sqrt(1.0 + 4.0 * z * z) / (w * w)
+        for level in range(SPLITS + LEVELS):
+            angle = w * h * 2.0 ** (level - SPLITS)
+            steep = (angle * (1.0 + 2.0 * z)) ** 4
+            missed = size * min(steep / 384.0, 2.0 + 0.25 * angle)
+            missed_rate = size * min(np.sqrt(3.0) / 216.0 * steep, 3.0 + 2.0 * angle)
+            out_bounds[level, 0, 0] += missed
+            out_bounds[level, 0, 1] += missed / w
+            out_bounds[level, 1, 0] += missed_rate
+            out_bounds[level, 1, 1] += missed_rate / w
+
+
+@inner(fastmath=LOOSE)
+def combine(target, striker, share, own, start, out_rows):
+    """Kernel of both bodies, reversed in time, from delay ``start`` on."""
+    n_steps = out_rows.shape[1]
+    for r in range(out_rows.shape[0]):
+        backwards = out_rows[r, : n_steps - start][::-1]
+        first, second = target[r, start:n_steps], striker[r, start:n_steps]
+        for m in range(backwards.size):
+            backwards[m] = share * first[m] + own * second[m]
+
+
+@inner(fastmath=LOOSE)
+def convolve(rows, n, known, segments, n_segments, force, ramp):
+    """Approach at the end of step n, mean and rate, caused by the forces before step ``known``; rows run backwards.
+
+    Indices without sign, here and below: loops over signed ones do not run in parallel lanes.
+    """
+    end = 0.0
+    mean = 0.0
+    rate = 0.0
+    shift = rows.shape[1] - 1 - n
+    for i in range(n_segments):
+        low, high = segments[i, 0], min(segments[i, 1], known)
+        if low < high:
+            first, start = np.uintp(shift + low), np.uintp(low)
+            for j in range(np.uintp(high - low)):
+                f = force[start + j]
+                s = ramp[start + j]
+                end += rows[END, first + j] * f + rows[END_RAMP, first + j] * s
+                mean += rows[MEAN, first + j] * f + rows[MEAN_RAMP, first + j] * s
+                rate += rows[RATE, first + j] * f + rows[RATE_RAMP, first + j] * s
+    return end, mean, rate
+
+
+@inner(fastmath=LOOSE)
+def convolve_flight(rows, n, segments, n_segments, force, ramp):
+    """The same after all forces: approach and rate."""
+    end = 0.0
+    rate = 0.0
+    shift = rows.shape[1] - 1 - n
+    for i in range(n_segments):
+        low, high = segments[i, 0], min(segments[i, 1], n)
+        if low < high:
+            first, start = np.uintp(shift + low), np.uintp(low)
+            for j in range(np.uintp(high - low)):
+                f = force[start + j]
+                s = ramp[start + j]
+                end += rows[END, first + j] * f + rows[END_RAMP, first + j] * s
+                rate += rows[RATE, first + j] * f + rows[RATE_RAMP, first + j] * s
+    return end, rate
+
+
+@inner(fastmath=LOOSE)
+def within(kernel, n, segments, n_segments, force, ramp):
+    """Approach and rate within step n caused by all earlier forces, from a kernel later by a part of a step."""
+    end = 0.0
+    rate = 0.0
+    for i in range(n_segments):
+        low, high = segments[i, 0], min(segments[i, 1], n)
+        if low < high:
+            first, start = np.uintp(n - 1 - low), np.uintp(low)
+            for j in range(np.uintp(high - low)):
+                f = force[start + j]
+                s = ramp[start + j]
+                end += kernel[END, first - j] * f + kernel[END_RAMP, first - j] * s
+                rate += kernel[RATE, first - j] * f + kernel[RATE_RAMP, first - j] * s
+    return end, rate
