@@ -53,6 +53,7 @@ FLATTER = 2.0
 # a blow on a hinged plate then errs by 2 % of it, whatever its other elements; test_vectors.py
 DIP = 60.0
 FLATTEST = 64.0  # [-] coarsest triangles at a blow; coarser ones were not tried
+MET = 0.9  # [-] of the allowed error, up to which an estimate suffices: some are a tenth too small (effectivity.py)
 MOST_VECTORS = 2000  # [-] limit on their number: a mesh of 20 000 unknowns takes some 0.3 GB for them
 
 
@@ -221,7 +222,7 @@ class Seen:
     def improved(self, error: Error, allowed: float) -> bool:
         """Take more vectors or a finer mesh, whichever the error of a blow calls for; False if neither is possible."""
         much = (error.truncation + error.mesh) / allowed if allowed > 0.0 else np.inf
-        if much <= 1.0:
+        if much <= MET:
             return False
         coarse = error.mesh > max(AT_FAULT * error.truncation, 0.5 * allowed)
         self.spent = self.spent or (not coarse and (self.count >= MOST_VECTORS or self._stuck(error.truncation)))

@@ -97,11 +97,13 @@ def test_mesh_is_refined_when_it_errs_more_than_too_few_vectors_explain():
     seen = vectors.Seen(Target.of(plate({"boundary": "hinged"}), None), *blow, False, Stages(None))
     count, size, fine = seen.count, seen.elements.size, seen.fine
     assert seen.coarse.system.n_dofs < fine.system.n_dofs
-    assert not seen.improved(Error(0.0, 4e-4, 5e-4), 1e-3) and seen.count == count
+    assert not seen.improved(Error(0.0, 4e-4, 4e-4), 1e-3) and seen.count == count
     assert seen.improved(Error(0.0, 1e-3, 2e-3), 1e-3) and seen.count > count and seen.elements.size == size
     count = seen.count
     assert seen.improved(Error(0.0, 1e-4, 2e-3), 1e-3) and seen.count == count and seen.elements.size < size
     assert seen.coarse is fine and seen.fine.system.n_dofs > fine.system.n_dofs
+    count = seen.count  # an estimate may be a tenth too small: it must leave that much
+    assert seen.improved(Error(0.0, 4.8e-4, 4.8e-4), 1e-3) and seen.count > count
 
 
 def test_meshes_are_compared_with_all_vectors():
