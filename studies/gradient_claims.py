@@ -202,7 +202,7 @@ def draw(cases):
     return figure
 
 
-def publish(cases, name="gradient_claims"):
+def publish(cases, name):
     """Write all cases, print the summary and draw."""
     with (HERE / f"{name}.csv").open("w", newline="") as file:
         table = csv.writer(file)
@@ -217,18 +217,18 @@ def publish(cases, name="gradient_claims"):
     drawing.save(HERE / "pictures" / f"{name}.png", draw(cases))
 
 
-def main():
-    """Examine, print, write and draw."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--scenes", type=int, default=500)
+def main(about, one, scenes, name):
+    """Examine with ``one`` that many random blows, as many as asked for; print, write and draw."""
+    parser = argparse.ArgumentParser(description=about.splitlines()[0])
+    parser.add_argument("--scenes", type=int, default=scenes)
     warnings.simplefilter("ignore", fi.ToleranceWarning)  # of modes left out: here the plate has 20
     wanted, cases, seed = parser.parse_args().scenes, [], 0
     while len(cases) < wanted:
-        found = examine(seed)
+        found = one(seed)
         cases += [] if found is None else [found]
         seed += 1
-    publish(cases)
+    publish(cases, name)
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, examine, 500, "gradient_claims")

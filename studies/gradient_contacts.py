@@ -7,8 +7,6 @@ often each. Every contact has a power law of its own with or without loss and a 
 change together; blows with an impact at each contact and five in all at most are looked at.
 """
 
-import argparse
-import warnings
 from functools import partial
 
 import gradient_claims as claims
@@ -80,18 +78,5 @@ def examine(seed, kind):
     return claims.examine(seed, partial(random_numbers, kind=kind), partial(strike, kind=kind), MOST)
 
 
-def main():
-    """Examine, print, write and draw."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--scenes", type=int, default=100)
-    warnings.simplefilter("ignore", fi.ToleranceWarning)  # of modes left out: here the plate has 20
-    wanted, cases, seed = parser.parse_args().scenes, [], 0
-    while len(cases) < wanted:
-        found = examine(seed, list(KINDS)[seed % len(KINDS)])
-        cases += [] if found is None else [found]
-        seed += 1
-    claims.publish(cases, "gradient_contacts")
-
-
 if __name__ == "__main__":
-    main()
+    claims.main(__doc__, lambda seed: examine(seed, list(KINDS)[seed % len(KINDS)]), 100, "gradient_contacts")

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .._base.rounding import ROUNDING
 from ..impact.response import Response
 from . import batches, solving
 from .cells import FAMILY_AXES, Case
@@ -14,7 +15,6 @@ from .store import Texts
 
 FAMILIES = 256  # [-] most pairs of bodies of a cloud that need kernels of their own: some 5 ms each
 BANDS = 64  # [-] most upper ends of the centroid's band; blows between share them, so that few kernels are needed
-SAME = 1e-12  # [-] relative difference of numbers that rounding may have made
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ def _ranks(column: np.ndarray) -> np.ndarray:
     """Whole numbers (n,) that are equal where values are, up to rounding."""
     order = np.argsort(column, kind="stable")
     ascending = column[order]
-    steps = np.diff(ascending) > SAME * np.maximum(1.0, np.abs(ascending[1:]))
+    steps = np.diff(ascending) > ROUNDING * np.maximum(1.0, np.abs(ascending[1:]))
     ranks = np.empty(len(column), int)
     ranks[order] = np.concatenate([[0], np.cumsum(steps)])
     return ranks
@@ -204,4 +204,4 @@ def _bands(ratio: np.ndarray, band: float | None) -> np.ndarray:
         return np.zeros(len(ratio))
     log = np.log(ratio)
     width = np.ptp(log) / BANDS
-    return band / np.exp(width * np.round(log / width) if width > SAME else log)
+    return band / np.exp(width * np.round(log / width) if width > ROUNDING else log)

@@ -15,6 +15,7 @@ import xarray
 
 from .._base import check
 from .._base.check import SimulationError
+from .._base.rounding import ROUNDING
 from ..fe import plausible
 from ..fe.assembly import System
 from ..impact import accuracy
@@ -39,7 +40,6 @@ SECONDS = {True: 1e-5, False: 2e-3}  # [s] per blow, in a batch or alone: the sl
 # [s] a map with default axes that takes less is computed in all its cells: refining it would gain nothing to notice
 DENSE = 1.0
 MOST_MIDDLES = 4  # [-] axes whose middle is examined, too: 3**4 = 81 blows, where five would take 243
-LEAST_MODEL_ERROR = 1e-12  # [-] smaller ones are rounding
 Tell = Callable[[str], Any]
 
 
@@ -171,7 +171,7 @@ class Grid:
             except SimulationError:
                 found[at] = np.nan
                 continue
-            found[at] = max(hit.model_error, LEAST_MODEL_ERROR)
+            found[at] = max(hit.model_error, ROUNDING)
             unknown |= {each.name: None for each in hit.assumptions if not each.known}
         logs = np.log(found)
         for axis, (places, n) in enumerate(zip(some, self.shape)):

@@ -10,6 +10,7 @@ import xarray
 from scipy import stats
 
 from .._base import check, markup
+from .._base.rounding import SAME
 from .inputs import Input
 from .solving import LAYERS
 
@@ -17,8 +18,6 @@ CONFIDENCE = 0.9  # [-] of every interval: nine of ten cover the truth; a choice
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)  # [-] quantiles told: median, quartiles and the ends of nine tenths of all
 RESAMPLES = 100  # [-] bootstrap samples behind the intervals of Sobol indices: tell a standard deviation to 7 %
 MOST_RESAMPLED = 4096  # [-] groups of blows from which Sobol indices are found: their bootstrap keeps 100 copies
-# [-] relative range of a quantity below which nothing varies it: blows round to less, inputs that matter do more
-ROUNDING = 1e-9
 # [-] share of the variance below which an input is not worth measuring better: the spread would shrink by 1 %
 NEGLIGIBLE = 0.02
 DOUBLE = "double_hit"
@@ -140,7 +139,7 @@ class Spread:
         """Quantities that are not the same in every blow."""
         return tuple(
             name for name in self.quantities
-            if len(v := self.values(name)) > 1 and np.ptp(v) > ROUNDING * np.abs(v).max(initial=0.0)
+            if len(v := self.values(name)) > 1 and np.ptp(v) > SAME * np.abs(v).max(initial=0.0)
         )  # fmt: skip
 
     @cached_property

@@ -90,9 +90,7 @@ class Grown(NamedTuple):
 
     rows: np.ndarray  # (n, SHAPES + n_contacts, n_modes) of omega, zeta, bias and the shape of each contact
     seen: np.ndarray  # (n, 2 + n_contacts, n_contacts, n_modes) all but the third times the shape of each contact
-    spans: (
-        np.ndarray
-    )  # (n, SHAPES + n_contacts, 2) where a row is not zero: first index, one after the last; 0 for none
+    spans: np.ndarray  # (n, SHAPES + n_contacts, 2) where a row is not zero: its first index, one after its last; or 0
 
 
 class Table(NamedTuple):
