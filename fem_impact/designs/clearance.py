@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 
 from .._base.check import SimulationError
 from ..fe.variation import SectionChange
-from ..impact.collision import LOOKS
 from ..impact.compiled import layout, record
+from ..impact.gradient import LOOKS
 from ..impact.parameters import Parameters
 from ..impact.response import History, Response
 from ..impact.sensitivity import Sensitivity

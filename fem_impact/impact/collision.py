@@ -21,6 +21,7 @@ from .compiled.energy import run_energy
 from .compiled.law import FELT
 from .compiled.stretched import Stretch
 from .contact import Contact, acting_stiffness, wall_time
+from .gradient import LOOKS
 from .quantities import asked_for
 from .response import Ends, Error, History, Response
 from .sensitivity import gauss
@@ -76,8 +77,6 @@ LOSSY_ABOVE, LOSSY_DAMPING = 30.0, 1.0
 LOSSY_STRIKER = 30.0  # [-] a lossy contact multiplies the truncation error of a striker by this: its modes are sparse
 STRIKER_SHARE = 0.05  # [-] fraction of the tolerance for the striker's left-out modes: keeping them is cheap
 NEGLIGIBLE = 1e-4  # [-] mesh errors below this fraction of the tolerance need no extra run; the blow errs by as little
-# [-] times per contact at which two motions are compared, several per turn, and their largest number
-LOOKS = 16.0, 20_000
 # [-] frequency errors are capped at this in that run, so that frequencies stay positive: no tolerance is met then
 LARGEST_ERROR = 0.5
 

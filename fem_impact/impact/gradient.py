@@ -29,7 +29,7 @@ UNIT_OF = {
 }  # fmt: skip
 GRAZE = 1e-3  # [-] of the deepest approach: a touch or gap below it may come or go with a change of a thousandth
 TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a change of 1e-4 may make the other the largest
-# [-] times per contact at which a flight is searched for near misses, and their largest number, as in `collision`
+# [-] times per contact at which a flight is searched for near misses or two motions are compared, and their most
 LOOKS = 16.0, 20_000
 STILL = 1e-9  # [-] of the fastest approach: bodies that rest against each other turn back more slowly, by rounding
 CUBIC = np.linspace(0.0, 1.0, 9) ** np.arange(4)[:, None]  # where in a piece of time its cubic is looked at, as powers
