@@ -21,7 +21,13 @@ PATIENCE = 300  # [s] for a cell on a busy machine; each notebook takes some sec
 def executed(path: Path) -> Any:
     """A notebook with the outputs of a fresh run in this folder, and nothing else that could differ."""
     notebook: Any = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
-    NotebookClient(notebook, timeout=PATIENCE, kernel_name="python3", resources={"metadata": {"path": HERE}}).execute()
+    NotebookClient(
+        notebook,
+        timeout=PATIENCE,
+        kernel_name="python3",
+        coalesce_streams=True,  # a cell's words may arrive in several pieces
+        resources={"metadata": {"path": HERE}},
+    ).execute()
     notebook.metadata = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
     for number, cell in enumerate(notebook.cells):
         cell.metadata, cell.id = {}, f"cell-{number}"
