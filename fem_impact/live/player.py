@@ -94,8 +94,8 @@ class Player:
         shortest = min(duration for _, duration in found)
         listen = self.points[0] if listen is None else listen
         self.step = self._arrays([system for system, _ in found], shortest, sticks, n_trace, listen)
-        self._when, self._pad = np.zeros(AT_ONCE, np.int64), np.zeros(AT_ONCE, np.int64)
-        self._speed, self.gain = np.zeros(AT_ONCE), 1.0 / FULL_SCALE
+        self._strokes = live.Strokes(np.zeros(AT_ONCE, np.int64), np.zeros(AT_ONCE, np.int64), np.zeros(AT_ONCE))
+        self.gain = 1.0 / FULL_SCALE
 
     def _arrays(self, systems: list, duration: float, sticks: int, n_trace: int, listen: Any) -> float:
         """Make the arrays of the kernel; the longest step in contact [s]."""
@@ -147,11 +147,10 @@ class Player:
     def fill(self, strokes: Sequence[Stroke], out: np.ndarray) -> None:
         """Compute the next block into ``out`` (n_frames,) float32, with the strokes in it, by frames of the block."""
         count = min(len(strokes), AT_ONCE)
+        now = live.Strokes(*(array[:count] for array in self._strokes))
         for i in range(count):
-            self._when[i], self._pad[i], self._speed[i] = strokes[i]
-        live.play(
-            self._body, self._pads, self._limits, self._state, self._when, self._pad, self._speed, count, self.gain, out
-        )
+            now.when[i], now.pad[i], now.speed[i] = strokes[i]
+        live.play(self._body, self._pads, self._limits, self._state, now, self.gain, out)
 
     def play(self, strokes: Sequence[Stroke | tuple[int, int, float]], duration: float) -> Sound:
         """The sound [m/s] of strokes, by frames since now, for a duration [s]; the same strokes give the same bits."""

@@ -30,8 +30,8 @@ def moments_alone(omega, zeta, out_moments):
 @njit
 def moment_slopes(omega, zeta, t, moments, out_faster, out_damped):
     per, own = np.empty(omega.size), np.empty(omega.size)
-    n_critical = tangents.divisors(omega, zeta, per, own)
-    tangents.moment_slopes(omega, zeta, t, moments, per, own, n_critical, out_faster, out_damped)
+    tangents.divisors(omega, zeta, per, own)
+    tangents.moment_slopes(omega, zeta, t, moments, per, own, out_faster, out_damped)
 
 
 @pytest.mark.parametrize("count", [4, 6])

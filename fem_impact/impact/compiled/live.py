@@ -66,6 +66,14 @@ class Limits(NamedTuple):
     still: float  # [m/s] speeds that are rounding
 
 
+class Strokes(NamedTuple):
+    """What is struck during a block, in the order of time."""
+
+    when: np.ndarray  # (n,) frames of the block
+    pad: np.ndarray  # (n,)
+    speed: np.ndarray  # (n,) [m/s]
+
+
 class State(NamedTuple):
     """What moves, for up to n_sticks sticks on the body; the first ``m`` rows are in use."""
 
@@ -337,16 +345,12 @@ def tidied(body, pads, state):
 
 
 @outer()
-def play(body, pads, limits, state, when, pad, speed, n_events, gain, out):
-    """Fill a block of sound (n_frames,), and leave the state at its end.
-
-    ``when`` (ascending frames of the block), ``pad`` and ``speed`` [m/s] are the strokes, of which the first
-    ``n_events`` count; ``gain`` multiplies what is heard.
-    """
+def play(body, pads, limits, state, strokes, gain, out):
+    """Fill a block of sound (n_frames,), and leave the state at its end; ``gain`` multiplies what is heard."""
     event = 0
     for k in range(out.size):
-        while event < n_events and when[event] <= k:
-            put_on(body, pads, limits, state, pad[event], speed[event])
+        while event < strokes.when.size and strokes.when[event] <= k:
+            put_on(body, pads, limits, state, strokes.pad[event], strokes.speed[event])
             event += 1
         out[k] = gain * product(body.listen, state.p)
         for i in range(state.place[N_ON] - 1, -1, -1):
