@@ -16,9 +16,10 @@ from .bundles import Bodies, Contacts, Course, Run, Scene
 from .flight import NEVER, ONSET, SLOW, approach, find_onset
 from .law import FELT, dent, harden, rest_of
 from .record import EXHAUSTED, FULL, HORIZON, IMPACTS, total_energy
+from .rounding import ITERATIONS, NEAR
 
 from .events import (  # isort: skip
-    AGAIN, EVENT_LIMIT, LOCATE_LIMIT, LOCATED, enclose, first_corner, first_crossing, narrow, nearer,
+    AGAIN, EVENT_LIMIT, LOCATED, enclose, first_corner, first_crossing, narrow, nearer,
 )  # fmt: skip
 from .layout import (  # isort: skip
     APPROACH, BEGUN, BLINDS, CLOCKS, CONTACT_ROWS, CORNERED, COUNTERS, EVENTS, FAINT, FALLBACKS, FLYING, FRESH, HEAD,
@@ -191,10 +192,10 @@ def locate(contacts, course, limits, h, cornered, lossy):
         else:
             guess = nearer(contacts, count[CORNERED], count[WHICH], h, bracket)
         count[TRIES] += 1
-        if guess != 0.0 and count[TRIES] < LOCATE_LIMIT:
+        if guess != 0.0 and count[TRIES] < ITERATIONS:
             count[SEEKS] = sought
             return TRY, guess
-        if sought == CROSSING and not abs(contacts.end[count[TARGET]]) <= 1e-9 * bracket[SIZE]:
+        if sought == CROSSING and not abs(contacts.end[count[TARGET]]) <= NEAR * bracket[SIZE]:
             return LOST, guess
     if sought != CORNER and cornered:
         count[CORNERED], count[WHICH], guess = first_corner(contacts, h, lossy, bracket)

@@ -18,13 +18,14 @@ from .exact import contact_sums, freshen, keep_in_mind, predict, solve_step
 from .flight import approach, motion_bounds, quadratic_wait
 from .law import at, rest_of, special_of, spring_of
 from .propagation import any_of, commit, glide, product, restore
+from .rounding import OVERFLOW
 
 from .layout import (  # isort: skip
     APPROACH, FASTEST, FREE_END, FREE_RATE, HARDEST, MEMORY, RATE, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE,
 )  # fmt: skip
 
 FULL = 1 << 20  # [-] ticks of a frame: the shortest step is one, 2e-11 s at 48 kHz
-LEVELS = 21  # [-] lengths of steps, from a frame to a tick
+LEVELS = FULL.bit_length()  # lengths of steps, from a frame to a tick
 N_ON, N_LOOKS, FRAME, FORCED = range(4)  # places of `State.place`
 LOOKS = 64  # [-] looks of a flight after which its bounds are drawn anew, as they loosen
 FAINT = 1e-140  # [-] of sqrt(J): a mode with less is at rest, before its numbers get slow to calculate with
@@ -331,7 +332,7 @@ def tidied(body, pads, state):
     lost = False
     for n in range(state.q.size):
         size = abs(state.p[n]) + body.omega[n] * abs(state.q[n])
-        lost = lost or not size < 1e300
+        lost = lost or not size < OVERFLOW
         if size < FAINT and body.omega[n] > 0.0:
             state.q[n] = 0.0
             state.p[n] = 0.0

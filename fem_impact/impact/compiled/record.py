@@ -17,7 +17,7 @@ from .layout import APPROACH, CLOSED, HEAD, KIND, LENGTH, LOSS, PUSH, RATE, SPEE
 FEW, CLOSER = 3, 16  # [-] parts into which the search for a largest force cuts all steps, and what is left, thrice
 HIGH_ENOUGH = 0.95  # [-] of the largest force: only steps with so much are looked at more closely
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = range(6)  # why a run ended
-FULL = -1  # [-] it did not: its record is full
+FULL = -1  # it did not: its record is full
 
 
 @inner(allocates=True)
