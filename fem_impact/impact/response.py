@@ -729,10 +729,10 @@ class Response(Totals):
             Whether the error is that of `velocity`.
         """
         name = "velocity" if velocity else "displacement"
-        apart = self._apart(points, times, name)
+        apart = self._largest_difference(points, times, name)
         return apart + self.error.total if apart <= MOVED[name] else float("inf")
 
-    def _apart(self, points: Any, times: Any, name: str) -> float:
+    def _largest_difference(self, points: Any, times: Any, name: str) -> float:
         """Largest difference [-] of the motions told by the descriptions of the target, over the largest motion."""
         times = check.array("times", times, (None,), "s", lift=True)
         lasting = not times.size or times.max() <= LASTS * self.history.end_time
@@ -748,7 +748,7 @@ class Response(Totals):
     def _told(self, points: Any, times: Any, body: int, name: str) -> bool:
         """Whether Ritz vectors tell a motion well enough."""
         mine = self.vectors is not None and body in (-1, len(self.bodies) - 1)
-        return mine and self._apart(points, times, name) <= MOVED[name]
+        return mine and self._largest_difference(points, times, name) <= MOVED[name]
 
     def _dip(self, points: Any, times: Any, body: int) -> tuple[Any, Any]:
         """Static deflection [m] of the left-out modes and its rate [m/s], (n_times, n_points); 0 if there are none."""
