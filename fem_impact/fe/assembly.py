@@ -298,7 +298,7 @@ def _graded(
     thicker = element in ELEMENTS["mindlin"]
     allowed = support_words("mindlin" if thicker else None)
     stated = _kinds(support_of_facets(mesh, supports, allowed))
-    order, unresolved, fine = around_corners(mesh, stated, section.material.nu)
+    order, unresolved, fine = around_corners(mesh, stated, section.material)
     fine = fine if graded else mesh
     if thicker:
         fine = thick.layered(fine, section, _kinds(support_of_facets(fine, supports, allowed)), layer)

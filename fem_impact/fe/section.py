@@ -15,6 +15,13 @@ SHEAR = 5.0 / 6.0  # [-] shear coefficient of plates: shear stress is parabolic 
 Varying = float | Callable[[np.ndarray], Any]
 
 
+def turned(stiffness: np.ndarray, angle: float) -> np.ndarray:
+    """The stiffness (3, 3) on strains (xx, yy, 2 xy) of a material turned anticlockwise by an angle [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
+    return turn.T @ stiffness @ turn
+
+
 @dataclass(frozen=True)
 class Material:
     """Linear elastic material; `Material.orthotropic` makes wood and composites.
@@ -143,9 +150,7 @@ class Material:
         local = np.array([[E, nu * across, 0.0], [nu * across, across, 0.0], [0.0, 0.0, G * inner]]) / inner
         if self.E_across is None:
             return local
-        c, s = np.cos(self.angle), np.sin(self.angle)
-        turn = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
-        return turn.T @ local @ turn
+        return turned(local, self.angle)
 
     @property
     def transverse(self) -> tuple[float, float]:
