@@ -583,3 +583,55 @@ def test_another_mesh_of_a_free_plate_may_turn_its_rigid_motions():
     true = abs(alone.restitution - hits[0].restitution)
     for hit in hits:
         assert 0.3 * true < hit.error.mesh < 1e-3
+
+
+@pytest.mark.parametrize("hard_exponent", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("exponent", [1.0, 1.7, 2.4])
+def test_a_mass_on_two_layers_gets_as_deep_as_its_energy(exponent, hard_exponent):
+    """Steps of collocation much longer than a swing on the hard layer must end in shorter ones, not in no answer."""
+    depth, mass = 3e-5, 0.2
+    soft, hard = 2e5 * 1e4 ** (exponent - 1.0), 1.5e8 * 3e4 ** (hard_exponent - 1.0)
+    law = fi.Contact.layers(soft, exponent, depth=depth, hard_stiffness=hard, hard_exponent=hard_exponent)
+
+    def lacks(x):
+        stored = soft * x ** (exponent + 1.0) / (exponent + 1.0)
+        return stored + hard * max(x - depth, 0.0) ** (hard_exponent + 1.0) / (hard_exponent + 1.0) - 0.5 * mass
+
+    hit = collide([fi.Modes.rigid(mass)], [Touch(law, 0, None)], speeds=[1.0], tolerance=1e-8)
+    deepest = brentq(lacks, depth, 1.0, xtol=1e-18, rtol=1e-15)
+    assert_allclose(hit.peak_force, float(law.force(deepest)), rtol=1e-8)  # the tolerance
+    assert_allclose(hit.impulse, 2.0 * mass, rtol=1e-8)
+
+
+@pytest.mark.parametrize("loss", [0.5, 5.0])
+@pytest.mark.parametrize("mass", [0.03, 0.1, 0.25])
+def test_collocation_finds_the_peak_wherever_in_its_steps_it_lies(mass, loss):
+    """With loss the force peaks before the turn, anywhere in a step: at its end, or at a fifth that no search hits."""
+    law = fi.Contact.layers(6e8, 2.1, depth=4e-5, hard_stiffness=2.5e7, loss=loss)
+    bodies, touch = [fi.Modes.rigid(mass), fi.Modes.rigid(0.2)], Touch(law, 0, 1)
+    for tolerance in 10.0 ** np.arange(-5.0, -8.0, -0.25):
+        hit = collide(bodies, [touch], speeds=[1.0, 0.0], tolerance=tolerance, scheme="collocation", residual=False)
+        rows = np.flatnonzero(hit.history.pressed[:, 0])
+        dense = hit.history.force(rows, 0, np.linspace(0.0, 1.0, 2001)[None]).max()
+        # 2000 looks per step miss (pi/2/2000/2)**2/2 of a peak whose swing takes two steps
+        assert_allclose(hit.peak_force, dense, rtol=2e-7)
+
+
+@pytest.mark.parametrize(
+    "frequency, gap, mass", [(81.0, 1.19e-3, 0.082), (796.0, 1.42e-3, 0.024), (56.0, 1.63e-3, 0.167)]
+)
+def test_contacts_that_open_and_close_together_stay_together(frequency, gap, mass):
+    """Two springs at one point are one of both; rounding lets one touch or part first, for a time no step resolves."""
+    target = fi.Modes.from_arrays([0.0, frequency, 3.1 * frequency], [[1.0, 0.8, -0.5]], points=[[0.0]], mass=mass)
+    springs = fi.Contact.hertz(1e8, gap=gap), fi.Contact.linear(2e5, gap=gap)
+    both = fi.Contact.layers(2e5, 1.0, depth=0.0, hard_stiffness=1e8, gap=gap)
+    two, one = (
+        collide(
+            [fi.Modes.rigid(0.05), target], [Touch(law, 0, 1, None, [0.0]) for law in laws], speeds=[1.0, 0.0],
+            tolerance=1e-8, residual=False, duration=0.02,
+        )
+        for laws in (springs, [both])
+    )  # fmt: skip
+    assert_allclose(two.speeds, one.speeds, atol=2e-8)  # the tolerance of both
+    assert_allclose(two.impulse, one.impulse, rtol=2e-8)
+    assert_allclose(two.touching_time, one.contact_time, rtol=2e-8)

@@ -112,7 +112,8 @@ def narrow(contacts, h, limits, target, bracket):
             guess = hermite_root(now[APPROACH, i], now[RATE, i], y[i], rate[i], h)
             return i, guess if guess < h else 0.5 * h
     miss = y[target]
-    if abs(miss) <= LOCATED * bracket[SIZE] or bracket[HIGH] - bracket[LOW] <= 4e-16 * bracket[HIGH]:
+    good = max(limits.depth, LOCATED * bracket[SIZE])
+    if abs(miss) <= good or bracket[HIGH] - bracket[LOW] <= 4e-16 * bracket[HIGH]:
         return target, 0.0
     if (miss > 0.0) != pressed[target]:
         bracket[HIGH] = h
@@ -157,7 +158,7 @@ def letting_go(loss, d0, v0, d1, v1, h):
 
 @inner()
 def turn_of(d0, v0, d1, v1, h):
-    """When the cubic through both ends, rising at first and falling at last, turns back, and how high it is there."""
+    """When the cubic through both ends, rising at first and falling later, turns back, and how high it is there."""
     a = 2.0 * (d0 - d1) + h * (v0 + v1)
     b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
     c = h * v0
@@ -299,11 +300,11 @@ def strayed(contacts, h, i, side):
     if bend == np.inf or abs(d0) > near or (d1 >= -near and not (yields and v1 < 0.0)):
         return 0
     high = 0.0
-    if v1 < 0.0 < v0:
+    if v0 > 0.0 and (v1 < 0.0 or d1 < d0):
         _, high = turn_of(d0, v0, d1, v1, h)
     if high <= near:
         return 1
-    return 0 if yields else 2
+    return 0 if yields and v1 < 0.0 else 2
 
 
 @inner()
