@@ -71,14 +71,12 @@ FALLING = 2.0, 1.0  # [-] the truncation error falls at least with this power of
 # [-] by dimension: frequency of the replacement mode over the last, fact: sqrt(sum u**2/w**2 / sum u**2/w**4) of those
 # above is sqrt(7/3) on a beam, whose n-th frequency goes as n**2, and sqrt(3) on a plate, where it goes as n
 REST_ABOVE = {1: 1.53, 2: 1.73}
-# [-] the replacement mode under a lossy contact, frequency over the last mode's and damping ratio: so far above that it
-# follows as a spring, so damped that it does not ring
-LOSSY_ABOVE, LOSSY_DAMPING = 30.0, 1.0
+# [-] frequency of the replacement mode under a lossy contact over the last mode's: so far above that it follows as a
+# spring; it is critically damped
+LOSSY_ABOVE = 30.0
 LOSSY_STRIKER = 30.0  # [-] a lossy contact multiplies the truncation error of a striker by this: its modes are sparse
 STRIKER_SHARE = 0.05  # [-] fraction of the tolerance for the striker's left-out modes: keeping them is cheap
 NEGLIGIBLE = 1e-4  # [-] mesh errors below this fraction of the tolerance need no extra run; the blow errs by as little
-# [-] frequency errors are capped at this in that run, so that frequencies stay positive: no tolerance is met then
-LARGEST_ERROR = 0.5
 
 
 @dataclass(frozen=True)
@@ -605,7 +603,7 @@ def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[f
     critically damped mode far above behaves like a series spring and takes almost no energy.
     """
     if lossy:
-        return LOSSY_ABOVE * omega, LOSSY_DAMPING
+        return LOSSY_ABOVE * omega, 1.0
     return REST_ABOVE[min(dimension, 2)] * omega, float(zeta)
 
 
@@ -1004,7 +1002,7 @@ def _mesh_error(bodies, parts, contacts, system: _System, coarse: History, schem
         soft = [(np.pi / pace[0]) ** 2 / mobility[i] * doubt for (i, _), doubt in zip(part.touched, part.doubt)]
         error = np.zeros(modes.n_modes) if modes.frequency_error is None else modes.frequency_error
         matters |= max(error.max(), *soft, 0.0) > NEGLIGIBLE * tolerance
-        lower = part.omega * (1.0 - np.minimum(error, LARGEST_ERROR))
+        lower = part.omega / (1.0 + error)
         softer.append(replace(part, omega=lower, rest=part.rest + np.diag(part.doubt)))
     if not matters:
         return 0.0
