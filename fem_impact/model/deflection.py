@@ -246,7 +246,7 @@ def _within(body: Known, area: np.ndarray) -> np.ndarray:
     if body.modes.dimension == 1:
         return np.ones(len(area))
     whole = np.pi * body.extent / np.maximum(area, ROUNDING * body.extent)  # 2 x at the edge
-    near, far = (np.euler_gamma + np.log(x) - special.sici(x)[1] for x in (np.pi, whole))
+    near, far = (np.euler_gamma + np.log(x) - special.sici(x)[1] for x in (0.5 * FRONT, whole))
     return near / far
 
 

@@ -54,9 +54,6 @@ LONGEST = 1e4
 PER_RADIAN = 2.5
 # [-] limit on their number: half a minute on a mesh of 50 000 unknowns; ten times more or less passes the tests
 MOST_VECTORS = 1000
-# [-] damping ratio of the contact with an infinite plate, critical, from which vectors alone do not resolve it; half
-# and twice pass the tests
-HEAVY = 1.0
 # [rad] phase of the first echo at that frequency at least, a turn and a half: the plate is wider than the wave is long;
 # half and twice pass the tests
 NEAR = 10.0
