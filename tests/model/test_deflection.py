@@ -205,6 +205,12 @@ def test_the_sound_of_a_gong_rises():
     assert told.value > 1.0 and told.beyond and "large deflections" in told.sentence
 
 
+@pytest.mark.parametrize(("speed", "gong"), [(0.9, False), (1.4, True)])
+def test_beyond_its_thickness_a_plate_is_called_a_gong(speed, gong):
+    told = found(struck(speed))
+    assert (told.value > 1.0) == gong and ("gong" in told.sentence) == gong
+
+
 def test_without_a_thickness_it_is_not_known():
     plate = fi.analytic.rectangle(SIDE, SIDE, mass=0.3, first_frequency=100.0, n_modes=20)
     hit = fi.strike(plate, fi.Striker.rigid(0.05), fi.Contact.linear(2e4), at=(0.07, 0.08), speed=3.0)
