@@ -31,22 +31,21 @@ from .striker import Striker
 
 TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
 SCHEMES = ("A", "A4", "collocation")
-MAX_STEPS = 500_000  # [-] of one run: takes about one second
-MAX_WORK = 1_000_000_000  # [-] modes, or entries of the forms of stretching, times steps of one run: some seconds
-# [-] modes times steps of one run in plain Python: 3 000 times less than with kernels, so that it ends as soon; ten
-# times more or less passes the tests
+MAX_STEPS = 500_000  # [-] of one run: a time limit of about one second
+# [-] modes, or entries of the forms of stretching, times steps of one run: a time limit of some seconds
+MAX_WORK = 1_000_000_000
+# [-] modes times steps of one run in plain Python: the same time limit, as it is 3 000 times slower than the kernels
 PLAIN_WORK = 300_000
-# [-] tolerance advised over the error reached: steps twice as long, to which it may lead, err 16 times more; half and
-# twice pass the tests
+# [-] tolerance advised over the error reached: steps twice as long, to which it may lead, err 16 times more
 REACHED = 20.0
 SOONER = 0.2  # [-] of a run that was given up, what is advised: the last run of a blow halves the steps twice
 FIRST_STEPS = 24.0  # [-] steps per contact with which A4 meets TOLERANCE in most blows; cheapest first run of 12 to 32
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
 # [-] fraction of the usual steps that averages over the blow need: errors of single instants cancel in them
 AVERAGED = 0.5
-# [-] a touch or gap below 2 tolerance times the deepest approach may be an error: twice what a run may err by
-GRAZE = 2.0
-GRAZES = 3  # [-] step halvings to decide whether such a touch is real: each divides the doubt by eight
+# [-] step halvings to decide whether bodies touch or part that do so by less than the tolerance of the deepest approach:
+# each divides the doubt by eight
+GRAZES = 3
 FEW = 20  # [-] no such check after more impacts: chatter always ends with a contact that barely touches
 DOUBLINGS = 7  # [-] step halvings before the run gives up: A4 then errs 2**28 times less
 # [-] Difference of two runs over the error of the finer one: first for speeds and impulse, then for contact time and
@@ -761,7 +760,7 @@ def _controlled(
         estimate = max(differ(coarse, fine, over), missed(fine))
         if estimate <= tolerance:
             met = fine, estimate, scheme, coarse, (size, before)
-            if grazes == GRAZES or not _grazes(fine, GRAZE * tolerance * (size / sizes[1]) ** 3):
+            if grazes == GRAZES or not _grazes(fine, tolerance * (size / sizes[1]) ** 3):
                 return met
         grazes += met is not None
         best, last = min(best, estimate), (coarse, fine)

@@ -13,7 +13,7 @@ from scipy import fft, special
 LEAST_SAMPLES = 800.0  # [-] per impact: its spectrum errs by less than 1e-3 up to the thirtieth lobe
 FEW = 2**12  # [-] pieces times frequencies up to which the direct sum is faster
 MOST_PERIODS = 2.0**18  # [-] periods of the highest frequency in a blow whose centroid is sought: takes half a second
-MOST_NODES = 2**24  # [-] nodes or cells of a transform: they take two gigabytes; above it, the direct sum
+MOST_NODES = 2**24  # [-] nodes or cells of a transform, to limit the memory to two gigabytes; above it, the direct sum
 TERMS = 14  # [-] of the series: for phases up to a half, that of a cell's end, they leave 0.5**14 / 14! = 7e-16
 WINDOW = 8  # [-] half width of the window that interpolates from twice as many even frequencies: errs by 4e-16
 BETA = 1.5 * np.pi * WINDOW  # [-] fact: best shape of the window, that of Kaiser and Bessel

@@ -26,7 +26,7 @@ NEAREST = 2.0  # [-] least clearance**2 / (rate contact time); below it, the ech
 ECHO = 1.2  # [-] error of one straight edge over ratio / nearness**2; measured 0.1 to 0.4, at a disk's centre 4
 # [-] modes up to this multiple of the contact frequency decide if a body is rigid: one there gives 1 / 400 as much
 LOOK = 20.0
-MOST_LOOKED_AT = 5000  # [-] upper limit on the number of these modes, as a plan should take no time
+MOST_LOOKED_AT = 5000  # [-] of these modes at most, to limit the work: a plan should take no time
 
 
 @dataclass(frozen=True)

@@ -38,12 +38,10 @@ AUDIBLE, AUDIBLE_POINTS = 20e3, 2001
 # [-] modes ring up to the last frequency where the force has this part of its impulse: -60 dB, which is not heard
 FAINT = 1e-3
 MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: some seconds
-# [-] the verifying run divides the tolerance by this: its own error is then an eighth of what it judges; half and twice
-# pass the tests
+# [-] the verifying run divides the tolerance by this: its own error is then an eighth of what it judges
 VERIFYING = 8.0
 FINEST = 1e-10  # [-] lowest tolerance of a verifying run: below, rounding of long runs begins to show
-# [-] safety factor on the mode error: costs a quarter more modes, but seldom needs a second run; half and twice pass
-# the tests
+# [-] safety factor on the mode error: costs a quarter more modes, but seldom needs a second run
 CAUTION = 2.0
 MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by source: takes about 2 GB and some minutes
 # [-] above it, a plate is infinite above a frequency, if its contact overdamps: 4 100 modes for 15 190 of a steel
@@ -58,8 +56,7 @@ PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_st
 ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
 TARGETS = ("rigid", "infinite", "vectors", "mixed", "modal")
 RINGING = ("modal", "vectors")  # those of a target that rings
-# [-] modes times steps of one run of a plate that is infinite above a frequency: takes ten seconds; ten times more or
-# less passes the tests
+# [-] modes times steps of one run of a plate that is infinite above a frequency: a time limit of ten seconds
 MOST_MIXED = 2e8
 COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced: longer than one likes to wait
 

@@ -24,11 +24,9 @@ SHIFT = 6.0, 1.0 / 6.0  # [-] shift over the angular frequency of the contact: h
 FIRST = 84, 0.22  # [-] vectors tried first: they resolve one undisturbed contact
 # [-] what modes left out may err, over what the highest pairs may that act as a spring: these err in every blow
 FOLDED = 4.0, 0.6
-# [-] highest frequency of a mode that matters, over that of the contact: a half sine has 1 / 143 of its impulse there;
-# half and twice pass the tests
+# [-] highest frequency of a mode that matters, over that of the contact: a half sine has 1 / 143 of its impulse there
 EXCITED = 12.0, 0.25
-# [-] vectors besides those that stand for modes: the dip under the load has no wavelength and takes its own; half and
-# twice pass the tests
+# [-] vectors besides those that stand for modes: the dip under the load has no wavelength and takes its own
 FEWEST = 30
 MORE = 1.4  # [-] factor on the number of vectors: less gains too little for a run, more may overshoot
 # [-] divides what those of poorer descriptions may err: so far apart that two blows differ by the error of the poorer;
@@ -49,7 +47,7 @@ FLATTER = 2.0
 DIP = 60.0
 FLATTEST = 64.0  # [-] coarsest triangles at a blow; coarser ones were not tried
 MET = 0.9  # [-] of the allowed error, up to which an estimate suffices: some are a tenth too small (effectivity.py)
-MOST_VECTORS = 2000  # [-] limit on their number: a mesh of 20 000 unknowns takes some 0.3 GB for them
+MOST_VECTORS = 2000  # [-] to limit the memory: a mesh of 20 000 unknowns takes some 0.3 GB for so many
 
 
 def usable(target: Target) -> bool:

@@ -1,6 +1,8 @@
 """Blows against closed forms: rigid walls, two masses, a stick on a heavy plate."""
 
+import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -682,3 +684,37 @@ def test_a_blow_at_the_usual_tolerance_is_told_by_few_steps(seed):
     truth = fi.strike(body, *how, **where, residual=False, tolerance=1e-8)
     assert worst(hit, truth) < hit.error.total < 0.5 * hit.tolerance
     assert abs(averaged.restitution - truth.restitution) < averaged.error.total
+
+
+def grazing_blow(seed, mass):
+    """A plate and a mass a little lighter or heavier than one that touches it once more, or once less."""
+    rng = np.random.default_rng(seed)
+    plate = fi.analytic.rectangle(
+        1.3, 1.0, mass=rng.uniform(0.2, 1.0), first_frequency=rng.uniform(40.0, 100.0),
+        n_modes=int(rng.integers(3, 30)), damping_ratio=rng.choice([0.0, 0.01]),
+    )  # fmt: skip
+    law = fi.Contact.hertz(10 ** rng.uniform(5.0, 7.0)) if seed % 2 else fi.Contact.linear(10 ** rng.uniform(4.0, 5.5))
+    where = {"at": tuple(rng.uniform(0.2, 0.8, 2)), "speed": 1.0, "residual": False}
+    return partial(fi.strike, plate, fi.Striker.rigid(mass), law, **where)
+
+
+@pytest.mark.parametrize(
+    ("seed", "mass"), [(1, 0.08040367666), (1, 0.31088011), (2, 0.0933117233), (3, 0.02846306), (6, 0.135557784)]
+)
+def test_a_touch_that_barely_happens_is_decided_by_finer_steps(seed, mass):
+    hit, truth = (grazing_blow(seed, mass)(tolerance=tolerance) for tolerance in (1e-2, 1e-8))
+    others = {grazing_blow(seed, factor * mass)(tolerance=1e-6).n_impacts for factor in (0.99, 1.0, 1.01)}
+    assert len(others) > 1  # the number does depend on the mass
+    assert hit.n_impacts == truth.n_impacts
+    assert_allclose(hit.contact_time, truth.contact_time, rtol=1e-2)  # the tolerance
+
+
+def test_the_tolerance_advised_is_met_and_hardly_looser_than_what_was_reached():
+    blow = grazing_blow(2, 0.0933117233)
+    with pytest.raises(fi.SimulationError, match="the step error stays at") as caught:
+        blow(tolerance=1e-9)
+    reached, advised = (
+        float(re.search(rf"{words} (\S+?),? ", f"{caught.value} ")[1]) for words in ("stays at", "raise tolerance to")
+    )
+    assert advised < 30.0 * reached  # steps twice as long, which may meet it, err 16 times more
+    assert blow(tolerance=advised).error.step < advised
