@@ -718,3 +718,15 @@ def test_the_tolerance_advised_is_met_and_hardly_looser_than_what_was_reached():
     )
     assert advised < 30.0 * reached  # steps twice as long, which may meet it, err 16 times more
     assert blow(tolerance=advised).error.step < advised
+
+
+@pytest.mark.parametrize("given", ["duration", "max_impacts"])
+def test_the_end_advised_to_a_run_without_end_leaves_room_for_finer_steps(monkeypatch, given):
+    monkeypatch.setattr(collision, "MAX_STEPS", 4000)
+    bodies, touches = [measured(3, 1), measured(3, 2)], [Touch(fi.Contact.linear(1e5), 0, 1, [0.0], [0.0])]
+    swing = {"states": [(np.zeros(3), np.full(3, 0.1)), (np.zeros(3), np.zeros(3))], "tolerance": 1e-6}
+    with pytest.raises(fi.SimulationError, match="no final separation") as caught:
+        collide(bodies, touches, **swing)
+    most = float(re.search(rf"{given} of at most (\S+)", str(caught.value))[1])
+    hit = collide(bodies, touches, **swing, **{given: type(2.0 if given == "duration" else 2)(most)})
+    assert hit.tolerance_met  # a run twice as long would need more steps than there may be
