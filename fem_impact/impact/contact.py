@@ -14,8 +14,6 @@ from .compiled.layout import DEPTH, EXPONENT, FIRST_YIELD, HARD, HARD_EXPONENT, 
 
 LOWEST_EXPONENT, HIGHEST_EXPONENT = 0.5, 100.0  # [-] limits: below, no longer a spring; above, a wall
 
-# [-] of its stiffness that felt is taken to keep in a guess of the contact time: otherwise all may relax
-LEAST_FELT = 1e-3
 MOST_LOSS = 1e12  # [s/m] far above that of a contact that swallows the slowest blow whole
 YIELDS = 1.6  # [-] fact: pressure at which a round contact first yields, over the yield strength, for nu = 0.3
 STIFFEST = 1e200  # [N/m**exponent] upper limit, 1/STIFFEST the lower: high exponents need huge stiffnesses
@@ -386,7 +384,7 @@ def acting_stiffness(law: Any, mobility: Any, speed: Any) -> np.ndarray:
     if kind == FELT:
         for _ in range(4):
             time = wall_time(whole, a, mobility, speed)
-            whole = k * np.maximum(1.0 - law[SHARE] * time / (time + law[RELAXATION]), LEAST_FELT)
+            whole = k * (law[RELAXATION] + (1.0 - law[SHARE]) * time) / (law[RELAXATION] + time)
         return whole
     energy = 0.5 * np.asarray(speed) ** 2 / np.asarray(mobility)  # [J]
     deepest = ((a + 1.0) * energy / k) ** (1.0 / (a + 1.0))  # [m] by the power law alone

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._base import check, markup
 from .._base.check import SimulationError
+from .._base.rounding import SAME
 from ..fe.variation import SectionChange
 from .compiled import record
 from .compiled.layout import EXPONENT, FIRST_YIELD, KIND
@@ -31,14 +32,12 @@ GRAZE = 1e-3  # [-] of the deepest approach: a touch or gap below it may come or
 TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a change of 1e-4 may make the other the largest
 # [-] times per contact at which a flight is searched for near misses or two motions are compared, and their most
 LOOKS = 16.0, 20_000
-STILL = 1e-9  # [-] of the fastest approach: bodies that rest against each other turn back more slowly, by rounding
 CUBIC = np.linspace(0.0, 1.0, 9) ** np.arange(4)[:, None]  # where in a piece of time its cubic is looked at, as powers
 # halving the steps brings these no sure gain
 ROUGH = "contact_time", "peak_time", "spectral_centroid", "spectral_level"
 # [-] difference of two runs over the error of the finer one, as order 2 leaves; order 1 for collocation, cautious
 RICHARDSON = {"A": 3.0, "A4": 3.0, "collocation": 1.0}
 INSTEAD = "take differences of runs with the number changed, told to a smaller tolerance"
-LEAST = 1e-9  # [-] of a derivative: what is left of differences of shapes, and two runs may agree by chance
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +167,7 @@ def gradients(
             gained = 1.0 if name in ROUGH else RICHARDSON[hit.scheme]
             if name == "peak_time":
                 apart = np.maximum(apart, fine.peak_doubt)
-            error = apart / gained + LEAST * np.abs(slopes)
+            error = apart / gained + SAME * np.abs(slopes)  # two runs may agree by chance
         label = name if band is None else f"{name}={band:g}"
         found[label] = Gradient(label, value, names, numbers, slopes, error)
     return found
@@ -325,7 +324,7 @@ class Way:
 def _nearly(way: Way, c: int) -> Iterator[tuple[str, float]]:
     """What barely happens at contact c, or barely does not, and by how much [m]."""
     depth, v, closed = way.between(c), way.rate[:, c], way.closed[:, c]
-    pressed, noise = runs(closed), STILL * float(np.abs(v).max())
+    pressed, noise = runs(closed), SAME * float(np.abs(v).max())
     yield "touch", min((float(depth[a:b].max()) for a, b in pressed), default=np.inf)
     parts = float(np.abs(depth[closed & (v[:-1] < -noise) & (v[1:] >= -noise)]).min(initial=np.inf))
     yield "gap", min([parts, *(float(-depth[a:b].min(initial=0.0)) for (_, a), (b, _) in pairwise(pressed) if b > a)])
@@ -341,7 +340,7 @@ def _yields(found: Sensitivity, c: int) -> float:
     if not len(ends):
         return np.inf
     d, v = found.found.way[:, c].T
-    noise = STILL * float(np.abs(v).max())
+    noise = SAME * float(np.abs(v).max())
     turns = (v[:-1] > noise) & (v[1:] <= noise) & ~found.pieces.yields[1:, c]
     last = np.searchsorted(ends, np.arange(len(turns)), side="right") - 1
     deepest = Way(found.time, found.found.way[:, :, 0], found.found.way[:, :, 1], found.pieces.closed).between(c)

@@ -34,8 +34,6 @@ PEAK_LOOKS = 16  # [-] samples per step in the search for the peak force; misses
 MOVED = {"displacement": 1e-2, "velocity": 3e-2}
 LASTS = 2.0  # [-] and no longer than this many times the run, as later echoes may be missing from all of them
 LOOKED_AT = 200  # [-] times at which this error is estimated, evenly among those asked for; more only cost time
-# [-] points per static solution: each is a load, and the cost grows with the pairs of points; fewer solve more often
-DIP_BLOCK = 8
 
 
 @dataclass(frozen=True)
@@ -757,7 +755,7 @@ class Response(Totals):
             ends = Ends(self.at[None], ((0, -1.0),), self._push, np.zeros((1, 1)), dip_force=self._push)
         if ends is None:
             return 0.0, 0.0
-        modes, n_ends = self._moved(body), len(ends.points)
+        modes = self._moved(body)
         times = check.array("times", times, (None,), "s", lift=True)
         found = [self.history.force_at(times, i) for i, _ in ends.touched]
         sign = np.array([sign for _, sign in ends.touched])
@@ -766,10 +764,9 @@ class Response(Totals):
         asked = modes.points("points", points)
         if not force.any() or not len(asked):
             return 0.0, 0.0
-        blocks = [asked[i : i + DIP_BLOCK] for i in range(0, len(asked), DIP_BLOCK)]
-        rest = np.vstack(
-            [modes.residual_compliance(np.vstack([ends.points, block]))[n_ends:, :n_ends] for block in blocks]
-        )  # (n_points, n_ends)
+        swings = modes.omega > 0.0
+        pushed, moved = (modes.shapes.at(place)[:, swings] / modes.omega[swings] for place in (ends.points, asked))
+        rest = modes.shapes.deflection(ends.points, asked) - moved @ pushed.T  # (n_points, n_ends)
         return force @ rest.T, rate @ rest.T
 
     @property

@@ -24,7 +24,6 @@ SHORTEST = 12  # [-] halvings of a frame that a step in contact may need: 5 ns a
 OPENING, CLOSING, FLIGHT = 5, 8, 2  # [-] halvings of that step to end at a release, at an onset, and in flight
 LASTING = 1.0  # [s] after which a stick that still rests on the body is lifted: a blow lasts some milliseconds
 AT_ONCE = 64  # [-] strokes in one block, far more than hands or a keyboard make; what comes on top waits for the next
-LOUDEST = 0.25  # [-] of full scale, reached by one stroke at full speed: four at once, one by each stick, do not clip
 
 
 class Stroke(NamedTuple):
@@ -50,6 +49,7 @@ class Player:
     fastest: float  # [m/s]
     striker: Striker  # with as many modes as the fastest stroke needs
     step: float  # [s] longest step in contact
+    sticks: int  # [-] most that are on the body at once
     gain: float  # [s/m] of samples
 
     def __init__(
@@ -82,7 +82,7 @@ class Player:
         self.points = modes.point("points", points[0]) if modes.dimension == 0 else _points(modes, points)
         self.rate = check.count("rate", rate, high=HIGHEST_RATE)
         self.block, self.fastest = check.count("block", block), check.positive("fastest", fastest, "m/s")
-        check.count("sticks", sticks, high=16)
+        self.sticks = check.count("sticks", sticks, high=16)
         needed = collision.striker_modes(striker, contact=contact, speed=fastest, tolerance=collision.TOLERANCE)[0]
         self.striker = striker if striker.fixed else collision.shortened(striker, needed)
         found = [

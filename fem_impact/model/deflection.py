@@ -33,7 +33,7 @@ LIMIT = 0.2  # [-] deflection over thickness at which the frequency of a hinged 
 SLIPS = 0.25  # [-] stretching of a plate whose edge may move in its plane over that of one whose edge may not
 # [-] instants of the blow, and of each period after it, where tension is found; ten times more or fewer pass the tests
 TIMES = 64
-RINGING = 1.5  # [-] tension that acts on a mode swinging alone, over the mean tension: 3/4 of its largest
+RINGING = 1.5  # [-] tension that acts on a mode swinging alone, over the mean tension, fact: 3/4 and 1/2 of its largest
 FRONT = 2.0 * np.pi  # [-] radius squared of the bent region over rate times time: where Si(r**2 / (4 rate t)) turns
 # [-] power of the slopes' share within the bent region: 2 on an endless plate, least errors on others; half and twice
 # pass the tests
@@ -46,8 +46,7 @@ SLIGHT = 0.03
 DENT = 0.7
 SLOWER = 3.0  # [-] a mode that is slower or faster than bending waves by this rocks or is pulled; wood differs by less
 NUMBER = "deflection over thickness"
-# [-] deflection over thickness beyond which no first-order estimate of the stretching helps; half and twice pass the
-# tests
+# [-] deflection over thickness beyond which no first-order estimate of the stretching helps
 GONG = 1.0
 # [-] the stress fields of a body that stretches over those left in the blow to compare with: half of them; half and
 # twice pass the tests
@@ -246,7 +245,7 @@ def _within(body: Known, area: np.ndarray) -> np.ndarray:
     if body.modes.dimension == 1:
         return np.ones(len(area))
     whole = np.pi * body.extent / np.maximum(area, ROUNDING * body.extent)  # 2 x at the edge
-    near, far = (np.euler_gamma + np.log(x) - special.sici(x)[1] for x in (np.pi, whole))
+    near, far = (np.euler_gamma + np.log(x) - special.sici(x)[1] for x in (0.5 * FRONT, whole))
     return near / far
 
 

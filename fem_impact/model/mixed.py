@@ -40,8 +40,8 @@ REACH = 2.0  # [-] the modes are needed up to this multiple of the frequency, wh
 # half and twice pass the tests
 RESOLVED = 1.25
 CHUNK = 2000  # [-] modes whose shares are found at a time, to limit memory
-# [-] first frequency tried, times mass and mobility, the time in which the striker slows down: five times its rate;
-# half and twice pass the tests
+# [-] angular frequency tried first, times mass and mobility, the time in which the striker slows down: five times its
+# rate, where a force hardly changes its speed
 SLOWING = 5.0
 # [-] duration of the blow to be expected, over mass times mobility: exp(-15) = 3e-7 of the speed is left then; half and
 # twice pass the tests
@@ -52,13 +52,9 @@ LONGEST = 1e4
 # [-] vectors that tell waves up to a frequency, per radian of its phase in that time: eight for each half turn; half
 # and twice pass the tests
 PER_RADIAN = 2.5
-# [-] limit on their number: half a minute on a mesh of 50 000 unknowns; ten times more or less passes the tests
+# [-] of these vectors at most, a time limit: half a minute on a mesh of 50 000 unknowns
 MOST_VECTORS = 1000
-# [-] damping ratio of the contact with an infinite plate, critical, from which vectors alone do not resolve it; half
-# and twice pass the tests
-HEAVY = 1.0
-# [rad] phase of the first echo at that frequency at least, a turn and a half: the plate is wider than the wave is long;
-# half and twice pass the tests
+# [rad] phase of the first echo at that frequency at least, a turn and a half: the plate is wider than the wave is long
 NEAR = 10.0
 
 

@@ -32,7 +32,7 @@ from .scene import Scene, load_scene
 CHECKED = 16  # [-] blows struck again one by one, as a sample: their worst shows an error that many have
 # [-] levels of an input of the body at which the body is made anew: nine tenths of its values lie between
 TAILS = (0.05, 0.95)
-# [-] default limit of a spread: some minutes of work, 1 GB of numbers; half and twice pass the tests
+# [-] default limit of a spread, to limit the work to some minutes and 1 GB of numbers
 MOST_BLOWS = 10**7
 PLACES = ("strike.x", "strike.y")  # inputs that move the strike point
 SIZE = "target.size"  # [-] factor on all lengths in the plane of a plate, or along a beam
