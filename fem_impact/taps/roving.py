@@ -341,7 +341,7 @@ def _views(
         outline = bodies.outline(target, stages)
         case = Case(outline, Striker.rigid(float(masses[0])), Contact.linear(1.0), points[0], SPEED)
         blows = [{"mass": float(mass), "stiffness": float(tip)} for mass, tip in zip(masses, stiffnesses)]
-        sized = bodies.Sized(target, case, blows, blows[:2], chooser.VECTORS, max_impacts=2)
+        sized = bodies.Sized(target, case, blows, blows[:2], chooser.TOLERANCE, max_impacts=2)
         seen = sized.views(points, stages)
         if seen is not None:
             return [seen[tuple(point.tolist())] for point in points]
