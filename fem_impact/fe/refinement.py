@@ -229,8 +229,8 @@ def _counted(system: System, flexibility: Flexibility, n: int, limit: float | No
             f"for {n + n_rigid} modes; {advice}"
         )
     more = min(n + (BLOCK if limit is None else 0), available)
-    for residual in (RESIDUAL, STRICT, STRICT):
-        values, vectors = lowest(flexibility, more, residual)
+    for allowed in (RESIDUAL, STRICT, STRICT):
+        values, vectors = lowest(flexibility, more, allowed)
         if more == available:
             return values[:n], vectors[:, :n]
         if limit is not None:

@@ -193,10 +193,11 @@ def refine(
     Notes
     -----
     Each block of cells has parabolas through its 3 x 3 nodes. Its quarters are computed at theirs; where these differ
-    from the parabolas by more than the time steps leave of the tolerance, have another number of impacts or failed, the quarters become
-    blocks. Otherwise the parabolas of the quarters fill them. The whole difference is added to the layer ``error``: the
-    parabolas of the quarters err by an eighth of it where the answer is smooth, by about all of it beside a kink. Last,
-    borders between numbers of impacts are followed until no interpolated cell is beside another number.
+    from the parabolas by more than the time steps leave of the tolerance, have another number of impacts or failed, the
+    quarters become blocks. Otherwise the parabolas of the quarters fill them. The whole difference is added to the
+    layer ``error``: the parabolas of the quarters err by an eighth of it where the answer is smooth, by about all of it
+    beside a kink. Last, borders between numbers of impacts are followed until no interpolated cell is beside another
+    number.
     """
     sheet = Sheet(shape, layers)
     blocks, turn = first_blocks(shape), 0
