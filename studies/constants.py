@@ -134,6 +134,10 @@ def limits_in(tree: ast.Module, module: str) -> set[str]:
             names = {f"{module}.{each.id}" for each in inside if isinstance(each, ast.Name)}
             names |= {ast.unparse(each) for each in inside if isinstance(each, ast.Attribute)}
             told |= {each for each in names if not refused or re.search(r"\.(MOST|LARGEST|LONGEST)_", each)}
+    for node in ast.walk(tree):  # those of another module, which owns them
+        if isinstance(node, ast.ImportFrom):
+            owner = (node.module or "").rpartition(".")[2]
+            told |= {f"{owner}.{each.name}" for each in node.names if f"{module}.{each.name}" in told}
     return told
 
 

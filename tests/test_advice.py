@@ -345,8 +345,8 @@ ADVICE = {  # what fails, the message, and what it advises
     ),
     "modes beyond the unknowns": (
         lambda _: fi.find_modes(fi.assemble(SQUARE, PLATE, HELD), n_modes=20),
-        "elements of 0.04 m suffice",
-        lambda _: fi.find_modes(fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.04), PLATE, HELD), n_modes=20),
+        "elements of 0.02 m suffice",
+        lambda _: fi.find_modes(fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.02), PLATE, HELD), n_modes=20),
     ),
     "a flat contact far away": (
         lambda _: chained(gap=1e9),

@@ -35,9 +35,8 @@ ELEMENTS: dict[str, tuple[str, ...]] = {
 HOLDS = {"hinged": 3, "clamped": 6}  # unknowns of a thin plate that a held facet and its first vertex take away
 MORLEY_ORDER = 4  # [-] order of the quadrature on Morley elements; exact for products of quadratics
 MASS_ORDER = 10  # [-] order of the quadrature on Argyris elements; exact for products of quintics
-# [-] ratio of triangle sizes above which eigenvalues come from the strain energy: rounding in K grows as its square
-UNEVEN = 20.0
-# [-] the same if the smallest triangle is below this fraction of the extent; larger ones keep digits enough in K
+# [-] smallest triangle over the extent below which eigenvalues come from the strain energy: rounding in K grows as the
+# size to the power -2, and larger triangles leave 1e-11
 TINY = 4e-3
 
 
@@ -83,7 +82,7 @@ def curvatures(hessian: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Strain:
-    """Data to compute the strain energy of a plate from curvatures, for meshes so uneven that K loses digits.
+    """Data to compute the strain energy of a plate from curvatures, where triangles are so small that K loses digits.
 
     The stiffness of a triangle grows with its size to the power -2, so the rounding of K in the smallest triangles
     affects the total energy. Curvature squared times area is equally accurate in all triangles.
@@ -674,11 +673,11 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict, masses: Attached
         springs = springs + _scatter(slope.reshape(shape).transpose(0, 2, 1) @ pulled.reshape(shape), dofs, n_all)
     matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), springs
     area = np.abs(np.linalg.det(space.jacobian))
-    uneven = area.min() < max(area.max() / UNEVEN**2, TINY**2)
+    tiny = area.min() < TINY**2
     return _supported(
         masses, matrices, (expand, project), mesh=mesh, section=section, supports=supports, element="argyris",
         mass=float(weighted[1].sum()) * frame.mass, frame=frame, element_dofs=dofs, space=space, softness=softness,
-        rim=rim, strain=Strain(x, weighted[0], springs.tocsc()) if uneven else None,
+        rim=rim, strain=Strain(x, weighted[0], springs.tocsc()) if tiny else None,
     )  # fmt: skip
 
 
@@ -714,12 +713,12 @@ def _assemble_thick(mesh: Mesh, section: Plate, supports: dict, masses: Attached
         springs = springs + _scatter(pushed, dofs[:, cells], n_all)
     matrices = _scatter(K, dofs, n_all), _scatter(M, dofs, n_all), springs
     area = np.abs(np.linalg.det(space.jacobian))
-    uneven = area.min() < max(area.max() / UNEVEN**2, TINY**2)
+    tiny = area.min() < TINY**2
     return _supported(
         masses, matrices, (expand, project), mesh=mesh, section=section, supports=supports,
         element="argyris and shear", mass=float(fields.inertia.sum()) * frame.mass, frame=frame, element_dofs=dofs,
         space=space, softness=softness, rim=replace(rim, kinds=kinds),
-        strain=ThickStrain(fields, springs.tocsc()) if uneven else None,
+        strain=ThickStrain(fields, springs.tocsc()) if tiny else None,
     )  # fmt: skip
 
 

@@ -21,13 +21,8 @@ NARROW = 4  # [-] the same for a beam, which has no multiple modes: 8 was 20 % s
 # [-] relative residual allowed for a Ritz vector; the eigenvalue's error is its square, 1e-14, which is near rounding
 RESIDUAL = 1e-7
 STRICT = 1e-11  # [-] relative residual allowed when the first search missed modes: rounding leaves 1e-12
-# [-] extra modes computed to find a gap after the last one wanted: a cluster of more takes a second search; half and
-# twice pass the tests
-SPARE = 6
 FIRST_SLICE = 24  # [-] modes found with shift zero; their eigenvalues span five decades and keep ten digits
 SLICE = 50  # [-] modes found with each further shift: 30 were 10 % slower, 80 were 40 % slower
-# [-] relative changes of a shift, tried in turn where the factorisation fails: far below CLUSTER, far above rounding
-NUDGES = 0.0, SAME, -SAME
 # [-] eigenvalues with a smaller relative distance count as equal: far above their errors, below what meshes tell apart
 CLUSTER = 1e-6
 
@@ -56,7 +51,7 @@ def factorise(A: Sparse) -> Any:
 
 def count_below(K: Sparse, M: Sparse, shift: float) -> int:
     """Count the eigenvalues below a shift from the signs of the pivots of K - shift M (Sylvester's law of inertia)."""
-    for nudge in NUDGES:  # if a pivot happens to vanish, SuperLU takes one off the diagonal and the signs are useless
+    for nudge in (0.0, SAME, -SAME):  # if a pivot happens to vanish, SuperLU takes one off the diagonal: useless signs
         lu = factorise(K - shift * (1.0 + nudge) * M)
         if np.array_equal(lu.perm_r, lu.perm_c):
             return int(np.count_nonzero(lu.U.diagonal() < 0.0))

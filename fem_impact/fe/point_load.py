@@ -10,13 +10,11 @@ from ..mesh.meshes import Mesh
 from . import beam_elements, residual
 from .assembly import System, reassemble
 from .eigenvalues import Flexibility
-from .refinement import COARSER
+from .refinement import CHEAP_CELLS, COARSER
 
-# [-] approximate number of triangles in the first mesh: the load has a mesh of its own, so the rest may be coarse
-CELLS = 600
 GOAL = 1e-5  # [-] refinement stops at this relative error of the compliance: a tenth of the default tolerance
 SPREAD = 4e-4  # [-] error of the points that stand for a spread force on a thick plate, times 2 pi the shear stiffness
-ROUNDS = 3  # [-] most meshes tried, each with half the element size: 600, 2 400 and 9 600 triangles; more would be slow
+ROUNDS = 3  # [-] most meshes tried, each with half the element size: 700, 2 800 and 11 200 triangles; a fourth is slow
 ROUNDING = 1e-7  # [-] relative rounding error of a plate's compliance, caused by the smallest triangles
 # [-] a point whose compliance in the frame is below this lies on a support: rounding of the solution leaves as much
 RESTS = 1e-15
@@ -68,7 +66,7 @@ def _compared(system: System, loads: np.ndarray) -> Deflection:
     """`static_deflection` of a thick plate; its error comes from a second mesh."""
     mesh = _coarse(system.mesh)
     finer = mesh.refined(COARSER)
-    if len(mesh.cells) > CELLS and len(mesh.refined(1.0 / COARSER).cells) < len(mesh.cells):
+    if len(mesh.cells) > CHEAP_CELLS and len(mesh.refined(1.0 / COARSER).cells) < len(mesh.cells):
         mesh, finer = mesh.refined(1.0 / COARSER), mesh
     with_fewer = _solved(system, mesh, loads).compliance.diagonal()
     found = _solved(system, finer, loads)
@@ -81,9 +79,9 @@ def _compared(system: System, loads: np.ndarray) -> Deflection:
 
 def _coarse(mesh: Mesh) -> Mesh:
     """The same body with fewer triangles, or unchanged if it cannot be meshed again."""
-    if mesh.recipe is None or mesh.dimension == 1 or len(mesh.cells) <= 2 * CELLS:
+    if mesh.recipe is None or mesh.dimension == 1 or len(mesh.cells) <= 2 * CHEAP_CELLS:
         return mesh
-    coarse = mesh.refined((CELLS / len(mesh.cells)) ** 0.5)
+    coarse = mesh.refined((CHEAP_CELLS / len(mesh.cells)) ** 0.5)
     return coarse if len(coarse.cells) < len(mesh.cells) else mesh
 
 

@@ -15,15 +15,12 @@ from ..mesh import mesh_files
 from ..mesh.meshes import MOST_CELLS, Mesh
 from . import residual, thick
 from .assembly import THICK, System, assemble, reassemble
-from .eigenvalues import FIRST_SLICE, RESIDUAL, SPARE, STRICT, Flexibility, by_slices, count_below, lowest
+from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, lowest
 from .section import Plate
 
 ARGYRIS = "argyris", "argyris and shear"
 # [-] ratio of element sizes whose frequencies are compared, and order: less than half the unknowns, errors times five
 COARSER, COMPARED = 1.5, 4.0
-# [-] least ratio of sizes found on the two meshes: errors then differ by 2.9; closer ones agree by chance; half and
-# twice pass the tests
-APART = 1.3
 # [rad] largest k h: error 1e-5, 1e-12 on beams
 WAVE_PER_ELEMENT = {
     "argyris": 1.8, "hermite": 30.0, "morley": 0.2, "argyris and shear": 1.8, "hermite and shear": 30.0,
@@ -37,17 +34,13 @@ CLAIMED = 2.0  # [-] factor on error estimates, which are 0.3 to 4 times the tru
 # [-] factor on the rounding error of K, estimated as a random walk: three standard deviations of one; half and twice
 # pass the tests
 ROUNDED = 3.0
-# [-] smallest relative error stated for a frequency; the eigensolver leaves about this much; ten times more or less
-# passes the tests
-LEAST = 1e-14
 MORLEY = 0.2574578  # [-] error constant of Morley interpolation, over h**2 (Carstensen and Gallistl 2014)
 # [-] unknowns of the Morley solution for the lower bounds; cheap beside the modes themselves; ten times more or less
 # passes the tests
 MORLEY_UNKNOWNS = 20_000
 # [rad] as WAVE_PER_ELEMENT, if CHEAP_CELLS triangles suffice: error 2e-7, clamped 1e-5; half and twice pass the tests
 FINE_WAVE = 1.1
-# [-] triangles that take little time to solve, so that fewer are not worthwhile; ten times more or less passes the
-# tests
+# [-] triangles that take little time to solve, so that fewer are not worthwhile; point loads start with as many
 CHEAP_CELLS = 700
 # [-] largest element under tension, in edge layers sqrt(D / tension): error 1e-5 on a disk; half and twice pass the
 # tests
@@ -62,11 +55,8 @@ MOST_UNKNOWNS = 150_000  # [-] refinement gives up beyond this size
 DOFS_PER_AREA = {
     "argyris": 10.4, "hermite": 2.0, "argyris and shear": 47.0, "hermite and shear": 4.0,
 }  # fmt: skip
-# [-] fraction of the tolerance that the first mesh aims at: nearly all, as ERROR_OF_WAVE is an upper bound; half and
-# twice pass the tests
-AIM = 0.9
-# [-] fraction of the tolerance that later meshes aim at: less makes them finer than needed, more often takes another;
-# half and twice pass the tests
+# [-] fraction of the tolerance that meshes after the first aim at: less makes them finer than needed, more often takes
+# another; half and twice pass the tests
 MARGIN = 0.6
 # [-] powers of the size with which both parts of the error fall: 8 of smooth shapes less a reserve, and at curved rims;
 # half and twice pass the tests
@@ -79,14 +69,6 @@ MOST_MESHES = 8
 # [-] corners are added to the estimate above this: rings leave 1e-7, or 6e-4 in a free corner of an L, 2e-3 at a slit;
 # ten times more or less passes the tests
 SAY = 1e-3
-# [-] unknowns per mode on a mesh proposed because another was too coarse: all modes exist; at 40 they are right; half
-# and twice pass the tests
-ROOMY = 8.0
-# [-] attempts to find every mode of a cluster: from the second on with four times as many spare modes, more strictly
-SEARCHES = 3
-# [-] a mesh file's elements are replaced by larger ones if they can grow by this factor: half as many triangles; half
-# and twice pass the tests
-STEP = 2.0**0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +188,8 @@ def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarr
         parts[:2, flexible] = CLAIMED * 0.5 * residual.energy_errors(system, vectors, vectors * values) / values
     squares = system.K.multiply(system.K)
     rounding = 0.5 * np.finfo(float).eps * np.sqrt(np.einsum("ij,ij->j", vectors**2, squares @ vectors**2)) / values
-    parts[2, flexible] = ROUNDED * rounding + LEAST + (system.unresolved if system.unresolved > SAY else 0.0)
+    corners = system.unresolved if system.unresolved > SAY else 0.0
+    parts[2, flexible] = ROUNDED * rounding + RESIDUAL**2 + corners  # the second is what the eigensolver leaves
     return parts
 
 
@@ -221,7 +204,7 @@ def _compared(system: System, omega: np.ndarray) -> np.ndarray:
     for factor in (1.0 / COARSER, COARSER, COARSER**2):  # where edges curve, coarser meshes may be no coarser there
         other = mesh.refined(factor)
         ratio = (len(other.cells) / len(mesh.cells)) ** 0.5
-        if max(ratio, 1.0 / ratio) > APART and (factor > 1.0 or len(other.cells) > n_modes):
+        if max(ratio, 1.0 / ratio) > COARSER**0.5 and (factor > 1.0 or len(other.cells) > n_modes):
             break
     again = _pairs(reassemble(system, other, layer=system.layer / factor), n_modes, None)[1]
     return np.abs(again - omega) / np.abs(ratio**-COMPARED - 1.0)
@@ -232,22 +215,22 @@ def _counted(system: System, flexibility: Flexibility, n: int, limit: float | No
 
     If a limit is given, n is the number of modes below it. Otherwise inertia confirms the number below a gap after the
     last mode. In a dense cluster the first search may miss some modes; it is then repeated for more modes, with a
-    stricter residual.
+    stricter residual, twice at most.
     """
     n_rigid = flexibility.rigid.shape[1]
     available = system.n_dofs - n_rigid
     if n > available:
-        shrink = (ROOMY * n / max(1, available)) ** (1.0 / system.mesh.dimension)
-        advice = f"elements of {system.mesh.size / shrink:.1g} m suffice"
-        if len(system.mesh.cells) * shrink**system.mesh.dimension > MOST_CELLS:
+        size = size_for(system, n + n_rigid, None, None)
+        advice = f"elements of {size:.1g} m suffice"
+        if len(system.mesh.cells) * (system.mesh.size / size) ** system.mesh.dimension > MOST_CELLS:
             advice = "no mesh allowed has enough"
         raise ValueError(
             f"size must be smaller or n_modes lower: elements of {system.mesh.size:g} m have {system.n_dofs} unknowns "
             f"for {n + n_rigid} modes; {advice}"
         )
-    more, residual = min(n + (SPARE if limit is None else 0), available), RESIDUAL
-    for _ in range(SEARCHES):
-        values, vectors = lowest(flexibility, more, residual)
+    more = min(n + (BLOCK if limit is None else 0), available)
+    for allowed in (RESIDUAL, STRICT, STRICT):
+        values, vectors = lowest(flexibility, more, allowed)
         if more == available:
             return values[:n], vectors[:, :n]
         if limit is not None:
@@ -258,7 +241,7 @@ def _counted(system: System, flexibility: Flexibility, n: int, limit: float | No
             below, found = count_below(system.K, system.M, 0.5 * (values[at] + values[at + 1])) - n_rigid, at + 1
         if below == found:
             return values[:n], vectors[:, :n]
-        more, residual = min(max(below, more) + 4 * SPARE, available), STRICT
+        more = min(max(below, more) + 4 * BLOCK, available)
     raise check.SimulationError(
         f"{below} flexible modes lie below {np.sqrt(values[min(n, more) - 1]) * system.frame.rate / 2 / np.pi:g} Hz, "
         f"but {found} were found; ask for a few more modes"
@@ -295,7 +278,7 @@ def size_for(system: System, n_modes: int | None, max_frequency: float | None, t
     wave = _wave(system, n_modes, max_frequency)
     size = WAVE_PER_ELEMENT[system.element] / wave
     if system.element in ARGYRIS and tolerance is not None:
-        size = _wave_per_element(AIM * tolerance) / wave
+        size = _wave_per_element(tolerance) / wave
     elif system.element in ARGYRIS:  # a few modes cost little, so find them more accurately
         affordable = (2.3 * system.mesh.area / CHEAP_CELLS) ** 0.5
         size = min(size, max(affordable, FINE_WAVE / wave))
@@ -371,7 +354,7 @@ def _needed(parts: np.ndarray, goal: float) -> float:
 def _start(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> System:
     """The system on the mesh expected to meet a tolerance if its edges and corners need no finer one."""
     mesh, size = system.mesh, size_for(system, n_modes, max_frequency, tolerance)
-    if mesh.size_stated or size <= STEP * mesh.size or len(mesh.cells) <= CHEAP_CELLS:
+    if mesh.size_stated or size <= mesh.size or len(mesh.cells) <= CHEAP_CELLS:
         return fine_enough(system, n_modes, max_frequency, tolerance)
     coarse = mesh.refined(mesh.size / size)  # a mesh file much finer than needed
     return reassemble(system, coarse) if len(coarse.cells) < len(mesh.cells) else system

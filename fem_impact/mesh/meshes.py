@@ -112,7 +112,7 @@ def _element_size(size: float | None, default: float) -> tuple[float, bool]:
     return (default, False) if size is None else (check.positive("size", size, "m"), True)
 
 
-def _check_affordable(cells: float, size: float, most: int = MOST_CELLS) -> None:
+def _check_affordable(cells: float, size: float, most: int) -> None:
     if cells > most:
         raise ValueError(f"size must be larger: {size:g} m gives about {cells:.1g} elements, more than {most}")
 
@@ -132,7 +132,7 @@ def rectangle(length: float, width: float, *, size: float | None = None) -> Mesh
     width = check.positive("width", width, "m")
     short, long = sorted((length, width))
     size, stated = _element_size(size, max(short / DEFAULT_DIVISIONS, long / LONG_DIVISIONS))
-    _check_affordable(2.0 * (length / size + 1.0) * (width / size + 1.0), size)
+    _check_affordable(2.0 * (length / size + 1.0) * (width / size + 1.0), size, MOST_CELLS)
     least = 1 if stated else 2
     nx, ny = max(least, round(length / size)), max(least, round(width / size))
     x, y = np.meshgrid(np.linspace(0.0, length, nx + 1), np.linspace(0.0, width, ny + 1), indexing="ij")
@@ -182,7 +182,7 @@ def fill(outline: Outline, *, size: float | None = None) -> Mesh:
         raise ValueError(problem)
     size, stated = _element_size(size, extent(outline.outer) / DEFAULT_DIVISIONS)
     around = polyline(outline.outer, extent(outline.outer) / 50.0)
-    _check_affordable(2.0 * abs(signed_area(around)) / size / size, size)
+    _check_affordable(2.0 * abs(signed_area(around)) / size / size, size, MOST_CELLS)
     arrays = triangulate(outline, size)
     return Mesh(**arrays, recipe=partial(fill, outline), size=size, size_stated=stated)
 
@@ -382,7 +382,7 @@ def pierced(mesh: Mesh, holes: Sequence[tuple[np.ndarray, float]], *, size: floa
     if problem:
         raise ValueError(f"point_supports must leave room for each clamp, inside the body and apart: {problem}")
     size, stated = (mesh.size, mesh.size_stated) if size is None else (size, True)
-    _check_affordable(2.0 * mesh.area / size / size, size)
+    _check_affordable(2.0 * mesh.area / size / size, size, MOST_CELLS)
     arrays = triangulate(whole, size)
     parts = arrays["edges"]
     if known is None:
@@ -427,7 +427,7 @@ def _resized(mesh: Mesh, *, size: float) -> Mesh:
     if ratio >= 1.0 - 1e-9 and 2.0 ** np.ceil(np.log2(ratio) - 1e-9) < OVERSHOOT * ratio:
         return replace(_divided(mesh, size=size), recipe=partial(_resized, mesh))
     around = _facets_outline(mesh)
-    _check_affordable(2.0 * mesh.area / size / size, size)
+    _check_affordable(2.0 * mesh.area / size / size, size, MOST_CELLS)
     try:
         arrays = None if crossed(around) else triangulate(around, size)
     except check.SimulationError:
@@ -442,7 +442,7 @@ def _resized(mesh: Mesh, *, size: float) -> Mesh:
 
 def _divided(mesh: Mesh, *, size: float) -> Mesh:
     """The mesh with its triangles split in four until their size is at most ``size`` [m]."""
-    _check_affordable(len(mesh.cells) * (mesh.size / size) ** 2, size)
+    _check_affordable(len(mesh.cells) * (mesh.size / size) ** 2, size, MOST_CELLS)
     fine = mesh
     for _ in range(max(0, int(np.ceil(np.log2(mesh.size / size) - 1e-9)))):
         fine = _quartered(fine)

@@ -31,7 +31,7 @@ from scipy.fft import irfft2, next_fast_len, rfft2
 from scipy.linalg import block_diag, eigh
 
 from .._base import check
-from .._base.rounding import SAME
+from .._base.rounding import EPSILON, SAME
 from ..fe import plausible
 from ..mesh.meshes import measure
 from .modal import Modes, Shapes
@@ -41,13 +41,11 @@ DENSITY, SPEED = 1.204, 343.2  # [kg/m^3], [m/s] fact: of air at 20 degrees C an
 PER_WAVE = 8.0
 FEWEST = 24.0  # [-] cells across a square as large as the plate, at least: cells at the rim cover a sixth of it
 SAMPLES = 2, 3  # [-] points across a cell over which a shape is averaged, fine and coarse: both use one set of points
-COARSER = SAMPLES[1] / SAMPLES[0]  # [-] cell size of the coarse grid, which tells the error, over that of the fine one
 # [-] modes solved at the same few frequencies, and modes beside it that air may mix in: far ones swing too differently
 BLOCK = 24
 NODES = 4  # [-] frequencies per block between which the integrals, smooth in frequency, are interpolated by a cubic
 # [-] the frequencies of a block are chosen anew from its modes in air so many times: they move less each time
 TURNS = 3
-FAR = 100.0  # [-] cells from which 1 / R between two cells is taken at their centres: errs by 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,8 +137,9 @@ def in_air(
     found, other = (_Air(modes, _strengths(samples, spacing, n), n * spacing, weight, speed) for n in SAMPLES)
     omega, own = found.solved()
     shift = other.solved()[0] / omega - 1.0
-    mix = _complete(own, modes.omega[modes.n_rigid :], omega) * (1.0 - shift / (COARSER**2 - 1.0))
-    omega *= 1.0 - shift / (COARSER**2 - 1.0)  # the error of square cells shrinks with their area
+    better = 1.0 - shift / ((SAMPLES[1] / SAMPLES[0]) ** 2 - 1.0)  # the error of square cells shrinks with their area
+    mix = _complete(own, modes.omega[modes.n_rigid :], omega) * better
+    omega *= better
     radiated = np.array([found.resistance(shape, x) / (2.0 * x) for shape, x in zip(own.T, omega)])
     doubt, side = np.abs(shift), "both sides" if sides == 2 else "one side"
     note = f"air of {density:g} kg/m^3 on {side}, with a rigid wall around the plate"
@@ -278,4 +277,5 @@ def mean_inverse_distance(nx: int, ny: int) -> np.ndarray:
     for axis in (0, 1):  # the fourth derivative by both coordinates, twice each, is 1 / R
         whole = np.diff(whole, 2, axis=axis)
     distance = distance[1:-1, 1:-1]
-    return np.where(distance > FAR, 1.0 / np.maximum(distance, 1.0), whole)
+    far = 0.5 * EPSILON ** (-1 / 6)  # rounding, 3 EPSILON R**4, then exceeds what the centres miss, R**-2 / 12
+    return np.where(distance > far, 1.0 / np.maximum(distance, 1.0), whole)

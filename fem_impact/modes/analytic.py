@@ -1,5 +1,6 @@
 """Modes from closed formulas, in the same type as FE modes, so that each can check the other."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
@@ -10,6 +11,7 @@ from scipy import special
 from scipy.optimize import elementwise
 
 from .._base import check
+from .._base.rounding import EPSILON
 from ..fe import plausible
 from ..fe.assembly import support_of_facets
 from ..fe.section import KINDS, Beam, Plate
@@ -18,21 +20,17 @@ from . import timoshenko
 from .modal import BeamlikeShapes, Damping, Modes, Shapes, damping_ratios
 from .timoshenko import ENDS
 
-# [-] image forces beyond each shorter side of a hinged plate; the n-th contributes exp(-2 pi n), the seventh 8e-20
-IMAGES = 6
+# [-] fact: image forces beyond each shorter side of a hinged plate until rounding, as the n-th gives exp(-2 pi n)
+IMAGES = math.ceil(-math.log(EPSILON) / (2.0 * np.pi))
 # [-] distance x below which polylogarithms are summed as power series, as (x / 2 pi)**n, beyond as exp(-n x)
 NEAR_POLE = 1.0
 POWERS = np.append(2, np.arange(3, 60, 2))  # [-] fact: exponents of these series; all other coefficients are zero
 SERIES: np.ndarray = (
     (-1.0) ** POWERS * special.bernoulli(60)[POWERS - 1] / (POWERS - 1.0) / special.factorial(POWERS)
 )  # zeta(2-k)/k!
-POLYLOG_TERMS = 40  # [-] terms of the direct sum used beyond NEAR_POLE; the next one is about exp(-40)
-FAR = 4.0  # [-] distance x from which a quarter of the terms is summed: the eleventh is exp(-44), too
 DISK_TERMS = 100_000  # [-] most terms summed at the edge of a disk, where they only fall as n**-3; error 5e-11
 MOST_MODES = 1_000_000  # [-] largest number of modes of a rectangle or beam; they take a few seconds
 MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a root search
-# [-] half-wave number pairs tried on a rectangle; pi / 4 of them lie in the ellipse of modes, three times MOST_MODES
-MOST_PAIRS = 4 * MOST_MODES
 SHEAR_RATIO = 2.6  # [-] fact: E / G of an isotropic material with nu = 0.3
 ROUND = 0.886  # [-] shear coefficient of a round section, nu = 0.3 (Cowper 1966); 0.857 at nu = 0, 0.9 at 0.5
 LIMIT = 1e5  # [-] largest slenderness of a Timoshenko beam: beyond, shear is below rounding
@@ -120,7 +118,7 @@ def _physical(
     return mass, float(np.sqrt(rigidity / mass))
 
 
-def _check_number(about: float, most: int = MOST_MODES) -> None:
+def _check_number(about: float, most: int) -> None:
     """Raise ValueError if more than ``most`` modes lie below max_frequency."""
     if about > most:
         raise ValueError(f"max_frequency must give at most {most} modes of this body, got about {about:.2g}; lower it")
@@ -132,7 +130,7 @@ def _enough(
     physical: tuple[float, float] | None,
     first_frequency: float | None,
     first: float,
-    most: int = MOST_MODES,
+    most: int,
 ) -> tuple[int, float]:
     """Largest number of modes and largest omega (at unit mass and rigidity); the one not asked for is no limit.
 
@@ -241,9 +239,10 @@ def _decaying_cosines(x: np.ndarray, angle: np.ndarray) -> np.ndarray:
     np.multiply.accumulate(powers[1:], out=powers[1:])
     series = gap * (SERIES @ powers) + u * ((SERIES / (POWERS + 1.0)) @ powers)
     result[near] = (0.5 * u**2 * (1.5 - log) + gap * u * (1.0 - log) + series).real
-    for part, n_terms in ((~near & (x < FAR), POLYLOG_TERMS), (x >= FAR, int(POLYLOG_TERMS / FAR))):
-        if part.any():
-            result[part] = _falling_cosines(x[part], angle[part], n_terms)
+    octave = np.floor(np.log2(np.where(near, 1.0, x)))
+    for each in np.unique(octave[~near]):
+        part = ~near & (octave == each)  # where terms fall at least as exp(-m 2**each), to rounding
+        result[part] = _falling_cosines(x[part], angle[part], math.ceil(-math.log(EPSILON) / 2.0**each))
     return result
 
 
@@ -305,13 +304,13 @@ def rectangle(
     def omega(m, n):
         return np.pi**2 * ((m / length) ** 2 + (n / width) ** 2) * root_area
 
-    count, reach = _enough(n_modes, max_frequency, physical, first_frequency, float(omega(1, 1)))
+    count, reach = _enough(n_modes, max_frequency, physical, first_frequency, float(omega(1, 1)), MOST_MODES)
     if not np.isfinite(reach):  # start from Weyl's law, then raise the limit until there are enough modes
         reach = 4.0 * np.pi * (count + 2.0) / root_area
         while _lattice(length, width, reach / root_area, count)[0].size < count:
             reach *= 1.3
     m, n = _lattice(length, width, reach / root_area, count)
-    _check_number(min(len(m), count))
+    _check_number(min(len(m), count), MOST_MODES)
     order = np.lexsort((n, m, omega(m, n)))[:count]
     if not order.size:
         raise ValueError(f"max_frequency must reach the first mode, got {max_frequency:g} Hz")
@@ -326,8 +325,8 @@ def _lattice(length: float, width: float, wavenumber_squared: float, most: int) 
     """Half-wave numbers (m, n), each at most ``most``, with wavenumber**2 up to ``wavenumber_squared`` [1/m^2]."""
     limit = wavenumber_squared * (1.0 + 1e-12)
     size = [int(min(most, side * np.sqrt(limit) / np.pi + 1.0)) for side in (length, width)]
-    if size[0] * size[1] > MOST_PAIRS:
-        _check_number(size[0] * size[1])
+    if size[0] * size[1] > 4 * MOST_MODES:  # more than `rectangle` tries for as many modes as are allowed
+        _check_number(size[0] * size[1], MOST_MODES)
     m, n = (grid.ravel() for grid in np.meshgrid(*(np.arange(1, k + 1) for k in size), indexing="ij"))
     keep = np.pi**2 * ((m / length) ** 2 + (n / width) ** 2) <= limit
     return m[keep], n[keep]
@@ -490,9 +489,9 @@ def beam(
         return replace(modes, thick=True)
     rigid = _beam_rigid(pair)
     first = float(_beam_roots(pair, 1)[0] ** 2)
-    count, reach = _enough(n_modes, max_frequency, physical, first_frequency, first)
+    count, reach = _enough(n_modes, max_frequency, physical, first_frequency, first, MOST_MODES)
     if np.isfinite(reach):
-        _check_number(np.sqrt(reach) / np.pi)
+        _check_number(np.sqrt(reach) / np.pi, MOST_MODES)
         count = len(rigid) + int(np.count_nonzero(_beam_roots(pair, int(np.sqrt(reach) / np.pi) + 2) ** 2 <= reach))
     if count <= len(rigid):
         raise ValueError(f"n_modes must exceed the {len(rigid)} rigid motions; max_frequency must reach a bending mode")
@@ -684,7 +683,7 @@ def _disk_green(edge: str, nu: float, place: np.ndarray, load: np.ndarray) -> fl
     if edge == "clamped":
         return clamped
     decay = r * rho
-    terms = DISK_TERMS if decay > 1.0 - 4e-4 else int(np.log(1e-17) / np.log(max(decay, 1e-3))) + 6
+    terms = min(DISK_TERMS, int(np.log(1e-17) / np.log(np.clip(decay, 1e-3, 1.0 - EPSILON))) + 6)
     n = np.arange(terms)
     wave = np.where(n == 0, 1.0, 2.0) * rho**n * np.cos(n * gamma)
     if edge == "hinged":

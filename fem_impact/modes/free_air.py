@@ -36,7 +36,9 @@ from .modal import Modes, Shapes
 LOG = logging.getLogger(__name__)
 # [-] cells across a square as large as the plate, in the lattices to choose of: next ones are 1.8 to 2.3 times as large
 ACROSS = 48.0, 64.0, 96.0, 128.0
-RESIDUAL = 3e-3  # [-] relative, of the solved equations: a thirtieth of LEAST
+# [-] relative, of the solved equations: a thirtieth of LEAST; smaller parts of the operator are not inverted either,
+# which only speeds up the solution
+RESIDUAL = 3e-3
 # [-] over the half space in front where two lattices are compared beside the listener's: one may agree by chance
 DIRECTIONS = 12
 DOUBT = 2.5  # [-] half width of an estimate over half the difference of the two lattices; test_free_air.py
@@ -44,8 +46,6 @@ DOUBT = 2.5  # [-] half width of an estimate over half the difference of the two
 LEAST = 0.1
 NEAREST = 2.0  # [-] cells of the coarsest lattice from the plate to a listener, at least: nearer, it could tell them
 TURNS, ROUNDS = 50, 8  # [-] iterations between restarts, and restarts; ten iterations are usual
-# [-] part of the lattice's operator below which its inverse, which only speeds up the solution, is not taken
-SMALLEST = 1e-3
 
 
 class Jumps(NamedTuple):
@@ -163,7 +163,7 @@ class Sheet:
         apart = np.where(self.distance > 0.0, self.distance, 1.0)
         swing = np.where(self.distance > 0.0, np.expm1(1j * wave * self.distance) / apart, 1j * wave)
         operator = fft2((self.inverse + swing) * self.size**4 / (4.0 * np.pi)) * (self.slopes - wave**2)
-        least = SMALLEST * np.abs(operator).max()
+        least = RESIDUAL * np.abs(operator).max()
         inverse = 1.0 / np.where(np.abs(operator) > least, operator, least)
         square = 2 * acceleration.shape
         whole, rough = (

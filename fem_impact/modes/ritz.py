@@ -19,6 +19,7 @@ import numpy as np
 from scipy.linalg import eigh_tridiagonal
 
 from .._base import check
+from .._base.rounding import SAME
 from ..fe import point_load
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise, one_thread
@@ -26,9 +27,8 @@ from .modal import Damping, Modes, Shapes, damping_notes, damping_ratios
 
 PIECE = 2**20  # [byte] of earlier vectors taken at a time: fits into the cache of a core
 DRIFT = 1e-11  # [-] overlap with earlier vectors above which they are removed more often; Ritz values err by its square
-# [-] a new vector shorter than this part of its length before orthogonalisation adds nothing: far below any direction
-DEPENDENT = 1e-10
-# [-] vectors that there is room for, over those wanted: taking more later copies all, which so happens seldom
+# [-] vectors that there is room for, over those wanted: taking more later copies all, which so happens seldom and is
+# faster
 ROOM = 2.0
 # [-] part of the vectors with which a second blow tells the error: at the third power it errs 2.9 times more
 FEWER = 0.7
@@ -149,7 +149,7 @@ class Krylov:
             length = np.sqrt((overlap**2).sum(axis=0) + gram.diagonal())  # before `overlap` was removed
             scaled = gram / np.outer(length, length)
             value, turn = np.linalg.eigh(scaled) if self.width > 1 else (scaled[0], np.ones((1, 1)))
-            kept = value > DEPENDENT**2
+            kept = value > SAME**2  # shorter parts of a vector before orthogonalisation add nothing
             if not kept.any():
                 self.full = True
                 return

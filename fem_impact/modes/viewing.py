@@ -10,8 +10,6 @@ if TYPE_CHECKING:
     from .modal import Modes
 
 ENOUGH = 2500  # [-] points on a plate: several per half wave in the first hundred modes, 5 across each of ten
-# [-] most refinements, each splitting a triangle into four: a thousand of each, where two triangles become 2 048
-HALVINGS = 5
 
 
 def grid(modes: "Modes") -> tuple[np.ndarray, np.ndarray]:
@@ -21,9 +19,7 @@ def grid(modes: "Modes") -> tuple[np.ndarray, np.ndarray]:
     points only are not refined.
     """
     points, cells = modes.shapes.grid()
-    for _ in range(HALVINGS if modes.continuous else 0):
-        if modes.dimension != 2 or cells.shape[1] != 3 or len(points) >= ENOUGH:
-            break
+    while modes.continuous and modes.dimension == 2 and cells.shape[1] == 3 and len(points) < ENOUGH:
         cells, sides = quartered(cells, len(points))
         points = np.vstack([points, points[sides].mean(axis=1)])
     return points, cells

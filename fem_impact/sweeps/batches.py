@@ -34,8 +34,8 @@ ALIAS = (4.0, 8.0)  # [rad] omega times step of badly sampled modes; faster ones
 LENGTHS = (48, 192, 768, 3072)  # [-] kernel lengths in steps, tried in turn until the blow fits
 SLACK = 2.0  # [-] a touch or gap counts only above this many times tolerance times deepest approach
 MODES = 4096  # [-] modes summed into a kernel at once: limits the memory to about 20 MB
-PIECE = 2**14  # [-] blows a thread follows at once at most, so that their data stay in the cache
-FEW = 1024  # [-] blows that are too few to split between threads
+PIECE = 2**14  # [-] blows a thread follows at once at most: is faster, as their data stay in the cache
+FEW = 1024  # [-] blows that are too few to split between threads: one alone is faster
 
 
 @dataclass(frozen=True, eq=False)

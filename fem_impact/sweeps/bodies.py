@@ -14,6 +14,7 @@ import numpy as np
 
 from .._base import check
 from .._base.files import replacing
+from .._base.rounding import HALVINGS
 from ..fe import refinement
 from ..fe.eigenvalues import Flexibility
 from ..impact import accuracy, collision
@@ -21,22 +22,16 @@ from ..impact.contact import Contact
 from ..impact.response import Error
 from ..impact.striker import Striker
 from ..model import planner, vectors
-from ..model.target import CLOSE, FIRST_FLEXIBLE, Elements, Stages, Target
-from ..model.target import FIRST_LOOK as LEAST_KEPT
+from ..model.target import CLOSE, FIRST_FLEXIBLE, FIRST_LOOK, Elements, Stages, Target
 from ..model.views import TOGETHER, Views
 from ..modes.modal import FieldShapes, Modes, SampledShapes, damping_ratios
 from .batches import ALLOWED
 from .cells import REACH, Case, checked_axes, sampled
 
-# [-] modes found first, to estimate how many a map needs: twice those of one blow, as a map has harder ones
-FIRST_LOOK = 40
 # [-] cells in all, and at each strike point at least, by which vectors are judged: each costs several whole blows
 STRUCK = 10, 4
 # [-] of these may miss the tolerance: two of ten, as beside a cell with another number of impacts no error is small
 SPARED = 0.2
-# [-] factor between contact stiffnesses tried in advice, and number of tries: down to 2e-18 of the hardest
-SOFTER, MUCH_SOFTER = 0.5, 60
-SEED = 0  # [-] of the choice of cells, any: the same map gives the same vectors
 
 Axes = Mapping[str, np.ndarray]
 Views_ = Mapping[tuple[float, ...], Modes]
@@ -76,7 +71,7 @@ def body_of(
         if seen is not None:
             return seen, axes
     with stages("modes"):
-        first = target.find(FIRST_LOOK, tolerance=tolerance, stages=stages)
+        first = target.find(2 * FIRST_LOOK, tolerance=tolerance, stages=stages)  # a map has harder blows than one
     case = _started(target.surrounded(first), striker, contact, at, speed)
     axes = checked_axes(case, over)
     with stages("modes"):
@@ -121,7 +116,7 @@ def _by_modes(target: Target, case: Case, axes: Axes, tolerance: float, keep: Pa
     if number > most:
         enough = accuracy.least_tolerance(lambda tolerance: number_of_modes(modes, reach(tolerance)) <= most)
         stiffest = float(np.max(axes.get("stiffness", case.contact.stiffness)))
-        softer = (float(f"{stiffest * SOFTER**n:.1e}") for n in range(1, MUCH_SOFTER))
+        softer = (float(f"{stiffest * 0.5**n:.1e}") for n in range(1, HALVINGS))
         fits = (
             k for k in softer if number_of_modes(modes, reach(tolerance, {**axes, "stiffness": np.array([k])})) <= most
         )
@@ -131,7 +126,7 @@ def _by_modes(target: Target, case: Case, axes: Axes, tolerance: float, keep: Pa
         )
     first = None
     if keep is not None and target.kind == "fe":
-        first = target.find(LEAST_KEPT, tolerance=tolerance)  # what is kept starts from its mesh
+        first = target.find(FIRST_LOOK, tolerance=tolerance)  # what is kept starts from its mesh
     more = target.find(number, tolerance=tolerance, first=first, keep=keep)
     return replace(case, modes=target.surrounded(more))
 
@@ -191,7 +186,8 @@ def by_vectors(
     views = None if keep is None else _read(keep, key)
     if views is None:
         others = {name: values for name, values in axes.items() if name != "at"}
-        rng, number = np.random.default_rng(SEED), max(STRUCK[1], math.ceil(STRUCK[0] / len(points)))
+        rng, number = np.random.default_rng(0), max(STRUCK[1], math.ceil(STRUCK[0] / len(points)))
+        # fixed seed, so that the same map gives the same vectors
         chance = [{name: rng.choice(values) for name, values in others.items()} for _ in range(number - 2)]
         views = Sized(target, case, corners(others), chance, tolerance).views(points, stages)
         if keep is not None and views is not None:

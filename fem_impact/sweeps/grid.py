@@ -36,7 +36,9 @@ TOLERANCE = 1e-3  # [-] default error limit of a map
 # [-] cells struck again for the error of vectors, in a batch or alone: some 0.1 and 0.2 s
 DOUBTED = {True: 10_000, False: 100}
 MOST_CELLS = 10**8  # [-] default limit of a map: half an hour to two hours of work, 8 GB
-SECONDS = {True: 1e-5, False: 2e-3}  # [s] per blow, in a batch or alone: the slower plates of studies/map_speed.py
+# [s] per blow, in a batch or alone, that foretell the time; the slower plates of studies/map_speed.py. Does not change
+# the result
+SECONDS = {True: 1e-5, False: 2e-3}
 # [s] a map with default axes that takes less is computed in all its cells: refining it would gain nothing to notice
 DENSE = 1.0
 MOST_MIDDLES = 4  # [-] axes whose middle is examined, too: 3**4 = 81 blows, where five would take 243
@@ -404,7 +406,7 @@ def _tell_interpolated(table: xarray.Dataset, computed: np.ndarray) -> None:
     meaning = "whether the cell was interpolated between others, to within the tolerance"
     for name, weight in refined.ROUGH.items():
         if name in table:
-            table[name].attrs["interpolation_error"] = refined.SHARE * table.attrs["tolerance"] / weight
+            table[name].attrs["interpolation_error"] = (1.0 - batches.ALLOWED) * table.attrs["tolerance"] / weight
     table["interpolated"] = (table.n_impacts.dims, ~computed, {"units": "1", "long_name": meaning})
 
 

@@ -28,8 +28,6 @@ DECIDED = 1e-4  # [-] error limit of the blows that decide where a range of tips
 WIDTH = 1e-3  # [-] relative width to which the ends of a range are found: finer than any tip is known
 # [-] hardest tip on a body of Ritz vectors, over that whose half sine has the bandwidth: three times its frequency
 HARDEST = 10.0
-# [-] error limit of vectors and mesh in the blows of all tips: the rest of TOLERANCE is for the time steps
-VECTORS = 6e-3
 # [-] modes used otherwise, whatever the bandwidth, to bound the time; residual compliance replaces the others
 MOST_MODES = 300
 # [-] softest tip tried, over those with the bandwidth and tuned to the first mode: a sixth of their frequency
@@ -37,7 +35,6 @@ SOFTEST = 0.03
 # [-] tips per decade at which impacts are counted, 2 % apart, and at which the bandwidth is found: it is smooth
 PER_DECADE = 100, 12
 STIFFEST = 100.0  # [-] hardest tip tried, over the one for which the modes are complete: ten times its frequency
-ROUGHLY = 0.05  # [-] relative width to which the hardest tip that the modes resolve is found, itself an estimate
 MASSES = (1e-6, 1e4)  # [kg] allowed: outside, a blow takes too long to compute or overflows
 BANDWIDTHS = (1e-3, 1e9)  # [Hz] allowed, for the same reason as the masses
 # [-] frequencies where the spectrum is evaluated to find where it falls: 100 per inverse of the contact time
@@ -221,7 +218,7 @@ def _body(target: Target, at: Any, masses: np.ndarray, centre: float, stages: St
 
         # only whether a second impact follows matters
         wanted = bodies.Sized(
-            target, case, blows(hardest, SOFTEST**0.5 * centre), blows(centre), VECTORS, max_impacts=2
+            target, case, blows(hardest, SOFTEST**0.5 * centre), blows(centre), TOLERANCE, max_impacts=2
         )
         views = wanted.views(case.at[None], stages)
         if views is not None:
@@ -288,7 +285,7 @@ def _hammer(
 
 
 def _last_resolved(modes: Modes, at: Any, mass: float) -> float:
-    """Hardest tip [N/m] for which the modes left out do not govern the contact, to the relative width ROUGHLY."""
+    """Hardest tip [N/m] for which the modes left out do not govern the contact, to the relative width WIDTH."""
 
     def complete(log: float) -> float:
         law = Contact.linear(float(np.exp(log)))
@@ -303,7 +300,7 @@ def _last_resolved(modes: Modes, at: Any, mass: float) -> float:
 
     centre = np.log(mass * float(modes.omega[-1]) ** 2)
     first = float(np.exp(brentq(complete, centre - 40.0, centre + 40.0)))
-    return _end(resolved, first, STIFFEST * first, ROUGHLY)
+    return _end(resolved, first, STIFFEST * first)
 
 
 def _series(low: float, high: float, per_decade: int) -> np.ndarray:
@@ -328,9 +325,9 @@ def _ranges(tips: np.ndarray, good: np.ndarray, suits: Callable[[float], bool]) 
     return tuple(found)
 
 
-def _end(suits: Callable[[float], bool], good: float, bad: float, width: float = WIDTH) -> float:
-    """The last tip that suits between a good one and a bad one, to a relative width."""
-    while abs(np.log(bad / good)) > width:
+def _end(suits: Callable[[float], bool], good: float, bad: float) -> float:
+    """The last tip that suits between a good one and a bad one, to the relative width WIDTH."""
+    while abs(np.log(bad / good)) > WIDTH:
         middle = float(np.sqrt(good * bad))
         good, bad = (middle, bad) if suits(middle) else (good, middle)
     return good

@@ -11,7 +11,6 @@ from scipy.stats import qmc
 
 from .._base import check
 
-BITS = 30  # [-] of each coordinate of a point: its resolution is 2**-30, scipy's default
 MOST_INPUTS = 64  # [-] inputs that may vary together
 REACH = 1e30  # [SI] largest number in a distribution, and largest value
 
@@ -140,9 +139,9 @@ def shares(n_points: int, n_inputs: int, seed: int) -> np.ndarray:
     Owen (1995), Randomly permuted (t, m, s)-nets and (t, s)-sequences; Joe and Kuo (2008), SIAM J. Sci. Comput. 30,
     2635-2654.
     """
-    engine = qmc.Sobol(n_inputs, scramble=True, bits=BITS, rng=np.random.default_rng(seed))
+    engine = qmc.Sobol(n_inputs, scramble=True, rng=np.random.default_rng(seed))
     points = engine.random_base2(max(0, (n_points - 1).bit_length()))[:n_points]
-    return points + 2.0 ** -(BITS + 1)  # the middle of each smallest cell: never 0, where a tail would be infinite
+    return points + 0.5 / engine.maxn  # the middle of each smallest cell: never 0, where a tail would be infinite
 
 
 def drawn(inputs: Sequence[Input], points: np.ndarray, mixer: np.ndarray | None) -> np.ndarray:

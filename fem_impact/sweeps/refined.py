@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from .batches import ALLOWED
 from .store import Texts
 
 BLOCK = 16  # [-] cells along the sides of the first blocks; islands narrower than a quarter of it can be missed
-SHARE = 0.5  # [-] of the tolerance that interpolation may take; the time steps of the cells take as much
 LINEAR = ("restitution",)  # layers whose errors are absolute; those of the others are relative
 ROUGH = {"centroid": 0.1}  # [-] weight of what is missed: its lobes change it by 1e-3, which no picture shows
 COUNTED = ("n_impacts", "error")  # layers that are not interpolated
@@ -193,10 +193,11 @@ def refine(
     Notes
     -----
     Each block of cells has parabolas through its 3 x 3 nodes. Its quarters are computed at theirs; where these differ
-    from the parabolas by more than ``SHARE * tolerance``, have another number of impacts or failed, the quarters become
-    blocks. Otherwise the parabolas of the quarters fill them. The whole difference is added to the layer ``error``: the
-    parabolas of the quarters err by an eighth of it where the answer is smooth, by about all of it beside a kink. Last,
-    borders between numbers of impacts are followed until no interpolated cell is beside another number.
+    from the parabolas by more than the time steps leave of the tolerance, have another number of impacts or failed, the
+    quarters become blocks. Otherwise the parabolas of the quarters fill them. The whole difference is added to the
+    layer ``error``: the parabolas of the quarters err by an eighth of it where the answer is smooth, by about all of it
+    beside a kink. Last, borders between numbers of impacts are followed until no interpolated cell is beside another
+    number.
     """
     sheet = Sheet(shape, layers)
     blocks, turn = first_blocks(shape), 0
@@ -207,7 +208,7 @@ def refine(
         sheet.add(quarters.cells(shape[1]), compute, f"round-{turn}")
         off = sheet.missed(blocks, quarters, of)
         split = np.zeros(len(blocks.along), bool)
-        np.logical_or.at(split, of, off > SHARE * tolerance)
+        np.logical_or.at(split, of, off > (1.0 - ALLOWED) * tolerance)
         sheet.fill(quarters.some(~split[of]), off[~split[of]])
         blocks = quarters.some(split[of])
         blocks = blocks.some((blocks.along[:, :, 1] - blocks.along[:, :, 0] > 1).any(axis=1))

@@ -17,7 +17,7 @@ from .solving import LAYERS
 CONFIDENCE = 0.9  # [-] of every interval: nine of ten cover the truth; a choice
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)  # [-] quantiles told: median, quartiles and the ends of nine tenths of all
 RESAMPLES = 100  # [-] bootstrap samples behind the intervals of Sobol indices: tell a standard deviation to 7 %
-MOST_RESAMPLED = 4096  # [-] groups of blows from which Sobol indices are found: their bootstrap keeps 100 copies
+MOST_RESAMPLED = 4096  # [-] groups of blows for Sobol indices, to limit memory: their bootstrap keeps 100 copies
 # [-] share of the variance below which an input is not worth measuring better: the spread would shrink by 1 %
 NEGLIGIBLE = 0.02
 DOUBLE = "double_hit"

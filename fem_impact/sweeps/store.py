@@ -13,7 +13,7 @@ import numpy as np
 
 from .._base import check
 
-LARGEST_BLOCK = 2**17  # [-] cells computed together at most: about half a second of work and 30 MB
+LARGEST_BLOCK = 2**17  # [-] cells computed together at most, to limit the memory to 30 MB: half a second of work
 BLOCKS = 64  # [-] fewest blocks of a large map: a killed run loses at most one block per worker
 TEXT = 240  # [byte] longer error texts are cut, because every cell has room for one
 EXTRA = "pip install 'fem-impact[cluster]'"

@@ -19,7 +19,6 @@ from .solver import Problem
 from .unknowns import TIME, Setting, Unknown, checked
 
 STARTS = 5  # [-] searches, from the best of `solver.SCREENED` points; where all end poorly, more follow
-POORER = 4.0  # [-] ratio of sums of squares from which the second of them does not go on: residuals twice as large
 # [-] rms of the residual over that of the records, above the noise of usual ones: after a poorer fit the search goes on
 POOR = 0.06
 PATIENCE = 3  # [-] times the number of starts, at most: where fifteen fail, the model is wrong rather than the start
@@ -259,7 +258,7 @@ def _search(problem: Problem, taps: Taps, length: float, starts: int, rng: Any, 
         raise SimulationError("no search ended: blows in the ranges of unknown do not end; narrow the ranges")
     found.sort(key=lambda one: one.cost)
     apart = np.zeros(len(problem.own) * taps.n_taps)
-    going = found[:1] + [one for one in found[1:2] if not one.ended and one.cost < POORER * found[0].cost]
+    going = found[:1] + [one for one in found[1:2] if not one.ended]
     finished = [solver.solve(problem, np.append(one.x, apart)) for one in going]
     best = min(finished, key=lambda one: one.cost)
     return best, tuple(one.cost for one in [*finished, *found[len(finished) :]])

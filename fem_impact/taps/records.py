@@ -12,7 +12,6 @@ import xarray as xr
 from .._base import check, markup
 from . import arguments, channels, readers, triggers
 
-TOGETHER = 0.05  # [s] pulses closer than this belong to one tap: nobody taps twice within a twentieth of a second
 RATES = (1.0, 1e9)  # [Hz] sampling rates allowed: beyond, the unit is a mistake
 
 
@@ -261,7 +260,7 @@ def read_taps(
     trigger: float | None = None,
     before: float | None = None,
     length: float | None = None,
-    together: float = TOGETHER,
+    together: float = 0.05,
     full_scale: float | None = None,
 ) -> Taps:
     """Read the taps of an instrumented hammer from a file, and find them in long records.
@@ -286,7 +285,7 @@ def read_taps(
     before, length : float [s], optional
         Record before the tap, and of the whole tap; by default all there is, up to the next tap.
     together : float [s]
-        Pulses closer than this are one tap, as those of a double hit.
+        Pulses closer than this are one tap, as those of a double hit; nobody taps twice within a twentieth of a second.
     full_scale : float [N], optional
         A force that reaches this is cut off.
 

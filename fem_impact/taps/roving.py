@@ -25,6 +25,7 @@ from ..show.sound import DECAY
 from ..sweeps import bodies
 from ..sweeps import hammers as chooser
 from ..sweeps.cells import Case
+from . import triggers
 from .rig import Rig
 
 RATE, FILTER = 2.56, "2.56"  # [-] sampling rate over bandwidth, as analysers have it, and their filter
@@ -33,11 +34,9 @@ CLOSE = 1e-3  # [-] tolerance of the frequencies of a system's modes, far below 
 BEYOND = 1.5
 # [-] tips of a hammer known by its mass, over that whose half sine has the bandwidth: each twice as stiff, to 5.5 times
 TIPS = np.geomspace(1.0, 30.0, 6)
-# [s] limits of the default record: lines at most 10 Hz apart, to part modes, at least 0.1 Hz, as nobody waits longer
-SHORTEST, LONGEST = 0.1, 10.0
+SHORTEST = 0.1  # [s] least length of the default record: lines at most 10 Hz apart, to part modes
 MOST_LINES = 100_000  # [-] of a record
 NOISE = 1e-3  # [-] of each channel over its peak, by default: some 60 dB, a choice
-SPEED = 1.0  # [m/s] of every blow; with linear tips the answer is the same at any speed
 MOST_BLOWS = 20_000  # [-] points times tips: some minutes
 WORKS, NO_BAND, DOUBLE, UNKNOWN = "works", "no tip reaches the band", "double hit", "too hard for the modes"
 
@@ -264,7 +263,7 @@ def planned(
     inside = (modes.omega > 0.0) & (modes.frequencies <= bandwidth)
     if duration is None:
         slowest = float((modes.damping_ratio * modes.omega)[inside].min(initial=np.inf))
-        duration = float(np.clip(DECAY / slowest, SHORTEST, LONGEST)) if slowest > 0.0 else LONGEST
+        duration = float(np.clip(DECAY / slowest, SHORTEST, triggers.LONGEST)) if slowest > 0.0 else triggers.LONGEST
     n_times = round(check.positive("duration", duration, "s") * RATE * bandwidth)
     if not 8 <= n_times <= 2 * MOST_LINES:
         raise ValueError(
@@ -339,9 +338,9 @@ def _views(
         return [modes] * len(points)
     if vectors.usable(target):
         outline = bodies.outline(target, stages)
-        case = Case(outline, Striker.rigid(float(masses[0])), Contact.linear(1.0), points[0], SPEED)
+        case = Case(outline, Striker.rigid(float(masses[0])), Contact.linear(1.0), points[0], 1.0)
         blows = [{"mass": float(mass), "stiffness": float(tip)} for mass, tip in zip(masses, stiffnesses)]
-        sized = bodies.Sized(target, case, blows, blows[:2], chooser.VECTORS, max_impacts=2)
+        sized = bodies.Sized(target, case, blows, blows[:2], chooser.TOLERANCE, max_impacts=2)
         seen = sized.views(points, stages)
         if seen is not None:
             return [seen[tuple(point.tolist())] for point in points]
@@ -354,7 +353,7 @@ def _hit(body: Modes, point: np.ndarray, mass: float, tip: float) -> tuple[int, 
     """Number of impacts of one tip, 2 for several and 0 if it is too hard for the modes, and the blow."""
     try:
         hit = strike(
-            body, Striker.rigid(mass), Contact.linear(tip), at=point, speed=SPEED, tolerance=chooser.DECIDED,
+            body, Striker.rigid(mass), Contact.linear(tip), at=point, speed=1.0, tolerance=chooser.DECIDED,
             max_impacts=2,
         )  # fmt: skip
     except SimulationError:

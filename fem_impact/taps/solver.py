@@ -29,17 +29,16 @@ LOOKS = 3  # [-] Gauss-Newton steps in speed and onset while looking: nearly lin
 ENOUGH = 60  # [-] iterations of one search: ten times more or fewer pass the tests
 # [-] relative change of the sum of squares or of the values that ends a search; ten times more or less passes the tests
 CLOSE = 1e-8
-# [-] iterations of a search that begins close to its end, or only shows whether to go on; half and twice pass the tests
+# [-] iterations of a search that begins close to its end, or only shows whether to go on, and steps with derivatives of
+# a point nearby; half and twice pass the tests
 QUICK = 12
 # [-] change that ends a search of which only the sum of squares counts: it errs by the square; ten times more or less
 # passes the tests
 NEARLY = 1e-6
-CHORDS = 8  # [-] steps with derivatives of a point nearby; half and twice pass the tests
 # [-] of the promised gain, with which a step by such derivatives is good enough; half and twice pass the tests
 KEPT = 0.3
 # [-] of the noise variance: a gain that is not sought, as luck makes as much; half and twice pass the tests
 SMALL = 0.05
-LONG = 1e6  # [-] longest way along a ridge, only to divide by; ten times more or less passes the tests
 # [-] of the largest singular value of scaled derivatives: flatter directions may be ridges; ten times passes the tests
 FLAT = 3e-5
 # [-] logarithms of speeds in m/s and of momenta over measured impulses are sought this far from zero: all there are
@@ -337,10 +336,10 @@ def chord(
     low, high = problem.bounds
     basis = directions(jacobian)
     steepest = np.abs(basis.flat).max(axis=1, initial=0.0) / (high - low)[free]
-    travel = 1.0 / max(float(steepest.max()), 1.0 / LONG)  # at most, along a ridge
+    travel = 1.0 / steepest.max() if basis.flat.size else 0.0  # at most, along a ridge
     residual = problem.residual(x)
     cost = float(residual @ residual)
-    for _ in range(CHORDS):
+    for _ in range(QUICK):
         along = basis.left.T @ residual
         promised = float(np.square(along[basis.told]).sum())
         if promised <= close * cost:  # the end, if there is nothing to gain along a ridge, up to its end

@@ -17,8 +17,6 @@ from .windows import joined
 METHODS = ("H1", "H2")
 MOST_TIMES = 2**24  # [-] samples of a transform
 TAPER = 0.25  # [-] of the force window that falls as a cosine, so that no edge is heard
-# [-] of a relative frequency difference of 100 % beside 1 - MAC when modes are paired: mostly shapes decide
-FREQUENCY_WEIGHT = 1.0
 UNITS = {"m/s^2": "accelerance", "m/s": "mobility", "m": "receptance"}
 FUNCTION, RESPONSE_CODE = 4, {"m/s^2": 12, "m/s": 11, "m": 8}  # codes of data set 58
 
@@ -184,7 +182,7 @@ def matched(measured: Any, computed: Any, *, points: Any = None) -> tuple[Pair, 
     if isinstance(measured, Modes) and isinstance(computed, Modes):
         place = measured.shapes.grid()[0] if points is None else points
         likeness = mac(measured.shape_at(place), computed.shape_at(place))
-        rows, columns = linear_sum_assignment(1.0 - likeness + FREQUENCY_WEIGHT * np.minimum(gap, 10.0))
+        rows, columns = linear_sum_assignment(1.0 - likeness + np.minimum(gap, 10.0))  # mostly shapes decide
         values: list[float | None] = [float(likeness[i, j]) for i, j in zip(rows, columns)]
     else:
         rows, columns = np.arange(len(one)), _in_order(gap)

@@ -16,8 +16,10 @@ LOW = 0.25  # [-] quantile of a record of one tap that is at rest: no pulse fill
 NOISE = 8.0
 GAUSS = 1.4826  # [-] fact: standard deviation over median absolute deviation of Gaussian noise
 PULSE = 0.1  # [-] of a tap's largest force: a pulse rises above this and ends below half of it; filters ring less
-CLEAR = 6.0  # [-] standard deviations of the noise: the same, if they are larger; two fewer, as a pulse is already sure
-MOST = 0.5  # [-] of a tap's largest force: the same at most, so that a tap in strong noise has a pulse
+# [-] standard deviations of the noise: the same, if they are larger, and those of its mean that an offset exceeds; two
+# fewer, as a pulse or a tap is already sure
+CLEAR = 6.0
+MOST = 0.5  # [-] of a tap's largest force: a pulse rises above this at most, so that a tap in strong noise has one
 DRIFT = 0.2  # [-] of the trigger: less drift within a record is not mentioned, as it moves no tap
 # [s] over which the force is at rest for more than half the time: slower changes are drift, a tap lasts some ms
 REST = 0.2

@@ -9,7 +9,6 @@ from . import triggers
 from .records import Taps
 from .solver import Data
 
-UNSURE = 6.0  # [-] standard deviations of a mean: an offset of less is noise, surely
 SLIGHT = 0.002  # [-] of the largest force: a smaller offset is left, as it hardly moves a fit
 BEFORE = 12  # [samples] before the tap that are compared: the filter rings there; half and twice of it pass the tests
 # [-] of the length from the first to the last pulse: what is compared after it, where the body's answer is still heard
@@ -43,7 +42,7 @@ def levelled(taps: Taps) -> Taps:
     for i, (row, onset) in enumerate(zip(taps.force, taps.onset)):
         rest = row[: max(0, round(onset * rates) - triggers.GUARD)]
         rest = rest if len(rest) >= triggers.FEWEST else row[-(len(row) // 3) :]
-        middle, sure = float(np.median(rest)), UNSURE * triggers.noise(row) / np.sqrt(len(rest))
+        middle, sure = float(np.median(rest)), triggers.CLEAR * triggers.noise(row) / np.sqrt(len(rest))
         if abs(middle) > max(sure, SLIGHT * float(np.ptp(row))):
             moved[i] = middle
     if not moved.any():

@@ -54,7 +54,7 @@ def test_where_a_pivot_vanishes_another_number_of_modes_is_counted(monkeypatch):
     K = csc_matrix(linalg.block_diag([[5.0, 1.0], [1.0, 5.0]], np.diag(values)))
     M = csc_matrix(np.eye(8))
     assert count_below(K, M, 5.0) == 4  # a nudge steps beside
-    monkeypatch.setattr(eigenvalues, "NUDGES", (0.0,))
+    monkeypatch.setattr(eigenvalues, "SAME", 0.0)
     with pytest.raises(SimulationError, match=r"a pivot vanished .*; change the number of modes"):
         count_below(K, M, 5.0)  # after four modes
     assert count_below(K, M, 6.5) == 5  # after five

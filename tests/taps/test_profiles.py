@@ -5,6 +5,42 @@ import pytest
 from scipy.stats import t
 
 from fem_impact.taps import profiles
+from fem_impact.taps.solver import Solution
+from fem_impact.taps.unknowns import Unknown
+
+FREEDOM = 200
+END = float(t.ppf(0.5 + 0.5 * profiles.SURE, FREEDOM))  # root of the rise to which profiles are followed
+
+
+class Known:
+    """Residuals of three unknowns: a function of the first, the second, which goes along with it, and the third."""
+
+    needless, n_shared = (), 3
+
+    def __init__(self, root, low=-10.0, high=10.0, partner=(-1e6, 1e6)):
+        self.root, self.free = root, (Unknown("a", low, high), Unknown("b", *partner), Unknown("c", -1.0, 1.0))
+        self.bounds = tuple(np.array(ends, float) for ends in zip(*(each.bounds for each in self.free)))
+
+    def residual(self, x):
+        a, b, c = (float(each.outside(part)) for each, part in zip(self.free, x))
+        return np.append(self.root(a), [50.0 * (b - 2.0 * a), c])
+
+    def jacobian(self, x, held=()):
+        steps = 1e-7 * np.eye(3)
+        slopes = [(self.residual(x + step) - self.residual(x - step)) / 2e-7 for step in steps]
+        return np.delete(np.transpose(slopes), list(held), axis=1)
+
+    def values(self, x):
+        return {each.name: float(each.outside(part)) for each, part in zip(self.free, x)}
+
+    def speeds(self, x):
+        return np.zeros(0)
+
+    def profile(self, best=0.0):
+        """Of the first unknown, whose best fit is known."""
+        x = np.array([float(each.inside(value)) for each, value in zip(self.free, (best, 2.0 * best, 0.0))])
+        start = Solution(x, float(np.square(self.residual(x)).sum()), self.jacobian(x))
+        return profiles.follow(self, start, 0, 1.0, FREEDOM, "a")[0]
 
 
 def parabola(open_=(False, False), log=False, n=41, width=0.1):
@@ -45,3 +81,73 @@ def test_white_residuals_are_white_and_coloured_ones_widen():
     coloured = np.array([np.convolve(row, np.ones(4), mode="same") for row in white])
     wider, fewer, chance = profiles.variance(coloured, 10)
     assert chance < 1e-6 and fewer < 150 and wider > 2.5 * np.mean(coloured**2)
+
+
+@pytest.mark.parametrize("bend", [0.05, 0.2, 0.3, 0.45])
+def test_ends_of_a_bent_likelihood_are_exact_to_a_thirtieth(bend):
+    """The root of the rise is (exp(bend x) - 1) / bend; of three points to a side at least its ends are read."""
+    made = Known(lambda a: np.expm1(bend * 100.0 * a) / bend).profile()
+    for level in (0.5, 0.9, profiles.SURE):
+        reached = t.ppf(0.5 + 0.5 * level, FREEDOM)
+        ends = np.array([np.log1p(sign * bend * reached) / bend / 100.0 for sign in (-1.0, 1.0)])
+        assert np.allclose(made.interval(level), ends, rtol=0.03)  # 0.027 was measured
+
+
+@pytest.mark.parametrize("decades", [2, 5])
+def test_a_limit_far_beyond_the_curvature_is_found(decades):
+    """The rise slows down at once, by its logarithm, and still ends a profile at one, where the data set a limit."""
+    near = 10.0**-decades
+    made = Known(lambda a: END * np.sign(a) * np.log1p(abs(a) / near) / np.log1p(1.0 / near)).profile()
+    assert made.open == (False, False) and np.allclose(made.interval(profiles.SURE), (-1.0, 1.0), rtol=5e-3)
+
+
+def test_a_profile_does_not_step_over_values_that_the_data_refuse():
+    """A quarter of the range is refused, a little away from a best fit beside which hardly anything changes."""
+    made = Known(lambda a: [0.001 * a, 4.0 * END * np.exp(-(((a - 10.0) / 4.0) ** 2))], high=30.0).profile()
+    first = 10.0 - 4.0 * np.sqrt(np.log(4.0))  # where the rise first reaches the end
+    assert made.open == (True, False) and made.interval(profiles.SURE)[1] == pytest.approx(first, rel=0.05)
+
+
+def test_a_profile_whose_rise_stalls_does_not_leap_over_a_bend():
+    """After a first step of 4, with the rise at a fifth, secants would lead beyond the bend from 12 to 18."""
+    stalls = Known(lambda a: [0.2 * END * np.tanh(a), 3.0 * END * np.exp(-(((a - 15.0) / 2.5) ** 2))], -100.0, 100.0)
+    found = stalls.profile().interval(profiles.SURE)[1]
+    assert found == pytest.approx(15.0 - 2.5 * np.sqrt(np.log(3.0)), rel=0.05)
+
+
+def test_another_unknown_at_its_bound_is_named_where_it_ends_the_profile():
+    """The second unknown would go along to 20 but ends at 12."""
+    made = Known(lambda a: 1e-3 * a, partner=(-60.0, 12.0)).profile()
+    assert made.held_by[1] == "b" and made.held_by[0] == ""
+
+
+def test_an_interval_open_at_one_end_and_wide_tells_nothing():
+    for width, told in ((0.7, "open"), (0.3, "limited")):
+        low = 1.0 + 2.0 * (1.0 - width)  # closed at this place of the range from 1 to 3
+        rise = np.where(np.linspace(1.0, 3.0, 201) < low, 100.0, 0.0)
+        one = profiles.Profile("a", 3.0, np.linspace(1.0, 3.0, 201), rise, (False, True), ("", ""), {}, 99, 1.0, 3.0, False)
+        assert one.told == told
+
+
+def test_a_ridge_names_what_moves_by_some_per_cent_for_twice_the_value():
+    values = np.linspace(1.0, 3.0, 41)
+    others = {"seen": values**0.08, "still": values**-0.03}
+    flat = profiles.Profile("a", 2.0, values, 0.0 * values, (True, True), ("", ""), others, 100, 1.0, 3.0, True)
+    assert list(flat.ridge) == ["seen"]
+
+
+def test_residuals_that_ring_for_some_samples_are_not_white():
+    rng = np.random.default_rng(4)
+    noise = rng.standard_normal((8, 200))
+    ringing = noise[:, 8:] + 0.3 * noise[:, :-8]  # an echo of eight samples later
+    assert profiles.variance(ringing, 3)[2] < profiles.DOUBTED
+
+
+def test_one_white_record_of_a_hundred_is_doubted():
+    """The variance then grows by the sum of an autocorrelation that is none."""
+    rng = np.random.default_rng(5)
+    grown = 0
+    for _ in range(400):
+        row = rng.standard_normal((2, 100))
+        grown += abs(profiles.variance(row, 0)[0] / np.square(row).mean() - 1.0) > 1e-12
+    assert grown <= 12  # 4 +- 2 are expected
