@@ -173,9 +173,10 @@ def evaluate(name: str, value: Varying, points: np.ndarray, unit: str) -> np.nda
         return np.full(len(points), check.positive(name, value, unit))
     field = check.field(name, value, points, unit)
     worst = int(np.argmin(field))
-    if field[worst] <= 0.0:
+    if field[worst] < 1.0 / check.REACH:
         where = ", ".join(f"{x:g}" for x in points[worst])
-        raise ValueError(f"{name} must be positive everywhere, got {field[worst]:g} {unit} at ({where}) m")
+        rule = "positive" if field[worst] <= 0.0 else f"at least {1.0 / check.REACH:g} {unit}"
+        raise ValueError(f"{name} must be {rule} everywhere, got {field[worst]:g} {unit} at ({where}) m")
     return field
 
 
