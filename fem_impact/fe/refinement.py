@@ -68,9 +68,9 @@ AIM = 0.9
 # [-] fraction of the tolerance that later meshes aim at: less makes them finer than needed, more often takes another;
 # half and twice pass the tests
 MARGIN = 0.6
-# [-] powers of the size with which both parts of the error fall: 8 of smooth shapes less a reserve, and at curved rims;
-# half and twice pass the tests
-ORDERS = 7.5, 5.0
+# [-] powers of the size with which the parts of the error fall: 8 of smooth shapes less a reserve, at curved rims, at
+# steps of the thickness; half and twice pass the tests
+ORDERS = 7.5, 5.0, 1.0
 # [-] smallest ratio of element sizes between two meshes: a tenth more triangles; with less the mesh may not change
 LEAST_STEP = 1.05
 # [-] meshes tried to meet a tolerance, each finer: where eight do not suffice, rounding or corners hold the error; half
@@ -97,7 +97,8 @@ class Spectrum:
     flexibility: Flexibility
     omega: np.ndarray  # (n_modes,) [rad/s]
     vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
-    parts: np.ndarray  # (3, n_modes) [-] relative error of omega from elements, curved edges, causes no mesh cures
+    # (4, n_modes) [-] relative error of omega from elements, curved edges, steps of the thickness, causes no mesh cures
+    parts: np.ndarray
 
     @property
     def error(self) -> np.ndarray:
@@ -191,8 +192,8 @@ def kept(system: System, n_modes: int | None, max_frequency: float | None, path:
 
 
 def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Estimated relative errors of frequencies (`Spectrum.parts`); the third is rounding and unresolved corners."""
-    parts, flexible = np.zeros((3, len(omega))), omega > 0.0
+    """Estimated relative errors of frequencies (`Spectrum.parts`); the last is rounding and unresolved corners."""
+    parts, flexible = np.zeros((4, len(omega))), omega > 0.0
     if not flexible.any():
         return parts
     values, vectors = (omega[flexible] / system.frame.rate) ** 2, vectors[:, flexible]
@@ -203,10 +204,10 @@ def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarr
         wave = (system.softness * values) ** 0.25 * np.sqrt(2.0 * system.mesh.area / len(system.mesh.cells))
         parts[0, flexible] = CLAIMED * MORLEY_ERROR * (wave / system.frame.length) ** 2
     else:
-        parts[:2, flexible] = CLAIMED * 0.5 * residual.energy_errors(system, vectors, vectors * values) / values
+        parts[:3, flexible] = CLAIMED * 0.5 * residual.energy_errors(system, vectors, vectors * values) / values
     squares = system.K.multiply(system.K)
     rounding = 0.5 * np.finfo(float).eps * np.sqrt(np.einsum("ij,ij->j", vectors**2, squares @ vectors**2)) / values
-    parts[2, flexible] = ROUNDED * rounding + LEAST + (system.unresolved if system.unresolved > SAY else 0.0)
+    parts[3, flexible] = ROUNDED * rounding + LEAST + (system.unresolved if system.unresolved > SAY else 0.0)
     return parts
 
 
@@ -358,12 +359,12 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
 
 
 def _needed(parts: np.ndarray, goal: float) -> float:
-    """Factor [-] to divide the element size by so that errors (3, n_modes) meet a goal; infinity if no mesh can."""
-    if float(parts[2].max()) >= goal:
+    """Factor [-] to divide the element size by so that errors (4, n_modes) meet a goal; infinity if no mesh can."""
+    if float(parts[3].max()) >= goal:
         return np.inf
 
     def excess(log: float) -> float:
-        return float((np.exp(-log * np.array(ORDERS)) @ parts[:2] + parts[2]).max()) - goal
+        return float((np.exp(-log * np.array(ORDERS)) @ parts[:3] + parts[3]).max()) - goal
 
     return max(LEAST_STEP, float(np.exp(brentq(excess, 0.0, -np.log(EPSILON))))) if excess(0.0) > 0.0 else LEAST_STEP
 

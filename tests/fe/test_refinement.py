@@ -54,14 +54,16 @@ def test_elements_of_the_size_for_a_tolerance_meet_it_on_a_smooth_plate(toleranc
 
 
 def test_the_step_of_refinement_solves_the_law_of_the_error():
-    parts, (smooth, curved) = np.zeros((3, 4)), refinement.ORDERS
+    parts, (smooth, curved, step_of_thickness) = np.zeros((4, 4)), refinement.ORDERS
     parts[0] = [1e-7, 1e-6, 1e-5, 1e-4]
     assert_allclose(refinement._needed(parts, 1e-6), 100.0 ** (1.0 / smooth), rtol=1e-9)
     parts[1] = parts[0] * 100.0
     step = refinement._needed(parts, 1e-6)
     assert_allclose(1e-4 * step**-smooth + 1e-2 * step**-curved, 1e-6, rtol=1e-9)
     assert refinement._needed(parts, 1.0) == refinement.LEAST_STEP
-    parts[2, 0] = 2e-6  # no mesh cures that
+    parts[2, 0] = 1e-5
+    assert refinement._needed(parts[:, :1], 1e-6) > 10.0**step_of_thickness
+    parts[3, 0] = 2e-6  # no mesh cures that
     assert refinement._needed(parts, 1e-6) == np.inf
 
 
