@@ -4,6 +4,7 @@ import hashlib
 import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -16,7 +17,7 @@ from ..mesh.meshes import MOST_CELLS, Mesh
 from . import residual, thick
 from .assembly import THICK, System, assemble, reassemble
 from .eigenvalues import FIRST_SLICE, RESIDUAL, SPARE, STRICT, Flexibility, by_slices, count_below, lowest
-from .section import Plate
+from .section import Plate, directional
 
 ARGYRIS = "argyris", "argyris and shear"
 # [-] ratio of element sizes whose frequencies are compared, and order: less than half the unknowns, errors times five
@@ -140,7 +141,10 @@ def _wave(system: System, n_modes: int | None, max_frequency: float | None) -> f
         ends = system.rim.points[system.rim.facets]
         length = frame.length * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         edge = float(length @ [EDGE_TERM[kind] for kind in system.rim.kinds])
-    return float((edge + np.sqrt(edge**2 + 16.0 * np.pi * mesh.area * n_modes)) / (2.0 * mesh.area))
+    mean = float((edge + np.sqrt(edge**2 + 16.0 * np.pi * mesh.area * n_modes)) / (2.0 * mesh.area))
+    assert isinstance(system.section, Plate)
+    stiffness = directional(system.section.material.plane_stress)  # waves across the grain are shorter than the mean
+    return mean * float((np.mean(stiffness**-0.5) ** -2 / stiffness.min()) ** 0.25)
 
 
 def solve(system: System, n_modes: int | None, max_frequency: float | None) -> Spectrum:
@@ -174,9 +178,12 @@ def _pairs(
 
 
 def kept(system: System, n_modes: int | None, max_frequency: float | None, path: Path) -> Spectrum:
-    """Call `solve` and save the result in a file; a later call for the same modes and matrices reads the file."""
-    asked = repr((n_modes, max_frequency)).encode()
-    key = hashlib.sha256(b"".join([asked, system.K.data.tobytes(), system.M.data.tobytes()])).hexdigest()
+    """Call `solve` and save the result in a file; a later call for the same modes of the same body reads it."""
+    frame = system.frame  # the matrices are the same for every size, thickness and material
+    asked = repr((n_modes, max_frequency, system.element, frame.length, frame.stiffness, frame.inertia)).encode()
+    matrices: Any = system.K, system.M
+    arrays = [part for A in matrices for part in (A.data, A.indices, A.indptr)]
+    key = hashlib.sha256(b"".join([asked, *(part.tobytes() for part in arrays)])).hexdigest()
     names = ("omega", "vectors", "parts")
     try:
         with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
