@@ -559,7 +559,9 @@ def _may_join(history: History, other: History) -> bool:
         return False
     contact, times = np.array([i for i, _ in pairs]), np.array([time for _, time in pairs])
     one, two = (
-        (found.offset + found.states(times)[0] @ found.shape.T)[np.arange(len(times)), contact]
+        (found.offset + found.states(times)[0] @ found.shape.T - found.surfaces(times)[0])[
+            np.arange(len(times)), contact
+        ]
         for found in (history, other)
     )
     return bool((-one < np.abs(one - two)).any())
@@ -585,13 +587,12 @@ def _may_touch(history: History, other: History, duration: float) -> bool:
     start = max(float(found.contacts[:, 1].min()) for found in (history, other))
     end = max(start, end)
     times = np.linspace(start, end, int(min(LOOKS[1], LOOKS[0] * (end - start) / duration)) + 2)
-    approach, doubt = history.motion(times), np.zeros((len(times), 1))
-    doubt[:, 0] = np.maximum.accumulate(np.abs(approach - other.motion(times)).max(axis=1))
-    row = np.searchsorted(history.steps[:, layout.START], times, side="right") - 1
-    closed = history.pressed[row] & (times < history.end_time)[:, None]
+    surface, opened = history.surfaces(times)
+    approach, doubt = history.motion(times) - surface, np.zeros((len(times), 1))
+    doubt[:, 0] = np.maximum.accumulate(np.abs(approach - other.motion(times) + other.surfaces(times)[0]).max(axis=1))
     nearest = np.zeros(approach.shape, bool)
     nearest[1:-1] = (approach[1:-1] >= approach[:-2]) & (approach[1:-1] >= approach[2:])
-    nearest &= ~closed
+    nearest &= opened
     return bool((nearest & (approach > -doubt)).any())
 
 

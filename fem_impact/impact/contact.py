@@ -10,7 +10,10 @@ from scipy.special import gamma
 from .._base import check
 from .._base.rounding import HALVINGS
 from .compiled.law import FELT, LAYERS, PLASTIC, POWER
-from .compiled.layout import DEPTH, EXPONENT, FIRST_YIELD, HARD, HARD_EXPONENT, KIND, RELAXATION, SHARE, STIFFNESS
+
+from .compiled.layout import (  # isort: skip
+    DEPTH, EXPONENT, FIRST_YIELD, HARD, HARD_EXPONENT, KIND, RELAXATION, SHARE, STIFFNESS, WIDTH,
+)  # fmt: skip
 
 LOWEST_EXPONENT, HIGHEST_EXPONENT = 0.5, 100.0  # [-] limits: below, no longer a spring; above, a wall
 
@@ -352,6 +355,23 @@ def _isotropic(name: str, material: Any) -> tuple[float, float]:
             f"{name} must have an isotropic material (E, nu), got {check.shown(material)}; use Contact.hertz"
         )
     return float(E), float(nu)
+
+
+def sunk(law: np.ndarray, memory: np.ndarray) -> np.ndarray:
+    """How much lower than at first the surface of each contact lies [m]: its dent, or how far felt is still pressed.
+
+    ``law`` (n_contacts, 9 or 4) is that of the compiled loops, ``memory`` (..., n_contacts) what its contacts remember.
+    """
+    found = np.zeros(memory.shape)
+    for i, row in enumerate(law if law.shape[1] == WIDTH else ()):
+        a, z = row[EXPONENT], np.abs(memory[..., i])
+        if row[KIND] == PLASTIC:
+            first = row[FIRST_YIELD]
+            deepest = np.maximum(z, first)
+            found[..., i] = deepest - (first / deepest) ** (a - 1.0) * (a * deepest - (a - 1.0) * first)
+        elif row[KIND] == FELT:
+            found[..., i] = (row[SHARE] * z) ** (1.0 / a)
+    return found
 
 
 def wall_time(stiffness: Any, exponent: Any, mobility: Any, speed: Any, compliance: Any = 0.0) -> np.ndarray:

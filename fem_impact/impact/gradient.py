@@ -13,7 +13,8 @@ from .._base.check import SimulationError
 from .._base.rounding import SAME
 from ..fe.variation import SectionChange
 from .compiled import record
-from .compiled.layout import EXPONENT, FIRST_YIELD, KIND
+from .compiled.layout import KIND
+from .contact import sunk
 from .parameters import POSSIBLE, Parameters, unit
 from .sensitivity import Sensitivity, runs, together
 
@@ -348,24 +349,13 @@ def _yields(found: Sensitivity, c: int) -> float:
     return float(min(np.abs(short).min(initial=np.inf), np.diff(d[ends]).min(initial=np.inf)))
 
 
-def _dents(found: Sensitivity) -> np.ndarray:
-    """How far plastic contacts have yielded at the ends of all pieces [m], (n_pieces + 1, n_contacts)."""
-    law, memory = found.history.law, found.pieces.memory
-    if not memory.any():
-        return memory
-    a, first = law[:, EXPONENT], law[:, FIRST_YIELD]
-    deepest = np.maximum(memory, np.where(first > 0.0, first, 1.0))
-    dents = deepest - (first / deepest) ** (a - 1.0) * (a * deepest - (a - 1.0) * first)
-    return np.asarray(np.where(memory > first, dents, 0.0))
-
-
 def _way(found: Sensitivity) -> Way:
     """The approaches of a run, from the dents where contacts yielded.
 
     While no contact is closed, at many times, and so beyond an end that the run saw.
     """
     history, pressed, way = found.history, found.pieces.closed, found.found.way.copy()
-    way[:, :, 0] -= _dents(found)
+    way[:, :, 0] -= sunk(history.law, found.pieces.memory)
     free = np.asarray(~pressed.any(axis=1))
     still = not (history.start_q.any() or history.start_p[history.omega > 0.0].any() or history.bias.any())
     flights = [(a, b) for a, b in runs(free).tolist() if a > 0 or not still]  # before the first impact nothing swings
@@ -415,5 +405,8 @@ def _flight(found: Sensitivity, begin: int, end: float) -> tuple[np.ndarray, np.
     count = int(np.clip(LOOKS[0] * (end - start) / max(_duration(history), 1e-300), 16, LOOKS[1]))
     times = np.linspace(0.0, end - start, count + 1)[:-1]
     q, p = free.states(times)
-    way = np.stack([history.offset - _dents(found)[begin] + q @ history.shape.T, p @ history.shape.T], axis=2)
+    way = np.stack(
+        [history.offset - sunk(history.law, found.pieces.memory)[begin] + q @ history.shape.T, p @ history.shape.T],
+        axis=2,
+    )
     return start + times, way, np.zeros((count, history.n_contacts), bool)

@@ -18,7 +18,7 @@ from . import assumption, datasets, force_spectrum, gradient, promise
 from .assumption import Assumption
 from .compiled import law, layout, propagation, record
 from .compiled.bundles import Scene
-from .contact import Contact
+from .contact import Contact, sunk
 from .free_motion import swing
 from .quantities import USUAL, words
 from .state import State
@@ -209,6 +209,22 @@ class History:
         for i, row in enumerate(self.shape[:, ~rigid]):
             found[n:, i] += swing(*bodies, (q, p), after, row[None]) + row @ (bodies[2] / bodies[0] ** 2)
         return found
+
+    def surfaces(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Approach [m] at which each contact would touch, and whether it is open, (n_times, n_contacts) each."""
+        rows = np.searchsorted(self.steps[:, layout.START], times, side="right") - 1
+        ended = times >= self.end_time
+        closed = self.pressed[rows] & ~ended[:, None]
+        if self.law.shape[1] < layout.WIDTH:
+            return np.zeros(closed.shape), ~closed
+        since = np.where(ended, times - self.end_time, times - self.steps[rows, layout.START])
+        memory = np.where(ended[:, None], self.now[layout.REMEMBERED], self.steps[rows, -self.n_contacts :])
+        closed &= memory >= 0.0  # felt from which the body has parted
+        felt = self.law[:, layout.KIND] == law.FELT
+        rate = np.where(
+            felt, (1.0 - self.law[:, layout.SHARE]) / np.where(felt, self.law[:, layout.RELAXATION], 1.0), 0.0
+        )
+        return sunk(self.law, memory * np.where(closed, 1.0, np.exp(-rate * since[:, None]))), ~closed
 
     @cached_property
     def contacts(self) -> np.ndarray:

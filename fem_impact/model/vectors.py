@@ -34,7 +34,8 @@ MORE = 1.4  # [-] factor on the number of vectors: less gains too little for a r
 LESS_FOLDED = 16.0
 # [-] each attempt divides by this what modes left out, highest pairs or the mesh may err: less may need one more
 NOTCH = 4.0
-# [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7, as one or two may fail by chance
+# [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7, as one or two may fail by chance;
+# one blow is given twice as many while two descriptions do not agree on its impacts: that error is 1 until they do
 PATIENCE, LEAST_GAIN = 3, 0.7
 TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before: five times smaller in all
 AT_FAULT = 3.0  # [-] the mesh is refined if it errs so many times more than too few vectors, which its error contains
@@ -116,9 +117,9 @@ def compared(target: Target, elements: Elements, stages: Stages) -> tuple[Elemen
     return finer(target, elements, stages), elements
 
 
-def hopeless(tried: list[float]) -> bool:
-    """Whether the last PATIENCE steps towards more vectors gained nothing; takes the errors of all steps."""
-    return len(tried) > PATIENCE and min(tried[-PATIENCE:]) > LEAST_GAIN * min(tried[:-PATIENCE])
+def hopeless(tried: list[float], patience: int = PATIENCE) -> bool:
+    """Whether the last ``patience`` steps towards more vectors gained nothing; takes the errors of all steps."""
+    return len(tried) > patience and min(tried[-patience:]) > LEAST_GAIN * min(tried[:-patience])
 
 
 def folded(found: Modes, cutoff: Callable[[Modes, float], float], margin: float) -> Modes:
@@ -184,9 +185,9 @@ class Seen:
         self.fine, self.coarse = self._krylov(self.elements), self._krylov(other)
 
     def _stuck(self, truncation: float) -> bool:
-        """Whether the last PATIENCE steps towards more vectors gained nothing."""
+        """Whether the last steps towards more vectors gained nothing."""
         self.tried.append(truncation)
-        return hopeless(self.tried)
+        return hopeless(self.tried, PATIENCE if truncation < 1.0 else 2 * PATIENCE)
 
     def _krylov(self, elements: Elements) -> Krylov:
         system = self.target.near(self.at, elements, self.stages)

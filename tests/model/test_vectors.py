@@ -162,6 +162,25 @@ BALL, WOODEN = fi.Striker.rigid(0.03), fi.Contact.hertz(1e6)
 BLOW = {"at": (0.2, 0.11), "speed": 1.0, "tolerance": 1e-3}
 
 
+@pytest.mark.parametrize(
+    "at, yield_strength, speed, n_impacts",
+    [((0.13, 0.07), None, 1.0, 2), ((0.1, 0.1), 2e8, 1.0, 3), ((0.1, 0.1), 2e8, 0.3, 1)],
+)
+def test_steel_ball_on_aluminium_meets_its_tolerance(at, yield_strength, speed, n_impacts):
+    """It leaves so slowly that the plate nearly reaches it again: vectors must agree on that, and beyond the dent."""
+    steel, aluminium = fi.Material(E=210e9, nu=0.3, rho=7850.0), fi.Material(E=70e9, nu=0.3, rho=2700.0)
+    plate, ball = fi.Plate(aluminium, 2e-3), fi.Striker.sphere(steel, 5e-3)
+    law = fi.Contact.between(ball, aluminium, yield_strength=yield_strength)
+    system = fi.assemble(fi.mesh.rectangle(0.3, 0.2), plate, {"boundary": "hinged"})
+    hit = fi.strike(system, ball, law, at=at, speed=speed, tolerance=1e-2, damping_ratio=0.01, strict=True)
+    modes = fi.analytic.rectangle(0.3, 0.2, section=plate, n_modes=4000, damping_ratio=0.01)
+    exact = fi.strike(modes, ball, law, at=at, speed=speed, tolerance=1e-3)
+    assert hit.n_impacts == exact.n_impacts == n_impacts
+    assert abs(hit.restitution - exact.restitution) < 1e-2  # the tolerance, as in the next three
+    for name in ("impulse", "contact_time", "peak_force"):
+        np.testing.assert_allclose(getattr(hit, name), getattr(exact, name), rtol=1e-2)
+
+
 @pytest.mark.parametrize("more", [{}, pytest.param({"target_force": 20.0, "max_impacts": 2}, marks=pytest.mark.slow)])
 def test_motion_after_the_blow_is_that_of_modes(more):
     """The modes that ring are driven by the force found, a constant one included."""
