@@ -43,7 +43,7 @@ FIRST_STEPS = 24.0  # [-] steps per contact with which A4 meets TOLERANCE in mos
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
 # [-] fraction of the usual steps that averages over the blow need: errors of single instants cancel in them
 AVERAGED = 0.5
-# [-] step halvings to decide whether bodies touch or part that do so by less than the tolerance of the deepest
+# [-] step halvings to decide whether bodies touch or part if they do so by less than the tolerance times the deepest
 # approach: each divides the doubt by eight
 GRAZES = 3
 FEW = 20  # [-] no such check after more impacts: chatter always ends with a contact that barely touches

@@ -168,10 +168,20 @@ def gradients(
             gained = 1.0 if name in ROUGH else RICHARDSON[hit.scheme]
             if name == "peak_time":
                 apart = np.maximum(apart, fine.peak_doubt)
-            error = apart / gained + SAME * np.abs(slopes)  # two runs may agree by chance
+            error = _shared(apart / gained + SAME * np.abs(slopes), numbers)
         label = name if band is None else f"{name}={band:g}"
         found[label] = Gradient(label, value, names, numbers, slopes, error)
     return found
+
+
+def _shared(error: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """Errors of slopes, (n,) or (n, n_modes), none of them below the largest, all per relative change of their number.
+
+    Two runs may agree by chance on what one number does, but hardly on what all do.
+    """
+    size = np.abs(numbers).reshape(-1, *[1] * (error.ndim - 1))
+    largest = (size * error).max(axis=0)
+    return np.maximum(error, np.divide(largest, size, out=np.zeros_like(error), where=size > 0.0))
 
 
 def section_changes(sections: Any) -> dict[str, tuple[float, SectionChange]]:

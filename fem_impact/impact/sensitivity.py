@@ -32,6 +32,9 @@ FULL = {False: (24, 128), True: (64, 128)}
 # [-] relative change at which the curvature of a contact law is taken, and of a step at which that of the force is:
 # leaves 1e-10
 NUDGE = 1e-5
+# [-] of the deepest approach: what is nearer starts or ends at zero, as the dip under a constant force is known to
+# 1e-9; a contact that ends deeper lets go by its loss
+AT_ZERO = 1e-7
 MORE = 2  # [-] Gauss nodes beyond those of the force, and three per radian of half the phase over a piece: err by 1e-9
 
 
@@ -154,7 +157,7 @@ class Sensitivity:
         d, v, a = self.found.base[mark, c, :3] - [self.found.dents[mark, c, 0], 0.0, 0.0]
         dd, dv = self.found.ends[mark, c, :2] - [self.found.dents[mark, c, 1:], np.zeros(len(self.change.offset))]
         still = np.zeros(dd.shape)
-        near = abs(d) <= SAME * self.deepest[c]
+        near = abs(d) <= AT_ZERO * self.deepest[c]
         if k == 0:
             h = self.history
             parts = (np.abs(dd) > ROUNDING * self._start_terms(c, h.start_q, self.change.start_q)).any()

@@ -30,8 +30,7 @@ SHARE = 0.45
 # [-] of the tolerance for what costs little: the time steps of a blow by Ritz vectors, the modes of strikers that meet
 # on the body, and the mesh, whose frequencies may err twice as much as the blow then does
 CHEAP = 0.1
-# [-] runs with ever more modes or finer meshes, until the tolerance is met: CAUTION makes even a second one rare; half
-# and twice pass the tests
+# [-] runs with ever more modes or finer meshes until the tolerance is met: CAUTION makes even a second one rare
 ATTEMPTS = 3
 # [Hz], [-] the ear's limit: no mode above is asked for unless a band of the sound is; the force looked at every 10 Hz
 AUDIBLE, AUDIBLE_POINTS = 20e3, 2001
@@ -44,8 +43,8 @@ FINEST = 1e-10  # [-] lowest tolerance of a verifying run: below, rounding of lo
 # [-] safety factor on the mode error: costs a quarter more modes, but seldom needs a second run
 CAUTION = 2.0
 MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by source: takes about 2 GB and some minutes
-# [-] above it, a plate is infinite above a frequency, if its contact overdamps: 4 100 modes for 15 190 of a steel
-# sheet; ten times more or less passes the tests
+# [-] a plate that needs more modes is taken as infinite above a frequency, if it overdamps the contact: a steel sheet
+# then keeps 4 100 modes instead of 15 190
 MANY_MODES = 10_000
 # [-] frequency error of the shortest waves that the mesh resolves by `refinement.WAVE_PER_ELEMENT`; beams also round
 SHORT_WAVES = {

@@ -20,7 +20,7 @@ from .target import Elements, Stages, Target
 
 # the next five: value at a tolerance of 1e-2 or more, and power of 1e-2 / tolerance with which it grows
 WAVES = 1.6, 0.37  # [-] highest frequency that the first mesh resolves, over that of the contact
-SHIFT = 6.0, 1.0 / 6.0  # [-] shift over the angular frequency of the contact: half and twice of it pass the same tests
+SHIFT = 6.0, 1.0 / 6.0  # [-] shift over the angular frequency of the contact: half or twice as much tells blows as well
 FIRST = 84, 0.22  # [-] vectors tried first: they resolve one undisturbed contact
 # [-] what modes left out may err, over what the highest pairs may that act as a spring: these err in every blow
 FOLDED = 4.0, 0.6
@@ -29,8 +29,7 @@ EXCITED = 12.0, 0.25
 # [-] vectors besides those that stand for modes: the dip under the load has no wavelength and takes its own
 FEWEST = 30
 MORE = 1.4  # [-] factor on the number of vectors: less gains too little for a run, more may overshoot
-# [-] divides what those of poorer descriptions may err: so far apart that two blows differ by the error of the poorer;
-# half and twice pass the tests
+# [-] divides what those of poorer descriptions may err: so little that two blows differ by the error of the poorer
 LESS_FOLDED = 16.0
 # [-] each attempt divides by this what modes left out, highest pairs or the mesh may err: less may need one more
 NOTCH = 4.0

@@ -27,9 +27,7 @@ SLOW = {"loss", "hard_stiffness", "yield_approach", "hysteresis"}  # axes of the
 SLOW |= {f"contact.{name}" for name in SLOW}
 FORMATS = ("nc", "zarr")
 FILES = (".nc", ".zarr", ".csv", ".png", ".pdf", ".svg")  # a folder name must not end like this
-# [-] a larger map gets no CSV file: spreadsheets end there, and it would have a hundred megabytes; half and twice pass
-# the tests
-MOST_ROWS = 10**6
+MOST_ROWS = 10**6  # [-] a larger map gets no CSV file: spreadsheets end there, and it would have a hundred megabytes
 PICTURED = {  # layers drawn for a map with two axes: name in the picture
     "n_impacts": "number of impacts",
     "contact_time": "time in contact",

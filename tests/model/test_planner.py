@@ -65,6 +65,33 @@ tolerance = 1e-3
 """
 
 
+SHEET = """
+[mesh]
+shape = "rectangle"
+length = 0.4
+width = 0.3
+[material]
+E = 210e9
+nu = 0.3
+rho = 7850.0
+[section]
+kind = "plate"
+thickness = {thickness}
+[supports]
+boundary = "hinged"
+[striker]
+kind = "rigid"
+mass = 4.11e-3
+[contact]
+kind = "hertz"
+stiffness = 1.09e10
+[strike]
+at = [0.13, 0.11]
+speed = 1e-3
+tolerance = 1e-2
+"""
+
+
 @pytest.fixture
 def scene(tmp_path):
     def write(text, **values):
@@ -244,6 +271,15 @@ def test_the_modes_planned_suffice_at_the_first_attempt(seed, loss):
     assert run.plan.n_modes < 1.35 * plan.n_modes  # Weyl's law is 25 % off at most; a second attempt takes 60 % more
     truth = collision.strike(modes, striker, law, **blow, tolerance=1e-5)
     assert difference(run.response, truth) < run.response.tolerance
+
+
+@pytest.mark.parametrize(("thickness", "target", "n_modes"), [(0.5e-3, "modal", 5600), (0.3e-3, "mixed", 500)])
+def test_a_plate_counts_as_infinite_above_a_frequency_where_all_its_modes_are_too_many(
+    scene, thickness, target, n_modes
+):
+    plan = scene(SHEET, thickness=thickness).plan()
+    assert plan.target == target and plan.n_modes < n_modes
+    assert plan.but(target="modal").n_modes == pytest.approx({"modal": 5568, "mixed": 25777}[target], rel=1e-2)
 
 
 def test_costly_plan_says_so():
