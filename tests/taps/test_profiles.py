@@ -125,7 +125,9 @@ def test_an_interval_open_at_one_end_and_wide_tells_nothing():
     for width, told in ((0.7, "open"), (0.3, "limited")):
         low = 1.0 + 2.0 * (1.0 - width)  # closed at this place of the range from 1 to 3
         rise = np.where(np.linspace(1.0, 3.0, 201) < low, 100.0, 0.0)
-        one = profiles.Profile("a", 3.0, np.linspace(1.0, 3.0, 201), rise, (False, True), ("", ""), {}, 99, 1.0, 3.0, False)
+        one = profiles.Profile(
+            "a", 3.0, np.linspace(1.0, 3.0, 201), rise, (False, True), ("", ""), {}, 99, 1.0, 3.0, False
+        )
         assert one.told == told
 
 
