@@ -39,7 +39,7 @@ MORLEY = 0.2574578  # [-] error constant of Morley interpolation, over h**2 (Car
 # [-] unknowns of the Morley solution for the lower bounds; cheap beside the modes themselves; ten times more or less
 # passes the tests
 MORLEY_UNKNOWNS = 20_000
-# [rad] as WAVE_PER_ELEMENT, if CHEAP_CELLS triangles suffice: error 2e-7, clamped 1e-5; half and twice pass the tests
+# [rad] as WAVE_PER_ELEMENT, if CHEAP_CELLS triangles suffice: error 2e-7, clamped 1e-5
 FINE_WAVE = 1.1
 # [-] triangles that take little time to solve, so that fewer are not worthwhile; point loads start with as many
 CHEAP_CELLS = 700
