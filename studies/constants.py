@@ -10,8 +10,8 @@ The kind follows from what is already written, in this order:
 layout    the comment names no unit: codes of formats, places in arrays, tables of names
 fact      the comment says so ("fact: ..."), says what the number is exact for, or cites its source (Author 1999):
           physics, mathematics and units, which nobody chose
-picture   it lives in `show`, `pages`, `cli`, `display`, `markup` or `sketch`, is in pixels or counts characters: what
-          something looks like
+picture   it lives in `show`, `pages`, `cli`, `display`, `markup`, `sketch` or `viewing`, is in pixels or counts
+          characters: what something looks like
 limit     a message quotes it, or an error is raised beyond a MOST_, LARGEST_ or LONGEST_: what the user is allowed
 resource  it lives in `model.cost`, or the comment says that it bounds memory or time, or what is faster: it changes or
           foretells the cost, not the answer
@@ -45,6 +45,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "fem_impact"
 HOLDERS = Path(__file__).with_suffix(".csv")
 COLUMNS = ("constant", "value", "factors", "holder")
+SHOWN = {"show", "pages", "cli", "display", "_base.markup", "mesh.sketch", "modes.viewing"}  # for the eye
 KINDS = ("layout", "fact", "picture", "limit", "resource", "rounding", "tuning")
 FACT = r"\bfact:|\bexact for\b|\([A-Z][^()]* (19|20)\d\d\)"
 CHEAP = r"to limit (the )?(memory|work)|limits the memory|is faster|% slower|time limit|does not change the result"
@@ -79,7 +80,7 @@ class Constant:
             return "layout"
         if re.search(FACT, self.comment):
             return "fact"
-        shown = {self.package, self.module} & {"show", "pages", "cli", "display", "_base.markup", "mesh.sketch"}
+        shown = {self.package, self.module} & SHOWN
         if shown or unit[1] == "px" or re.search(r"\bcharacters\b", self.comment):
             return "picture"
         if self.told:
@@ -226,7 +227,7 @@ def tests_of(constant: Constant) -> list[str]:
         kernels = [path for path, text in texts.items() if re.search(rf"{KERNELS}(\.| import )", text)]
         own = rf"compiled(\.{name}\b| import .*\b{name}\b)"
         return sorted(kernels, key=lambda path: not re.search(own, texts[path]))
-    using = rf"\b{name}\.{constant.name}\b|\b{name} import [^\n]*\b{constant.name}\b"
+    using = rf"\b{name}\.{constant.name}\b|\b{name} import (\([^)]*|[^\n]*)\b{constant.name}\b"
     home = PACKAGE / (constant.module.replace(".", "/") + ".py")
     for path in [home, *sorted(PACKAGE.rglob("*.py"))]:
         own = ROOT / "tests" / path.parent.relative_to(PACKAGE).as_posix().removeprefix("_") / f"test_{path.name}"

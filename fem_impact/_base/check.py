@@ -16,7 +16,7 @@ from typing import Any, TypeVar, get_args, get_origin
 import numpy as np
 
 LONGEST = 500  # [-] characters quoted from a file or another library; longer text is cut
-FEW = 4  # [-] entries of an array that `brief` shows: fits on a line
+FEW = 4  # [-] entries of an array that `brief` shows: some 50 characters, which fit on a line
 SHOWN = 80  # [-] characters quoted from a value the user passed; longer text is cut
 REACH = 1e75  # [-] largest number accepted; 1 / REACH is the smallest: the fourth power of both still fits a float
 MOST = 10**9  # [-] largest count accepted: more items would not fit into memory

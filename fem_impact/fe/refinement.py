@@ -16,6 +16,7 @@ from ..mesh import mesh_files
 from ..mesh.meshes import MOST_CELLS, Mesh
 from . import residual, thick
 from .assembly import THICK, System, assemble, reassemble
+from .beam_elements import DEGREE
 from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, lowest
 from .section import Plate, directional
 
@@ -39,22 +40,20 @@ MORLEY = 0.2574578  # [-] error constant of Morley interpolation, over h**2 (Car
 # [-] unknowns of the Morley solution for the lower bounds; cheap beside the modes themselves; ten times more or less
 # passes the tests
 MORLEY_UNKNOWNS = 20_000
-# [rad] as WAVE_PER_ELEMENT, if CHEAP_CELLS triangles suffice: error 2e-7, clamped 1e-5; half and twice pass the tests
+# [rad] as WAVE_PER_ELEMENT, if CHEAP_CELLS triangles suffice: error 2e-7, clamped 1e-5
 FINE_WAVE = 1.1
 # [-] triangles that take little time to solve, so that fewer are not worthwhile; point loads start with as many
 CHEAP_CELLS = 700
-# [-] largest element under tension, in edge layers sqrt(D / tension): error 1e-5 on a disk; half and twice pass the
-# tests
+# [-] largest element under tension, in edge layers sqrt(D / tension): error of 3e-4 at most on a clamped disk
 LAYERS = 10.0
 # [-] but elements are not made smaller than the extent over this: some 4 000 triangles on a square at most; half and
 # twice pass the tests
 FINEST_LAYER = 40.0
 LOOSEST = 0.1  # [-] largest tolerance of frequencies
 MOST_UNKNOWNS = 150_000  # [-] refinement gives up beyond this size
-# [-] unknowns per square, or length, of the element size, counted: 10.4 where netgen meshes, 9 on rectangles; half and
-# twice pass the tests
+# [-] unknowns per square, or length, of the element size: counted on plates, 10.4 where netgen meshes, 9 on rectangles
 DOFS_PER_AREA = {
-    "argyris": 10.4, "hermite": 2.0, "argyris and shear": 47.0, "hermite and shear": 4.0,
+    "argyris": 10.4, "hermite": DEGREE - 1, "argyris and shear": 47.0, "hermite and shear": 2 * DEGREE - 1,
 }  # fmt: skip
 # [-] fraction of the tolerance that meshes after the first aim at: less makes them finer than needed, more often takes
 # another; half and twice pass the tests

@@ -39,7 +39,7 @@ FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  
 # [-] values along an axis that has no count: 160 000 cells together take some 2 s, 10 000 alone some 20 s
 SIDE = {True: 400, False: 100}
 MOST_VALUES = 10**6  # [-] most values along one axis of a map
-EVEN = 1e-3  # [-] relative difference of steps that count as equal: values typed with four digits do
+EVEN = 1e-3  # [-] of a value, off even spacing in the logarithm: less counts as even, as what is typed with four digits
 REACH = 1e30  # [SI] speeds, masses and frequencies lie between 1/REACH and REACH: beyond, the kernels never finish
 
 
@@ -217,5 +217,8 @@ def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
 
 def logarithmic(values: np.ndarray) -> bool:
     """Whether values along an axis (n,) are evenly spaced in the logarithm."""
-    steps = np.diff(np.log(values)) if (values > 0.0).all() else np.zeros(0)
-    return len(steps) > 1 and bool(np.allclose(steps, steps[0], rtol=EVEN))
+    if len(values) < 3 or not (values > 0.0).all():
+        return False
+    spaced = (space(values[0], values[-1], len(values)) for space in (np.geomspace, np.linspace))
+    by_factors, by_steps = (float(np.abs(each / values - 1.0).max()) for each in spaced)
+    return by_factors < min(EVEN, by_steps)

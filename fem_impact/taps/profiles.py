@@ -21,8 +21,8 @@ FIRST = 0.8
 FARTHEST = 0.25  # [-] of its range: the first step at most, so that four steps see all of it
 # [-] largest ratio of two steps, where the rise stalls or where it was too steep: not so long as to leap over a bend
 GROWTH = 3.0
-# [-] where the root of the rise exceeds the target by more, a shorter step is tried: the interval's ends then err by
-# 3 % of its half width in likelihoods as bent as an exponential, by 8 % at 1.6
+# [-] where the root of the rise over the target is more, a shorter step is tried: the interval's ends then err by 3 %
+# of its half width in likelihoods as bent as an exponential, by 8 % at 1.6
 TOO_STEEP = 1.1
 AT_BOUND = 0.02  # [-] of a range: a value this close to its bound may be held by it
 # [-] of its range (by its coordinate): an interval open at one end and wider than this tells nothing; a choice

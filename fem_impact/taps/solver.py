@@ -45,7 +45,7 @@ FLAT = 3e-5
 REACH = 25.0
 # [samples] the onset is sought this far from the trigger, which is set at 5 % of the peak; ten times passes the tests
 LATEST = 60.0
-# [samples] the onset may move by at a single look: pulses are linear in it so far; half and twice pass the tests
+# [samples] the onset may move by at a single look: pulses are linear in it so far
 SHIFT = 3.0
 
 

@@ -108,3 +108,10 @@ def test_the_speed_and_the_sphere_of_a_blow_are_noted():
     hit = fi.strike(modes, ball, fi.Contact.linear(1e6), at=(0.1, 0.1), speed=2000.0, tolerance=0.1)
     assert np.array([[word in note for word in ("E = 210 Pa", "speed 2000 m/s")] for note in hit.notes]).any(0).all()
     assert "Note: speed 2000 m/s is as fast as a bullet" in hit.summary()
+
+
+@pytest.mark.parametrize(("share", "thick"), [(0.25, False), (0.45, True)])
+def test_a_plate_of_nearly_half_its_side_is_noted_as_thick(share, thick):
+    assert (
+        "times the shortest side" in " ".join(elements(fi.mesh.rectangle(0.3, 0.2), plate(0.2 * share)).notes)
+    ) == thick

@@ -135,3 +135,45 @@ def test_stated_errors_are_those_of_a_smooth_plate_within_a_factor(element, size
     found = refinement.solve(system, 20, None)
     low, high = median
     assert low < np.median(found.error / np.abs(found.omega / exact - 1.0)) < high
+
+
+@pytest.mark.parametrize("theory", ["kirchhoff", "mindlin", "euler", "timoshenko"])
+def test_the_number_of_unknowns_is_foretold(theory):
+    """To a quarter, as the edges of a small mesh hold many of them."""
+    if theory in ("kirchhoff", "mindlin"):
+        mesh, section = fi.mesh.rectangle(0.5, 0.3, size=0.04), PLATE
+    else:
+        mesh, section = fi.mesh.line(1.0, size=0.1), fi.Beam.rectangular(PLATE.material, width=0.02, height=0.01)
+    system = fi.assemble(mesh, section, {"boundary": "hinged"}, theory=theory)
+    assert_allclose(refinement.unknowns(system.element, mesh, mesh.size), system.n_dofs, rtol=0.25)
+
+
+@pytest.mark.parametrize("n_modes", [8, 40])
+def test_some_modes_are_found_to_a_few_millionths_if_nothing_is_asked(n_modes):
+    """Elements are finer than the wave of the last mode asks, as few of them cost little."""
+    system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), PLATE, {"boundary": "hinged"})
+    found = refinement.solve(refinement.fine_enough(system, n_modes, None, None), n_modes, None)
+    exact = 2.0 * np.pi * fi.analytic.rectangle(0.5, 0.3, section=PLATE, n_modes=n_modes).frequencies
+    assert np.abs(found.omega / exact - 1.0).max() < 4e-6  # 2e-7 and 2.3e-6 were measured
+
+
+def test_the_edge_layer_of_a_stretched_plate_is_resolved():
+    """A clamped disk under so much tension that its edge bends over a hundredth of its radius."""
+    plate = fi.Plate(PLATE.material, thickness=5e-4, tension=2e4)
+    coarse, fine = (
+        refinement.solve(refinement.reassemble(system, system.mesh.refined(factor)), 4, None).omega
+        for system in [fi.assemble(fi.mesh.disk(0.3), plate, {"boundary": "clamped"})]
+        for factor in [system.mesh.size / refinement.size_for(system, 4, None, None) * k for k in (1.0, 1.7)]
+    )
+    assert_allclose(coarse, fine, rtol=4e-4)  # 2.6e-4 was measured
+
+
+@pytest.mark.parametrize("mesh", [fi.mesh.rectangle(0.5, 0.3, size=0.1), fi.mesh.disk(0.3, size=0.06)])
+def test_errors_fall_as_the_step_of_refinement_assumes(mesh):
+    """A mesh made to have a fiftieth of the error has that, or up to three times as much: then a third one follows."""
+    found = refinement.solve(fi.assemble(mesh, PLATE, {"boundary": "hinged"}), 12, None)
+    goal = found.error.max() / 50.0
+    step = refinement._needed(found.parts, goal)
+    finer = refinement.solve(refinement.reassemble(found.system, mesh.refined(step)), 12, None)
+
+    assert 0.3 * goal < finer.error.max() < 3.0 * goal

@@ -161,3 +161,33 @@ def test_links_to_other_files_are_not_followed(tmp_path):
     for href in ("other.svg#x", f"file://{tmp_path}/other.svg#x", "http://localhost:1/other.svg#x"):
         with pytest.raises(ValueError, match="has no outline"):
             mesh.outline(svg(tmp_path, f'<use href="{href}"/><image href="{href}" width="1" height="1"/>'))
+
+
+@pytest.mark.parametrize(("gap", "closed"), [(0.5, True), (5.0, False)])
+def test_a_gap_as_wide_as_a_pencil_line_is_closed_and_noted_a_wider_one_refused(tmp_path, gap, closed):
+    """Of an outline a metre wide; gaps in mm."""
+    body = f'<path d="M0 0 H1000 V600 H0 V{gap}"/>'
+    drawn = svg(tmp_path, body, 'width="1000mm" height="600mm" viewBox="0 0 1000 600"')
+    if closed:
+        assert any("gap" in note for note in mesh.outline(drawn).notes)
+    else:
+        with pytest.raises(ValueError, match="has an open outline"):
+            mesh.outline(drawn)
+
+
+@pytest.mark.parametrize(("degrees", "n_edges"), [(3.0, 4), (9.0, 5)])
+def test_a_bend_of_some_degrees_starts_a_new_edge(tmp_path, degrees, n_edges):
+    rise = 500.0 * np.tan(np.radians(degrees / 2.0))
+    body = f'<path d="M0 100 L500 {100.0 - rise} L1000 100 V600 H0 Z"/>'
+    shape = mesh.outline(svg(tmp_path, body, 'width="1000mm" height="600mm" viewBox="0 0 1000 600"'))
+    assert sum(name.startswith("edge") for name in shape.edges) == n_edges
+
+
+@pytest.mark.parametrize(("size", "plausible"), [(15.0, True), (30.0, False)])
+def test_a_plate_of_thirty_metres_was_drawn_in_millimetres(tmp_path, size, plausible):
+    drawn = dxf(tmp_path, lambda space: space.add_circle((0, 0), 0.5 * size), units=0)
+    if plausible:
+        assert mesh.outline(drawn).notes
+    else:
+        with pytest.raises(ValueError, match="looks like millimetres"):
+            mesh.outline(drawn)

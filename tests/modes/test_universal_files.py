@@ -139,3 +139,22 @@ def test_what_a_file_lacks_is_said(tmp_path):
 def test_a_rigid_mass_has_no_shape_to_write(tmp_path):
     with pytest.raises(ValueError, match="no shape to write"):
         export.write_uff(tmp_path / "mass.uff", Modes.rigid(1.0))
+
+
+@pytest.mark.parametrize(("degrees", "real"), [(10.0, True), (25.0, False)])
+def test_shapes_with_phases_of_some_degrees_are_taken_as_real(tmp_path, degrees, real):
+    """Half of the points lead, half lag."""
+    _, points, _, path = written(tmp_path)
+    sets = pyuff.UFF(str(path)).read_sets()
+    for entry in sets[3:]:
+        phase = np.radians(degrees) * np.where(np.arange(len(entry["r3"])) % 2, 1.0, -1.0)
+        entry["r3"] = entry["r3"] * np.exp(1j * phase)
+        entry["r1"], entry["r2"], entry["data_type"] = 0.0 * entry["r3"], 0.0 * entry["r3"], 5
+    other = tmp_path / "complex.uff"
+    pyuff.UFF(str(other)).write_sets(sets, mode="add")
+    if real:
+        found, whole = (Modes.from_uff(each, mass=1.0).shape_at(points) for each in (other, path))
+        assert np.abs(found).max() == pytest.approx(np.abs(whole).max(), rel=0.02)  # the cosine of 10 degrees
+    else:
+        with pytest.raises(ValueError, match="phases far from 0 and 180 degrees"):
+            Modes.from_uff(other, mass=1.0)

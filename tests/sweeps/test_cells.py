@@ -91,3 +91,10 @@ def test_axes_without_a_count_are_as_fine_as_a_picture():
 def test_ranges_of_no_sense_are_told(values, message):
     with pytest.raises(ValueError, match=re.escape(message) if "{" in message else message):
         cells.laid_out({"mass": values}, fi.Contact.linear(1e5))
+
+
+def test_values_typed_with_four_digits_are_evenly_spaced_in_the_logarithm():
+    values = np.geomspace(0.01, 10.0, 40)
+    assert cells.logarithmic(np.array([float(f"{value:.4g}") for value in values]))
+    assert not cells.logarithmic(values * (1.0 + 3e-3 * (np.arange(40) % 2)))
+    assert not cells.logarithmic(np.linspace(1.0, 1.02, 5))  # nearly even in the logarithm, too

@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import fem_impact as fi
 from fem_impact import cli
+from fem_impact.taps import prompt
 
 ROOT = Path(__file__).parents[2]
 TAPS = ROOT / "studies" / "measured" / "acceleration_multi.lvm"
@@ -59,3 +61,14 @@ def test_a_single_tap_is_fitted_too(tmp_path, capsys):
     assert cli.main(["fit", str(single), "--out", str(tmp_path / "out"), *words]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["left_out"] == [] and data["intervals"]["contact.stiffness"][0] > 1e5
+
+
+def test_peaks_of_five_times_their_surroundings_are_listed_and_lower_ones_are_not():
+    frequency = np.arange(400.0)
+    size = 1.0 + 7.0 * np.exp(-(((frequency - 100.0) / 3.0) ** 2)) + 2.0 * np.exp(-(((frequency - 250.0) / 3.0) ** 2))
+    found = xr.Dataset(
+        {"H": (("frequency", "channel"), size[:, None].astype(complex)),
+         "coherence": (("frequency", "channel"), np.ones((400, 1))), "units": ("channel", ["m/s^2/N"])},
+        {"frequency": frequency, "channel": ["a"]},
+    )  # fmt: skip
+    assert [row[1] for row in prompt.peaks(found)[0]] == ["100 Hz"]

@@ -346,3 +346,53 @@ def test_universal_files_that_are_damaged(tmp_path):
     nothing[3] = np.inf
     with pytest.raises(ValueError, match="no finite number"):
         readers.arrays(universal(path, {"binary": 1, "data": nothing}))
+
+
+def timed(path, time):
+    """A table of two taps at given times."""
+    _, force, acceleration = channels()
+    rows = [f"{t:.12g},{f:.6g},{a:.6g}" for t, f, a in zip(time, force, acceleration)]
+    path.write_text("Time [s],Force [N],Acceleration [m/s^2]\n" + "\n".join(rows) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(("off", "even"), [(0.015, True), (0.05, False)])
+def test_a_sample_off_its_time_by_a_fiftieth_of_a_step_is_told(tmp_path, off, even):
+    time = channels()[0]
+    time[200:] += off / RATE  # the clock jumped
+    path = timed(tmp_path / "taps.csv", time)
+    if even:
+        assert readers.table(path).rate == pytest.approx(RATE, rel=1e-4)
+    else:
+        with pytest.raises(ValueError, match="not evenly sampled"):
+            readers.table(path)
+
+
+@pytest.mark.parametrize(("rounded", "even"), [(1.7e-5, True), (7.1e-5, False)])
+def test_times_rounded_to_less_than_half_a_step_are_even(tmp_path, rounded, even):
+    time = np.round(channels()[0] / rounded) * rounded
+    if even:
+        assert readers.table(timed(tmp_path / "taps.csv", time)).rate == pytest.approx(RATE, rel=1e-3)
+    else:
+        with pytest.raises(ValueError, match="not evenly sampled"):
+            readers.table(timed(tmp_path / "taps.csv", time))
+
+
+@pytest.mark.parametrize(("stated", "agree"), [(1.002, True), (1.03, False)])
+def test_a_rate_that_contradicts_the_times_by_some_per_cent_is_refused(tmp_path, stated, agree):
+    time, force, acceleration = channels()
+    path = tmp_path / "taps.npz"
+    np.savez(path, time=time, force=force, acceleration=acceleration, rate=stated * RATE)
+    if agree:
+        assert readers.numpy_file(path).rate == pytest.approx(RATE, rel=0.01)
+    else:
+        with pytest.raises(ValueError, match="states different rates"):
+            readers.numpy_file(path)
+
+
+@pytest.mark.parametrize(("n_taps", "doubt"), [(12, False), (20, True)])
+def test_the_axis_of_time_is_in_doubt_where_a_table_has_many_rows(tmp_path, n_taps, doubt):
+    force = np.tile(channels()[1][:1000], (n_taps, 1))
+    np.savez(tmp_path / "taps.npz", force=force, rate=RATE)
+    notes = " ".join(readers.numpy_file(tmp_path / "taps.npz").notes)
+    assert ("was taken as time" in notes) == doubt

@@ -77,3 +77,12 @@ def test_too_few_samples_are_refused():
     taps = fi.Taps.from_arrays(np.array([0, 0, 0, 0, 50, 90, 50, 0, 0, 0.0]), rate=25600.0)
     with pytest.raises(ValueError, match=r"window must leave samples|too few"):
         fit.fit(taps, striker=fi.Striker.rigid(0.1), contact=fi.Contact.linear(1.0), unknown=RANGES, window=(0.0, 1e-4))
+
+
+def test_a_blow_six_samples_before_its_trigger_is_found(found):
+    """By the looks at a starting point, which improve speed and onset alone."""
+    n = found.problem.n_shared
+    x = found.best.x.copy()
+    x[n + 2 :] += 6.0
+    improved = found.problem.aligned(x)
+    assert np.abs(improved[n + 2 :] - found.best.x[n + 2 :]).max() < 0.5  # searches go on from there
