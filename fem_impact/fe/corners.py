@@ -106,7 +106,7 @@ def rings(z: float, kinds: tuple[str, str], share: float = 1.0) -> int:
 
 
 def meetings(mesh: Mesh, kinds: Sequence) -> list[tuple[int, int, int]]:
-    """Vertices where edges meet at an angle or supports ``kinds`` (n_facets,) change, and the facets before and after."""
+    """Vertices at which edges meet at an angle or supports (n_facets,) change, and the facets before and after each."""
     into: dict[int, int] = {}
     out_of: dict[int, int] = {}
     for facet, (a, b) in enumerate(mesh.facets.tolist()):
