@@ -109,6 +109,8 @@ def of_note(note: int, velocity: int, n_points: int, fastest: float) -> tuple[in
 def read_midi(path: Path, n_points: int, fastest: float, rate: int) -> list[Stroke]:
     """The notes of all tracks of a MIDI file as strokes; pauses, controllers and the ends of notes say nothing."""
     mido = check.extra("mido", "play", "a MIDI file")
+    if not path.is_file():
+        raise ValueError(f"{path}: {check.absent(path)}")
     if path.stat().st_size > LARGEST_FILE:
         raise ValueError(f"{path}: a MIDI file must have at most {LARGEST_FILE / 1e6:g} MB")
     strokes, now = [], 0.0
