@@ -120,6 +120,11 @@ class Target:
         """The target that a user has assembled, or whose modes a user has found."""
         if isinstance(body, Modes):
             return cls(modes=body, damping_ratio=damping_ratio)
+        if body.element == "morley":
+            raise ValueError(
+                "target must not be a system of element 'morley', which serves to check frequencies; assemble it with "
+                "'argyris', or give its modes of `find_modes`"
+            )
         posts = tuple((at, "hinged" if np.isinf(stiffness) else stiffness) for at, stiffness in body.point_supports)
         held, masses = body.supports, body.point_masses
         return cls(body.mesh, body.section, held, masses, posts, {}, damping_ratio, "fe", body.theory, body)

@@ -173,3 +173,12 @@ def test_closed_forms_are_known_by_the_mesh():
     ):
         assert none is None
     assert np.all(hinged > 0.0)
+
+
+@pytest.mark.parametrize("function", [fi.strike, fi.plan])
+def test_a_system_that_only_checks_frequencies_is_not_struck_itself(function):
+    plate = fi.assemble(
+        fi.mesh.rectangle(0.4, 0.3), fi.Plate(ALUMINIUM, 2e-3), {"boundary": "hinged"}, element="morley"
+    )
+    with pytest.raises(ValueError, match="assemble it with 'argyris', or give its modes"):
+        function(plate, STICK, SOFT, at=(0.1, 0.1), speed=1.0, tolerance=0.3)
