@@ -38,6 +38,8 @@ LOW = 40
 TRUE_VECTORS = 4  # [-] of so many Ritz pairs the lowest one is a mode: those above are packets, whose shear is singular
 TOP = 4  # [-] the upper one of so many parts of the integrated modes tells how those above go on: ten modes, of LOW
 NODES = 3  # [-] Gauss points in each direction of a triangle: slopes to 1e-3, as a mode's wave spans several triangles
+TINY = 0.25  # [-] of the size of triangles before rings are added: smaller ones are rings around a corner or a point
+BLUNT = 0.16  # [-] of the thickness: with triangles of this size a hinged L-shape softens by shear as Mindlin's does
 ALONG = 200  # [-] Gauss points along a beam or the radius of a disk: 20 and more for each wave of its fortieth mode
 
 
@@ -200,6 +202,18 @@ def _extended(modes: Modes, low: slice, found: np.ndarray, per_extent: float, th
     return Bending(wave, every[0], every[1], *(every[2:] if thick else (None, None, None)))
 
 
+def _blunted(energy: np.ndarray, area: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """Energy of shear (n_cells, n), with no higher peaks in cells of less than the ``least`` size than in others.
+
+    At singular corners the shear force of a thin plate grows as r**(z - 3), and its energy without limit on smaller
+    triangles; that of a true plate does not grow any more nearer than a part of its thickness.
+    """
+    fine = np.sqrt(2.0 * area) < least
+    density = energy / area[:, None]
+    highest = density[~fine].max(axis=0)
+    return np.where(fine[:, None], np.minimum(density, highest), density) * area[:, None]
+
+
 def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     """Slope, volume, rotary inertia, shear and edge (5, n) of a plate's shapes (n_dofs, n) by elements."""
     space: Any = system.space
@@ -228,7 +242,10 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     Q = np.stack([(q @ moved) for q in (force[:, 0, 0] + force[:, 1, 2], force[:, 0, 2] + force[:, 1, 1])])
     soft = np.linalg.inv(section.shear(flat)).reshape(*area.shape, 2, 2) * frame.stiffness / frame.length**2
     energy = (vectors * (system.K @ vectors)).sum(axis=0)
-    result[3] = np.einsum("eq,aeqk,eqab,beqk->k", area, Q, soft, Q, optimize=True) / energy
+    sheared = np.einsum("eq,aeqk,eqab,beqk->ek", area, Q, soft, Q, optimize=True)
+    usual = TINY * np.sqrt(2.0 * area.sum() / len(system.mesh.cells))
+    least = np.minimum(BLUNT * h.min(axis=1) / frame.length, usual)
+    result[3] = _blunted(sheared, area.sum(axis=1), least).sum(axis=0) / energy
     rim = system.rim
     free = np.flatnonzero(np.array(rim.kinds) == "free") if rim is not None else np.zeros(0, int)
     if len(free) and rim is not None:

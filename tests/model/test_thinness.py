@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 import thick_references as thick
+from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.model import audit, thinness
+from fem_impact.model import audit, bending, thinness
 
 E, NU, RHO = 210e9, 0.3, 7850.0
 STEEL = fi.Material(E=E, nu=NU, rho=RHO)
@@ -174,3 +175,25 @@ def test_a_stick_that_is_told_slender_or_stout_has_its_shear_and_a_hammer_has_no
 def test_waves_are_a_hundredth_too_fast_at_the_limit():
     """Mindlin's plate to second order in h k: rotation adds 1 / 12, shear 1 / (5 (1 - nu)), each to 1 / omega**2."""
     assert pytest.approx(0.01, rel=0.05) == 0.5 * (1.0 / 12.0 + 0.2 / (1.0 - 0.3)) * thinness.LIMIT**2
+
+
+@pytest.mark.parametrize(
+    ("corners", "rtol"),
+    [
+        ([(0, 0), (0.3, 0), (0.2, 0.2), (-0.1, 0.2)], 0.03),  # first order in the drop; 1e3 times it was told before
+        pytest.param(  # 10 % were measured; 1e12 times it
+            [(0, 0), (0.4, 0), (0.4, 0.2), (0.2, 0.2), (0.2, 0.4), (0, 0.4)], 0.2, marks=pytest.mark.slow
+        ),
+    ],
+    ids=["obtuse", "re-entrant"],
+)
+def test_hinged_corners_soften_a_plate_by_shear_as_mindlin_says(corners, rtol):
+    """The shear force of a thin plate grows without limit there, and so did its energy on ever smaller triangles."""
+    shape, plate = fi.mesh.polygon(corners), fi.Plate(STEEL, 0.01)
+    thin, thick_one = (
+        fi.find_modes(fi.assemble(shape, plate, {"boundary": "hinged"}, theory=theory), n_modes=2)
+        for theory in (None, "mindlin")
+    )
+    body = bending.known(thin)
+    assert body is not None
+    assert_allclose(bending.bending(body).thick, (thin.omega / thick_one.omega) ** 2 - 1.0, rtol=rtol)
