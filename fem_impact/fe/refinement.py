@@ -57,8 +57,7 @@ DOFS_PER_AREA = {
 # [-] fraction of the tolerance that meshes after the first aim at: less makes them finer than needed, more often takes
 # another; half and twice pass the tests
 MARGIN = 0.6
-# [-] powers of the size with which both parts of the error fall: 8 of smooth shapes less a reserve, and at curved rims;
-# half and twice pass the tests
+# [-] powers of the size with which both parts of the error fall: 8 of smooth shapes less a reserve, and at curved rims
 ORDERS = 7.5, 5.0
 # [-] smallest ratio of element sizes between two meshes: a tenth more triangles; with less the mesh may not change
 LEAST_STEP = 1.05
