@@ -59,7 +59,7 @@ DOFS_PER_AREA = {
 # another; half and twice pass the tests
 MARGIN = 0.6
 # [-] powers of the size with which the parts of the error fall: 8 of smooth shapes less a reserve, at curved rims, at
-# steps of the thickness; half and twice pass the tests
+# steps of the thickness
 ORDERS = 7.5, 5.0, 1.0
 # [-] smallest ratio of element sizes between two meshes: a tenth more triangles; with less the mesh may not change
 LEAST_STEP = 1.05
