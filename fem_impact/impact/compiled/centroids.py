@@ -6,8 +6,8 @@ from .build import LOOSE, inner
 from .cubics import cubic
 from .law import at
 
-MOST_WAVES = 3e8  # [-] samples times frequencies of one centroid; the engine finds those of longer blows by a transform
-LANES = 32  # [-] frequencies of a spectrum found together
+MOST_WAVES = 3e8  # [-] samples times frequencies of one centroid, to limit the work; longer ones take a transform
+LANES = 32  # [-] frequencies of a spectrum found together; does not change the result
 WAVES = 16.0  # [-] frequencies over the inverse of the time between first touch and last: errs by 1e-4; test_batches.py
 FEWEST_WAVES, MOST_POINTS = 64.0, 65536.0  # [-] frequencies of a spectrum
 SAMPLES = 12.0  # [-] of the force per period of a spectrum's highest frequency: the rule errs by (2 pi / 12)**4 / 720

@@ -17,10 +17,10 @@ from .propagation import N_LANE, any_of, glide, lane_table, restore
 from .rounding import REPEATED
 
 PATIENT = 4  # [-] looks of a flight that make do with the table of a step up to four times shorter than allowed
-GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before
+GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before; does not change the result
 SLOW_LOOKS = 300  # [-] looks of a flight that lead hardly on before a stepping scheme takes over
 ONSET, NEVER, LATER, SLOW, UNPROVED = range(5)  # how a flight ends, see `find_onset`
-LOOK_LIMIT = 20_000_000  # [-] looks ahead times modes in one free flight before the run gives up: some 0.1 s
+LOOK_LIMIT = 20_000_000  # [-] looks ahead times modes in one free flight: a time limit of some 0.1 s
 
 
 @inner(arrays=arrays.approach, fastmath=LOOSE)

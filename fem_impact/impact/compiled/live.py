@@ -29,7 +29,7 @@ LEVELS = FULL.bit_length()  # lengths of steps, from a frame to a tick
 N_ON, N_LOOKS, FRAME, FORCED = range(4)  # places of `State.place`
 LOOKS = 64  # [-] looks of a flight after which its bounds are drawn anew, as they loosen
 FAINT = 1e-140  # [-] of sqrt(J): a mode with less is at rest, before its numbers get slow to calculate with
-SWEEP = 1024  # [-] frames after which modes are looked at for that
+SWEEP = 1024  # [-] frames after which modes are looked at for that, to limit the work
 STRUCK, STOLEN, TOUCHED, TRACED, STEPS, LOST, COUNTERS = 0, 1, 2, 3, 4, 5, 6  # what is counted; how many counters
 
 

@@ -26,7 +26,7 @@ from .propagation import any_of, free_table, product, restore
 
 N_LAW = 8  # numbers of a law that may change, in the order of `law.spring_of`
 OMEGA, ZETA, BIAS, SHAPES = range(4)  # rows of a `Grown`; the changes of motion that they make follow the motion itself
-SLOTS = 12  # [-] lengths of pieces whose tables are kept
+SLOTS = 12  # [-] lengths of pieces whose tables are kept, to limit the memory
 SMALL = 0.5  # [rad] phase below which the recursion of the moments cancels: two orders lose a digit
 TERMS = 13  # [-] of their power series there: leave 1e-16
 CRITICAL = 1e-4  # [-] this near to critical damping, derivatives in zeta are differences; they err by its square
