@@ -191,7 +191,8 @@ class _Parser(argparse.ArgumentParser):
             words = [word.partition("=")[0] for word in self.given if word.startswith("--")]
             found = [word for word in words if word not in known]
         close = difflib.get_close_matches(found[0], known, n=1) if found else []
-        hint = f"did you mean {close[0]}?" if close else f"see {self.prog} --help"
+        verb = "".join(f" {word}" for choices in verbs for word in self.given[:1] if word in choices)
+        hint = f"did you mean {close[0]}?" if close else f"see {self.prog}{verb} --help"
         sys.exit(_complain(f"{message:.300}; {hint}", BAD_INPUT))
 
 

@@ -21,7 +21,8 @@ tuning    all others: thresholds, safety factors, tolerances and counts that dec
 `constants.csv` remembers for each constant that was changed its value, the factors and the first test that failed, or
 that none did. Constants of order one and small counts are changed by 2, others by 10, up and then down; the tests
 run are the fast ones of its module and of the modules that use it, or where there are none, of its package. So a
-constant that none of them holds may still be held by others. Compiled kernels are left out.
+constant that none of them holds may still be held by others. For a compiled kernel, which is compiled anew with each
+change, the tests are all that import any kernel.
 """
 
 import argparse
@@ -34,7 +35,7 @@ import re
 import resource
 import signal
 import sys
-import types
+import tempfile
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -49,6 +50,8 @@ KINDS = ("layout", "fact", "picture", "limit", "resource", "rounding", "tuning")
 FACT = r"\bfact:|\bexact for\b|\([A-Z][^()]* (19|20)\d\d\)"
 CHEAP = r"to limit (the )?(memory|work)|limits the memory|is faster|% slower|time limit|does not change the result"
 SECONDS = 60  # [s] of CPU that the tests of one changed constant may take; longer ones count as not failed
+KERNEL_SECONDS = 300  # [s] the same where kernels are compiled first
+KERNELS = "impact.compiled"
 NONE, SLOW = "none", f"none within {SECONDS} s"
 
 
@@ -219,6 +222,11 @@ class First:
 def tests_of(constant: Constant) -> list[str]:
     """The test files of its module and of others that use it; where there are none, those that name the module."""
     found, name = [], constant.module.rpartition(".")[2]
+    if constant.package == KERNELS:
+        texts = {str(path): path.read_text("utf-8") for path in sorted((ROOT / "tests").rglob("test_*.py"))}
+        kernels = [path for path, text in texts.items() if re.search(rf"{KERNELS}(\.| import )", text)]
+        own = rf"compiled(\.{name}\b| import .*\b{name}\b)"
+        return sorted(kernels, key=lambda path: not re.search(own, texts[path]))
     using = rf"\b{name}\.{constant.name}\b|\b{name} import (\([^)]*|[^\n]*)\b{constant.name}\b"
     home = PACKAGE / (constant.module.replace(".", "/") + ".py")
     for path in [home, *sorted(PACKAGE.rglob("*.py"))]:
@@ -232,18 +240,25 @@ def tests_of(constant: Constant) -> list[str]:
 
 def first_failure(tests: list[str], change: Changing | None) -> str:
     """The first test that fails with a constant changed, found in a process of its own."""
+    import numba
     import pytest
+    import warming
 
+    kernels = change is not None and change.constant.package == KERNELS
+    seconds = KERNEL_SECONDS if kernels else SECONDS
+    folder = tempfile.TemporaryDirectory()
     answer, told = os.pipe()
     child = os.fork()
     if not child:
         quiet = os.open(os.devnull, os.O_WRONLY)
         os.dup2(quiet, 1)
         os.dup2(quiet, 2)
-        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-        sys.modules["warming"] = types.SimpleNamespace(compile_all=lambda: None)  # kernels are on disk
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+        warming.compile_all = lambda: None  # kernels are on disk, or compiled as needed
         if change:
             sys.meta_path.insert(0, change)
+        if kernels:
+            numba.config.CACHE_DIR = folder.name
         first = First()
         status = pytest.main(["-x", "-n", "0", "-q", "-p", "no:cacheprovider", "--no-header", *tests], plugins=[first])
         if status not in (0, 1, 2, 5) and first.holder == NONE:
@@ -252,6 +267,7 @@ def first_failure(tests: list[str], change: Changing | None) -> str:
         os._exit(0)
     os.close(told)
     _, status = os.waitpid(child, 0)
+    folder.cleanup()
     with os.fdopen(answer) as pipe:
         said = pipe.read()
     return said or (SLOW if status in (signal.SIGXCPU, signal.SIGKILL) else "crash")
@@ -331,7 +347,6 @@ def main() -> None:
     elif options.hold:
         asked = [each for name in options.hold for each in found
                  if f"{each.path}.".startswith(f"{name}.") and each.kind in ("tuning", "rounding")
-                 and each.package != "impact.compiled"
                  and (options.again or rows.get(each.path, {"value": None})["value"] != each.value)]  # fmt: skip
         hold(asked)
     else:

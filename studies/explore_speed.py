@@ -26,7 +26,7 @@ from playwright.sync_api import sync_playwright
 from scipy import ndimage
 
 import fem_impact as fi
-from fem_impact.pages import explore_desk, explore_map, explore_model, explore_view
+from fem_impact.pages import explore_map, explore_model, explore_numbers, explore_view
 
 TURNS = 30  # moves of each slider
 ZOOMS = 6
@@ -87,53 +87,53 @@ def spent(work: Callable[..., Any], *arguments: Any) -> tuple[float, Any]:
     return time.process_time() - begin, found
 
 
-def opened(scene: str) -> explore_desk.Desk:
+def opened(scene: str) -> explore_numbers.Explorer:
     """Print what it takes until the page knows its first strike point; what is compiled has been before."""
-    opening, bench = spent(lambda: explore_model.Bench.of(fi.load_scene(scene)))
-    desk = explore_desk.Desk(bench)
-    first, _ = spent(desk.answer, bench.start)
-    known, view = spent(desk.look, bench.start.at)
-    desk.answer(bench.start), desk.judge(bench.start)
-    answer, _ = spent(desk.answer, bench.start)
-    exact, _ = spent(desk.judge, bench.start)
+    opening, setup = spent(lambda: explore_model.Setup.of(fi.load_scene(scene)))
+    explorer = explore_numbers.Explorer(setup)
+    first, _ = spent(explorer.answer, setup.start)
+    known, view = spent(explorer.look, setup.start.at)
+    explorer.answer(setup.start), explorer.judge(setup.start)
+    answer, _ = spent(explorer.answer, setup.start)
+    exact, _ = spent(explorer.judge, setup.start)
     by = "modes" if view.seen is None else f"{view.seen.n_modes} vectors"
     print(
         f"CPU time [s]: opening {opening:.2f}, first answer {first:.3f}; strike point known by {by} {known:.2f}, "
         f"then an answer {answer:.3f}, the exact blow {exact:.3f}"
     )
-    return desk
+    return explorer
 
 
-def drawn(desk: explore_desk.Desk, window: explore_map.Window) -> tuple[list[float], explore_map.Picture]:
+def drawn(explorer: explore_numbers.Explorer, window: explore_map.Window) -> tuple[list[float], explore_map.Picture]:
     """CPU times [ms] until each picture of a map, and the last of them."""
-    settings, times = desk.bench.start, []
-    seconds, first = spent(desk.picture, settings, window)
+    settings, times = explorer.setup.start, []
+    seconds, first = spent(explorer.picture, settings, window)
     times.append(seconds)
-    seconds, picture = spent(desk.finer, settings, first)
+    seconds, picture = spent(explorer.finer, settings, first)
     times.append(seconds)
-    seconds, _ = spent(desk.sharp, settings, picture)
+    seconds, _ = spent(explorer.sharp, settings, picture)
     times.append(seconds)
-    seconds, picture = spent(desk.surer, settings, picture)
+    seconds, picture = spent(explorer.surer, settings, picture)
     while not picture.finest:
-        more, picture = spent(desk.finer, settings, picture)
+        more, picture = spent(explorer.finer, settings, picture)
         seconds += more
     return (1e3 * np.cumsum([*times, seconds])).tolist(), picture
 
 
-def otherwise(desk: explore_desk.Desk, picture: explore_map.Picture, number: int = 400) -> tuple[int, int]:
+def otherwise(explorer: explore_numbers.Explorer, picture: explore_map.Picture, number: int = 400) -> tuple[int, int]:
     """How many pixels beside borders, of some at random, a map of a tenth of the tolerance counts otherwise."""
     count = picture.n_impacts.astype(int)
     beside = ndimage.maximum_filter(count, 3) != ndimage.minimum_filter(count, 3)
     i, j = np.random.default_rng(0).permutation(np.argwhere(beside))[:number].T
-    settings, seen = desk.bench.start, desk.look(desk.bench.start.at).seen
+    settings, seen = explorer.setup.start, explorer.look(explorer.setup.start.at).seen
     tolerance = 0.1 * explore_model.MAP_TOLERANCE
-    fine = explore_map.Mapper(desk.bench)._counts(settings, seen, picture.mass[j], picture.stiffness[i], tolerance)
+    fine = explore_map.Mapper(explorer.setup)._counts(settings, seen, picture.mass[j], picture.stiffness[i], tolerance)
     return int((fine != count[i, j]).sum()), len(i)
 
 
-def windows(bench: explore_model.Bench) -> list[explore_map.Window]:
+def windows(setup: explore_model.Setup) -> list[explore_map.Window]:
     """Parts of a map, in logarithms a third of each axis, anywhere."""
-    rng, whole = np.random.default_rng(2), explore_map.Window.of(bench, None, None)
+    rng, whole = np.random.default_rng(2), explore_map.Window.of(setup, None, None)
     found = []
     for _ in range(ZOOMS):
         parts = (rng.uniform(0.2, 0.6), 0.3), (rng.uniform(0.2, 0.6), 0.35)
@@ -141,27 +141,27 @@ def windows(bench: explore_model.Bench) -> list[explore_map.Window]:
             (low * (high / low) ** start, low * (high / low) ** (start + size))
             for (low, high), (start, size) in zip((whole.mass, whole.stiffness), parts)
         ]
-        found.append(explore_map.Window.of(bench, *ends))
+        found.append(explore_map.Window.of(setup, *ends))
     return found
 
 
-def maps(desk: explore_desk.Desk) -> None:
+def maps(explorer: explore_numbers.Explorer) -> None:
     """Print the CPU time of a whole map and of zooms."""
-    whole = explore_map.Window.of(desk.bench, None, None)
+    whole = explore_map.Window.of(explorer.setup, None, None)
     said = "25, 49, sharp borders, each border pixel struck"
-    times, _ = drawn(desk, whole)
+    times, _ = drawn(explorer, whole)
     print(f"CPU time [ms] until a map of {said}: {', '.join(f'{t:.0f}' for t in times)}")
-    found = [drawn(desk, window) for window in windows(desk.bench)]
+    found = [drawn(explorer, window) for window in windows(explorer.setup)]
     least, middle, most = (f([times for times, _ in found], axis=0) for f in (np.min, np.median, np.max))
     print(f"{ZOOMS} zooms: " + "; ".join(f"{m:.0f} ({a:.0f} to {b:.0f})" for m, a, b in zip(middle, least, most)))
-    wrong, tried = np.sum([otherwise(desk, picture) for _, picture in found], axis=0)
+    wrong, tried = np.sum([otherwise(explorer, picture) for _, picture in found], axis=0)
     print(f"pixels beside a border that a tenth of the tolerance counts otherwise: {wrong} of {tried}")
 
 
-def computed(desk: explore_desk.Desk) -> np.ndarray:
+def computed(explorer: explore_numbers.Explorer) -> np.ndarray:
     """CPU times [ms] of answers in this process, each slider being moved anywhere in turn."""
-    rng, found, settings = np.random.default_rng(1), [], desk.bench.start
-    ends = explore_view.ends(desk.bench)
+    rng, found, settings = np.random.default_rng(1), [], explorer.setup.start
+    ends = explore_view.ends(explorer.setup)
     names = [name for name in ends if name not in ("x", "y", "height", "rate")]
     for i in range(ANSWERS):
         name = names[i % len(names)]
@@ -170,18 +170,18 @@ def computed(desk: explore_desk.Desk) -> np.ndarray:
         value = float(np.exp(rng.uniform(np.log(low), np.log(high))) if logarithmic else rng.uniform(low, high))
         settings = replace(settings, **{name: value})
         begin = time.thread_time()
-        _, hit = desk.answer(settings)
+        _, hit = explorer.answer(settings)
         middle = time.thread_time()
-        desk.rest_of(settings, hit)
+        explorer.rest_of(settings, hit)
         found.append((middle - begin, time.thread_time() - begin))
     return 1e3 * np.array(found)
 
 
 def main(scene: str, browser: bool = True) -> None:
     """Measure without a browser, then serve the scene, move every slider and print the response times."""
-    parts, desk = (50.0, 90.0, 99.0, 100.0), opened(scene)
-    maps(desk)
-    for what, times in zip(("force and numbers", "everything"), computed(desk).T):
+    parts, explorer = (50.0, 90.0, 99.0, 100.0), opened(scene)
+    maps(explorer)
+    for what, times in zip(("force and numbers", "everything"), computed(explorer).T):
         said = ", ".join(f"{part:g} %: {value:.1f}" for part, value in zip(parts, np.percentile(times, parts)))
         print(f"CPU time until {what} [ms], {ANSWERS} moves: {said}")
     if browser:

@@ -203,16 +203,16 @@ def by_elements(only):
         for first, second in zip(one, two or ()):
             if first.hardest and second.hardest and not (first.unlimited or second.unlimited):
                 print(f"    {1e3 * first.mass:.4g} g: hardest tip {first.hardest:.4g} and {second.hardest:.4g} N/m")
-        seconds, bench, _ = timed(explore_model.Bench.of, scene)
-        point, seen, _ = timed(bench.seen, bench.start.at)
+        seconds, setup, _ = timed(explore_model.Setup.of, scene)
+        point, seen, _ = timed(setup.seen, setup.start.at)
         before, _, _ = timed(lambda: scene.modes(explore_model.MOST_MODES))  # noqa: B023
         print(
             f"  explore opens after {seconds:.1f} s, before after {before:.1f} s or more; a strike point is known by "
             f"{seen.n_modes} vectors after {point:.1f} s"
         )
         for stiffness in (1.0, 100.0):
-            settings = replace(bench.start, stiffness=stiffness)
-            exact, quick = (explore_model.blow(bench.case(settings, seen=modes)).error.total for modes in (seen, None))
+            settings = replace(setup.start, stiffness=stiffness)
+            exact, quick = (explore_model.blow(setup.case(settings, seen=modes)).error.total for modes in (seen, None))
             print(
                 f"    {stiffness:g} times the stiffness: error {exact:.1e} by vectors, {quick:.1e} by the first modes"
             )

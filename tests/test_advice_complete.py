@@ -85,6 +85,9 @@ ELSEWHERE = {  # advice followed in a test of its own: the test, and patterns of
     "impact/test_promise.py::test_errors_that_miss_only_together_propose_a_tolerance_that_is_met": (
         "^take a tolerance of",
     ),
+    "impact/test_promise.py::test_impacts_that_cannot_be_told_leave_the_first_one": (
+        "give max_impacts = 1 for the first impact alone",
+    ),
     "impact/test_state.py::test_errors_of_the_blow_before_count": ("^give the blow before a smaller tolerance$",),
     "impact/test_state.py::test_the_motion_of_a_system_goes_on_in_its_modes": (
         "^start needs modes, taken as they are",

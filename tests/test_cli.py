@@ -165,6 +165,7 @@ def test_missing_scene_is_a_sentence_with_the_nearest_name(scene, tmp_path, caps
         (["hammer", "SCENE"], "required: --bandwidth; see fem-impact hammer --help"),
         (["modes", "SCENE", "--count", "x"], "invalid int value: 'x'; see fem-impact modes --help"),
         (["map", "SCENE", "--format", "zar"], "did you mean zarr?"),
+        (["play", "SCENE", "--silent", "a.wav"], "unrecognized arguments: a.wav; see fem-impact play --help"),
         ([], "required: COMMAND; see fem-impact --help"),
         (["strike", ""], "argument SCENE: it must be the path of a file, got ''"),
         (["report", "SCENE", "--out", "x" * 300], "argument --out: it must be the path of a file"),

@@ -9,6 +9,7 @@ from scipy.special import j1
 from skfem import Basis, BilinearForm, ElementHex2, ElementTriP4, ElementVector, MeshHex, MeshTri
 
 from fem_impact.fe.corners import around_corners
+from fem_impact.fe.section import Material
 
 KAPPA = 5.0 / 6.0  # [-]
 
@@ -46,7 +47,7 @@ def by_rotations(mesh, h, n_modes, matrices):
 
     ``matrices`` of `studies/thick_elements.py` knows neither our elements nor our edges.
     """
-    fine = around_corners(mesh, ["hinged"] * len(mesh.facets), 0.3)[2]
+    fine = around_corners(mesh, ["hinged"] * len(mesh.facets), Material(E=1.0, nu=0.3, rho=1.0))[2]
     plane = MeshTri(np.ascontiguousarray(fine.points.T), np.ascontiguousarray(fine.cells.T))
     deflection, rotation, K, M = matrices(plane, h, (ElementTriP4(), ElementTriP4()), False)
     n_w, across = deflection.N, {}

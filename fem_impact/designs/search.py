@@ -13,6 +13,7 @@ from scipy.stats import qmc
 
 from .._base import check, markup
 from .._base.check import SimulationError, ToleranceWarning
+from .._base.rounding import SAME
 from ..fe.variation import SectionChange
 from ..impact import gradient, promise
 from ..impact.response import Response
@@ -32,8 +33,6 @@ CLOSE = 1e-10
 LOST = 1e3  # [-] miss of numbers that make no blow: any that is far above the miss of a blow makes the search turn back
 MOST_MODES = 10_000  # [-] of a body in a blow
 MOST_TRIES = 1024  # [-] points where a search begins
-# [-] of a range: nearer to its end counts as there; a search ends at its bounds to CLOSE, so anything above would do
-AT_END = 1e-6
 
 
 @dataclass(frozen=True)
@@ -369,7 +368,7 @@ class _Search:
     def run(self, first: np.ndarray, tolerance: float) -> Design:
         """One search from one point."""
         low, high = self.bounds
-        inside = np.clip(first, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
+        inside = np.clip(first, low + CLOSE * (high - low), high - CLOSE * (high - low))
         self.state(inside)  # an error at the start is the user's
         x = self._squares(inside)  # with a number to make least, this finds where the goals are met at all
         if self.least is not None:
@@ -380,7 +379,7 @@ class _Search:
             for goal, value, row in zip(self.goals, state.found, slopes)
         )
         part = (x - low) / (high - low)
-        ends = tuple(each.name for each, p in zip(self.ranges, part) if min(p, 1.0 - p) < AT_END)
+        ends = tuple(each.name for each, p in zip(self.ranges, part) if min(p, 1.0 - p) < SAME)
         return Design(
             MappingProxyType(state.values), reached, tolerance, ends, len(self.seen), self.maker,
             MappingProxyType(state.hits),

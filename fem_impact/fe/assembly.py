@@ -19,7 +19,7 @@ from . import beam_elements, plausible, shear_beam, thick
 from .beam_elements import HermiteSpace
 from .corners import around_corners
 from .elements import CHUNK, ArgyrisSpace, Bent, MorleySpace, numbering, quadrature, triangles
-from .section import KINDS, SOFT, Beam, Elastic, Plate, evaluate
+from .section import KINDS, SOFT, Beam, Elastic, Plate, directional, evaluate
 from .shear_beam import TimoshenkoSpace
 from .splitting import towards_points
 from .springs import beam_springs, check_masses, check_posts, edge_springs, plate_springs
@@ -297,7 +297,7 @@ def _graded(
     thicker = element in ELEMENTS["mindlin"]
     allowed = support_words("mindlin" if thicker else None)
     stated = _kinds(support_of_facets(mesh, supports, allowed))
-    order, unresolved, fine = around_corners(mesh, stated, section.material.nu)
+    order, unresolved, fine = around_corners(mesh, stated, section.material)
     fine = fine if graded else mesh
     if thicker:
         fine = thick.layered(fine, section, _kinds(support_of_facets(fine, supports, allowed)), layer)
@@ -614,7 +614,8 @@ def _plate_fields(section: Plate, x: np.ndarray, centre: np.ndarray, length: flo
     stiffness, inertia = section.stiffness(flat).reshape(*x.shape[:2], 3, 3), section.inertia(flat).reshape(x.shape[:2])
     frame = Frame(centre, length, float(stiffness.max()), float(inertia.max()))
     stiffness, inertia = stiffness / frame.stiffness, inertia / frame.inertia
-    softness = float((inertia / np.minimum(stiffness[..., 0, 0], stiffness[..., 1, 1])).max())
+    plane = section.material.plane_stress
+    softness = float((inertia / stiffness[..., 0, 0]).max() * plane[0, 0] / directional(plane).min())
     return frame, stiffness, inertia, softness
 
 

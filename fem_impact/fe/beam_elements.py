@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from skfem import ElementLineHermite, MeshLine
 
-from .._base.rounding import SAME
+from .._base.rounding import EPSILON, SAME
 from .._base.untyped import Cells
 from ..mesh.facets import powers
 
@@ -22,6 +22,7 @@ APART = 0.01  # [-] nodes closer than this fraction of the beam cause a rounding
 ROUNDED = 1e-15  # [-] rounding error of an element as long as the beam; grows as 1 / length**3 for shorter ones
 # [-] degree of the polynomial that must fit the section within an element: well below the 31 that QUADRATURE bears
 SMOOTH = 12
+LOOKS = 4000  # [-] places where a section is looked at: saw cuts wider than 4e-4 of the beam, pi / 2 / LOOKS, are seen
 # [-] smallest element made to fit the section, as a fraction of the beam: 20 halvings, a jump is then pinned to 1e-6
 NARROWEST = 1e-6
 ROUNDING = 1e-14  # [-] a smaller misfit is just rounding
@@ -162,7 +163,7 @@ def divided(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes
     every = np.sort(np.append(nodes, breaks))
     low, high, margin = every[:-1], every[1:], SAME * span  # skip the inexactly located kink at a node
     while low.size:
-        rough = (_misfit(fields, low + margin, high - margin) > SAME) & (high - low > NARROWEST * span)
+        rough = (_misfit(fields, low + margin, high - margin, span) > SAME) & (high - low > NARROWEST * span)
         middle = 0.5 * (low + high)[rough]
         every = np.append(every, middle)
         low, high = np.append(low[rough], middle), np.append(middle, high[rough])
@@ -175,7 +176,9 @@ def _breaks(fields: Callable, nodes: np.ndarray) -> np.ndarray:
     found: list[float] = []
     while low.size:
         # at a kink the misfit falls only in proportion to the interval; for a smooth section it falls much faster
-        rough = _misfit(fields, low, high) > np.maximum(SAME * (high - low) / span, ROUNDING)
+        # neighbours look a little beyond their common end, so that a step there is within one of them
+        over = 0.01 * SAME * span
+        rough = _misfit(fields, low - over, high + over, span) > np.maximum(SAME * (high - low) / span, ROUNDING)
         low, high = low[rough], high[rough]
         found += (0.5 * (low + high)[high - low < SAME * span]).tolist()
         low, high = low[high - low >= SAME * span], high[high - low >= SAME * span]
@@ -187,16 +190,17 @@ def _breaks(fields: Callable, nodes: np.ndarray) -> np.ndarray:
     return places[np.append(True, np.diff(places) > 4.0 * SAME * span)[: len(places)]]  # drop doubles
 
 
-def _misfit(fields: Callable, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Relative misfit (n,) of stiffness, its inverse and inertia to polynomials of degree SMOOTH on intervals."""
-    count = 2 * SMOOTH + 1
-    node = np.cos(np.pi * (np.arange(count) + 0.5) / count)  # Chebyshev
+def _misfit(fields: Callable, low: np.ndarray, high: np.ndarray, span: float) -> np.ndarray:
+    """Relative misfit (n,) of stiffness, its inverse and inertia to polynomials of degree SMOOTH, beyond rounding."""
+    count = 2 * SMOOTH + 1 + int(LOOKS * (high - low).max() / span)
+    node = np.cos(np.pi * np.arange(count) / (count - 1))  # Chebyshev, with both ends
     x = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * node
     stiffness, inertia = (field.reshape(x.shape) for field in fields(x.ravel()))
     vander = np.polynomial.chebyshev.chebvander(node, SMOOTH)
-    missed = np.eye(count) - vander @ np.linalg.pinv(vander)
     every = np.stack([stiffness, 1.0 / stiffness, inertia])
-    return (np.abs(every @ missed.T).max(axis=2) / np.abs(every).max(axis=2)).max(axis=0)
+    missed = np.abs(every - (every @ np.linalg.pinv(vander).T) @ vander.T).max(axis=2)
+    rounded = 8.0 * EPSILON * span / (high - low) * np.ptp(every, axis=2)  # places are rounded, too
+    return ((missed - rounded) / np.abs(every).max(axis=2)).max(axis=0)
 
 
 def energy_errors(

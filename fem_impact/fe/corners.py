@@ -1,11 +1,13 @@
 """Find how singular a plate is at its corners, and put triangles there that shrink geometrically."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 
 from .._base.rounding import HALVINGS
 from ..mesh.meshes import Mesh
+from .section import Material, turned
 from .splitting import Rim, bisected, strip
 
 # [-] size of each ring of triangles over that of the ring around it: 0.7 takes twice the rings, 0.35 slimmer cells
@@ -17,53 +19,70 @@ CORNER_ERROR = 1e-7
 SMALLEST = 1e-10  # [-] smallest ring as a fraction of the extent; rounding of the coordinates spoils smaller ones
 SMALLEST_FREE = 3e-3  # [-] the same at a free corner, which moves: rounding grows with the ring's size to the -2
 MILD = 2.95  # [-] corners with a larger exponent get no rings: there rings cost quintic triangles more than they gain
+FLATTEST = 1e-9  # [-] least imaginary part of a root mu, far below that of any material: rounding may take it away
 MILD_FREE = 2.5  # [-] the same between free edges, where the singular part is small, so that rings pay off later
+# [-] roots mu that lie closer, over their imaginary part, are taken apart: those of an isotropic plate are equal, and
+# exponents change by 1e-7
+APART = 3e-4
 
 
-def _rows(kind: str, z: np.ndarray, angle: float, nu: float) -> list[np.ndarray]:
-    """Two conditions (n, 4) of a straight edge at an angle, on r**z times the four biharmonic functions."""
-    c, s = np.cos(z * angle), np.sin(z * angle)
-    y = z - 2.0
-    c2, s2 = np.cos(y * angle), np.sin(y * angle)
-    f = np.stack([c, s, c2, s2], axis=1)
-    df = np.stack([-z * s, z * c, -y * s2, y * c2], axis=1)
-    d2f = np.stack([-(z**2) * c, -(z**2) * s, -(y**2) * c2, -(y**2) * s2], axis=1)
-    d3f = np.stack([z**3 * s, -(z**3) * c, y**3 * s2, -(y**3) * c2], axis=1)
+def _roots(D: np.ndarray) -> np.ndarray:
+    """The four numbers mu (4,) for which any function of ``x + mu y`` bends a plate of stiffness D without load."""
+    equation = [D[1, 1], 4.0 * D[1, 2], 2.0 * D[0, 1] + 4.0 * D[2, 2], 4.0 * D[0, 2], D[0, 0]]
+    upper = sorted(np.roots(equation), key=lambda mu: mu.imag)[2:]  # above the real axis, but for rounding
+    one, other = (complex(mu.real, max(mu.imag, FLATTEST)) for mu in upper)
+    if abs(one - other) < APART * one.imag:
+        middle, step = 0.5 * (one + other), 0.5j * APART * one.imag
+        one, other = middle + step, middle - step
+    return np.array([one, other, np.conj(one), np.conj(other)])
+
+
+def _rows(kind: str, z: np.ndarray, angle: float, mu: np.ndarray, D: np.ndarray) -> list[np.ndarray]:
+    """Two conditions (n, 4) of a straight edge at an angle, on the functions ``(x + mu y)**z`` at distance one."""
+    c, s, way = np.cos(angle), np.sin(angle), 1j * np.sign(mu.imag)
+    base = c + mu * s
+    log = np.log(base * np.exp(-way * angle)) + way * angle  # continuous from edge to edge
+    value = np.exp(z[:, None] * log)
     if kind == "clamped":
-        return [f, df]
+        return [value, value * (c * mu - s) / base]
+    second = value / base**2  # over z (z - 1), as are the moments; the shear force is also over z - 2
+    xx, yy, xy = D @ np.stack([np.ones(4), mu**2, 2.0 * mu])
+    moment = second * (s * s * xx + c * c * yy - 2.0 * c * s * xy)
     if kind == "hinged":
-        return [f, d2f]
-    moment = d2f + (z + nu * z * (z - 1.0))[:, None] * f
-    shear = d3f + (z**2 + (1.0 - nu) * (z - 1.0) * (z - 2.0))[:, None] * df
-    return [moment, shear]
+        return [value, moment]
+    twist = c * s * (yy - xx) + (c * c - s * s) * xy
+    return [moment, second * (twist + (c * (xy + mu * yy) - s * (xx + mu * xy)) / base)]
 
 
-def _determinant(z: np.ndarray, angle: float, kinds: tuple[str, str], nu: float) -> np.ndarray:
-    matrix = np.stack(_rows(kinds[0], z, 0.0, nu) + _rows(kinds[1], z, angle, nu), axis=1)
+def _determinant(z: np.ndarray, angle: float, kinds: tuple[str, str], mu: np.ndarray, D: np.ndarray) -> np.ndarray:
+    matrix = np.stack(_rows(kinds[0], z, 0.0, mu, D) + _rows(kinds[1], z, angle, mu, D), axis=1)
     matrix = matrix / np.abs(matrix).max(axis=2, keepdims=True)
     return np.linalg.det(matrix) / ((z - 1.0) * (z - 2.0))  # the basis alone causes these two zeros
 
 
 @lru_cache(maxsize=256)
-def exponent(angle: float, kinds: tuple[str, str], nu: float) -> float:
+def exponent(angle: float, kinds: tuple[str, str], stiffness: tuple[float, ...]) -> float:
     """Smallest real part above 1 of the exponents z for which r**z solves the plate equation in a corner.
 
     Parameters
     ----------
     angle : float [rad], interior angle of the corner
     kinds : supports of the two edges: clamped, hinged or free
-    nu : float [-]
+    stiffness : (9,), rows of the bending stiffness on curvatures (xx, yy, 2 xy), in any unit; x is along the first edge
 
     References
     ----------
-    Williams (1952), Proc. 1st US National Congress of Applied Mechanics, 325-329.
+    Williams (1952), Proc. 1st US National Congress of Applied Mechanics, 325-329; Lekhnitskii (1968), Anisotropic
+    plates, ch. 9, for the roots mu.
     """
+    D = np.reshape(stiffness, (3, 3))
+    mu = _roots(D)
     real, imaginary = np.meshgrid(np.arange(1.02, MILD + 0.1, 0.06), [0.0, 0.15, 0.4, 0.8])
     z = (real + 1j * imaginary).ravel()
     before = z + 1e-3
-    value_before = _determinant(before, angle, kinds, nu)
+    value_before = _determinant(before, angle, kinds, mu, D)
     for _ in range(40):  # secant steps from all starting points at once
-        value = _determinant(z, angle, kinds, nu)
+        value = _determinant(z, angle, kinds, mu, D)
         change = value - value_before
         step = np.where(change == 0.0, 0.0, value * (z - before) / np.where(change == 0.0, 1.0, change))
         step = step * np.minimum(1.0, 0.3 / np.maximum(np.abs(step), 1e-300))
@@ -74,12 +93,11 @@ def exponent(angle: float, kinds: tuple[str, str], nu: float) -> float:
     return float(z.real[settled].min()) if settled.any() else MILD
 
 
-def rings(angle: float, kinds: tuple[str, str], nu: float, share: float = 1.0) -> int:
-    """Number of rings of triangles needed at a corner to miss less than CORNER_ERROR of the energy.
+def rings(z: float, kinds: tuple[str, str], share: float = 1.0) -> int:
+    """Number of rings of triangles needed at a corner of exponent z to miss less than CORNER_ERROR of the energy.
 
     ``share`` is the length of the facets there divided by the extent of the body.
     """
-    z = exponent(round(angle, 9), kinds, nu)
     if z >= (MILD_FREE if kinds == ("free", "free") else MILD - 1e-3):
         return 0
     wanted = np.log(CORNER_ERROR) / (2.0 * (z - 1.0) * np.log(SHRINK))
@@ -87,7 +105,21 @@ def rings(angle: float, kinds: tuple[str, str], nu: float, share: float = 1.0) -
     return max(0, int(np.ceil(min(wanted, np.log(smallest / share) / np.log(SHRINK)))))
 
 
-def around_corners(mesh: Mesh, kinds: list[str], nu: float) -> tuple[float, float, Mesh]:
+def meetings(mesh: Mesh, kinds: Sequence) -> list[tuple[int, int, int]]:
+    """Vertices at which edges meet at an angle or supports (n_facets,) change, and the facets before and after each."""
+    into: dict[int, int] = {}
+    out_of: dict[int, int] = {}
+    for facet, (a, b) in enumerate(mesh.facets.tolist()):
+        out_of[a], into[b] = facet, facet
+    pairs = ((vertex, into[vertex], facet) for vertex, facet in out_of.items())
+    return [
+        (vertex, before, facet)
+        for vertex, before, facet in pairs
+        if kinds[before] != kinds[facet] or mesh.tangents[before, 1] @ mesh.tangents[facet, 0] <= 1.0 - 1e-12
+    ]
+
+
+def around_corners(mesh: Mesh, kinds: list[str], material: Material) -> tuple[float, float, Mesh]:
     """Put rings of shrinking triangles at every corner that the supports ``kinds`` (n_facets,) make singular.
 
     Returns the power of the element size with which the frequency error falls, the approximate relative error that no
@@ -95,23 +127,18 @@ def around_corners(mesh: Mesh, kinds: list[str], nu: float) -> tuple[float, floa
     exponent is 1.04, and rounding of the coordinates leaves an error of 13 % (9 % measured on a 48-sided polygon).
     """
     order, unresolved = np.inf, 0.0
-    into: dict[int, int] = {}
-    out_of: dict[int, int] = {}
-    for facet, (a, b) in enumerate(mesh.facets.tolist()):
-        out_of[a], into[b] = facet, facet
-    wanted = {}
+    wanted, stiffness = {}, material.plane_stress / material.plane_stress.max()
     length = np.linalg.norm(np.diff(mesh.points[mesh.facets], axis=1)[:, 0], axis=1)
     extent = float(np.ptp(mesh.points, axis=0).max())
-    for vertex, facet in out_of.items():
-        before = into[vertex]
-        if kinds[before] == kinds[facet] and (mesh.tangents[before, 1] @ mesh.tangents[facet, 0]) > 1.0 - 1e-12:
-            continue
+    for vertex, before, facet in meetings(mesh, kinds):
         (x, y), (u, v) = mesh.tangents[before, 1], mesh.tangents[facet, 0]
         angle, pair = float(np.pi - np.arctan2(x * v - y * u, x * u + y * v)), (kinds[facet], kinds[before])
-        n = rings(angle, pair, nu, length[[before, facet]].max() / extent)
+        seen = turned(stiffness, -np.arctan2(v, u)) if material.E_across is not None else stiffness
+        z = exponent(round(angle, 9), pair, tuple(seen.ravel().round(9).tolist()))
+        n = rings(z, pair, length[[before, facet]].max() / extent)
         if n:
             wanted[vertex] = n
-            power = 2.0 * (exponent(round(angle, 9), pair, nu) - 1.0)
+            power = 2.0 * (z - 1.0)
             innermost = length[[before, facet]].max() / extent * SHRINK**n
             order, unresolved = min(order, power), max(unresolved, float(innermost**power))
     return order, unresolved, towards(mesh, wanted)

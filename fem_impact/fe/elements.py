@@ -263,13 +263,17 @@ class ArgyrisSpace:
         """
         return self.inner.derivatives(cells, points, orders, monomials, self.coefficients)
 
+    def rule(self, order: int) -> tuple[np.ndarray, np.ndarray]:
+        """Quadrature of the reference triangle: local coordinates (n_q, 2) and weights (n_q,)."""
+        X, weight = get_quadrature(self.element.refdom, order)
+        return X.T - 1.0 / 3.0, weight
+
     def uniform(self, cells: np.ndarray, stiffness: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
         """Bending and mass matrices (n, 21, 21) of straight cells (n,) with uniform stiffness (3, 3) and unit inertia.
 
         The integrals of products of monomials are the same for all triangles, so they are computed once.
         """
-        X, weight = get_quadrature(self.element.refdom, order)
-        local = X.T - 1.0 / 3.0
+        local, weight = self.rule(order)
         values = monomials(local, 0, 0)
         bends = np.stack([monomials(local, 2 - k, k) for k in range(3)])  # (3, n_q, 21)
         products = np.einsum("iqa,q,jqb->ijab", bends, weight, bends).reshape(9, 441)

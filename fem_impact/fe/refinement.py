@@ -4,6 +4,7 @@ import hashlib
 import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -17,7 +18,7 @@ from . import residual, thick
 from .assembly import THICK, System, assemble, reassemble
 from .beam_elements import DEGREE
 from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, lowest
-from .section import Plate
+from .section import Plate, directional
 
 ARGYRIS = "argyris", "argyris and shear"
 # [-] ratio of element sizes whose frequencies are compared, and order: less than half the unknowns, errors times five
@@ -57,8 +58,9 @@ DOFS_PER_AREA = {
 # [-] fraction of the tolerance that meshes after the first aim at: less makes them finer than needed, more often takes
 # another; half and twice pass the tests
 MARGIN = 0.6
-# [-] powers of the size with which both parts of the error fall: 8 of smooth shapes less a reserve, and at curved rims
-ORDERS = 7.5, 5.0
+# [-] powers of the size with which the parts of the error fall: 8 of smooth shapes less a reserve, at curved rims, at
+# steps of the thickness
+ORDERS = 7.5, 5.0, 1.0
 # [-] smallest ratio of element sizes between two meshes: a tenth more triangles; with less the mesh may not change
 LEAST_STEP = 1.05
 # [-] meshes tried to meet a tolerance, each finer: where eight do not suffice, rounding or corners hold the error; half
@@ -77,7 +79,8 @@ class Spectrum:
     flexibility: Flexibility
     omega: np.ndarray  # (n_modes,) [rad/s]
     vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
-    parts: np.ndarray  # (3, n_modes) [-] relative error of omega from elements, curved edges, causes no mesh cures
+    # (4, n_modes) [-] relative error of omega from elements, curved edges, steps of the thickness, causes no mesh cures
+    parts: np.ndarray
 
     @property
     def error(self) -> np.ndarray:
@@ -119,7 +122,10 @@ def _wave(system: System, n_modes: int | None, max_frequency: float | None) -> f
         ends = system.rim.points[system.rim.facets]
         length = frame.length * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         edge = float(length @ [EDGE_TERM[kind] for kind in system.rim.kinds])
-    return float((edge + np.sqrt(edge**2 + 16.0 * np.pi * mesh.area * n_modes)) / (2.0 * mesh.area))
+    mean = float((edge + np.sqrt(edge**2 + 16.0 * np.pi * mesh.area * n_modes)) / (2.0 * mesh.area))
+    assert isinstance(system.section, Plate)
+    stiffness = directional(system.section.material.plane_stress)  # waves across the grain are shorter than the mean
+    return mean * float((np.mean(stiffness**-0.5) ** -2 / stiffness.min()) ** 0.25)
 
 
 def solve(system: System, n_modes: int | None, max_frequency: float | None) -> Spectrum:
@@ -153,9 +159,12 @@ def _pairs(
 
 
 def kept(system: System, n_modes: int | None, max_frequency: float | None, path: Path) -> Spectrum:
-    """Call `solve` and save the result in a file; a later call for the same modes and matrices reads the file."""
-    asked = repr((n_modes, max_frequency)).encode()
-    key = hashlib.sha256(b"".join([asked, system.K.data.tobytes(), system.M.data.tobytes()])).hexdigest()
+    """Call `solve` and save the result in a file; a later call for the same modes of the same body reads it."""
+    frame = system.frame  # the matrices are the same for every size, thickness and material
+    asked = repr((n_modes, max_frequency, system.element, frame.length, frame.stiffness, frame.inertia)).encode()
+    matrices: Any = system.K, system.M
+    arrays = [part for A in matrices for part in (A.data, A.indices, A.indptr)]
+    key = hashlib.sha256(b"".join([asked, *(part.tobytes() for part in arrays)])).hexdigest()
     names = ("omega", "vectors", "parts")
     try:
         with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
@@ -171,8 +180,8 @@ def kept(system: System, n_modes: int | None, max_frequency: float | None, path:
 
 
 def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Estimated relative errors of frequencies (`Spectrum.parts`); the third is rounding and unresolved corners."""
-    parts, flexible = np.zeros((3, len(omega))), omega > 0.0
+    """Estimated relative errors of frequencies (`Spectrum.parts`); the last is rounding and unresolved corners."""
+    parts, flexible = np.zeros((4, len(omega))), omega > 0.0
     if not flexible.any():
         return parts
     values, vectors = (omega[flexible] / system.frame.rate) ** 2, vectors[:, flexible]
@@ -183,11 +192,11 @@ def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarr
         wave = (system.softness * values) ** 0.25 * np.sqrt(2.0 * system.mesh.area / len(system.mesh.cells))
         parts[0, flexible] = CLAIMED * MORLEY_ERROR * (wave / system.frame.length) ** 2
     else:
-        parts[:2, flexible] = CLAIMED * 0.5 * residual.energy_errors(system, vectors, vectors * values) / values
+        parts[:3, flexible] = CLAIMED * 0.5 * residual.energy_errors(system, vectors, vectors * values) / values
     squares = system.K.multiply(system.K)
     rounding = 0.5 * np.finfo(float).eps * np.sqrt(np.einsum("ij,ij->j", vectors**2, squares @ vectors**2)) / values
     corners = system.unresolved if system.unresolved > SAY else 0.0
-    parts[2, flexible] = ROUNDED * rounding + RESIDUAL**2 + corners  # the second is what the eigensolver leaves
+    parts[3, flexible] = ROUNDED * rounding + RESIDUAL**2 + corners  # the second is what the eigensolver leaves
     return parts
 
 
@@ -339,12 +348,12 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
 
 
 def _needed(parts: np.ndarray, goal: float) -> float:
-    """Factor [-] to divide the element size by so that errors (3, n_modes) meet a goal; infinity if no mesh can."""
-    if float(parts[2].max()) >= goal:
+    """Factor [-] to divide the element size by so that errors (4, n_modes) meet a goal; infinity if no mesh can."""
+    if float(parts[3].max()) >= goal:
         return np.inf
 
     def excess(log: float) -> float:
-        return float((np.exp(-log * np.array(ORDERS)) @ parts[:2] + parts[2]).max()) - goal
+        return float((np.exp(-log * np.array(ORDERS)) @ parts[:3] + parts[3]).max()) - goal
 
     return max(LEAST_STEP, float(np.exp(brentq(excess, 0.0, -np.log(EPSILON))))) if excess(0.0) > 0.0 else LEAST_STEP
 

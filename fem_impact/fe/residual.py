@@ -4,7 +4,8 @@ Three residuals are squared, weighted by powers of the element size and summed: 
 triangles, the jumps of bending moment and effective shear force between triangles, and the violation of the natural
 conditions at the edge. The sum is proportional to the energy error, and for quintic triangles the factor is nearly
 the same for every plate (CALIBRATION). On a curved edge the supports hold the plate exactly only at vertices; the
-work of the reactions on the motion in between is added.
+work of the reactions on the motion in between is added. Where the thickness jumps within a triangle, so do the
+moments, and what keeps them from any cubic is added, too.
 
 References
 ----------
@@ -18,7 +19,7 @@ import numpy as np
 
 from ..mesh.facets import powers
 from . import beam_elements, shear_beam
-from .assembly import System, beam_fields
+from .assembly import MASS_ORDER, System, beam_fields
 from .section import Beam
 from .shear_beam import TimoshenkoSpace
 from .springs import along_facets
@@ -37,6 +38,9 @@ def _cubic(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
     return powers(local[..., 0], 3, dx)[..., POWERS[:, 0]] * powers(local[..., 1], 3, dy)[..., POWERS[:, 1]]
 
 
+# [-] misfit of the thickness to a cubic within a triangle, beyond which its moments are no cubics either: a step
+STEP = 0.01
+HALVED = 3  # [-] times a triangle is divided in four to look at its thickness: a step is placed to an eighth of a side
 FIT = np.linalg.inv(_cubic(NODES, 0, 0))  # from values at NODES to the coefficients of the cubic
 
 
@@ -85,6 +89,15 @@ class Moments:
         return np.einsum("ei,eij,ej->e", bend, self.stiffness[cells].mean(axis=1), bend)
 
 
+def _looks() -> np.ndarray:
+    """Local coordinates (n, 2) of the centres of the 4**HALVED equal parts of a triangle."""
+    n = 2**HALVED
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+    up = np.column_stack([i, j])[i + j < n] + 1.0 / 3.0
+    down = np.column_stack([i, j])[i + j < n - 1] + 2.0 / 3.0
+    return np.vstack([up, down]) / n - 1.0 / 3.0
+
+
 def _stiffness(system: System, x: np.ndarray) -> np.ndarray:
     """Bending stiffness (n_cells, n_q, 3, 3) at points (n_cells, n_q, 2), in the frame."""
     frame = system.frame
@@ -105,12 +118,16 @@ class Residual:
     missed: np.ndarray  # (n_facets, 2 n_q, 21) of what a free edge asks
     moved: np.ndarray  # (n_facets, 2, n_q, 21) of what a held edge forbids
     reaction: np.ndarray  # (n_facets, 2, n_q, 21)
+    stepped: np.ndarray  # (n,) cells across which the thickness jumps
+    uneven: np.ndarray  # (n, 3 n_q, 21) what their moments differ from any cubic
+    misplaced: np.ndarray  # (2, n, 21, 21) stiffness and mass that the quadrature misses
 
     def __init__(self, system: System) -> None:
         self.system, self.moments = system, Moments(system)
         self._set_cells()
         self._set_sides()
         self._set_rim()
+        self._set_steps()
 
     def _set_cells(self) -> None:
         space, frame = self.moments.space, self.system.frame
@@ -182,8 +199,52 @@ class Residual:
         self.moved = np.stack([value, -turn], axis=1) * held * ds[:, None, :, None]
         self.reaction = force[:, ::-1]  # the shear force does work on the deflection, the moment on the slope
 
+    def _set_steps(self) -> None:
+        """A deflection that is smooth where the stiffness jumps makes the moments jump, which true ones do not.
+
+        Nor does the quadrature of the matrices place a step exactly.
+        """
+        space, looks = self.moments.space, _looks()
+        places, weight = space.rule(MASS_ORDER)
+        self.stepped = np.zeros(0, int)
+        section: Any = self.system.section
+        if callable(section.thickness):
+            every = np.vstack([looks, places])
+            fit = _cubic(every, 0, 0)
+            thickness = self._fields(np.arange(self.moments.n_cells), every)[1]
+            missed = thickness - (thickness @ np.linalg.pinv(fit).T) @ fit.T
+            self.stepped = np.flatnonzero(np.abs(missed).max(axis=1) > STEP * thickness.max(axis=1))
+        if not len(self.stepped):
+            self.uneven, self.misplaced = np.zeros((0, 0, 21)), np.zeros((2, 0, 21, 21))
+            return
+        bent, root, placed = self._energies(looks, np.full(len(looks), 0.5 / len(looks)))
+        smooth = np.linalg.inv(root)[..., None] * _cubic(looks, 0, 0)[:, None, None]  # (n, n_q, 3, 3, 10)
+        basis = np.linalg.qr(smooth.reshape(*bent.shape[:2], -1))[0]
+        self.uneven = bent - basis @ (basis.transpose(0, 2, 1) @ bent)
+        self.misplaced = placed - self._energies(places, weight)[2]
+
+    def _fields(self, cells: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points (n, n_q, 2) of cells (n,) in the frame, and inertia there."""
+        space, frame = self.moments.space, self.system.frame
+        x = space.origin[cells, None] + local @ space.jacobian[cells].transpose(0, 2, 1)
+        inertia = self.system.section.inertia(frame.centre + frame.length * x.reshape(-1, 2))
+        return x, inertia.reshape(x.shape[:2]) / frame.inertia
+
+    def _energies(self, local: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of stepped cells: roots of strain energy (n, 3 n_q, 21) and stiffness, and both matrices (2, n, 21, 21)."""
+        space, cells = self.moments.space, self.stepped
+        x, inertia = self._fields(cells, local)
+        dx = weight * np.abs(np.linalg.det(space.jacobian[cells]))[:, None]
+        root = np.linalg.cholesky(_stiffness(self.system, x))  # (n, n_q, 3, 3)
+        value, second = space.functions(cells, x, (0, 2))
+        hessian = second[:, [0, 2, 1]] * np.array([1.0, 1.0, 2.0])[:, None, None]
+        bent = root.transpose(0, 1, 3, 2) @ hessian.transpose(0, 2, 1, 3) * np.sqrt(dx)[..., None, None]
+        bent = bent.reshape(len(cells), -1, 21)
+        mass = (value * (inertia * dx)[..., None]).transpose(0, 2, 1) @ value
+        return bent, root, np.stack([bent.transpose(0, 2, 1) @ bent, mass])
+
     def errors(self, vectors: np.ndarray, loads: np.ndarray) -> np.ndarray:
-        """Errors (2, n) of `energy_errors` for solutions (n_dofs, n) under the inertia of ``loads`` (n_dofs, n)."""
+        """Errors (3, n) of `energy_errors` for solutions (n_dofs, n) under the inertia of ``loads`` (n_dofs, n)."""
         blocks = [slice(i, i + BLOCK) for i in range(0, vectors.shape[1], BLOCK)]
         return np.concatenate([self._errors(vectors[:, block], loads[:, block]) for block in blocks], axis=1)
 
@@ -194,7 +255,11 @@ class Residual:
         at_rim = unknowns[self.rim_cells]
         total += _squares(self.missed @ at_rim)
         moved, reaction = (operator @ at_rim[:, None] for operator in (self.moved, self.reaction))
-        return np.stack([total / CALIBRATION, 2.0 * np.abs(np.einsum("fiqk,fiqk->ik", moved, reaction)).sum(axis=0)])
+        rim = 2.0 * np.abs(np.einsum("fiqk,fiqk->ik", moved, reaction)).sum(axis=0)
+        across, load = unknowns[self.stepped], pushed[self.stepped]
+        stiff, heavy = (np.einsum("eik,eij,ejk->k", one, m, across) for one, m in zip((across, load), self.misplaced))
+        steps = _squares(self.uneven @ across) + np.abs(stiff - heavy)
+        return np.stack([total / CALIBRATION, rim, steps])
 
 
 def _of_cells(system: System, vectors: np.ndarray) -> np.ndarray:
@@ -205,11 +270,11 @@ def _of_cells(system: System, vectors: np.ndarray) -> np.ndarray:
 def energy_errors(
     system: System, vectors: np.ndarray, loads: np.ndarray, forced: np.ndarray | None = None
 ) -> np.ndarray:
-    """Estimated error of the squared energy norm of finite element solutions, (2, n).
+    """Estimated error of the squared energy norm of finite element solutions, (3, n).
 
     The first row is the error of the elements, which falls with the eighth power of their size if the solution is
     smooth. The second comes from supports on curved edges, which let the plate move between their nodes; it falls with
-    the fifth or sixth power.
+    the fifth or sixth power. The third comes from steps of the thickness within triangles; it falls with the first.
 
     Parameters
     ----------
@@ -243,7 +308,7 @@ def energy_errors(
             space, beam_fields(system.mesh, system.section, frame), _of_cells(system, vectors),
             _of_cells(system, loads), pushed, hinges,
         )  # fmt: skip
-        return np.stack([errors, np.zeros_like(errors)])
+        return np.stack([errors, 0.0 * errors, 0.0 * errors])
     x, _ = beam_elements.quadrature(space)
     place = (frame.centre + frame.length * x.reshape(-1, 1)).clip(system.mesh.points.min(), system.mesh.points.max())
     stiffness = system.section.stiffness(place).reshape(x.shape) / frame.stiffness
@@ -265,7 +330,7 @@ def energy_errors(
         moments += (x[..., None] - frame.local(forced)[:, 0]).clip(0.0)
     load = inertia[..., None] * (value @ _of_cells(system, loads))
     errors = beam_elements.energy_errors(space, stiffness, bend @ _of_cells(system, vectors), load, moments, hinges)
-    return np.stack([errors, np.zeros_like(errors)])
+    return np.stack([errors, 0.0 * errors, 0.0 * errors])
 
 
 def _squares(values: np.ndarray) -> np.ndarray:

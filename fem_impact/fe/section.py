@@ -12,7 +12,22 @@ from . import plausible
 KINDS = ("clamped", "hinged", "free")  # supports of an edge besides `Elastic`
 SOFT = "soft hinged"  # support of a thick plate that leaves the rotation along the edge free
 SHEAR = 5.0 / 6.0  # [-] shear coefficient of plates: shear stress is parabolic over the thickness (Reissner 1945)
+DIRECTIONS = 36  # [-] directions in which waves in wood are looked at: the softest is then known to a hundredth
 Varying = float | Callable[[np.ndarray], Any]
+
+
+def turned(stiffness: np.ndarray, angle: float) -> np.ndarray:
+    """The stiffness (3, 3) on strains (xx, yy, 2 xy) of a material turned anticlockwise by an angle [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
+    return turn.T @ stiffness @ turn
+
+
+def directional(stiffness: np.ndarray) -> np.ndarray:
+    """What a stiffness (3, 3) on strains (xx, yy, 2 xy) opposes to a wave in each of DIRECTIONS directions."""
+    angle = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    wave = np.stack([np.cos(angle) ** 2, np.sin(angle) ** 2, np.sin(2.0 * angle)])
+    return np.asarray(np.einsum("in,ij,jn->n", wave, stiffness, wave))
 
 
 @dataclass(frozen=True)
@@ -143,9 +158,7 @@ class Material:
         local = np.array([[E, nu * across, 0.0], [nu * across, across, 0.0], [0.0, 0.0, G * inner]]) / inner
         if self.E_across is None:
             return local
-        c, s = np.cos(self.angle), np.sin(self.angle)
-        turn = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
-        return turn.T @ local @ turn
+        return turned(local, self.angle)
 
     @property
     def transverse(self) -> tuple[float, float]:
@@ -168,9 +181,10 @@ def evaluate(name: str, value: Varying, points: np.ndarray, unit: str) -> np.nda
         return np.full(len(points), check.positive(name, value, unit))
     field = check.field(name, value, points, unit)
     worst = int(np.argmin(field))
-    if field[worst] <= 0.0:
+    if field[worst] < 1.0 / check.REACH:
         where = ", ".join(f"{x:g}" for x in points[worst])
-        raise ValueError(f"{name} must be positive everywhere, got {field[worst]:g} {unit} at ({where}) m")
+        rule = "positive" if field[worst] <= 0.0 else f"at least {1.0 / check.REACH:g} {unit}"
+        raise ValueError(f"{name} must be {rule} everywhere, got {field[worst]:g} {unit} at ({where}) m")
     return field
 
 

@@ -31,22 +31,21 @@ from .striker import Striker
 
 TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
 SCHEMES = ("A", "A4", "collocation")
-MAX_STEPS = 500_000  # [-] of one run: takes about one second
-MAX_WORK = 1_000_000_000  # [-] modes, or entries of the forms of stretching, times steps of one run: some seconds
-# [-] modes times steps of one run in plain Python: 3 000 times less than with kernels, so that it ends as soon; ten
-# times more or less passes the tests
+MAX_STEPS = 500_000  # [-] of one run: a time limit of about one second
+# [-] modes, or entries of the forms of stretching, times steps of one run: a time limit of some seconds
+MAX_WORK = 1_000_000_000
+# [-] modes times steps of one run in plain Python: the same time limit, as it is 3 000 times slower than the kernels
 PLAIN_WORK = 300_000
-# [-] tolerance advised over the error reached: steps twice as long, to which it may lead, err 16 times more; half and
-# twice pass the tests
+# [-] tolerance advised over the error reached: steps twice as long, to which it may lead, err 16 times more
 REACHED = 20.0
 SOONER = 0.2  # [-] of a run that was given up, what is advised: the last run of a blow halves the steps twice
 FIRST_STEPS = 24.0  # [-] steps per contact with which A4 meets TOLERANCE in most blows; cheapest first run of 12 to 32
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
 # [-] fraction of the usual steps that averages over the blow need: errors of single instants cancel in them
 AVERAGED = 0.5
-# [-] a touch or gap below 2 tolerance times the deepest approach may be an error: twice what a run may err by
-GRAZE = 2.0
-GRAZES = 3  # [-] step halvings to decide whether such a touch is real: each divides the doubt by eight
+# [-] step halvings to decide whether bodies touch or part if they do so by less than the tolerance times the deepest
+# approach: each divides the doubt by eight
+GRAZES = 3
 FEW = 20  # [-] no such check after more impacts: chatter always ends with a contact that barely touches
 DOUBLINGS = 7  # [-] step halvings before the run gives up: A4 then errs 2**28 times less
 # [-] Difference of two runs over the error of the finer one: first for speeds and impulse, then for contact time and
@@ -71,14 +70,12 @@ FALLING = 2.0, 1.0  # [-] the truncation error falls at least with this power of
 # [-] by dimension: frequency of the replacement mode over the last, fact: sqrt(sum u**2/w**2 / sum u**2/w**4) of those
 # above is sqrt(7/3) on a beam, whose n-th frequency goes as n**2, and sqrt(3) on a plate, where it goes as n
 REST_ABOVE = {1: 1.53, 2: 1.73}
-# [-] the replacement mode under a lossy contact, frequency over the last mode's and damping ratio: so far above that it
-# follows as a spring, so damped that it does not ring
-LOSSY_ABOVE, LOSSY_DAMPING = 30.0, 1.0
+# [-] frequency of the replacement mode under a lossy contact over the last mode's: so far above that it follows as a
+# spring; it is critically damped
+LOSSY_ABOVE = 30.0
 LOSSY_STRIKER = 30.0  # [-] a lossy contact multiplies the truncation error of a striker by this: its modes are sparse
 STRIKER_SHARE = 0.05  # [-] fraction of the tolerance for the striker's left-out modes: keeping them is cheap
 NEGLIGIBLE = 1e-4  # [-] mesh errors below this fraction of the tolerance need no extra run; the blow errs by as little
-# [-] frequency errors are capped at this in that run, so that frequencies stay positive: no tolerance is met then
-LARGEST_ERROR = 0.5
 
 
 @dataclass(frozen=True)
@@ -562,7 +559,9 @@ def _may_join(history: History, other: History) -> bool:
         return False
     contact, times = np.array([i for i, _ in pairs]), np.array([time for _, time in pairs])
     one, two = (
-        (found.offset + found.states(times)[0] @ found.shape.T)[np.arange(len(times)), contact]
+        (found.offset + found.states(times)[0] @ found.shape.T - found.surfaces(times)[0])[
+            np.arange(len(times)), contact
+        ]
         for found in (history, other)
     )
     return bool((-one < np.abs(one - two)).any())
@@ -588,13 +587,12 @@ def _may_touch(history: History, other: History, duration: float) -> bool:
     start = max(float(found.contacts[:, 1].min()) for found in (history, other))
     end = max(start, end)
     times = np.linspace(start, end, int(min(LOOKS[1], LOOKS[0] * (end - start) / duration)) + 2)
-    approach, doubt = history.motion(times), np.zeros((len(times), 1))
-    doubt[:, 0] = np.maximum.accumulate(np.abs(approach - other.motion(times)).max(axis=1))
-    row = np.searchsorted(history.steps[:, layout.START], times, side="right") - 1
-    closed = history.pressed[row] & (times < history.end_time)[:, None]
+    surface, opened = history.surfaces(times)
+    approach, doubt = history.motion(times) - surface, np.zeros((len(times), 1))
+    doubt[:, 0] = np.maximum.accumulate(np.abs(approach - other.motion(times) + other.surfaces(times)[0]).max(axis=1))
     nearest = np.zeros(approach.shape, bool)
     nearest[1:-1] = (approach[1:-1] >= approach[:-2]) & (approach[1:-1] >= approach[2:])
-    nearest &= ~closed
+    nearest &= opened
     return bool((nearest & (approach > -doubt)).any())
 
 
@@ -605,7 +603,7 @@ def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[f
     critically damped mode far above behaves like a series spring and takes almost no energy.
     """
     if lossy:
-        return LOSSY_ABOVE * omega, LOSSY_DAMPING
+        return LOSSY_ABOVE * omega, 1.0
     return REST_ABOVE[min(dimension, 2)] * omega, float(zeta)
 
 
@@ -763,7 +761,7 @@ def _controlled(
         estimate = max(differ(coarse, fine, over), missed(fine))
         if estimate <= tolerance:
             met = fine, estimate, scheme, coarse, (size, before)
-            if grazes == GRAZES or not _grazes(fine, GRAZE * tolerance * (size / sizes[1]) ** 3):
+            if grazes == GRAZES or not _grazes(fine, tolerance * (size / sizes[1]) ** 3):
                 return met
         grazes += met is not None
         best, last = min(best, estimate), (coarse, fine)
@@ -1004,7 +1002,7 @@ def _mesh_error(bodies, parts, contacts, system: _System, coarse: History, schem
         soft = [(np.pi / pace[0]) ** 2 / mobility[i] * doubt for (i, _), doubt in zip(part.touched, part.doubt)]
         error = np.zeros(modes.n_modes) if modes.frequency_error is None else modes.frequency_error
         matters |= max(error.max(), *soft, 0.0) > NEGLIGIBLE * tolerance
-        lower = part.omega * (1.0 - np.minimum(error, LARGEST_ERROR))
+        lower = part.omega / (1.0 + error)
         softer.append(replace(part, omega=lower, rest=part.rest + np.diag(part.doubt)))
     if not matters:
         return 0.0

@@ -10,12 +10,13 @@ from scipy.special import gamma
 from .._base import check
 from .._base.rounding import HALVINGS
 from .compiled.law import FELT, LAYERS, PLASTIC, POWER
-from .compiled.layout import DEPTH, EXPONENT, FIRST_YIELD, HARD, HARD_EXPONENT, KIND, RELAXATION, SHARE, STIFFNESS
+
+from .compiled.layout import (  # isort: skip
+    DEPTH, EXPONENT, FIRST_YIELD, HARD, HARD_EXPONENT, KIND, RELAXATION, SHARE, STIFFNESS, WIDTH,
+)  # fmt: skip
 
 LOWEST_EXPONENT, HIGHEST_EXPONENT = 0.5, 100.0  # [-] limits: below, no longer a spring; above, a wall
 
-# [-] of its stiffness that felt is taken to keep in a guess of the contact time: otherwise all may relax
-LEAST_FELT = 1e-3
 MOST_LOSS = 1e12  # [s/m] far above that of a contact that swallows the slowest blow whole
 YIELDS = 1.6  # [-] fact: pressure at which a round contact first yields, over the yield strength, for nu = 0.3
 STIFFEST = 1e200  # [N/m**exponent] upper limit, 1/STIFFEST the lower: high exponents need huge stiffnesses
@@ -356,6 +357,23 @@ def _isotropic(name: str, material: Any) -> tuple[float, float]:
     return float(E), float(nu)
 
 
+def sunk(law: np.ndarray, memory: np.ndarray) -> np.ndarray:
+    """How much lower than at first the surface of each contact lies [m]: its dent, or how far felt is still pressed.
+
+    ``law`` (n_contacts, 9 or 4) is that of the compiled loops, ``memory`` (..., n_contacts) what its contacts remember.
+    """
+    found = np.zeros(memory.shape)
+    for i, row in enumerate(law if law.shape[1] == WIDTH else ()):
+        a, z = row[EXPONENT], np.abs(memory[..., i])
+        if row[KIND] == PLASTIC:
+            first = row[FIRST_YIELD]
+            deepest = np.maximum(z, first)
+            found[..., i] = deepest - (first / deepest) ** (a - 1.0) * (a * deepest - (a - 1.0) * first)
+        elif row[KIND] == FELT:
+            found[..., i] = (row[SHARE] * z) ** (1.0 / a)
+    return found
+
+
 def wall_time(stiffness: Any, exponent: Any, mobility: Any, speed: Any, compliance: Any = 0.0) -> np.ndarray:
     """Contact times [s] of masses 1 / ``mobility`` [1/kg] on a rigid wall, without loss; the arguments broadcast.
 
@@ -386,7 +404,7 @@ def acting_stiffness(law: Any, mobility: Any, speed: Any) -> np.ndarray:
     if kind == FELT:
         for _ in range(4):
             time = wall_time(whole, a, mobility, speed)
-            whole = k * np.maximum(1.0 - law[SHARE] * time / (time + law[RELAXATION]), LEAST_FELT)
+            whole = k * (law[RELAXATION] + (1.0 - law[SHARE]) * time) / (law[RELAXATION] + time)
         return whole
     energy = 0.5 * np.asarray(speed) ** 2 / np.asarray(mobility)  # [J]
     deepest = ((a + 1.0) * energy / k) ** (1.0 / (a + 1.0))  # [m] by the power law alone

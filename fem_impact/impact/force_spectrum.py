@@ -13,12 +13,11 @@ from scipy import fft, special
 LEAST_SAMPLES = 800.0  # [-] per impact: its spectrum errs by less than 1e-3 up to the thirtieth lobe
 FEW = 2**12  # [-] pieces times frequencies up to which the direct sum is faster
 MOST_PERIODS = 2.0**18  # [-] periods of the highest frequency in a blow whose centroid is sought: takes half a second
-MOST_NODES = 2**24  # [-] nodes or cells of a transform: they take two gigabytes; above it, the direct sum
+MOST_NODES = 2**24  # [-] nodes or cells of a transform, to limit the memory to two gigabytes; above it, the direct sum
 TERMS = 14  # [-] of the series: for phases up to a half, that of a cell's end, they leave 0.5**14 / 14! = 7e-16
 WINDOW = 8  # [-] half width of the window that interpolates from twice as many even frequencies: errs by 4e-16
 BETA = 1.5 * np.pi * WINDOW  # [-] fact: best shape of the window, that of Kaiser and Bessel
 EVEN = 1e-15  # [-] of the highest frequency: rounding of frequencies that are evenly spaced from zero on
-SERIES = 0.5  # [rad] half the phase over a piece below which the first spherical Bessel function takes its series
 # Gauss rules, and half the phase [rad] over a piece at which they err by 1e-15 of its force, by their error term
 RULES = {n: np.polynomial.legendre.leggauss(n) for n in range(2, 12)}
 REACH = {
@@ -78,13 +77,7 @@ def directly(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
     total = np.zeros(len(omega), complex)
     for block in np.array_split(np.arange(len(omega)), max(1, len(omega) * len(h) // 2**20)):
         y = omega[block, None] * (0.5 * h)  # (n_block, n_pieces)
-        square = np.minimum(np.abs(y), SERIES) ** 2  # beyond, the closed form is taken
-        near = np.ones_like(y)
-        for k in range(6, 0, -1):
-            near = 1.0 - square / (2 * k * (2 * k + 3)) * near
-        safe = np.where(np.abs(y) < SERIES, 1.0, y)
-        bessel = np.where(np.abs(y) < SERIES, y / 3.0 * near, (np.sin(safe) / safe - np.cos(safe)) / safe)
-        whole = 0.5 * h * ((f0 + f1) * np.sinc(y / np.pi) - 1j * (f1 - f0) * bessel)
+        whole = 0.5 * h * ((f0 + f1) * np.sinc(y / np.pi) - 1j * (f1 - f0) * special.spherical_jn(1, y))
         total[block] = (np.exp(-1j * omega[block, None] * (t + 0.5 * h)) * whole).sum(axis=1)
     return total
 

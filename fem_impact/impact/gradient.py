@@ -10,9 +10,11 @@ import numpy as np
 
 from .._base import check, markup
 from .._base.check import SimulationError
+from .._base.rounding import SAME
 from ..fe.variation import SectionChange
 from .compiled import record
-from .compiled.layout import EXPONENT, FIRST_YIELD, KIND
+from .compiled.layout import KIND
+from .contact import sunk
 from .parameters import POSSIBLE, Parameters, unit
 from .sensitivity import Sensitivity, runs, together
 
@@ -31,14 +33,12 @@ GRAZE = 1e-3  # [-] of the deepest approach: a touch or gap below it may come or
 TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a change of 1e-4 may make the other the largest
 # [-] times per contact at which a flight is searched for near misses or two motions are compared, and their most
 LOOKS = 16.0, 20_000
-STILL = 1e-9  # [-] of the fastest approach: bodies that rest against each other turn back more slowly, by rounding
 CUBIC = np.linspace(0.0, 1.0, 9) ** np.arange(4)[:, None]  # where in a piece of time its cubic is looked at, as powers
 # halving the steps brings these no sure gain
 ROUGH = "contact_time", "peak_time", "spectral_centroid", "spectral_level"
 # [-] difference of two runs over the error of the finer one, as order 2 leaves; order 1 for collocation, cautious
 RICHARDSON = {"A": 3.0, "A4": 3.0, "collocation": 1.0}
 INSTEAD = "take differences of runs with the number changed, told to a smaller tolerance"
-LEAST = 1e-9  # [-] of a derivative: what is left of differences of shapes, and two runs may agree by chance
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,10 +168,20 @@ def gradients(
             gained = 1.0 if name in ROUGH else RICHARDSON[hit.scheme]
             if name == "peak_time":
                 apart = np.maximum(apart, fine.peak_doubt)
-            error = apart / gained + LEAST * np.abs(slopes)
+            error = _shared(apart / gained + SAME * np.abs(slopes), numbers)
         label = name if band is None else f"{name}={band:g}"
         found[label] = Gradient(label, value, names, numbers, slopes, error)
     return found
+
+
+def _shared(error: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """Errors of slopes, (n,) or (n, n_modes), none of them below the largest, all per relative change of their number.
+
+    Two runs may agree by chance on what one number does, but hardly on what all do.
+    """
+    size = np.abs(numbers).reshape(-1, *[1] * (error.ndim - 1))
+    largest = (size * error).max(axis=0)
+    return np.maximum(error, np.divide(largest, size, out=np.zeros_like(error), where=size > 0.0))
 
 
 def section_changes(sections: Any) -> dict[str, tuple[float, SectionChange]]:
@@ -325,7 +335,7 @@ class Way:
 def _nearly(way: Way, c: int) -> Iterator[tuple[str, float]]:
     """What barely happens at contact c, or barely does not, and by how much [m]."""
     depth, v, closed = way.between(c), way.rate[:, c], way.closed[:, c]
-    pressed, noise = runs(closed), STILL * float(np.abs(v).max())
+    pressed, noise = runs(closed), SAME * float(np.abs(v).max())
     yield "touch", min((float(depth[a:b].max()) for a, b in pressed), default=np.inf)
     parts = float(np.abs(depth[closed & (v[:-1] < -noise) & (v[1:] >= -noise)]).min(initial=np.inf))
     yield "gap", min([parts, *(float(-depth[a:b].min(initial=0.0)) for (_, a), (b, _) in pairwise(pressed) if b > a)])
@@ -341,23 +351,12 @@ def _yields(found: Sensitivity, c: int) -> float:
     if not len(ends):
         return np.inf
     d, v = found.found.way[:, c].T
-    noise = STILL * float(np.abs(v).max())
+    noise = SAME * float(np.abs(v).max())
     turns = (v[:-1] > noise) & (v[1:] <= noise) & ~found.pieces.yields[1:, c]
     last = np.searchsorted(ends, np.arange(len(turns)), side="right") - 1
     deepest = Way(found.time, found.found.way[:, :, 0], found.found.way[:, :, 1], found.pieces.closed).between(c)
     short = (d[ends[last]] - deepest.max(axis=1))[turns & found.pieces.closed[:, c] & (last >= 0)]
     return float(min(np.abs(short).min(initial=np.inf), np.diff(d[ends]).min(initial=np.inf)))
-
-
-def _dents(found: Sensitivity) -> np.ndarray:
-    """How far plastic contacts have yielded at the ends of all pieces [m], (n_pieces + 1, n_contacts)."""
-    law, memory = found.history.law, found.pieces.memory
-    if not memory.any():
-        return memory
-    a, first = law[:, EXPONENT], law[:, FIRST_YIELD]
-    deepest = np.maximum(memory, np.where(first > 0.0, first, 1.0))
-    dents = deepest - (first / deepest) ** (a - 1.0) * (a * deepest - (a - 1.0) * first)
-    return np.asarray(np.where(memory > first, dents, 0.0))
 
 
 def _way(found: Sensitivity) -> Way:
@@ -366,7 +365,7 @@ def _way(found: Sensitivity) -> Way:
     While no contact is closed, at many times, and so beyond an end that the run saw.
     """
     history, pressed, way = found.history, found.pieces.closed, found.found.way.copy()
-    way[:, :, 0] -= _dents(found)
+    way[:, :, 0] -= sunk(history.law, found.pieces.memory)
     free = np.asarray(~pressed.any(axis=1))
     still = not (history.start_q.any() or history.start_p[history.omega > 0.0].any() or history.bias.any())
     flights = [(a, b) for a, b in runs(free).tolist() if a > 0 or not still]  # before the first impact nothing swings
@@ -416,5 +415,8 @@ def _flight(found: Sensitivity, begin: int, end: float) -> tuple[np.ndarray, np.
     count = int(np.clip(LOOKS[0] * (end - start) / max(_duration(history), 1e-300), 16, LOOKS[1]))
     times = np.linspace(0.0, end - start, count + 1)[:-1]
     q, p = free.states(times)
-    way = np.stack([history.offset - _dents(found)[begin] + q @ history.shape.T, p @ history.shape.T], axis=2)
+    way = np.stack(
+        [history.offset - sunk(history.law, found.pieces.memory)[begin] + q @ history.shape.T, p @ history.shape.T],
+        axis=2,
+    )
     return start + times, way, np.zeros((count, history.n_contacts), bool)

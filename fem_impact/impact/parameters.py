@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._base import check
+from .._base.rounding import ROUNDING
 from ..fe.section import Beam, Elastic, Plate
 from ..fe.variation import DIFFERENCES, SectionChange
 from ..modes import varied
@@ -39,11 +40,9 @@ BAR = {"section.height": (1.0, 1.0), "section.width": (0.0, 1.0), **BEAM}
 ROD = {"section.diameter": (1.0, 2.0), **BEAM}
 # all lengths along the body, at the same thickness
 SCALE: dict[type[object], tuple[float, float]] = {Plate: (-2.0, 2.0), Beam: (-2.0, 1.0)}
-# [rad] of the shortest wave: distance for the slope of a shape; errs by its fourth power, and rounds to 1e-12
+# [-] distance for the slope of a shape in radians of the shortest wave, and of the static compliance in lengths of the
+# body: errs by the fourth power, 1e-12, and leaves 1e-9 of the rounding of a compliance
 SHIFT = 1e-3
-STILL = 1e-12  # [-] of the terms of an approach at the start, or of its rate: what rounding leaves
-# [-] of the body: the same for the static compliance, which has no short waves; its rounding of 1e-12 leaves 1e-9
-STATIC_SHIFT = 1e-3
 
 
 def unit(name: str) -> str:
@@ -152,7 +151,7 @@ class Parameters:
         h = self.hit.history
         sizes = [np.abs(h.shape[c]) @ np.abs(x) for x in (h.start_q, h.start_p)]
         d, v = float(h.offset[c] + h.shape[c] @ h.start_q), float(h.shape[c] @ h.start_p)
-        return abs(d) <= STILL * (sizes[0] + abs(h.offset[c])) and abs(v) <= STILL * sizes[1]
+        return abs(d) <= ROUNDING * (sizes[0] + abs(h.offset[c])) and abs(v) <= ROUNDING * sizes[1]
 
     @cached_property
     def _ringing_alone(self) -> bool:
@@ -351,7 +350,7 @@ class Parameters:
         carried = target.shapes.at(hit.at[None])[0, flexible] / target.omega[flexible] ** 2
         rests = [None] * len(axes)
         if hit.ends[1].rest.any():
-            rests = _slopes(target, hit.at, axes.values(), STATIC_SHIFT * span, _softness(target, hit.at))
+            rests = _slopes(target, hit.at, axes.values(), SHIFT * span, _softness(target, hit.at))
         striker = hit.striker
         assert striker is not None  # it starts at the surface, which may be displaced
         for i, slope, rest in zip(axes, slopes, rests):

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 PACKAGE = str(Path(__file__).parents[1]) + os.sep  # where our own lines are
 # [-] of the tolerance that the advice leaves to one kind of error: two of them fit, and a fifth is left for the rest
 SHARE = 0.4
+UNSURE = 0.9  # [-] errors from here on are of blows that differ in their impacts, for which no tolerance helps
 SPARE = 1.1  # [-] modes advised over modes estimated: Weyl's law counts them only on average, so a tenth is added
 # [-] of that share for the estimate from few modes, which errs: twice if they resolve the contact, 20 times if not
 CAUTION = 0.5, 0.05
@@ -60,6 +61,8 @@ def remedy(hit: "Response") -> str:
         advice.append("give the blow before a smaller tolerance")
     if error.step > allowed:
         advice.append("leave dt and scheme to the program, or give a smaller dt")
+    if not advice and error.total >= UNSURE:
+        return "how often the bodies touch cannot be told: give max_impacts = 1 for the first impact alone"
     return "; ".join(advice) or f"take a tolerance of {_above(error.total):g}"
 
 

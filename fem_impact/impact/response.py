@@ -18,7 +18,7 @@ from . import assumption, datasets, force_spectrum, gradient, promise
 from .assumption import Assumption
 from .compiled import law, layout, propagation, record
 from .compiled.bundles import Scene
-from .contact import Contact
+from .contact import Contact, sunk
 from .free_motion import swing
 from .quantities import USUAL, words
 from .state import State
@@ -34,8 +34,6 @@ PEAK_LOOKS = 16  # [-] samples per step in the search for the peak force; misses
 MOVED = {"displacement": 1e-2, "velocity": 3e-2}
 LASTS = 2.0  # [-] and no longer than this many times the run, as later echoes may be missing from all of them
 LOOKED_AT = 200  # [-] times at which this error is estimated, evenly among those asked for; more only cost time
-# [-] points per static solution: each is a load, and the cost grows with the pairs of points; fewer solve more often
-DIP_BLOCK = 8
 
 
 @dataclass(frozen=True)
@@ -211,6 +209,22 @@ class History:
         for i, row in enumerate(self.shape[:, ~rigid]):
             found[n:, i] += swing(*bodies, (q, p), after, row[None]) + row @ (bodies[2] / bodies[0] ** 2)
         return found
+
+    def surfaces(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Approach [m] at which each contact would touch, and whether it is open, (n_times, n_contacts) each."""
+        rows = np.searchsorted(self.steps[:, layout.START], times, side="right") - 1
+        ended = times >= self.end_time
+        closed = self.pressed[rows] & ~ended[:, None]
+        if self.law.shape[1] < layout.WIDTH:
+            return np.zeros(closed.shape), ~closed
+        since = np.where(ended, times - self.end_time, times - self.steps[rows, layout.START])
+        memory = np.where(ended[:, None], self.now[layout.REMEMBERED], self.steps[rows, -self.n_contacts :])
+        closed &= memory >= 0.0  # felt from which the body has parted
+        felt = self.law[:, layout.KIND] == law.FELT
+        rate = np.where(
+            felt, (1.0 - self.law[:, layout.SHARE]) / np.where(felt, self.law[:, layout.RELAXATION], 1.0), 0.0
+        )
+        return sunk(self.law, memory * np.where(closed, 1.0, np.exp(-rate * since[:, None]))), ~closed
 
     @cached_property
     def contacts(self) -> np.ndarray:
@@ -729,10 +743,10 @@ class Response(Totals):
             Whether the error is that of `velocity`.
         """
         name = "velocity" if velocity else "displacement"
-        apart = self._apart(points, times, name)
+        apart = self._largest_difference(points, times, name)
         return apart + self.error.total if apart <= MOVED[name] else float("inf")
 
-    def _apart(self, points: Any, times: Any, name: str) -> float:
+    def _largest_difference(self, points: Any, times: Any, name: str) -> float:
         """Largest difference [-] of the motions told by the descriptions of the target, over the largest motion."""
         times = check.array("times", times, (None,), "s", lift=True)
         lasting = not times.size or times.max() <= LASTS * self.history.end_time
@@ -748,7 +762,7 @@ class Response(Totals):
     def _told(self, points: Any, times: Any, body: int, name: str) -> bool:
         """Whether Ritz vectors tell a motion well enough."""
         mine = self.vectors is not None and body in (-1, len(self.bodies) - 1)
-        return mine and self._apart(points, times, name) <= MOVED[name]
+        return mine and self._largest_difference(points, times, name) <= MOVED[name]
 
     def _dip(self, points: Any, times: Any, body: int) -> tuple[Any, Any]:
         """Static deflection [m] of the left-out modes and its rate [m/s], (n_times, n_points); 0 if there are none."""
@@ -757,7 +771,7 @@ class Response(Totals):
             ends = Ends(self.at[None], ((0, -1.0),), self._push, np.zeros((1, 1)), dip_force=self._push)
         if ends is None:
             return 0.0, 0.0
-        modes, n_ends = self._moved(body), len(ends.points)
+        modes = self._moved(body)
         times = check.array("times", times, (None,), "s", lift=True)
         found = [self.history.force_at(times, i) for i, _ in ends.touched]
         sign = np.array([sign for _, sign in ends.touched])
@@ -766,10 +780,9 @@ class Response(Totals):
         asked = modes.points("points", points)
         if not force.any() or not len(asked):
             return 0.0, 0.0
-        blocks = [asked[i : i + DIP_BLOCK] for i in range(0, len(asked), DIP_BLOCK)]
-        rest = np.vstack(
-            [modes.residual_compliance(np.vstack([ends.points, block]))[n_ends:, :n_ends] for block in blocks]
-        )  # (n_points, n_ends)
+        swings = modes.omega > 0.0
+        pushed, moved = (modes.shapes.at(place)[:, swings] / modes.omega[swings] for place in (ends.points, asked))
+        rest = modes.shapes.deflection(ends.points, asked) - moved @ pushed.T  # (n_points, n_ends)
         return force @ rest.T, rate @ rest.T
 
     @property

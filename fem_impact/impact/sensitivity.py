@@ -11,6 +11,7 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
+from .._base.rounding import ROUNDING, SAME
 from .compiled import layout, record
 from .compiled.law import PLASTIC
 from .compiled.tangents import N_LAW, Blow, Change, Found, Pieces, follow, law_at, rate_slopes
@@ -24,21 +25,16 @@ NODES = 3, 5
 # the last, for a force that is linear in each step and for one of higher order, whose steps are long for their error:
 # there the slope of a power law goes as (exponent - 1) powers of time, that in the exponent as its logarithm
 GRADES = 3, 6
-# [-] of such a step: what is left beyond goes to the last of them, as a sliver would cost as much as a piece
-WHOLLY = 0.9
 # [-] steps from the start or end of a contact, per step that a piece may hold there: pieces grow away from the kinks
 NEAR = 4
 # [-] steps of a contact from which on pieces are of two steps, and of four; a lossy force rings with every mode
 FULL = {False: (24, 128), True: (64, 128)}
-BESIDE = 1e-4  # [-] of a step: distance of two rates of the force from which its peak is told; leaves 1e-12 of the step
-NUDGE = 1e-5  # [-] relative change at which the curvature of a contact law is taken; leaves 1e-10
-MORE = 2  # [-] Gauss nodes beyond those of the force, and three per radian of half the phase over a piece: err by 1e-9
-EDGE = 1e-9  # [-] of a step: what lies nearer to its ends is at them
-ROUNDING = 1e-14  # [-] of the duration: the same
-ALIKE = 1e-11  # [-] difference of lengths of pieces that rounding leaves
-CANCELS = 1e-12  # [-] of the changes of the approach at the start: what they leave if they cancel
-GREW = 1e-8  # [-] of what a contact remembers: steps end at its corners to 1e-9
-AT_ZERO = 1e-7  # [-] of the deepest approach: a contact that ends deeper lets go by its loss
+# [-] relative change at which the curvature of a contact law is taken, and of a step at which that of the force is:
+# leaves 1e-10
+NUDGE = 1e-5
+# [-] of the deepest approach: what is nearer starts or ends at zero, as the dip under a constant force is known to
+# 1e-9; a contact that ends deeper lets go by its loss
+AT_ZERO = 1e-7
 
 
 @cache
@@ -163,9 +159,9 @@ class Sensitivity:
         near = abs(d) <= AT_ZERO * self.deepest[c]
         if k == 0:
             h = self.history
-            parts = (np.abs(dd) > CANCELS * self._start_terms(c, h.start_q, self.change.start_q)).any()
-            resting = abs(v) <= CANCELS * np.abs(self.found.way[:, :, 1]).max()
-            parts |= resting and (np.abs(dv) > CANCELS * self._start_terms(c, h.start_p, self.change.start_p)).any()
+            parts = (np.abs(dd) > ROUNDING * self._start_terms(c, h.start_q, self.change.start_q)).any()
+            resting = abs(v) <= ROUNDING * np.abs(self.found.way[:, :, 1]).max()
+            parts |= resting and (np.abs(dv) > ROUNDING * self._start_terms(c, h.start_p, self.change.start_p)).any()
             if near and parts:
                 raise SimulationError(
                     "no gradient: the bodies touch at the start already, and a change would press or part them; "
@@ -253,7 +249,7 @@ class Sensitivity:
         """
         pieces, closed = self.pieces, self.pieces.closed.any(axis=1)
         phase = np.pi * highest * pieces.length[closed].max(initial=0.0)
-        rule = len(pieces.powers) + MORE + int(3.0 * phase)
+        rule = len(pieces.powers) + int(np.ceil(3.0 * phase))  # errs by 2e-10 at most
         nodes = gauss(rule)[0][:-1]
         basis = np.vander(nodes, len(pieces.powers), increasing=True) @ pieces.powers.T  # (rule, s)
         length = pieces.length[closed, None]
@@ -399,7 +395,7 @@ class Sensitivity:
         turning = np.empty(5 + N_LAW)
         rate_slopes(now[:3], law, self._yields, along * (NUDGE / np.where(sizes, sizes, 1.0))[:, None], turning)
         turning[1:] *= sizes / NUDGE
-        bend = float(turning[1]) if EDGE < self.peak / self.time[-1] < 1.0 - EDGE else 0.0
+        bend = float(turning[1]) if SAME < self.peak / self.time[-1] < 1.0 - SAME else 0.0
         return Summit(now, changes, float(turning[0]), bend, turning[2:5] @ changes[:3] + law_change @ turning[5:])
 
 
@@ -501,7 +497,7 @@ def _alike(length: np.ndarray) -> np.ndarray:
     """Lengths (n,) of pieces, those equal but for rounding made equal: pieces of one length share their tables."""
     order = np.argsort(length)
     ascending = length[order]
-    first = np.append(True, np.diff(ascending) > ALIKE * ascending[1:])[: len(length)]
+    first = np.append(True, np.diff(ascending) > SAME * ascending[1:])[: len(length)]
     found = np.empty(len(length))
     found[order] = ascending[first][np.cumsum(first) - 1]
     return found
@@ -529,7 +525,7 @@ def _sharper(history: "History", time: float, c: int) -> float:
     The force of a long step is a polynomial through its nodes, whose largest value is a little beside that of the law.
     """
     start, end = _step_at(history, time)
-    shape, omega, zeta, beside = history.shape, history.omega, history.zeta, BESIDE * (end - start)
+    shape, omega, zeta, beside = history.shape, history.omega, history.zeta, NUDGE * (end - start)
     row = int(np.searchsorted(history.steps[:, layout.START], start, side="right")) - 1
     memory, yields = (each[row] for each in remembered(history))
     best = time
@@ -603,7 +599,7 @@ def remembered(history: "History") -> tuple[np.ndarray, np.ndarray]:
     first = layout.HEAD + (layout.PUSH + history.n_coefficients) * m
     memory = np.where(plastic, np.vstack([history.steps[:, first : first + m], history.now[layout.REMEMBERED]]), 0.0)
     before = np.maximum(memory[:-1], law[:, layout.FIRST_YIELD])
-    yields = history.pressed & plastic & (memory[1:] - before > GREW * before)
+    yields = history.pressed & plastic & (memory[1:] - before > SAME * before)
     return memory, np.vstack([yields, np.zeros((1, m), bool)])
 
 
@@ -631,12 +627,12 @@ def _cut(
     if len(grades) and pressed.any():
         grades = grades * float(np.median(steps[pressed.any(axis=1), layout.LENGTH]))
         for first, last in np.vstack(edges).tolist():
-            inside[first].update(part for part in (grades / steps[first, layout.LENGTH]).tolist() if part < WHOLLY)
+            inside[first].update((grades / steps[first, layout.LENGTH]).tolist())
             last -= 1
-            inside[last].update(1.0 - part for part in (grades / steps[last, layout.LENGTH]).tolist() if part < WHOLLY)
+            inside[last].update((1.0 - grades / steps[last, layout.LENGTH]).tolist())
     begins, rows = [np.zeros(len(steps))], [np.arange(len(steps))]
     for k, fractions in inside.items():
-        least = EDGE + ROUNDING * history.end_time / steps[k, layout.LENGTH]
+        least = SAME + ROUNDING * history.end_time / steps[k, layout.LENGTH]
         kept = [0.0]
         for fraction in sorted(fractions):
             if kept[-1] + least < fraction < 1.0 - least:
@@ -665,7 +661,7 @@ def _joined(
     far = np.abs(number[:, None] - edges).min(axis=1, initial=len(number)) // NEAR
     most_here = np.where(history.pressed.any(axis=1), np.minimum(most, far), 0)
     most_here[list(cut)] = 0
-    new = np.append(True, np.abs(np.diff(length)) > ALIKE * length[1:])
+    new = np.append(True, np.abs(np.diff(length)) > SAME * length[1:])
     kept, count = [0], [1]
     for j in range(1, len(row)):
         one, other = row[kept[-1]], row[j]

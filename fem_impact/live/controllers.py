@@ -17,13 +17,11 @@ from ..modes.modal import Modes
 from ..modes.viewing import grid
 from .player import AT_ONCE, Stroke
 
-# [-] the note of the first point, the middle of a keyboard; each semitone up is the next one, round and round
+# [-] fact: the MIDI note in the middle of a keyboard; it is the first point, each semitone up the next, round and round
 FIRST_NOTE = 60
 LOUDEST_NOTE = 127  # [-] fact: the MIDI velocity of the fastest stroke; speeds go with it
 LARGEST_FILE = 10_000_000  # [byte] of a MIDI file: days of music
-KEYS = ("zxcvbnm,./", "asdfghjkl;", "qwertyuiop", "1234567890")  # a column strikes one point, a row up is louder
-# [-] of the fastest stroke, by the lowest row; each row up is twice as fast, so that the fourth is the fastest
-SOFTEST = 0.125
+KEYS = ("zxcvbnm,./", "asdfghjkl;", "qwertyuiop", "1234567890")  # a column strikes one point, a row up twice as fast
 ENDS = ("\x1b", "\x04", "\x03")  # Escape, Ctrl-D and Ctrl-C end the playing
 # [s] between looks whether the playing has ended: nobody notices such a delay at the end, and it costs nothing
 PATIENCE = 0.05
@@ -111,6 +109,8 @@ def of_note(note: int, velocity: int, n_points: int, fastest: float) -> tuple[in
 def read_midi(path: Path, n_points: int, fastest: float, rate: int) -> list[Stroke]:
     """The notes of all tracks of a MIDI file as strokes; pauses, controllers and the ends of notes say nothing."""
     mido = check.extra("mido", "play", "a MIDI file")
+    if not path.is_file():
+        raise ValueError(f"{path}: {check.absent(path)}")
     if path.stat().st_size > LARGEST_FILE:
         raise ValueError(f"{path}: a MIDI file must have at most {LARGEST_FILE / 1e6:g} MB")
     strokes, now = [], 0.0
@@ -165,7 +165,7 @@ def of_key(key: str, n_points: int, fastest: float) -> tuple[int, float] | None:
     """Point and speed [m/s] of a key; None if it has none."""
     for row, keys in enumerate(KEYS):
         if key.lower() in keys:
-            return keys.index(key.lower()) % n_points, fastest * SOFTEST * 2.0**row
+            return keys.index(key.lower()) % n_points, fastest * 2.0 ** (row + 1 - len(KEYS))
     return None
 
 

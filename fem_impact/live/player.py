@@ -24,7 +24,6 @@ SHORTEST = 12  # [-] halvings of a frame that a step in contact may need: 5 ns a
 OPENING, CLOSING, FLIGHT = 5, 8, 2  # [-] halvings of that step to end at a release, at an onset, and in flight
 LASTING = 1.0  # [s] after which a stick that still rests on the body is lifted: a blow lasts some milliseconds
 AT_ONCE = 64  # [-] strokes in one block, far more than hands or a keyboard make; what comes on top waits for the next
-LOUDEST = 0.25  # [-] of full scale, reached by one stroke at full speed: four at once, one by each stick, do not clip
 
 
 class Stroke(NamedTuple):
@@ -50,6 +49,7 @@ class Player:
     fastest: float  # [m/s]
     striker: Striker  # with as many modes as the fastest stroke needs
     step: float  # [s] longest step in contact
+    sticks: int  # [-] most that are on the body at once
     gain: float  # [s/m] of samples
 
     def __init__(
@@ -82,7 +82,7 @@ class Player:
         self.points = modes.point("points", points[0]) if modes.dimension == 0 else _points(modes, points)
         self.rate = check.count("rate", rate, high=HIGHEST_RATE)
         self.block, self.fastest = check.count("block", block), check.positive("fastest", fastest, "m/s")
-        check.count("sticks", sticks, high=16)
+        self.sticks = check.count("sticks", sticks, high=16)
         needed = collision.striker_modes(striker, contact=contact, speed=fastest, tolerance=collision.TOLERANCE)[0]
         self.striker = striker if striker.fixed else collision.shortened(striker, needed)
         found = [
@@ -94,8 +94,8 @@ class Player:
         shortest = min(duration for _, duration in found)
         listen = self.points[0] if listen is None else listen
         self.step = self._arrays([system for system, _ in found], shortest, sticks, n_trace, listen)
-        self._when, self._pad = np.zeros(AT_ONCE, np.int64), np.zeros(AT_ONCE, np.int64)
-        self._speed, self.gain = np.zeros(AT_ONCE), 1.0 / FULL_SCALE
+        self._strokes = live.Strokes(np.zeros(AT_ONCE, np.int64), np.zeros(AT_ONCE, np.int64), np.zeros(AT_ONCE))
+        self.gain = 1.0 / FULL_SCALE
 
     def _arrays(self, systems: list, duration: float, sticks: int, n_trace: int, listen: Any) -> float:
         """Make the arrays of the kernel; the longest step in contact [s]."""
@@ -147,11 +147,10 @@ class Player:
     def fill(self, strokes: Sequence[Stroke], out: np.ndarray) -> None:
         """Compute the next block into ``out`` (n_frames,) float32, with the strokes in it, by frames of the block."""
         count = min(len(strokes), AT_ONCE)
+        now = live.Strokes(*(array[:count] for array in self._strokes))
         for i in range(count):
-            self._when[i], self._pad[i], self._speed[i] = strokes[i]
-        live.play(
-            self._body, self._pads, self._limits, self._state, self._when, self._pad, self._speed, count, self.gain, out
-        )
+            now.when[i], now.pad[i], now.speed[i] = strokes[i]
+        live.play(self._body, self._pads, self._limits, self._state, now, self.gain, out)
 
     def play(self, strokes: Sequence[Stroke | tuple[int, int, float]], duration: float) -> Sound:
         """The sound [m/s] of strokes, by frames since now, for a duration [s]; the same strokes give the same bits."""

@@ -40,7 +40,7 @@ def read(path: Any, unit: str | None) -> tuple[
     data = meshio_reader.read(path)
     raw, notes = _plane_points(path, data, unit)
     cells, nodes = _triangles(path, data)
-    names = _named_pairs(path, data)
+    names = _named_pairs(path, data, cells)
     points, cells, number = _mend(path, raw, cells, notes)
     middles = {_pair(number[a], number[b]): raw[node] for (a, b), node in nodes.items()}
     pairs = {name: {_pair(number[a], number[b]) for a, b in found} for name, found in names.items()}
@@ -124,8 +124,8 @@ def _triangles(path: Path, data: meshio_reader.Raw) -> tuple[np.ndarray, dict]:
     return np.concatenate(cells), middles
 
 
-def _named_pairs(path: Path, data: meshio_reader.Raw) -> dict[str, set[tuple[int, int]]]:
-    """Edge name -> sides, from physical groups, cell sets and numbered line cells."""
+def _named_pairs(path: Path, data: meshio_reader.Raw, cells: np.ndarray) -> dict[str, set[tuple[int, int]]]:
+    """Edge name -> sides, from physical groups, cell sets, numbered line cells and sets of nodes."""
     names: dict[str, set[tuple[int, int]]] = {}
 
     def add(name: str, row: np.ndarray) -> None:
@@ -145,6 +145,10 @@ def _named_pairs(path: Path, data: meshio_reader.Raw) -> dict[str, set[tuple[int
                         f"{path.name} has no line {number}, named by set {check.line(name)}; export it again"
                     )
                 add(name, nodes[number])
+    sides = np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])
+    for name, group in data.nodes.items():
+        for row in sides[np.isin(sides, group).all(axis=1)]:
+            add(name, row)
     return names
 
 

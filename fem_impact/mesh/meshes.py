@@ -286,9 +286,9 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     Returns
     -------
     Mesh
-        Physical groups of lines, cell sets and numbered line cells become named edges ("edge7" for number 7 without a
-        name); "outer", "hole0" ... are the loops of the rim and "boundary" is all of it. A rim with only small turns
-        at its vertices becomes a smooth curve. `Mesh.notes` says what was repaired or assumed.
+        Physical groups of lines, cell sets, sets of nodes and numbered line cells become named edges ("edge7" for
+        number 7 without a name); "outer", "hole0" ... are the loops of the rim and "boundary" is all of it. A rim with
+        only small turns at its vertices becomes a smooth curve. `Mesh.notes` says what was repaired or assumed.
 
         If the modes need another element size, `find_modes` splits each triangle in four or meshes the inside of the
         rim anew, whichever takes fewer triangles. If the thickness varies, it only splits: the triangles of the file
@@ -367,8 +367,11 @@ def pierced(mesh: Mesh, holes: Sequence[tuple[np.ndarray, float]], *, size: floa
 
     Edges keep their names and curves; a mesh from a file keeps its own vertices on the rim, not inside.
     """
-    least = SMALLEST_HOLE * float(np.ptp(mesh.points, axis=0).max())
+    extent = float(np.ptp(mesh.points, axis=0).max())
+    least = SMALLEST_HOLE * extent
     for _, radius in holes:
+        if radius > extent:
+            raise ValueError(f"radius of point_supports must be smaller than the body, {extent:g} m, got {radius:g} m")
         if radius < least:
             raise ValueError(
                 f"radius of point_supports must be at least {SMALLEST_HOLE:g} of the body, {least:g} m, got "

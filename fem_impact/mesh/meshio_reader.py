@@ -2,7 +2,7 @@
 
 import json
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,8 @@ import numpy as np
 
 from .._base import isolated
 
-TAGS = ("gmsh:physical", "medit:ref", "edge", "cell_tags")  # meshio's keys for the numbers of cells, preferred first
+# meshio's keys for the numbers of cells, preferred first
+TAGS = ("gmsh:physical", "medit:ref", "edge", "cell_tags", "su2:tag", "nastran:ref")
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +22,7 @@ class Raw:
     blocks: list[tuple[str, np.ndarray, np.ndarray | None]]  # cell type, nodes (n_cells, n), tags (n_cells,)
     labels: dict[int, str]  # tag of line cells -> name
     sets: dict[str, list[np.ndarray | None]]  # name -> cell numbers in each block
+    nodes: dict[str, np.ndarray] = field(default_factory=dict)  # name -> numbers of nodes
 
 
 def read(path: Path) -> Raw:
@@ -29,7 +31,8 @@ def read(path: Path) -> Raw:
     index = json.loads(arrays["index"].tobytes())
     blocks = [(kind, arrays[f"cells{i}"], arrays.get(f"tags{i}")) for i, kind in enumerate(index["kinds"])]
     sets = {name: [arrays.get(f"set{s}_{i}") for i in range(len(blocks))] for s, name in enumerate(index["sets"])}
-    return Raw(arrays["points"], blocks, {int(number): name for number, name in index["labels"]}, sets)
+    nodes = {name: arrays[f"nodes{i}"] for i, name in enumerate(index["nodes"])}
+    return Raw(arrays["points"], blocks, {int(number): name for number, name in index["labels"]}, sets, nodes)
 
 
 def arrays(path: Path) -> dict[str, np.ndarray]:
@@ -55,8 +58,11 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         for i, members in enumerate(mesh.cell_sets[name]):
             if members is not None:
                 found[f"set{s}_{i}"] = np.asarray(members, np.int64).ravel()
+    for i, members in enumerate(mesh.point_sets.values()):
+        found[f"nodes{i}"] = np.asarray(members, np.int64).ravel()
     labels = [(int(v[0]), name) for name, v in mesh.field_data.items() if len(v) == 2 and int(v[1]) == 1]
-    index = {"kinds": [block.type for block in mesh.cells], "sets": sets, "labels": labels}
+    kinds = [block.type for block in mesh.cells]
+    index = {"kinds": kinds, "sets": sets, "labels": labels, "nodes": list(mesh.point_sets)}
     found["index"] = np.frombuffer(json.dumps(index).encode(), np.uint8)
     return found
 

@@ -5,8 +5,10 @@ twisting moment M_nt that Kirchhoff's theory leaves there and the true plate can
 inertia multiplies omega**2 by 1 - int (rho h**3 / 12) |grad w|**2 / int rho h w**2, shear by
 1 - int |Q|**2 / (kappa G h) / (omega**2 int rho h w**2), and a free edge by 1 - 2 int M_nt**2 l / (2 D66) ds /
 (omega**2 int rho h w**2), where the twist fades over the length l = h / sqrt(12 kappa). The last is what shortens
-Saint-Venant's torsion of a strip, 1 - 0.63 h / b. Many modes are needed and few are integrated: the rest follow from
-those, as rotary inertia and shear go with omega and the edge with none of it.
+Saint-Venant's torsion of a strip, 1 - 0.63 h / b. Where edges meet or supports change, Q may grow as r**(z - 3) with
+the exponents of `corners`, but in a thick plate only down to about the same length l: nearer, |Q|**2 is left out. Many
+modes are needed and few are integrated: the rest follow from those, as rotary inertia and shear go with omega and the
+edge with none of it.
 
 References
 ----------
@@ -19,9 +21,11 @@ from typing import Any
 
 import numpy as np
 from scipy import special
+from scipy.spatial import KDTree
 
 from ..fe import beam_elements
 from ..fe.assembly import System, support_of_facets
+from ..fe.corners import meetings
 from ..fe.residual import Moments
 from ..fe.section import SHEAR, Beam, Plate, evaluate
 from ..fe.springs import along_facets
@@ -38,6 +42,7 @@ LOW = 40
 TRUE_VECTORS = 4  # [-] of so many Ritz pairs the lowest one is a mode: those above are packets, whose shear is singular
 TOP = 4  # [-] the upper one of so many parts of the integrated modes tells how those above go on: ten modes, of LOW
 NODES = 3  # [-] Gauss points in each direction of a triangle: slopes to 1e-3, as a mode's wave spans several triangles
+FADES = 1.0 / np.sqrt(12.0 * SHEAR)  # [-] of the thickness, fact: over this length a twist that shear undoes fades
 ALONG = 200  # [-] Gauss points along a beam or the radius of a disk: 20 and more for each wave of its fortieth mode
 
 
@@ -228,7 +233,8 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     Q = np.stack([(q @ moved) for q in (force[:, 0, 0] + force[:, 1, 2], force[:, 0, 2] + force[:, 1, 1])])
     soft = np.linalg.inv(section.shear(flat)).reshape(*area.shape, 2, 2) * frame.stiffness / frame.length**2
     energy = (vectors * (system.K @ vectors)).sum(axis=0)
-    result[3] = np.einsum("eq,aeqk,eqab,beqk->k", area, Q, soft, Q, optimize=True) / energy
+    plane = np.where(_from_corners(system, flat).reshape(area.shape) > h * FADES, area, 0.0)
+    result[3] = np.einsum("eq,aeqk,eqab,beqk->k", plane, Q, soft, Q, optimize=True) / energy
     rim = system.rim
     free = np.flatnonzero(np.array(rim.kinds) == "free") if rim is not None else np.zeros(0, int)
     if len(free) and rim is not None:
@@ -241,9 +247,15 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
         flat = frame.centre + frame.length * place.reshape(-1, 2)
         h = evaluate("thickness", section.thickness, flat, "m").reshape(ds.shape)
         stiff = section.stiffness(flat)[:, 2, 2].reshape(ds.shape) / frame.stiffness
-        fades = h / np.sqrt(12.0 * SHEAR) / frame.length
-        result[4] = np.einsum("eq,eqk->k", ds * fades / stiff, twist**2) / energy
+        result[4] = np.einsum("eq,eqk->k", ds * h * FADES / frame.length / stiff, twist**2) / energy
     return result
+
+
+def _from_corners(system: System, points: np.ndarray) -> np.ndarray:
+    """Distances (n,) [m] of points from the next corner or change of support; infinite without any."""
+    mesh = system.mesh
+    places = [vertex for vertex, _, _ in meetings(mesh, support_of_facets(mesh, system.supports))]
+    return KDTree(mesh.points[places]).query(points)[0] if places else np.full(len(points), np.inf)
 
 
 def _beam(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:

@@ -42,6 +42,14 @@ ATTEMPTS = 3.0  # [-] blows on the way to a tolerance
 # As the runs of studies/cost_predictions.py need; it compares the numbers predicted with those done.
 GROWN = 120.0, 0.3  # [-] first vectors up to this number suffice; if more, the number grows by this power of the ratio
 LONG = 4.0, 0.7  # [-] the same over the length of the blow, in undisturbed contacts: later echoes need more vectors
+# [-] unknowns of the elements that shrink towards the blow; triangles of a thick plate have more
+AT_BLOW = {"argyris": 3000, "argyris and shear": 7500}
+PER_MODE = 65.0  # [-] unknowns per mode found for motion and sound: 40 at 1.8 rad per triangle, 108 at 1.1
+# [-] frequency times contact time up to which modes for motion and sound are counted: 16 of a half sine, less of
+# smoother forces
+FAINTEST = 8.0
+LONGEST = 100.0  # [-] a blow is followed up to so many undisturbed contacts; the cost of longer ones is told too low
+MANY = 2  # [-] impacts up to which two meshes suffice; each multiplies the error that a mesh makes before it
 PROCESS, ELEMENTS = 2.1e8, 5e7  # [byte] of the process with its libraries, and of those for elements
 PER_UNKNOWN, PER_PAIR = 1e4, 16.0  # [byte] per unknown with its factors; per unknown and solution
 WORTH = 1.0  # [s] a run predicted to take longer is worth the benchmark

@@ -31,29 +31,21 @@ from .restrike import Struck
 
 LIMIT = 0.2  # [-] deflection over thickness at which the frequency of a hinged square rises by 2 %
 SLIPS = 0.25  # [-] stretching of a plate whose edge may move in its plane over that of one whose edge may not
-# [-] instants of the blow, and of each period after it, where tension is found; ten times more or fewer pass the tests
+# [-] instants of the blow, and of each period after it, at which tension is found: the largest deflection to 1e-3
 TIMES = 64
-RINGING = 1.5  # [-] tension that acts on a mode swinging alone, over the mean tension: 3/4 of its largest
+RINGING = 1.5  # [-] tension that acts on a mode swinging alone, over the mean tension, fact: 3/4 and 1/2 of its largest
 FRONT = 2.0 * np.pi  # [-] radius squared of the bent region over rate times time: where Si(r**2 / (4 rate t)) turns
-# [-] power of the slopes' share within the bent region: 2 on an endless plate, least errors on others; half and twice
-# pass the tests
-AHEAD = 1.5
-# [-] deflection over thickness below which the free edges of a plate are not looked at closely: 1e-3; ten times more or
-# less passes the tests
+AHEAD = 1.5  # [-] power of the slopes' share within the bent region: 2 on an endless plate, least errors on others
+# [-] deflection over thickness below which the free edges of a plate are not looked at closely: it stiffens by 1e-3
+# there
 SLIGHT = 0.03
-# [-] stiffening of a wide plate under a point force over (deflection / thickness)**2, from the held disk; half and
-# twice pass the tests
-DENT = 0.7
+DENT = 0.7  # [-] stiffening of a wide plate under a point force over (deflection / thickness)**2, from the held disk
 SLOWER = 3.0  # [-] a mode that is slower or faster than bending waves by this rocks or is pulled; wood differs by less
 NUMBER = "deflection over thickness"
-# [-] deflection over thickness beyond which no first-order estimate of the stretching helps; half and twice pass the
-# tests
+# [-] deflection over thickness beyond which no first-order estimate of the stretching helps
 GONG = 1.0
-# [-] the stress fields of a body that stretches over those left in the blow to compare with: half of them; half and
-# twice pass the tests
-FEWER = 2
-# [-] periods of the first mode after a blow that are looked through for its deflection; half and twice pass the tests
-PERIODS = 2.0
+FEWER = 2  # [-] divides the stress fields of a body that stretches for the blow to compare with: half of them
+PERIODS = 2.0  # [-] periods of the first mode after a blow that are searched for its largest deflection
 REMEDY = "take a softer blow or a thicker body: stretching is not modelled"
 BETTER = "let it stretch, stretching = true, or take a softer blow or a thicker body"
 OTHER = "take element 'argyris'"
@@ -246,7 +238,7 @@ def _within(body: Known, area: np.ndarray) -> np.ndarray:
     if body.modes.dimension == 1:
         return np.ones(len(area))
     whole = np.pi * body.extent / np.maximum(area, ROUNDING * body.extent)  # 2 x at the edge
-    near, far = (np.euler_gamma + np.log(x) - special.sici(x)[1] for x in (np.pi, whole))
+    near, far = (np.euler_gamma + np.log(x) - special.sici(x)[1] for x in (0.5 * FRONT, whole))
     return near / far
 
 

@@ -26,9 +26,7 @@ NEAREST = 2.0  # [-] least clearance**2 / (rate contact time); below it, the ech
 ECHO = 1.2  # [-] error of one straight edge over ratio / nearness**2; measured 0.1 to 0.4, at a disk's centre 4
 # [-] modes up to this multiple of the contact frequency decide if a body is rigid: one there gives 1 / 400 as much
 LOOK = 20.0
-MOST_LOOKED_AT = 5000  # [-] upper limit on the number of these modes, as a plan should take no time
-# [-] in an eighth of a turn, where the fastest wave of an orthotropic plate is sought: missed by the square of 1e-3
-DIRECTIONS = 1001
+MOST_LOOKED_AT = 5000  # [-] of these modes at most, to limit the work: a plan should take no time
 
 
 @dataclass(frozen=True)
@@ -71,11 +69,10 @@ class Waves:
         a, b, h = along[0, 0], along[1, 1], along[0, 1] + 2.0 * along[2, 2]
         middle = a**0.25 * b**0.25
         inner = 0.5 * (1.0 + h / np.sqrt(a) / np.sqrt(b))  # above zero, as the rigidities are positive definite
-        turn = np.linspace(0.0, 0.25 * np.pi, DIRECTIONS)
-        squared = 1.0 - (1.0 - inner) * np.sin(2.0 * turn) ** 2  # of the rate, relative to the middle one
-        slope = -2.0 * (1.0 - inner) * np.sin(4.0 * turn)
-        # the phase of the group that arrives from a distance d after t is d**2 / (4 t rate (1 + (rate' / rate)**2 / 4))
-        fastest = np.sqrt(squared) * (1.0 + (slope / squared) ** 2 / 16.0)
+        # the group that arrives from a distance d after t has the phase d**2 / (4 t rate (1 + (rate' / rate)**2 / 4)),
+        # whose denominator is largest where the squared rate over the middle one is
+        squared = np.clip(3.0 * inner / (1.0 + inner), *sorted((inner, 1.0)))
+        fastest = ((1.0 + inner) * squared - inner) / squared**1.5
         cosine, sine = np.cos(material.angle), np.sin(material.angle)
         narrow = (b / a) ** 0.125
         crossing = (b - h) / (a + b - 2.0 * h) if a + b != 2.0 * h else 0.0  # c**2 of the least rate
@@ -83,8 +80,8 @@ class Waves:
         return cls(
             np.array([[narrow * cosine, narrow * sine], [-sine / narrow, cosine / narrow]]),
             rate=float(0.5 * np.pi * middle / ellipkm1(inner)),
-            fastest=float(middle * fastest.max()),
-            slowest=float(middle * np.sqrt(squared.min())),
+            fastest=float(middle * fastest),
+            slowest=float(middle * min(1.0, inner) ** 0.5),
             least=float(np.sqrt(min(a, b, least) if 0.0 < crossing < 1.0 else min(a, b))),
         )
 

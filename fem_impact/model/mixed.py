@@ -36,29 +36,21 @@ from ..modes.modal import Modes, SampledShapes
 ANGLE = 0.05
 RATIO = ANGLE / 1.5  # [-] between neighbouring frequencies, less one: a ripple of 2e-4
 REACH = 2.0  # [-] the modes are needed up to this multiple of the frequency, where they keep 1 % of their squared shape
-# [-] finite elements resolve waves of so many times the frequency: room for a second, higher frequency on that mesh;
-# half and twice pass the tests
+# [-] finite elements resolve waves of so many times the frequency: room for a second, higher frequency on that mesh
 RESOLVED = 1.25
 CHUNK = 2000  # [-] modes whose shares are found at a time, to limit memory
-# [-] first frequency tried, times mass and mobility, the time in which the striker slows down: five times its rate;
-# half and twice pass the tests
+# [-] angular frequency tried first, times mass and mobility, the time in which the striker slows down: five times its
+# rate, where a force hardly changes its speed
 SLOWING = 5.0
-# [-] duration of the blow to be expected, over mass times mobility: exp(-15) = 3e-7 of the speed is left then; half and
-# twice pass the tests
+# [-] duration of the blow to be expected, over mass times mobility: exp(-15) = 3e-7 of the speed is left then
 LASTING = 15.0
-# [-] that duration over the contact time on a wall at most: longer blows take too many steps, some 24 for each; ten
-# times more or less passes the tests
+# [-] that duration over the contact time on a wall at most: longer blows take too many steps, some 24 for each
 LONGEST = 1e4
-# [-] vectors that tell waves up to a frequency, per radian of its phase in that time: eight for each half turn; half
-# and twice pass the tests
+# [-] vectors that tell waves up to a frequency, per radian of its phase in that time: eight for each half turn
 PER_RADIAN = 2.5
-# [-] limit on their number: half a minute on a mesh of 50 000 unknowns; ten times more or less passes the tests
+# [-] of these vectors at most, a time limit: half a minute on a mesh of 50 000 unknowns
 MOST_VECTORS = 1000
-# [-] damping ratio of the contact with an infinite plate, critical, from which vectors alone do not resolve it; half
-# and twice pass the tests
-HEAVY = 1.0
-# [rad] phase of the first echo at that frequency at least, a turn and a half: the plate is wider than the wave is long;
-# half and twice pass the tests
+# [rad] phase of the first echo at that frequency at least, a turn and a half: the plate is wider than the wave is long
 NEAR = 10.0
 
 

@@ -27,33 +27,26 @@ from .target import FIRST_LOOK, Elements, Stages, Target, Watch
 
 # [-] of the tolerance for left-out modes, as much for the time steps, as neither is cheap; the mesh gets the rest
 SHARE = 0.45
-# [-] of the tolerance for the time steps of a blow by Ritz vectors: finer steps cost nothing there; half and twice pass
-# the tests
-STEPS = 0.1
-# [-] of the tolerance for the mesh, whose frequencies may err twice as much as the blow then does; half and twice pass
-# the tests
-MESH = 0.1
-# [-] runs with ever more modes or finer meshes, until the tolerance is met: CAUTION makes even a second one rare; half
-# and twice pass the tests
+# [-] of the tolerance for what costs little: the time steps of a blow by Ritz vectors, the modes of strikers that meet
+# on the body, and the mesh, whose frequencies may err twice as much as the blow then does
+CHEAP = 0.1
+# [-] runs with ever more modes or finer meshes until the tolerance is met: CAUTION makes even a second one rare
 ATTEMPTS = 3
 # [Hz], [-] the ear's limit: no mode above is asked for unless a band of the sound is; the force looked at every 10 Hz
 AUDIBLE, AUDIBLE_POINTS = 20e3, 2001
 # [-] modes ring up to the last frequency where the force has this part of its impulse: -60 dB, which is not heard
 FAINT = 1e-3
 MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: some seconds
-# [-] the verifying run divides the tolerance by this: its own error is then an eighth of what it judges; half and twice
-# pass the tests
+# [-] the verifying run divides the tolerance by this: its own error is then an eighth of what it judges
 VERIFYING = 8.0
 FINEST = 1e-10  # [-] lowest tolerance of a verifying run: below, rounding of long runs begins to show
-# [-] safety factor on the mode error: costs a quarter more modes, but seldom needs a second run; half and twice pass
-# the tests
+# [-] safety factor on the mode error: costs a quarter more modes, but seldom needs a second run
 CAUTION = 2.0
 MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by source: takes about 2 GB and some minutes
-# [-] above it, a plate is infinite above a frequency, if its contact overdamps: 4 100 modes for 15 190 of a steel
-# sheet; ten times more or less passes the tests
+# [-] a plate that needs more modes is taken as infinite above a frequency, if it overdamps the contact: a steel sheet
+# then keeps 4 100 modes instead of 15 190
 MANY_MODES = 10_000
-# [-] frequency error for which `find_modes` chooses the mesh, as for its `WAVE_PER_ELEMENT`; beams also round; ten
-# times more or less passes the tests
+# [-] frequency error of the shortest waves that the mesh resolves by `refinement.WAVE_PER_ELEMENT`; beams also round
 SHORT_WAVES = {
     "argyris": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
 }  # fmt: skip
@@ -62,21 +55,7 @@ PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_st
 ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
 TARGETS = ("rigid", "infinite", "vectors", "mixed", "modal")
 RINGING = ("modal", "vectors")  # those of a target that rings
-DOFS_AT_BLOW = 3000  # [-] unknowns of the elements that shrink towards the blow; only foretells the cost
-THICK_DOFS_AT_BLOW = 7500  # [-] the same of a thick plate, whose triangles have more unknowns; only foretells the cost
-# [-] impacts up to which the first two meshes suffice; each multiplies the error that a mesh makes before it; half and
-# twice pass the tests
-MANY = 2
-# [-] length of the blow that foresees the cost, in undisturbed contacts; the cost of longer ones is told too low; ten
-# times more or less passes the tests
-LONGEST = 100.0
-# [-] frequency times duration up to which a force has FAINT of its impulse: 16 of a half sine, less of smoother ones;
-# half and twice pass the tests
-FAINTEST = 8.0
-# [-] unknowns per mode found for motion and sound: 40 at 1.8 rad per triangle, 108 at 1.1; only foretells the cost
-PER_MODE = 65.0
-# [-] modes times steps of one run of a plate that is infinite above a frequency: takes ten seconds; ten times more or
-# less passes the tests
+# [-] modes times steps of one run of a plate that is infinite above a frequency: a time limit of ten seconds
 MOST_MIXED = 2e8
 COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced: longer than one likes to wait
 
@@ -306,7 +285,7 @@ class _Asked:
 
     def find(self, n_modes: int, max_frequency: float | None = None, **how: Any) -> Modes:
         """Modes of the target, see `Target.find`."""
-        size, limit = self.pieces.get("size"), 2.0 * MESH * self.tolerance / self.fineness
+        size, limit = self.pieces.get("size"), 2.0 * CHEAP * self.tolerance / self.fineness
         return self.blow.target.find(n_modes, max_frequency, tolerance=limit, size=size, **how)
 
 
@@ -339,7 +318,7 @@ def make(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
         target = "modal"
     plan = None if target in ("modal", "vectors", "mixed") else _idealised(asked, target, stages)
     if plan is None and (target == "mixed" or (target is None and blow.target.kind == "fe")):
-        plan = _mixed(asked, target, stages, mixed.HEAVY if target is None else 0.0)
+        plan = _mixed(asked, target, stages, heavy=target is None)
     return plan or _by_vectors(asked, target, stages) or _modal(asked, stages)
 
 
@@ -381,7 +360,7 @@ def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:
             first = run(**{**asked.values, "tolerance": SHARE * asked.tolerance})
             response = within(asked.tolerance, first, run, asked.values)
         short = response.error.truncation > SHARE * asked.tolerance
-        coarse = not given and response.error.total > asked.tolerance and response.error.mesh > MESH * asked.tolerance
+        coarse = not given and response.error.total > asked.tolerance and response.error.mesh > CHEAP * asked.tolerance
         if plan.target != "modal" or fixed or not (short or coarse) or attempt == ATTEMPTS - 1:
             break
         margin *= vectors.NOTCH if short else 1.0
@@ -535,7 +514,7 @@ def _mixed_by_vectors(
 def _in_fine_steps(run: Callable[..., Response], asked: _Asked) -> Response:
     """The blow with a small part of the tolerance for its steps, or with half of it if that takes too many."""
     with suppress(check.SimulationError):
-        return run(**{**asked.values, "tolerance": STEPS * asked.tolerance})
+        return run(**{**asked.values, "tolerance": CHEAP * asked.tolerance})
     return run(**{**asked.values, "tolerance": SHARE * asked.tolerance})
 
 
@@ -668,10 +647,11 @@ def _last_resort(asked: _Asked, stages: Stages) -> Plan | None:
     return None
 
 
-def _mixed(asked: _Asked, target: str | None, stages: Stages, least: float = 0.0) -> Plan | None:
+def _mixed(asked: _Asked, target: str | None, stages: Stages, heavy: bool = False) -> Plan | None:
     """The plan with modes up to a frequency and an infinite plate above it; None if its mobility is not known.
 
-    Or if fewer modes tell the blow, or the damping ratio of the contact with an infinite plate is below ``least``.
+    Or, if it must be ``heavy``, where vectors or few modes do: the infinite plate damps the contact less than
+    critically, or few modes tell the blow.
     """
     blow, values = asked.blow, asked.values
     plain = not (blow.target.thick or blow.target.air or values["stretching"] or blow.striker.hand)
@@ -689,8 +669,8 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, least: float = 0.0
     highest = _highest(asked, seen.mobility)
     if target is None and mixed.LASTING * asked.mass * seen.mobility > mixed.LONGEST * asked.duration:
         return None
-    if least and (
-        0.5 * np.pi * asked.mass * seen.mobility < least * asked.duration
+    if heavy and (
+        0.5 * np.pi * asked.mass * seen.mobility < asked.duration
         or blow.target.count_below(highest / blow.target.stretch) < MANY_MODES
     ):
         return None
@@ -828,7 +808,7 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     elements, fixed = _elements(asked, size), blow.target.size_stated or "size" in asked.pieces
     n_dofs = blow.target.unknowns(at, elements, stages)
     meshes = list(vectors.compared(blow.target, elements, stages))
-    if impacts > MANY and not fixed:
+    if impacts > cost.MANY and not fixed:
         meshes.append(vectors.finer(blow.target, meshes[0], stages))
     count = vectors.first_count(blow.target, 0.5 / asked.duration, asked.tolerance)
     kept = f"the target is described by some {count} Ritz vectors started from the blow, more if their error shows"
@@ -839,12 +819,12 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     work = cost.by_vectors([blow.target.unknowns(at, each, stages) for each in meshes], count, lasts)
     if asked.moving:
         rings = _ringing_count(asked)
-        work += cost.by_modes(PER_MODE * FIRST_LOOK, FIRST_LOOK) + cost.by_modes(PER_MODE * rings, rings)
-    shares = dict.fromkeys(("Ritz vectors", "mesh"), SHARE * (1.0 - STEPS) * asked.tolerance)
+        work += cost.by_modes(cost.PER_MODE * FIRST_LOOK, FIRST_LOOK) + cost.by_modes(cost.PER_MODE * rings, rings)
+    shares = dict.fromkeys(("Ritz vectors", "mesh"), SHARE * (1.0 - CHEAP) * asked.tolerance)
     why = f"the contact lasts about {asked.duration:.3g} s"
     return _plan(
         asked, target="vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
-        element="argyris", steps=STEPS, mass=blow.target.mass, notes=blow.target.notes, work=work,
+        element="argyris", steps=CHEAP, mass=blow.target.mass, notes=blow.target.notes, work=work,
     )  # fmt: skip
 
 
@@ -863,7 +843,7 @@ def _foreseen(asked: _Asked) -> tuple[float, int]:
     with suppress(check.SimulationError):
         hit = collision.strike(
             endless, collision.shortened(striker, _striker_modes(asked, 1.0)[0]), asked.blow.contact, at=at,
-            speed=asked.values["speed"], tolerance=audit.ROUGH, duration=LONGEST * asked.duration,
+            speed=asked.values["speed"], tolerance=audit.ROUGH, duration=cost.LONGEST * asked.duration,
         )  # fmt: skip
         return max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, hit.n_impacts
     return 1.0, 1
@@ -874,7 +854,7 @@ def _ringing_count(asked: _Asked) -> int:
     target, band = asked.blow.target, asked.quantities.get("sound")
     mesh, section = target.mesh, target.section
     assert mesh is not None and isinstance(section, Plate)
-    wave = target.wave((band or min(AUDIBLE, FAINTEST / asked.duration)) / target.stretch)
+    wave = target.wave((band or min(AUDIBLE, cost.FAINTEST / asked.duration)) / target.stretch)
     stiffness = section.stiffness(mesh.points[mesh.cells].mean(axis=1))
     ratio = float((stiffness[:, 0, 0] / stiffness[:, 1, 1]).mean())
     number = mesh.area * wave**2 / (4.0 * np.pi) * min(ratio, 1.0 / ratio) ** 0.25  # waves across the grain are shorter
@@ -904,7 +884,7 @@ def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: fl
         number, limit = target.modes.n_modes, target.modes.frequencies[-1]
     most = MOST_MODES[target.kind]
     if number > min(most, MANY_MODES) and band <= needed and "target" not in asked.pieces:
-        plan = _mixed(asked, None, stages, mixed.HEAVY if number <= most else 0.0)
+        plan = _mixed(asked, None, stages, heavy=number <= most)
         if plan is not None:
             return plan
     if number > most:
@@ -946,7 +926,7 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
         work = sum((cost.by_modes(n, plan.n_modes) for n in [n_dofs, *coarser]), cost.NOTHING)
         if mesh.dimension == 2:
             finer = [n_dofs * refinement.COARSER**2] if thick else []
-            at_blow = THICK_DOFS_AT_BLOW if thick else DOFS_AT_BLOW
+            at_blow = cost.AT_BLOW[system.element]
             work = sum((cost.compliance(n + at_blow) for n in [n_dofs, *finer]), work)
     return replace(
         plan, element=system.element, size=size, n_dofs=n_dofs, errors={**plan.errors, "mesh": error},

@@ -24,8 +24,6 @@ from . import audit, planner
 
 LOG = logging.getLogger(__name__)
 EACH = 0.5  # [-] of the tolerance for each blow by itself; as much is left for what it inherits from those before
-# [-] of the tolerance at which a striker's modes are chosen that meets others on the body, for all their blows
-FEW_MODES = 0.1
 MOST_BLOWS = 100_000  # [-] above a day of drumming; more are a mistake
 LISTED = 20  # [-] impacts listed in a summary
 
@@ -422,7 +420,7 @@ class _Game:
         one = self.played[number]
         striker = one.striker
         if not striker.fixed and rule["residual"]:
-            tolerance = FEW_MODES * rule["tolerance"]
+            tolerance = planner.CHEAP * rule["tolerance"]
             needed = collision.striker_modes(striker, contact=one.contact, speed=one.speed, tolerance=tolerance)[0]
             striker = collision.shortened(striker, needed)
         surface = float(self.modes.shape_at(one.at[None])[0] @ self.q)

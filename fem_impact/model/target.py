@@ -40,7 +40,7 @@ FIRST_LOOK = 20  # [-] modes found first: enough to scale the body and to predic
 RIGID_MOTIONS = 3  # [-] fact: most that a free body has before its first flexible mode
 FIRST_FLEXIBLE = RIGID_MOTIONS + 1  # [-] fact: modes that hold a flexible one
 CLOSE = 1e-6  # [-] error of a frequency to which a body is scaled or designed: far below the tolerance of usual blows
-MESHES = 4  # [-] meshes that are remembered: a plan counts the unknowns of two or three, which its run then uses
+MESHES = 4  # [-] meshes remembered, to limit the memory: a plan counts the unknowns of two or three, its run uses them
 
 Watch = Callable[[str], AbstractContextManager[Any]]
 # Says where an error comes from; takes "mesh", "supports" or another part of a scene, and the names of what was changed

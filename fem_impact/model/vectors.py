@@ -20,30 +20,23 @@ from .target import Elements, Stages, Target
 
 # the next five: value at a tolerance of 1e-2 or more, and power of 1e-2 / tolerance with which it grows
 WAVES = 1.6, 0.37  # [-] highest frequency that the first mesh resolves, over that of the contact
-SHIFT = 6.0, 1.0 / 6.0  # [-] shift over the angular frequency of the contact: half and twice of it pass the same tests
+SHIFT = 6.0, 1.0 / 6.0  # [-] shift over the angular frequency of the contact: half or twice as much tells blows as well
 FIRST = 84, 0.22  # [-] vectors tried first: they resolve one undisturbed contact
 # [-] what modes left out may err, over what the highest pairs may that act as a spring: these err in every blow
 FOLDED = 4.0, 0.6
-# [-] highest frequency of a mode that matters, over that of the contact: a half sine has 1 / 143 of its impulse there;
-# half and twice pass the tests
+# [-] highest frequency of a mode that matters, over that of the contact: a half sine has 1 / 143 of its impulse there
 EXCITED = 12.0, 0.25
-# [-] vectors besides those that stand for modes: the dip under the load has no wavelength and takes its own; half and
-# twice pass the tests
+# [-] vectors besides those that stand for modes: the dip under the load has no wavelength and takes its own
 FEWEST = 30
-# [-] smallest and largest factor on the number of vectors: less gains too little for a run, more may overshoot
-MORE = 1.2, 1.4
-# [-] power of the number of vectors with which their error falls, once they resolve the contact; half and twice pass
-# the tests
-FALLING = 3.0
-# [-] divides what those of poorer descriptions may err: so far apart that two blows differ by the error of the poorer;
-# half and twice pass the tests
+MORE = 1.4  # [-] factor on the number of vectors: less gains too little for a run, more may overshoot
+# [-] divides what those of poorer descriptions may err: so little that two blows differ by the error of the poorer
 LESS_FOLDED = 16.0
 # [-] each attempt divides by this what modes left out, highest pairs or the mesh may err: less may need one more
 NOTCH = 4.0
-# [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7, as one or two may fail by chance
+# [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7, as one or two may fail by chance;
+# one blow is given twice as many while two descriptions do not agree on its impacts: that error is 1 until they do
 PATIENCE, LEAST_GAIN = 3, 0.7
 TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before: five times smaller in all
-AIM = 0.5  # [-] of what the steps leave of the tolerance: errors that more vectors are to reach, without ever more runs
 AT_FAULT = 3.0  # [-] the mesh is refined if it errs so many times more than too few vectors, which its error contains
 # [-] a mesh with more than this part of the elements of another is no coarser: sizes 1.5 apart should leave 0.44
 ALIKE = 0.85
@@ -54,7 +47,7 @@ FLATTER = 2.0
 DIP = 60.0
 FLATTEST = 64.0  # [-] coarsest triangles at a blow; coarser ones were not tried
 MET = 0.9  # [-] of the allowed error, up to which an estimate suffices: some are a tenth too small (effectivity.py)
-MOST_VECTORS = 2000  # [-] limit on their number: a mesh of 20 000 unknowns takes some 0.3 GB for them
+MOST_VECTORS = 2000  # [-] to limit the memory: a mesh of 20 000 unknowns takes some 0.3 GB for so many
 
 
 def usable(target: Target) -> bool:
@@ -123,9 +116,9 @@ def compared(target: Target, elements: Elements, stages: Stages) -> tuple[Elemen
     return finer(target, elements, stages), elements
 
 
-def hopeless(tried: list[float]) -> bool:
-    """Whether the last PATIENCE steps towards more vectors gained nothing; takes the errors of all steps."""
-    return len(tried) > PATIENCE and min(tried[-PATIENCE:]) > LEAST_GAIN * min(tried[:-PATIENCE])
+def hopeless(tried: list[float], patience: int = PATIENCE) -> bool:
+    """Whether the last ``patience`` steps towards more vectors gained nothing; takes the errors of all steps."""
+    return len(tried) > patience and min(tried[-patience:]) > LEAST_GAIN * min(tried[:-patience])
 
 
 def folded(found: Modes, cutoff: Callable[[Modes, float], float], margin: float) -> Modes:
@@ -191,9 +184,9 @@ class Seen:
         self.fine, self.coarse = self._krylov(self.elements), self._krylov(other)
 
     def _stuck(self, truncation: float) -> bool:
-        """Whether the last PATIENCE steps towards more vectors gained nothing."""
+        """Whether the last steps towards more vectors gained nothing."""
         self.tried.append(truncation)
-        return hopeless(self.tried)
+        return hopeless(self.tried, PATIENCE if truncation < 1.0 else 2 * PATIENCE)
 
     def _krylov(self, elements: Elements) -> Krylov:
         system = self.target.near(self.at, elements, self.stages)
@@ -227,8 +220,7 @@ class Seen:
         coarse = error.mesh > max(AT_FAULT * error.truncation, 0.5 * allowed)
         self.spent = self.spent or (not coarse and (self.count >= MOST_VECTORS or self._stuck(error.truncation)))
         if not coarse and not self.spent:
-            more = np.clip((much / AIM) ** (1.0 / FALLING), *MORE)
-            self.count, self.margin = min(MOST_VECTORS, round(more * self.count)), NOTCH * self.margin
+            self.count, self.margin = min(MOST_VECTORS, round(MORE * self.count)), NOTCH * self.margin
             return True
         more = self.fine.system.n_dofs * refinement.COARSER**2
         useless = self.spent and error.truncation > allowed

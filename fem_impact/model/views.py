@@ -14,7 +14,7 @@ from ..modes.ritz import Krylov
 from .target import Elements
 from .vectors import Seen
 
-# [-] points that share a mesh: each adds elements that shrink towards it; fewer find the body's modes more often
+# [-] points that share a mesh, to limit the work: each adds elements that shrink towards it; fewer make more meshes
 TOGETHER = 8
 
 

@@ -298,6 +298,8 @@ class Modes:
         [[0.9, -1.1]]
         """
         omega = 2.0 * np.pi * check.ascending("frequencies", frequencies, "Hz")
+        if not len(omega):
+            raise ValueError("frequencies must not be empty")
         points = check.array("points", points, (None, None), "m")
         values = check.array("shapes", shapes, (len(points), len(omega)), "kg**-0.5")
         if compliance is None:
@@ -455,6 +457,7 @@ class Modes:
 
     def stretched(self, mass: float, frequency: float) -> "Modes":
         """The same body with its mass and all frequencies multiplied by these factors [-]."""
+        mass, frequency = check.positive("mass", mass), check.positive("frequency", frequency)
         shapes = ScaledShapes(self.shapes, float(mass**-0.5), frequency)
         bounds = None if self.bounds is None else self.bounds * frequency
         poorer = {cause: modes.stretched(mass, frequency) for cause, modes in self.poorer.items()}
@@ -569,7 +572,9 @@ def rayleigh(mass_factor: float, stiffness_factor: float) -> Callable[[np.ndarra
     stiffness_factor = check.non_negative("stiffness_factor", stiffness_factor, "s")
 
     def ratio(frequency: np.ndarray) -> np.ndarray:
-        omega = 2.0 * np.pi * np.asarray(frequency, float)
+        omega = 2.0 * np.pi * check.finite("frequency", check.numbers("frequency", frequency, "Hz"), "Hz")
+        if (omega <= 0.0).any():
+            raise ValueError(f"frequency must be positive, got {omega.min() / (2.0 * np.pi):g} Hz")
         return 0.5 * (mass_factor / omega + stiffness_factor * omega)
 
     return ratio

@@ -12,8 +12,8 @@ from .._base import check
 from ..model.planner import Watch
 from ..scenes.scene import Scene
 from . import report
-from .explore_desk import Desk
-from .explore_model import Bench
+from .explore_model import Setup
+from .explore_numbers import Explorer
 from .explore_session import Session
 from .explore_view import page
 from .explore_worker import Worker
@@ -61,12 +61,12 @@ def serve(
     workers: list[Worker] = []
     try:
         with (watch or nullcontext)("modes"):
-            desk = Desk(Bench.of(scene))
-            workers += [Worker(desk), Worker(desk)]  # one judges blows while the other draws a map or a sound
-            desk.answer(desk.bench.start)  # compile the kernels before the page opens
+            explorer = Explorer(Setup.of(scene))
+            workers += [Worker(explorer), Worker(explorer)]  # one judges blows while the other draws a map or a sound
+            explorer.answer(explorer.setup.start)  # compile the kernels before the page opens
         gc.collect()
         gc.freeze()  # the modes outlive every answer, and looking through them takes longer than one
-        server, address = _server(desk, workers, port)
+        server, address = _server(explorer, workers, port)
         if ready is not None:
             ready(address)
         try:
@@ -79,7 +79,7 @@ def serve(
             worker.stop()
 
 
-def _server(desk: Desk, workers: list[Worker], port: int) -> tuple[Any, str]:
+def _server(explorer: Explorer, workers: list[Worker], port: int) -> tuple[Any, str]:
     """A server on the loopback address that refuses requests for any other host name."""
     from tornado.httpserver import HTTPServer
     from tornado.routing import Router
@@ -92,7 +92,7 @@ def _server(desk: Desk, workers: list[Worker], port: int) -> tuple[Any, str]:
     hosts = {f"{name}:{port}" for name in (LOCAL, "localhost")}
     kinds = {"/": "text/html", "/explore.css": "text/css", "/explore.js": "text/javascript"}
     texts = {path: (report.WEB / path[1:]).read_text(encoding="utf-8") for path in list(kinds)[1:]}
-    texts["/"] = page(desk.bench)
+    texts["/"] = page(explorer.setup)
 
     class Text(RequestHandler):
         """One of the three files of the page."""
@@ -111,7 +111,7 @@ def _server(desk: Desk, workers: list[Worker], port: int) -> tuple[Any, str]:
 
         def open(self, *_: str, **__: str) -> None:
             self.set_nodelay(True)
-            self.session = Session(desk, workers[0], workers[1], self._say)
+            self.session = Session(explorer, workers[0], workers[1], self._say)
 
         def on_message(self, message: str | bytes) -> None:
             try:

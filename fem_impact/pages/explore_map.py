@@ -11,7 +11,7 @@ from .._base.check import SimulationError
 from ..impact import threshold
 from ..modes.modal import Modes
 from ..sweeps import batches, grid, refined
-from .explore_model import MAP_TOLERANCE, Bench, Settings, quick
+from .explore_model import MAP_TOLERANCE, Settings, Setup, quick
 
 FIRST = {False: (25, 17), True: (13, 9)}  # [-] points of mass and stiffness at first, with True where blows take longer
 FINEST = 385  # [-] points of mass at most: about one per pixel of the picture
@@ -47,11 +47,11 @@ class Window:
     stiffness: tuple[float, float]  # [-]
 
     @classmethod
-    def of(cls, bench: Bench, mass: tuple[float, float] | None, stiffness: tuple[float, float] | None) -> "Window":
+    def of(cls, setup: Setup, mass: tuple[float, float] | None, stiffness: tuple[float, float] | None) -> "Window":
         """The part in view that lies on the map, no narrower than `NARROWEST`; None for the whole of an axis."""
         ends = []
         for name, wanted in (("mass", mass), ("stiffness", stiffness)):
-            least, most = bench.range(name)
+            least, most = setup.range(name)
             low, high = (least, most) if wanted is None else sorted(min(max(x, least), most) for x in wanted)
             if high < low * NARROWEST:
                 low = min(low, most / NARROWEST)
@@ -61,17 +61,17 @@ class Window:
 
 
 class Mapper:
-    """Draws maps of one bench; kernels are kept while only the part in view changes."""
+    """Draws maps of one setup; kernels are kept while only the part in view changes."""
 
-    def __init__(self, bench: Bench) -> None:
-        self.bench = bench
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
         self.about: tuple[Settings, Modes | None] | None = None  # settings and body that the kernels are of
         self.kernels: batches.Kernels = {}
         self.limits: np.ndarray | None = None  # (LIMITS,) [Hz] threshold of hammers all along the map
 
     def first(self, settings: Settings, window: Window, seen: Modes | None = None) -> Picture:
-        """The map in its coarsest form; the settings' mass and stiffness do not matter, ``seen`` as in `Bench.case`."""
-        case = self.bench.case(settings, seen=seen)
+        """The map in its coarsest form; the settings' mass and stiffness do not matter, ``seen`` as in `Setup.case`."""
+        case = self.setup.case(settings, seen=seen)
         law = case.contact
         slow = bool(law.lossy or law.hard_stiffness or law.exponent < 1.0)
         mass, stiffness = (
@@ -81,9 +81,9 @@ class Mapper:
         counts = self._counts(settings, seen, x, y, DRAFT).reshape(len(stiffness), len(mass))
         felt = case.striker.felt_mass / case.striker.mass
         found = self._thresholds(settings, seen, felt, mass)
-        there = [self.bench.case(replace(settings, mass=float(one), stiffness=1.0), seen=seen) for one in mass]
+        there = [self.setup.case(replace(settings, mass=float(one), stiffness=1.0), seen=seen) for one in mass]
         if law.hard_stiffness or law.remembers:  # as far as the map goes
-            reached = [[self.bench.case(replace(settings, mass=float(m), stiffness=float(k))).resonance
+            reached = [[self.setup.case(replace(settings, mass=float(m), stiffness=float(k))).resonance
                         for k in stiffness] for m in mass]  # fmt: skip
             rising = np.maximum.accumulate(reached, axis=1)
             limit = [np.interp(*at, np.log(stiffness), math.nan, math.nan) for at in zip(found, rising)]
@@ -165,7 +165,7 @@ class Mapper:
 
     def _keep(self, settings: Settings, seen: Modes | None) -> Settings:
         """The settings without their place on the map; forgets what is kept if they or the body are others."""
-        settings = replace(settings, mass=self.bench.start.mass, stiffness=1.0)
+        settings = replace(settings, mass=self.setup.start.mass, stiffness=1.0)
         if self.about is None or self.about[0] != settings or self.about[1] is not seen:
             self.about, self.kernels, self.limits = (settings, seen), {}, None
         return settings
@@ -173,9 +173,9 @@ class Mapper:
     def _thresholds(self, settings: Settings, seen: Modes | None, felt: float, mass: np.ndarray) -> np.ndarray:
         """Thresholds (n,) [Hz] of hammers (n,) [kg], interpolated between those found once for the whole map."""
         settings = self._keep(settings, seen)
-        along = np.geomspace(*self.bench.range("mass"), LIMITS)
+        along = np.geomspace(*self.setup.range("mass"), LIMITS)
         if self.limits is None:
-            case = self.bench.case(settings, seen=seen)
+            case = self.setup.case(settings, seen=seen)
             self.limits = threshold.thresholds(case.modes, case.at, felt * along)
         place = np.interp(np.log(mass), np.log(along), np.arange(LIMITS))
         low, part = place.astype(int), place % 1.0
@@ -191,7 +191,7 @@ class Mapper:
         settings = self._keep(settings, seen)
         if not len(mass):
             return np.empty(0, np.int8)
-        case = self.bench.case(settings, seen=seen)
+        case = self.setup.case(settings, seen=seen)
         law, shared = case.contact, np.ones(len(mass))
         hard = stiffness * law.stiffness
         lossy = law.loss > 0.0

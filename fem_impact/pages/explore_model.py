@@ -57,7 +57,7 @@ class Settings:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class Setup:
     """A struck body with the hammers and contacts of the sliders."""
 
     scene: Scene
@@ -65,8 +65,8 @@ class Bench:
     base: grid.Case
 
     @classmethod
-    def of(cls, scene: Scene) -> "Bench":
-        """The bench of a scene, with enough modes for its shortest blow, but at most `MOST_MODES`.
+    def of(cls, scene: Scene) -> "Setup":
+        """The setup of a scene, with enough modes for its shortest blow, but at most `MOST_MODES`.
 
         If vectors can tell the blows (`seen`), the first few modes do: they bridge the seconds until the vectors of a
         new strike point are found.
@@ -75,15 +75,15 @@ class Bench:
         first = planner.struck(plan, Stages())
         at = np.atleast_1d(np.asarray(scene.blow.values["at"], float))
         case = grid.Case(first, scene.make_striker(), scene.make_contact(), at, float(scene.blow.values["speed"]))
-        bench = cls(scene, scene.body(), case)
-        if bench.told:
-            return bench
-        hard = replace(bench.start, stiffness=SPANS["stiffness"] ** 0.5, mass=bench.start.mass / SPANS["mass"] ** 0.5)
-        needed = bodies.number_of_modes(first, bodies.needed_frequency(bench.case(hard), TOLERANCE))
+        setup = cls(scene, scene.body(), case)
+        if setup.told:
+            return setup
+        hard = replace(setup.start, stiffness=SPANS["stiffness"] ** 0.5, mass=setup.start.mass / SPANS["mass"] ** 0.5)
+        needed = bodies.number_of_modes(first, bodies.needed_frequency(setup.case(hard), TOLERANCE))
         if needed <= first.n_modes:
-            return bench
+            return setup
         more = planner.struck(plan.but(n_modes=min(needed, MOST_MODES)), Stages())
-        return replace(bench, base=replace(case, modes=more))
+        return replace(setup, base=replace(case, modes=more))
 
     @cached_property
     def start(self) -> Settings:

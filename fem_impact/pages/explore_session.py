@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 from .._base.check import SimulationError
-from .explore_desk import Desk, Message, Point, View, drawn
 from .explore_map import Picture, Window
-from .explore_model import Bench, Settings
+from .explore_model import Settings, Setup
+from .explore_numbers import Explorer, Message, Point, View, drawn
 from .explore_view import RATES, checked, pair
 
 REST = 0.15  # [s] without a change before the blow is judged and the map drawn again
@@ -28,16 +28,16 @@ class _Superseded(Exception):
 class Session:
     """The settings of one open page, and what of it is still being computed.
 
-    Everything runs on the event loop; ``judge`` and ``mapper`` are processes that hold a `Desk` each.
+    Everything runs on the event loop; ``judge`` and ``mapper`` are processes that hold a `Explorer` each.
     """
 
-    def __init__(self, desk: Desk, judge: Asks, mapper: Asks, send: Callable[[Message], Any]) -> None:
-        self.desk, self.judge, self.mapper, self.send = desk, judge, mapper, send
-        self.bench: Bench = desk.bench
-        self.settings: Settings = self.bench.start
+    def __init__(self, explorer: Explorer, judge: Asks, mapper: Asks, send: Callable[[Message], Any]) -> None:
+        self.explorer, self.judge, self.mapper, self.send = explorer, judge, mapper, send
+        self.setup: Setup = explorer.setup
+        self.settings: Settings = self.setup.start
         self.height, self.rate = 0.0, RATES[2]
-        self.heard_at: Point = tuple(float(x) for x in self.bench.scene.points[0])
-        self.window = Window.of(self.bench, None, None)
+        self.heard_at: Point = tuple(float(x) for x in self.setup.scene.points[0])
+        self.window = Window.of(self.setup, None, None)
         self.number = 0  # of the last request
         self.resting: asyncio.TimerHandle | None = None
         self.tasks: dict[str, asyncio.Task[None]] = {}  # judging, mapping, listening
@@ -55,7 +55,7 @@ class Session:
         """Do what the page asks for; ValueError if that makes no sense."""
         if not isinstance(message, dict):
             raise ValueError("a message must be a table")
-        turned = checked(self.bench, message.get("turn", {}))
+        turned = checked(self.setup, message.get("turn", {}))
         number = message.get("number", 0)
         if "play" in message:
             self._listen(bool(message["play"] == "roll"))
@@ -64,11 +64,11 @@ class Session:
             if view is not None and not isinstance(view, dict):
                 raise ValueError("view must be a table of mass and stiffness")
             ends = [None, None] if view is None else [pair("view", view.get(name)) for name in ("mass", "stiffness")]
-            self.window = Window.of(self.bench, *ends)
+            self.window = Window.of(self.setup, *ends)
             self._start("map", self._map)
         else:
             if "ear" in message:
-                self.heard_at = self.bench.place(*pair("ear", message["ear"])) or self.heard_at
+                self.heard_at = self.setup.place(*pair("ear", message["ear"])) or self.heard_at
             self._answer(number, self._turn(turned))
 
     def _turn(self, turned: dict[str, float]) -> bool:
@@ -79,7 +79,7 @@ class Session:
         at = [turned.pop(letter, None) for letter in "xy"]
         if any(value is not None for value in at):
             point = [old if new is None else new for old, new in zip(before.at, at)]
-            turned_at = self.bench.place(*point, *([0.0] * (2 - len(point))))
+            turned_at = self.setup.place(*point, *([0.0] * (2 - len(point))))
             self.settings = replace(self.settings, at=turned_at or before.at)
         changes: dict[str, Any] = dict(turned)
         self.settings = replace(self.settings, **changes)
@@ -88,8 +88,8 @@ class Session:
     def _answer(self, number: Any, again: bool) -> None:
         """What the hand looks at first: force and numbers; spectrum, threshold and scene follow at once."""
         self.number = number = number if isinstance(number, int) else 0
-        desk, settings = self.desk, self.settings
-        said = desk.said(settings, self.height, self.rate)
+        explorer, settings = self.explorer, self.settings
+        said = explorer.said(settings, self.height, self.rate)
         about = {"number": number, "said": said, "at": settings.at, "ear": self.heard_at}
         about |= {"mass": settings.mass, "stiffness": settings.stiffness}
         if not again:
@@ -97,9 +97,9 @@ class Session:
             self.send({"kind": "rest", "number": number})
             return
         self.judged = None
-        message, hit = desk.answer(settings)
+        message, hit = explorer.answer(settings)
         self.send({"kind": "blow", **about, **message})
-        self.send({"kind": "rest", "number": number, **desk.rest_of(settings, hit)})
+        self.send({"kind": "rest", "number": number, **explorer.rest_of(settings, hit)})
         if self.resting is not None:
             self.resting.cancel()
         self.resting = asyncio.get_running_loop().call_later(REST, self._rested)
@@ -119,20 +119,20 @@ class Session:
         """The exact blow, until it is the one on the page; finds out about a new strike point first."""
         while self.judged != self.settings and self.resting is None:
             settings = self.settings
-            if settings.at not in self.desk.views:
-                view: View = await asyncio.wrap_future(self.judge.ask(Desk.look, settings.at))
-                self.desk.learn(settings.at, view)
-                self.mapper.ask(Desk.learn, settings.at, view)
+            if settings.at not in self.explorer.views:
+                view: View = await asyncio.wrap_future(self.judge.ask(Explorer.look, settings.at))
+                self.explorer.learn(settings.at, view)
+                self.mapper.ask(Explorer.learn, settings.at, view)
                 self._start("map", self._map)
-            message = await asyncio.wrap_future(self.judge.ask(Desk.judge, settings))
+            message = await asyncio.wrap_future(self.judge.ask(Explorer.judge, settings))
             if settings == self.settings:
                 self.judged = settings
                 self.send({"kind": "blow", "number": self.number, "exact": True, **message})
 
     def _about_map(self) -> tuple[Any, ...]:
         """What the map depends on."""
-        settings = replace(self.settings, mass=self.bench.start.mass, stiffness=1.0)
-        return settings, self.window, self.settings.at in self.desk.views
+        settings = replace(self.settings, mass=self.setup.start.mass, stiffness=1.0)
+        return settings, self.window, self.settings.at in self.explorer.views
 
     async def _map(self) -> None:
         """The map in view, more and more finely, until nothing is left to refine."""
@@ -163,17 +163,17 @@ class Session:
             self.send({"kind": "map", "computing": not exact, "exact": exact, **drawn(picture)})
             return picture
 
-        picture = sent(await made(Desk.finer, sent(await made(Desk.picture, window))))
-        sent(await made(Desk.sharp, picture))
-        picture = await made(Desk.surer, picture)
+        picture = sent(await made(Explorer.finer, sent(await made(Explorer.picture, window))))
+        sent(await made(Explorer.sharp, picture))
+        picture = await made(Explorer.surer, picture)
         while not picture.finest:
-            picture = await made(Desk.finer, picture)
+            picture = await made(Explorer.finer, picture)
         sent(picture, exact=True)
 
     def _listen(self, roll: bool) -> None:
         async def work() -> None:
             rate = self.rate if roll else None
-            asked = self.mapper.ask(Desk.listen, self.settings, self.heard_at, self.height, rate)
+            asked = self.mapper.ask(Explorer.listen, self.settings, self.heard_at, self.height, rate)
             self.send({"kind": "sound", **await asyncio.wrap_future(asked)})
 
         self.send({"kind": "sound", "uri": "", "note": "Computing the sound …"})

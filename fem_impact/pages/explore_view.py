@@ -7,9 +7,9 @@ import numpy as np
 
 from ..mesh.meshes import Mesh
 from ..show.figures import SPECTRUM_DEPTH
-from .explore_desk import BAND, SPECTRUM_POINTS
 from .explore_map import NARROWEST
-from .explore_model import Bench
+from .explore_model import Setup
+from .explore_numbers import BAND, SPECTRUM_POINTS
 from .report import template
 
 SLIDERS = {
@@ -27,25 +27,25 @@ HIGHEST = 3.0  # [m] of the listener above the plate; at zero the sound is the m
 RATES = (2.0, 30.0, 12.0)  # [1/s] strokes of a roll: least, most and at first
 
 
-def ends(bench: Bench) -> dict[str, tuple[float, float, float]]:
-    """Lowest, highest and first value of every slider of a bench."""
+def ends(setup: Setup) -> dict[str, tuple[float, float, float]]:
+    """Lowest, highest and first value of every slider of a setup."""
     found = {"rate": RATES}
-    low, high = bench.mesh.points.min(axis=0), bench.mesh.points.max(axis=0)
-    for letter, *three in zip("xy", low, high, bench.start.at):
+    low, high = setup.mesh.points.min(axis=0), setup.mesh.points.max(axis=0)
+    for letter, *three in zip("xy", low, high, setup.start.at):
         found[letter] = (float(three[0]), float(three[1]), float(three[2]))
-    if bench.mesh.dimension == 2:
+    if setup.mesh.dimension == 2:
         found["height"] = (0.0, HIGHEST, 0.0)
     for name in SLIDERS:
-        value = getattr(bench.start, name, None)
+        value = getattr(setup.start, name, None)
         if name not in found and value is not None:
-            found[name] = (*bench.range(name), value)
+            found[name] = (*setup.range(name), value)
     return found
 
 
-def page(bench: Bench) -> str:
+def page(setup: Setup) -> str:
     """The page as HTML."""
-    title = bench.scene.title or bench.scene.path.stem
-    known = ends(bench)
+    title = setup.scene.title or setup.scene.path.stem
+    known = ends(setup)
     cards = {
         card: [
             {
@@ -57,9 +57,9 @@ def page(bench: Bench) -> str:
         for card, names in CARDS.items()
     }  # fmt: skip
     facts = {
-        "loops": loops(bench.mesh), "band": BAND, "points": SPECTRUM_POINTS, "at": bench.start.at,
+        "loops": loops(setup.mesh), "band": BAND, "points": SPECTRUM_POINTS, "at": setup.start.at,
         "depth": SPECTRUM_DEPTH, "narrowest": NARROWEST,
-        "mass": bench.range("mass"), "stiffness": bench.range("stiffness"),
+        "mass": setup.range("mass"), "stiffness": setup.range("stiffness"),
     }  # fmt: skip
     return str(template("explore.html").render(heading=title, cards=cards, steps=STEPS, facts=facts))
 
@@ -88,9 +88,9 @@ def loops(mesh: Mesh) -> list[list[list[float]]]:
     return found
 
 
-def checked(bench: Bench, turned: Any) -> dict[str, float]:
+def checked(setup: Setup, turned: Any) -> dict[str, float]:
     """What a page says of its sliders: finite numbers within their ends; ValueError if it is anything else."""
-    known = ends(bench)
+    known = ends(setup)
     if not isinstance(turned, dict) or not set(turned) <= set(known):
         raise ValueError(f"sliders must be some of {', '.join(known)}")
     return {name: _number(name, value, *known[name][:2]) for name, value in turned.items()}

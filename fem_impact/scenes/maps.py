@@ -27,9 +27,7 @@ SLOW = {"loss", "hard_stiffness", "yield_approach", "hysteresis"}  # axes of the
 SLOW |= {f"contact.{name}" for name in SLOW}
 FORMATS = ("nc", "zarr")
 FILES = (".nc", ".zarr", ".csv", ".png", ".pdf", ".svg")  # a folder name must not end like this
-# [-] a larger map gets no CSV file: spreadsheets end there, and it would have a hundred megabytes; half and twice pass
-# the tests
-MOST_ROWS = 10**6
+MOST_ROWS = 10**6  # [-] a larger map gets no CSV file: spreadsheets end there, and it would have a hundred megabytes
 PICTURED = {  # layers drawn for a map with two axes: name in the picture
     "n_impacts": "number of impacts",
     "contact_time": "time in contact",
@@ -37,8 +35,6 @@ PICTURED = {  # layers drawn for a map with two axes: name in the picture
     "peak_force": "peak force",
     "centroid": "spectral centroid",
 }
-# [Hz] contours drawn, three per decade, from 1 Hz up to 500 kHz: fewer lines say too little, more hide the map
-RESONANCES = tuple(m * 10.0**e for e in range(6) for m in (1, 2, 5))
 
 
 @check.typed
@@ -274,7 +270,9 @@ def _contours(table: xarray.Dataset, values: xarray.DataArray) -> list[Any]:
     resonance = table.contact_resonance.broadcast_like(values).transpose(*values.dims)
     if np.ptp(resonance.values) == 0.0:
         return []
-    shown = [f for f in RESONANCES if resonance.min() < f < resonance.max()]
+    low, high = float(resonance.min()), float(resonance.max())
+    decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
+    shown = [float(f) for f in np.outer(decades, (1.0, 2.0, 5.0)).ravel() if low < f < high]
     found: list[Any] = [(resonance, shown, "Hz", "contact resonance")]
     limit = (resonance / table.threshold).transpose(*values.dims)
     if float(limit.min()) < 1.0 < float(limit.max()):

@@ -32,7 +32,7 @@ from .scene import Scene, load_scene
 CHECKED = 16  # [-] blows struck again one by one, as a sample: their worst shows an error that many have
 # [-] levels of an input of the body at which the body is made anew: nine tenths of its values lie between
 TAILS = (0.05, 0.95)
-# [-] default limit of a spread: some minutes of work, 1 GB of numbers; half and twice pass the tests
+# [-] default limit of a spread, to limit the work to some minutes and 1 GB of numbers
 MOST_BLOWS = 10**7
 PLACES = ("strike.x", "strike.y")  # inputs that move the strike point
 SIZE = "target.size"  # [-] factor on all lengths in the plane of a plate, or along a beam
@@ -389,7 +389,7 @@ class _Asked:
                 except check.SimulationError:
                     worst = math.inf
                     continue
-                worst = max(worst, *_apart(one, two).values()) if one[0] == two[0] else math.inf
+                worst = max(worst, *_differences(one, two).values()) if one[0] == two[0] else math.inf
             found[name] = worst
         return found
 
@@ -471,7 +471,7 @@ def _checked(exact: Cloud, numbers: np.ndarray, workers: int | None) -> Checks:
         if row[0] != numbers[0, i]:
             others += 1
             continue
-        for name, value in _apart(row, numbers[:, i]).items():
+        for name, value in _differences(row, numbers[:, i]).items():
             apart[name] = max(apart.get(name, 0.0), value)
     unknown = {each.name: None for hit in hits.values() for each in hit.assumptions if not each.known}
     return Checks(
@@ -481,7 +481,7 @@ def _checked(exact: Cloud, numbers: np.ndarray, workers: int | None) -> Checks:
     )  # fmt: skip
 
 
-def _apart(one: np.ndarray, two: np.ndarray) -> dict[str, float]:
+def _differences(one: np.ndarray, two: np.ndarray) -> dict[str, float]:
     """Differences of two blows: of the restitution absolute, of the others relative to the first."""
     found = {}
     for i, name in enumerate(solving.LAYERS):

@@ -266,7 +266,10 @@ def _follow(blows: Blows, tolerance: float, band: float, kernels: Kernels) -> tu
 
 
 def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Result of `_Engine.run` once the steps are short enough, and its error; NaN if they never are."""
+    """Result of `_Engine.run` once the steps are short enough, and its error; NaN if they never are.
+
+    Neither are they of a blow too long for the longest kernel: shorter steps only make it longer.
+    """
     n = engine.blows.n_cases
     first = step = engine.first_step(tolerance)
     finer = np.full(n, 2)  # [half-octaves]
@@ -275,6 +278,10 @@ def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarra
     error = np.full(n, np.nan)
     final = np.full_like(coarse, np.nan)
     for _ in range(REFINEMENTS):
+        fits = coarse[FOUND_STATUS] != many_blows.LONG
+        coarse, todo, step, finer = coarse[:, fits], todo[fits], step[fits], finer[fits]
+        if not todo.size:
+            break
         ratio = 2.0 ** (0.5 * finer)
         slack = SLACK * tolerance * 2.0 ** (0.5 * STEP_ORDER * (first[todo] - step))
         fine = engine.run(todo, step, slack, ratio * coarse[FOUND_STEPS])
@@ -283,8 +290,6 @@ def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarra
         final[:, todo[met]] = fine[:, met]
         error[todo[met]] = found[met]
         coarse, todo = fine[:, ~met], todo[~met]
-        if not todo.size:
-            break
         finer = np.where(found[~met] < MILD * ALLOWED * tolerance, 1, 2)
         step = step[~met] + finer
     return final, error
@@ -302,7 +307,8 @@ def _counted(blows: Blows, tolerance: float, most: int, kernels: Kernels) -> tup
         now[FOUND_IMPACTS] = np.where(counted, np.minimum(now[FOUND_IMPACTS], most), np.nan)
         met = np.zeros(len(todo), bool) if before is None else now[FOUND_IMPACTS] == before[FOUND_IMPACTS]
         number[todo[met]] = now[FOUND_IMPACTS, met]
-        before, todo, step = now[:, ~met], todo[~met], step[~met]
+        again = ~met & (now[FOUND_STATUS] != many_blows.LONG)  # shorter steps would only make it longer
+        before, todo, step = now[:, again], todo[again], step[again]
         if not todo.size:
             break
     return (number,)

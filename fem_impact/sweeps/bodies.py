@@ -295,7 +295,7 @@ class Sized:
         try:
             hit = collision.strike(
                 case.modes, case.striker, case.contact, at=case.at, speed=case.speed,
-                tolerance=max(planner.FINEST, planner.STEPS * self.tolerance), max_impacts=self.max_impacts,
+                tolerance=max(planner.FINEST, planner.CHEAP * self.tolerance), max_impacts=self.max_impacts,
             )  # fmt: skip
         except check.SimulationError:
             return 0.0, 0.0

@@ -482,7 +482,7 @@ def described(grid: Grid, numbers: np.ndarray, workers: int | None = None) -> np
     for cause in causes:
         other, _ = solve(replace(few, base=grid.base.poorer(cause), kernels={}), 0, few.n_cases, workers=workers)
         before, better = other.reshape(mine.shape), before
-        total += _apart(few.layers, better, before)
+        total += _largest_difference(few.layers, better, before)
     several = np.flatnonzero(mine[few.layers.index("n_impacts")] > 1)
     several = several[:: max(1, -(-len(several) // DOUBTED[False]))]
     with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
@@ -491,7 +491,7 @@ def described(grid: Grid, numbers: np.ndarray, workers: int | None = None) -> np
     return total[np.ix_(*nearest)]
 
 
-def _apart(names: list[str], one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _largest_difference(names: list[str], one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Largest difference of two maps in the quantities under tolerance; 1 if their impacts differ in number."""
     mine, its = dict(zip(names, one)), dict(zip(names, other))
     apart = np.abs(mine["restitution"] - its["restitution"])

@@ -103,6 +103,30 @@ def test_steps_and_kinks_of_the_section_become_nodes():
     assert divisions(uniform, np.array([0.0, 0.5, 1.0])).tolist() == [0.0, 0.5, 1.0]
 
 
+@pytest.mark.parametrize("width", [1e-3, 0.02, 0.1])
+def test_a_notch_is_found_wherever_it_is(width):
+    """Its sides near or on the ends of an interval that was halved, such as 1/4, are seen from within a neighbour."""
+    for left in (*np.random.default_rng(3).uniform(0.01, 0.89, 40), 0.25, 0.5, 0.25 - width, 0.375 + 1e-12):
+
+        def fields(x, low=left, high=left + width):
+            return np.where((x > low) & (x < high), 0.1, 1.0), np.ones_like(x)
+
+        found = divisions(fields, np.array([0.0, 1.0]))
+        assert np.abs(found[1:-1] - [left, left + width]).max() < 2e-9
+
+
+def test_a_narrow_smooth_dimple_is_no_cluster_of_kinks():
+    """Rounding of the places makes a steep section rough: 1e-16 over a width of 1e-3 is more than its own."""
+
+    def fields(x):
+        depth = 1.0 - 0.5 * np.exp(-(((x - 0.4217) / 1e-3) ** 2))
+        return depth**3, depth
+
+    found = divisions(fields, np.array([0.0, 1.0]))
+    gap, middle = np.diff(found), 0.5 * (found[1:] + found[:-1])
+    assert gap[np.abs(middle - 0.4217) < 1e-3].max() < 2e-3 and len(found) < 60
+
+
 def test_smooth_sections_are_divided_until_a_polynomial_fits():
     """A Runge function of width 0.01: intervals near it must be about as narrow, those far from it need not be."""
 

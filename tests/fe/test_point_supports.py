@@ -205,6 +205,7 @@ def test_what_is_no_point_support_says_so():
     for mesh, section, posts, words in (
         (line, BAR, 3, "point_supports must be a list"),
         (line, BAR, [(0.5,)], r"point_supports\[0\] must be a pair"),
+        (square, SHEET, [((0.5, 0.5), "clamped", 1e25)], "radius of point_supports must be smaller than the body, 1 m"),
         (line, BAR, [((0.5,), "clamped")], r"support of point_supports\[0\] must be one of hinged"),
         (line, BAR, [((0.5,), "clamped", 0.01)], r"point_supports\[0\] must not clamp a point of a beam"),
         (square, SHEET, [((0.5, 0.5), "clamped", 0.0)], r"radius of point_supports\[0\] must be positive"),

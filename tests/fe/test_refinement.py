@@ -53,15 +53,29 @@ def test_elements_of_the_size_for_a_tolerance_meet_it_on_a_smooth_plate(toleranc
     assert (error <= 3.0 * found.error).all()
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.4, np.pi / 4.0, 1.2])
+def test_the_shortest_wave_in_wood_runs_across_the_grain_whatever_its_angle(angle):
+    wood = fi.Material.orthotropic(E_along=140e9, E_across=10e9, nu=0.3, G=5e9, rho=1600.0, angle=angle)
+    system = fi.assemble(fi.mesh.disk(0.2), fi.Plate(wood, 2e-3), {"boundary": "clamped"})
+    bending = 10e9 * 2e-3**2 / 12.0 / (1.0 - 0.3**2 * 10.0 / 140.0) / 1600.0  # over mass per area, across the grain
+    expected = ((2.0 * np.pi * 1000.0) ** 2 / bending) ** 0.25
+    assert_allclose(refinement._wave(system, None, 1000.0), expected, rtol=2e-3)  # directions are 5 degrees apart
+    modes = fi.find_modes(system, n_modes=40)
+    shortest = refinement._wave(system, None, modes.frequencies[-1])
+    assert_allclose(refinement._wave(system, 40, None), shortest, rtol=0.05)  # Weyl's law for 40 modes: 2 %
+
+
 def test_the_step_of_refinement_solves_the_law_of_the_error():
-    parts, (smooth, curved) = np.zeros((3, 4)), refinement.ORDERS
+    parts, (smooth, curved, step_of_thickness) = np.zeros((4, 4)), refinement.ORDERS
     parts[0] = [1e-7, 1e-6, 1e-5, 1e-4]
     assert_allclose(refinement._needed(parts, 1e-6), 100.0 ** (1.0 / smooth), rtol=1e-9)
     parts[1] = parts[0] * 100.0
     step = refinement._needed(parts, 1e-6)
     assert_allclose(1e-4 * step**-smooth + 1e-2 * step**-curved, 1e-6, rtol=1e-9)
     assert refinement._needed(parts, 1.0) == refinement.LEAST_STEP
-    parts[2, 0] = 2e-6  # no mesh cures that
+    parts[2, 0] = 1e-5
+    assert refinement._needed(parts[:, :1], 1e-6) > 10.0**step_of_thickness
+    parts[3, 0] = 2e-6  # no mesh cures that
     assert refinement._needed(parts, 1e-6) == np.inf
 
 
@@ -97,6 +111,20 @@ def test_a_kept_spectrum_is_read_and_a_damaged_or_foreign_one_replaced(tmp_path,
     other = fi.assemble(fi.mesh.rectangle(0.5, 0.3, size=0.1), PLATE, {"left": "hinged"})
     assert refinement.kept(other, 7, None, path).omega[0] < again.omega[0]  # another body
     assert len(solved) == 4
+
+
+@pytest.mark.parametrize(("thickness", "size", "rho"), [(4e-3, 1.0, 2700.0), (2e-3, 2.0, 2700.0), (2e-3, 1.0, 2800.0)])
+def test_the_kept_spectrum_of_a_body_of_another_size_is_not_taken(tmp_path, thickness, size, rho):
+    """In the frame of the body, the matrices of all these plates are the same numbers."""
+
+    def plate(thickness, size, rho):
+        section = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=rho), thickness)
+        return fi.assemble(fi.mesh.rectangle(0.5 * size, 0.3 * size, size=0.1 * size), section, {"left": "clamped"})
+
+    fi.find_modes(plate(2e-3, 1.0, 2700.0), n_modes=3, keep=tmp_path / "modes.npz")
+    other = plate(thickness, size, rho)
+    kept = fi.find_modes(other, n_modes=3, keep=tmp_path / "modes.npz")
+    assert_allclose(kept.omega, fi.find_modes(other, n_modes=3).omega, rtol=1e-12)
 
 
 @pytest.mark.parametrize(("element", "size", "median"), [("argyris", 0.06, (0.8, 2.0)), ("morley", 0.02, (1.7, 4.0))])

@@ -49,6 +49,7 @@ def test_thickness_may_vary():
         (lambda: Material.orthotropic(E_along=1.0, E_across=4.0, nu=0.5, G=1.0, rho=1.0), "release energy"),
         (lambda: Plate(STEEL, 0.0), "thickness must be positive, got 0 m"),
         (lambda: Plate(STEEL, lambda x: x[:, 0]).inertia(POINT), r"thickness must be positive everywhere, got 0 m at"),
+        (lambda: Plate(STEEL, lambda x: x[:, 0] + 1e-300).inertia(POINT), "thickness must be at least 1e-75 m every"),
         (
             lambda: Plate(STEEL, lambda x: np.ones(7)).inertia(POINT),
             "thickness must be a function that returns numbers",

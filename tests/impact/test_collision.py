@@ -1,6 +1,8 @@
 """Blows against closed forms: rigid walls, two masses, a stick on a heavy plate."""
 
+import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from scipy.optimize import brentq
 from scipy.special import gamma
 
 import fem_impact as fi
+from fem_impact.impact import collision
 from fem_impact.impact.collision import Touch, collide
 
 RATIOS = [10.0**n for n in range(-6, 7)]
@@ -583,3 +586,199 @@ def test_another_mesh_of_a_free_plate_may_turn_its_rigid_motions():
     true = abs(alone.restitution - hits[0].restitution)
     for hit in hits:
         assert 0.3 * true < hit.error.mesh < 1e-3
+
+
+@pytest.mark.parametrize("hard_exponent", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("exponent", [1.0, 1.7, 2.4])
+def test_a_mass_on_two_layers_gets_as_deep_as_its_energy(exponent, hard_exponent):
+    """Steps of collocation much longer than a swing on the hard layer must end in shorter ones, not in no answer."""
+    depth, mass = 3e-5, 0.2
+    soft, hard = 2e5 * 1e4 ** (exponent - 1.0), 1.5e8 * 3e4 ** (hard_exponent - 1.0)
+    law = fi.Contact.layers(soft, exponent, depth=depth, hard_stiffness=hard, hard_exponent=hard_exponent)
+
+    def lacks(x):
+        stored = soft * x ** (exponent + 1.0) / (exponent + 1.0)
+        return stored + hard * max(x - depth, 0.0) ** (hard_exponent + 1.0) / (hard_exponent + 1.0) - 0.5 * mass
+
+    hit = collide([fi.Modes.rigid(mass)], [Touch(law, 0, None)], speeds=[1.0], tolerance=1e-8)
+    deepest = brentq(lacks, depth, 1.0, xtol=1e-18, rtol=1e-15)
+    assert_allclose(hit.peak_force, float(law.force(deepest)), rtol=1e-8)  # the tolerance
+    assert_allclose(hit.impulse, 2.0 * mass, rtol=1e-8)
+
+
+@pytest.mark.parametrize("loss", [0.5, 5.0])
+@pytest.mark.parametrize("mass", [0.03, 0.1, 0.25])
+def test_collocation_finds_the_peak_wherever_in_its_steps_it_lies(mass, loss):
+    """With loss the force peaks before the turn, anywhere in a step: at its end, or at a fifth that no search hits."""
+    law = fi.Contact.layers(6e8, 2.1, depth=4e-5, hard_stiffness=2.5e7, loss=loss)
+    bodies, touch = [fi.Modes.rigid(mass), fi.Modes.rigid(0.2)], Touch(law, 0, 1)
+    for tolerance in 10.0 ** np.arange(-5.0, -8.0, -0.25):
+        hit = collide(bodies, [touch], speeds=[1.0, 0.0], tolerance=tolerance, scheme="collocation", residual=False)
+        rows = np.flatnonzero(hit.history.pressed[:, 0])
+        dense = hit.history.force(rows, 0, np.linspace(0.0, 1.0, 2001)[None]).max()
+        # 2000 looks per step miss (pi/2/2000/2)**2/2 of a peak whose swing takes two steps
+        assert_allclose(hit.peak_force, dense, rtol=2e-7)
+
+
+@pytest.mark.parametrize(
+    "frequency, gap, mass", [(81.0, 1.19e-3, 0.082), (796.0, 1.42e-3, 0.024), (56.0, 1.63e-3, 0.167)]
+)
+def test_contacts_that_open_and_close_together_stay_together(frequency, gap, mass):
+    """Two springs at one point are one of both; rounding lets one touch or part first, for a time no step resolves."""
+    target = fi.Modes.from_arrays([0.0, frequency, 3.1 * frequency], [[1.0, 0.8, -0.5]], points=[[0.0]], mass=mass)
+    springs = fi.Contact.hertz(1e8, gap=gap), fi.Contact.linear(2e5, gap=gap)
+    both = fi.Contact.layers(2e5, 1.0, depth=0.0, hard_stiffness=1e8, gap=gap)
+    two, one = (
+        collide(
+            [fi.Modes.rigid(0.05), target], [Touch(law, 0, 1, None, [0.0]) for law in laws], speeds=[1.0, 0.0],
+            tolerance=1e-8, residual=False, duration=0.02,
+        )
+        for laws in (springs, [both])
+    )  # fmt: skip
+    assert_allclose(two.speeds, one.speeds, atol=2e-8)  # the tolerance of both
+    assert_allclose(two.impulse, one.impulse, rtol=2e-8)
+    assert_allclose(two.touching_time, one.contact_time, rtol=2e-8)
+
+
+def worst(one, two):
+    """Largest difference of two blows in what a tolerance promises; 1 if they differ in the number of impacts."""
+    if one.n_impacts != two.n_impacts:
+        return 1.0
+    names = ("impulse", "contact_time", "peak_force")
+    apart = [abs(getattr(one, name) / getattr(two, name) - 1.0) for name in names]
+    return max(abs(one.restitution - two.restitution), *apart)
+
+
+def thinned_blow(seed, lossy=False):
+    """A random plate of 1500 modes, how many of them a user keeps, and a mass that strikes it."""
+    rng = np.random.default_rng(seed)
+    plate = fi.analytic.rectangle(
+        rng.uniform(1.0, 2.0), 1.0, mass=rng.uniform(0.3, 3.0), first_frequency=rng.uniform(30.0, 100.0), n_modes=1500
+    )
+    kept = int(rng.integers(25, 120))
+    law = fi.Contact.linear(10 ** rng.uniform(4.0, 5.5)) if seed % 2 else fi.Contact.hertz(10 ** rng.uniform(5.0, 7.0))
+    law = replace(law, loss=rng.uniform(0.05, 0.5)) if lossy else law
+    at = tuple(rng.uniform(0.2, 0.8, 2))
+    return plate, kept, (fi.Striker.rigid(10 ** rng.uniform(-2.2, -1.0)), law), {"at": at, "speed": 1.0}
+
+
+def left_out(seed, lossy=False):
+    """Estimated and true error of leaving out the upper modes; both blows at the same small step error."""
+    plate, kept, how, where = thinned_blow(seed, lossy)
+    few = fi.strike(plate.truncated(n_modes=kept), *how, **where, tolerance=1e-6)
+    return few.error.truncation, worst(few, fi.strike(plate, *how, **where, tolerance=1e-6))
+
+
+@pytest.mark.parametrize("seed", [0, 2, 4, 8, 12, 14, 16, 21])
+def test_error_of_leaving_out_modes_is_neither_below_the_true_one_nor_far_above(seed):
+    told, true = left_out(seed)
+    assert true < told < 4.0 * true  # 1.2 to 2.7 times it were measured
+
+
+@pytest.mark.parametrize("seed", [55, 105, 123, 151, 183, 206, 274])
+def test_runs_that_agree_by_chance_do_not_hide_the_modes_left_out(seed):
+    told, true = left_out(seed)
+    assert 0.5 * true < told < 3.0 * true  # 0.6 to 1.4 times it were measured; 0.3 to 10 are promised
+
+
+@pytest.mark.parametrize("seed", [1, 5, 10, 12])
+def test_what_stands_for_modes_left_out_under_loss_hardly_swings(seed):
+    """A lossy contact feels rates, so that no spring can stand for these modes; one of them would ring."""
+    plate, kept, how, where = thinned_blow(seed, lossy=True)
+    truth = fi.strike(plate, *how, **where, tolerance=1e-6)
+    bare, whole = (
+        fi.strike(plate.truncated(n_modes=kept), *how, **where, residual=residual, tolerance=1e-6)
+        for residual in (False, True)
+    )
+    assert worst(whole, truth) < 0.0125 * worst(bare, truth)  # 0.008 to 0.010 were measured
+
+
+def test_a_lossy_force_hears_strongly_damped_modes():
+    plate = fi.analytic.rectangle(1.3, 1.0, mass=0.708, first_frequency=94.3, n_modes=60, damping_ratio=0.45)
+    law = fi.Contact.power(1.81e5, 1.0, loss=1.87)
+    blow, where = (plate, fi.Striker.rigid(0.0174), law), {"at": (0.657, 0.248), "speed": 1.0}
+    hit, truth = (fi.strike(*blow, **where, tolerance=tolerance) for tolerance in (1e-3, 1e-7))
+    assert hit.error.step < hit.tolerance
+    assert worst(hit, truth) < hit.tolerance  # twice as long steps miss it 1.6-fold and state 0.86 of it
+
+
+def stick_blow(seed):
+    """A random stick on a plate, through a contact that is lossy for even seeds."""
+    rng = np.random.default_rng(seed)
+    plate = fi.analytic.rectangle(
+        1.3, 1.0, mass=rng.uniform(0.3, 3.0), first_frequency=rng.uniform(30.0, 100.0), n_modes=60
+    )
+    stick = fi.Striker.stick(10 ** rng.uniform(-1.5, -0.5), 10 ** rng.uniform(2.5, 4.0))
+    law = fi.Contact.power(10 ** rng.uniform(5.0, 7.5), 1.5, loss=0.0 if seed % 2 else rng.uniform(0.02, 0.5))
+    return plate, stick, law, {"at": tuple(rng.uniform(0.2, 0.8, 2)), "speed": 1.0}
+
+
+@pytest.mark.parametrize("seed", [54, 22, 51, 15])
+def test_the_modes_that_a_striker_keeps_err_by_less_than_told_and_leave_the_tolerance_to_others(seed):
+    plate, stick, law, where = stick_blow(seed)
+    kept, told = collision.striker_modes(stick, contact=law, speed=1.0, tolerance=1e-3)
+    few, all_but_one = (
+        fi.strike(plate, collision.shortened(stick, n), law, **where, tolerance=1e-6) for n in (kept, 95)
+    )
+    assert worst(few, all_but_one) < min(told, 0.1e-3)  # a tenth of the tolerance; 0.04 of it were measured at most
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 5, 11])
+def test_a_blow_at_the_usual_tolerance_is_told_by_few_steps(seed):
+    """Its first two runs suffice; averages over the blow, as the restitution, take half as many."""
+    plate, kept, how, where = thinned_blow(seed)
+    body = plate.truncated(n_modes=kept)
+    hit, averaged = (fi.strike(body, *how, **where, residual=False, quantity=asked) for asked in (None, "restitution"))
+    assert hit.tolerance_met
+    assert averaged.tolerance_met
+    assert len(hit.history.steps) < 40  # 25 were measured
+    assert len(averaged.history.steps) < 20  # 13 were measured
+    truth = fi.strike(body, *how, **where, residual=False, tolerance=1e-8)
+    assert worst(hit, truth) < hit.error.total < 0.5 * hit.tolerance
+    assert abs(averaged.restitution - truth.restitution) < averaged.error.total
+
+
+def grazing_blow(seed, mass):
+    """A plate and a mass a little lighter or heavier than one that touches it once more, or once less."""
+    rng = np.random.default_rng(seed)
+    plate = fi.analytic.rectangle(
+        1.3, 1.0, mass=rng.uniform(0.2, 1.0), first_frequency=rng.uniform(40.0, 100.0),
+        n_modes=int(rng.integers(3, 30)), damping_ratio=rng.choice([0.0, 0.01]),
+    )  # fmt: skip
+    law = fi.Contact.hertz(10 ** rng.uniform(5.0, 7.0)) if seed % 2 else fi.Contact.linear(10 ** rng.uniform(4.0, 5.5))
+    where = {"at": tuple(rng.uniform(0.2, 0.8, 2)), "speed": 1.0, "residual": False}
+    return partial(fi.strike, plate, fi.Striker.rigid(mass), law, **where)
+
+
+@pytest.mark.parametrize(
+    ("seed", "mass"), [(1, 0.08040367666), (1, 0.31088011), (2, 0.0933117233), (3, 0.02846306), (6, 0.135557784)]
+)
+def test_a_touch_that_barely_happens_is_decided_by_finer_steps(seed, mass):
+    hit, truth = (grazing_blow(seed, mass)(tolerance=tolerance) for tolerance in (1e-2, 1e-8))
+    others = {grazing_blow(seed, factor * mass)(tolerance=1e-6).n_impacts for factor in (0.99, 1.0, 1.01)}
+    assert len(others) > 1  # the number does depend on the mass
+    assert hit.n_impacts == truth.n_impacts
+    assert_allclose(hit.contact_time, truth.contact_time, rtol=1e-2)  # the tolerance
+
+
+def test_the_tolerance_advised_is_met_and_hardly_looser_than_what_was_reached():
+    blow = grazing_blow(2, 0.0933117233)
+    with pytest.raises(fi.SimulationError, match="the step error stays at") as caught:
+        blow(tolerance=1e-12)  # the smallest there is
+    reached, advised = (
+        float(re.search(rf"{words} (\S+?),? ", f"{caught.value} ")[1]) for words in ("stays at", "raise tolerance to")
+    )
+    assert advised < 30.0 * reached  # steps twice as long, which may meet it, err 16 times more
+    assert blow(tolerance=advised).error.step < advised
+
+
+@pytest.mark.parametrize("given", ["duration", "max_impacts"])
+def test_the_end_advised_to_a_run_without_end_leaves_room_for_finer_steps(monkeypatch, given):
+    monkeypatch.setattr(collision, "MAX_STEPS", 4000)
+    bodies, touches = [measured(3, 1), measured(3, 2)], [Touch(fi.Contact.linear(1e5), 0, 1, [0.0], [0.0])]
+    swing = {"states": [(np.zeros(3), np.full(3, 0.1)), (np.zeros(3), np.zeros(3))], "tolerance": 1e-6}
+    with pytest.raises(fi.SimulationError, match="no final separation") as caught:
+        collide(bodies, touches, **swing)
+    most = float(re.search(rf"{given} of at most (\S+)", str(caught.value))[1])
+    hit = collide(bodies, touches, **swing, **{given: type(2.0 if given == "duration" else 2)(most)})
+    assert hit.tolerance_met  # a run twice as long would need more steps than there may be

@@ -289,6 +289,30 @@ def test_errors_of_slopes_are_of_the_size_they_say(tolerance):
         assert found.error.max() <= 50.0 * tolerance * scale, name
 
 
+@pytest.mark.parametrize("seed", [20, 28, 36, 38, 47])
+def test_no_slope_errs_by_more_than_it_says(seed):
+    """Two runs may agree by chance on one of them, and then tell nothing of its error: that missed up to 12-fold."""
+    rng = np.random.default_rng(seed)
+    plate = fi.analytic.rectangle(
+        1.55,
+        1.0,
+        mass=rng.uniform(0.2, 5.0),
+        first_frequency=rng.uniform(30.0, 150.0),
+        n_modes=int(rng.integers(5, 40)),
+    )
+    law = fi.Contact.linear(10 ** rng.uniform(3.5, 6.0)) if seed % 2 else fi.Contact.hertz(10 ** rng.uniform(4.5, 7.0))
+    where = {"at": tuple(rng.uniform(0.2, 0.8, 2)), "speed": 1.0, "residual": False}
+    striker = fi.Striker.rigid(10 ** rng.uniform(-2.5, -0.5))
+    names = "striker.mass", "contact.stiffness", "target.mass", "target.first_frequency"
+    rough, fine = (
+        fi.strike(plate, striker, law, **where, tolerance=tolerance, scheme="A4").gradient(QUANTITIES[:4], names)
+        for tolerance in (1e-4, 1e-7)
+    )
+    for quantity, found in rough.items():
+        wrong = np.abs(found.slopes - fine[quantity].slopes)
+        assert (wrong < found.error).all(), quantity  # 0.82 of it at most were measured
+
+
 def test_the_peak_is_that_of_the_motion_and_not_of_the_steps():
     """Seed 184: at a border that two runs share, the polynomials of the force on both sides straddle its peak.
 

@@ -111,6 +111,18 @@ def test_errors_that_miss_only_together_propose_a_tolerance_that_is_met():
     assert not missed.tolerance_met and replace(missed, tolerance=met).tolerance_met
 
 
+def test_impacts_that_cannot_be_told_leave_the_first_one():
+    """No tolerance above 1 exists; error 1 means that two descriptions of the body touch another number of times."""
+    system = fi.assemble(fi.mesh.rectangle(*SIZE), PLATE, {"boundary": "hinged"})
+    blow = {"at": AT, "speed": 1.0, "tolerance": 1e-2}
+    hit = fi.strike(system, HAMMER, SOFT, **blow)
+    unsure = replace(hit, error=replace(hit.error, truncation=1.0))
+    assert unsure.verdict.endswith(
+        "; how often the bodies touch cannot be told: give max_impacts = 1 for the first impact alone"
+    )
+    assert fi.strike(system, HAMMER, SOFT, max_impacts=1, strict=True, **blow).tolerance_met
+
+
 def test_an_infinite_plate_that_echoes_is_told_to_be_modal():
     blow = {"at": AT, "speed": 1.0, "tolerance": 1e-2}
     system = fi.assemble(fi.mesh.rectangle(*SIZE), PLATE, {"boundary": "clamped"})

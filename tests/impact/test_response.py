@@ -1,5 +1,7 @@
 """What is read from a blow: histories, spectrum, motion, words."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -100,3 +102,20 @@ def test_motion_after_the_end_needs_no_replay():
     times = np.linspace(0.0, 3.0 * history.end_time, 40)
     replayed = history.offset + history.states(times)[0] @ history.shape.T
     assert_allclose(history.motion(times), replayed, rtol=0, atol=1e-12 * np.abs(replayed).max())
+
+
+def test_motion_is_told_by_modes_of_the_same_body_only():
+    """Found on another mesh, its mass may differ a little; another body is refused."""
+    plate = fi.analytic.rectangle(1.0, 0.7, mass=2.0, first_frequency=60.0, n_modes=40)
+    hit = fi.strike(plate, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), at=(0.4, 0.3), speed=1.0, tolerance=1e-2)
+    assert hit.on(plate.scaled(mass=2.01)).target.mass == pytest.approx(2.01)
+    for other in (plate.scaled(mass=2.06), plate.scaled(first_frequency=62.0)):
+        with pytest.raises(ValueError, match="modes must be of the body struck"):
+            hit.on(other)
+
+
+@pytest.mark.parametrize(("growth", "chaotic"), [(300.0, False), (3000.0, True)])
+def test_a_blow_that_loses_three_digits_is_called_chaotic(growth, chaotic):
+    wall = fi.strike(fi.Modes.rigid(1.0), fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), at=None, speed=1.0)
+    summary = replace(wall, error=replace(wall.error, sensitivity=growth)).summary()
+    assert ("chaotic" in summary) == chaotic

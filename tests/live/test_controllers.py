@@ -111,8 +111,9 @@ def test_what_is_no_midi_file_is_one_clear_error(tmp_path):
             controllers.read_midi(tmp_path / "b.mid", 10, 1.0, 48_000)
         except ValueError as error:
             assert str(error).startswith(str(tmp_path / "b.mid")) and "\n" not in str(error)
-    with pytest.raises(FileNotFoundError):
-        controllers.read_midi(tmp_path / "none.mid", 10, 1.0, 48_000)
+    for absent, why in ((tmp_path / "none.mid", "there is no such file"), (tmp_path, "it is a folder")):
+        with pytest.raises(ValueError, match=why):
+            controllers.read_midi(absent, 10, 1.0, 48_000)
 
 
 def test_a_midi_port_is_found_by_the_start_of_its_name(monkeypatch):

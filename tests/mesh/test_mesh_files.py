@@ -51,6 +51,29 @@ def test_saved_mesh_comes_back_with_its_edges(tmp_path):
     assert_allclose(parameters(plate, supports), parameters(GOOD, supports), rtol=1e-5)
 
 
+def test_sets_of_nodes_are_edges(tmp_path):
+    """Abaqus names a support by the nodes it holds; that of all nodes is the whole rim, a single node no edge."""
+    points = np.column_stack([GOOD.points, np.zeros(len(GOOD.points))])
+    sets = {"WALL": np.flatnonzero(points[:, 0] == 0.0), "ALL": np.arange(len(points)), "FORCE": np.array([3])}
+    meshio.Mesh(points, [("triangle", GOOD.cells)], point_sets=sets).write(tmp_path / "plate.inp")
+    plate = mesh.load(tmp_path / "plate.inp")
+    assert set(plate.edges) == {"WALL", "ALL", "outer", "boundary"} and not plate.notes
+    assert len(plate.edges["WALL"]) == len(GOOD.edges["left"])
+    assert_allclose(plate.points[plate.facets[plate.edges["WALL"]]][..., 0], 0.0)
+    assert plate.edges["ALL"].tolist() == plate.edges["boundary"].tolist()
+
+
+def test_markers_of_su2_are_edges(tmp_path):
+    nodes = "\n".join(f"{x} {y} {i}" for i, (x, y) in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)]))
+    markers = "MARKER_TAG= {}\nMARKER_ELEMS= 1\n3 {} {}\n"
+    cells = "NELEM= 2\n5 0 1 2 0\n5 0 2 3 1\n"
+    sides = "NMARK= 2\n" + markers.format(7, 0, 1) + markers.format(8, 2, 3)
+    (tmp_path / "square.su2").write_text(f"NDIME= 2\n{cells}NPOIN= 4\n{nodes}\n{sides}")
+    plate = mesh.load(tmp_path / "square.su2")
+    assert_allclose(plate.points[plate.facets[plate.edges["edge7"]]][..., 1], 0.0)
+    assert_allclose(plate.points[plate.facets[plate.edges["edge8"]]][..., 1], 1.0)
+
+
 @pytest.mark.parametrize("name", ["plate.msh", "plate.vtu"])
 def test_a_disk_from_a_file_is_a_disk_and_no_polygon(tmp_path, name):
     disk = mesh.disk(1.0, size=0.2)

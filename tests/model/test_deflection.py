@@ -192,6 +192,12 @@ def test_effect_on_a_plate_with_free_edges_is_that_of_a_blow_with_stretching(nam
     assert told.remedy == "let it stretch, stretching = true, or take a softer blow or a thicker body"
 
 
+def test_the_deflection_told_is_the_largest():
+    hit = struck(1.0)
+    largest = np.abs(hit.displacement([(0.1, 0.1)], np.linspace(0.0, 0.01, 4000))).max()
+    assert found(hit).value == pytest.approx(largest / H, rel=0.01)  # the contact, half a swing, is looked at 64 times
+
+
 def test_a_thick_plate_keeps_silent():
     hit = fi.strike(square(30, 0.02), fi.Striker.rigid(0.01), fi.Contact.hertz(1e7), at=(0.07, 0.08), speed=0.5)
     assert found(hit).worst < 1e-6 and found(hit).value < 1e-2
@@ -203,6 +209,12 @@ def test_the_sound_of_a_gong_rises():
     )
     told = found(hit)
     assert told.value > 1.0 and told.beyond and "large deflections" in told.sentence
+
+
+@pytest.mark.parametrize(("speed", "gong"), [(0.9, False), (1.4, True)])
+def test_beyond_its_thickness_a_plate_is_called_a_gong(speed, gong):
+    told = found(struck(speed))
+    assert (told.value > 1.0) == gong and ("gong" in told.sentence) == gong
 
 
 def test_without_a_thickness_it_is_not_known():

@@ -149,3 +149,17 @@ def test_sheet_by_elements_against_all_modes():
         hit = fi.strike(system(1e-3), BALL, HARD, at=AT, speed=1.0, tolerance=1e-2, damping_ratio=1e-3)
     assert abs(hit.restitution - true.restitution) <= min(5e-3, hit.error.total)
     assert_allclose([hit.impulse, hit.peak_force], [true.impulse, true.peak_force], rtol=1e-2)
+
+
+def test_no_plate_counts_as_infinite_for_waves_whose_echo_comes_within_a_turn():
+    frequency = mixed.first_frequency(mass=1.0, mobility=1.0, echo=1e-4, duration=1.0)
+    assert 2.0 * np.pi * frequency * 1e-4 > 2.0 * np.pi
+
+
+def test_the_striker_hardly_swings_above_the_first_frequency():
+    """A mass against a dashpot of 1 / mobility: the higher the frequency, the less of its speed it gives or takes."""
+    mass, mobility = 0.01, 0.04
+    omega = 2.0 * np.pi * mixed.first_frequency(mass, mobility, echo=1e6, duration=1e-6)
+    assert abs(1.0 / (1.0 + 1j * omega * mass * mobility)) < 0.25
+    soft = 2.0 * np.pi * mixed.first_frequency(mass, mobility, echo=1e6, duration=1.0)
+    assert soft > np.pi  # of a contact longer than that: above the contact resonance, pi over its duration

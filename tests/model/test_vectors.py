@@ -106,6 +106,34 @@ def test_mesh_is_refined_when_it_errs_more_than_too_few_vectors_explain():
     assert seen.improved(Error(0.0, 4.8e-4, 4.8e-4), 1e-3) and seen.count > count
 
 
+def test_a_soft_blow_takes_no_more_vectors_than_modes_that_it_may_excite():
+    run, truth = compared("rectangle", 3e-3, 0.02, 0.6, 1e-2, "hertz", (0.13, 0.1))
+    assert run.plan.n_modes < 50  # 42 were measured, half of what a hard blow takes
+    assert missed(run.response, truth) < run.response.error.total < 0.1 * run.response.tolerance
+
+
+@pytest.mark.parametrize(
+    ("errors", "stuck"),
+    [
+        ([1.0, 0.95, 0.95], False),  # two attempts may fail by chance
+        ([1.0, 0.95, 0.95, 0.95], True),
+        ([1.0, 0.6, 0.9, 0.9], False),  # one of them gained
+        ([1.0, 0.8, 0.6, 0.5, 0.4], False),
+        ([1.0, 0.5, 0.25, 0.3, 0.25, 0.28], True),
+    ],
+)
+def test_more_vectors_are_given_up_when_three_attempts_gain_nothing(errors, stuck):
+    assert vectors.hopeless(errors) == stuck
+
+
+def test_a_finer_mesh_has_more_triangles_even_where_small_features_of_the_outline_set_them():
+    class Rough:
+        def n_cells(self, size, stages):
+            return 1000 if size > 0.5 else 1100 if size > 0.25 else 4000
+
+    assert vectors.finer(Rough(), Elements(1.0), Stages()).size < 0.25
+
+
 def test_meshes_are_compared_with_all_vectors():
     """Each description is poorer than the one before in one respect only."""
     blow = np.array([0.2, 0.11]), 200.0, 1e-3, Elements(0.06)
@@ -132,6 +160,25 @@ def plate(supports, **more):
 
 BALL, WOODEN = fi.Striker.rigid(0.03), fi.Contact.hertz(1e6)
 BLOW = {"at": (0.2, 0.11), "speed": 1.0, "tolerance": 1e-3}
+
+
+@pytest.mark.parametrize(
+    "at, yield_strength, speed, n_impacts",
+    [((0.13, 0.07), None, 1.0, 2), ((0.1, 0.1), 2e8, 1.0, 3), ((0.1, 0.1), 2e8, 0.3, 1)],
+)
+def test_steel_ball_on_aluminium_meets_its_tolerance(at, yield_strength, speed, n_impacts):
+    """It leaves so slowly that the plate nearly reaches it again: vectors must agree on that, and beyond the dent."""
+    steel, aluminium = fi.Material(E=210e9, nu=0.3, rho=7850.0), fi.Material(E=70e9, nu=0.3, rho=2700.0)
+    plate, ball = fi.Plate(aluminium, 2e-3), fi.Striker.sphere(steel, 5e-3)
+    law = fi.Contact.between(ball, aluminium, yield_strength=yield_strength)
+    system = fi.assemble(fi.mesh.rectangle(0.3, 0.2), plate, {"boundary": "hinged"})
+    hit = fi.strike(system, ball, law, at=at, speed=speed, tolerance=1e-2, damping_ratio=0.01, strict=True)
+    modes = fi.analytic.rectangle(0.3, 0.2, section=plate, n_modes=4000, damping_ratio=0.01)
+    exact = fi.strike(modes, ball, law, at=at, speed=speed, tolerance=1e-3)
+    assert hit.n_impacts == exact.n_impacts == n_impacts
+    assert abs(hit.restitution - exact.restitution) < 1e-2  # the tolerance, as in the next three
+    for name in ("impulse", "contact_time", "peak_force"):
+        np.testing.assert_allclose(getattr(hit, name), getattr(exact, name), rtol=1e-2)
 
 
 @pytest.mark.parametrize("more", [{}, pytest.param({"target_force": 20.0, "max_impacts": 2}, marks=pytest.mark.slow)])

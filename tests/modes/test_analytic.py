@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from fem_impact.fe import section
-from fem_impact.modes import analytic
+from fem_impact.modes import analytic, modal
 
 ENDS = list(itertools.product(analytic.KINDS, repeat=2))
 
@@ -197,6 +197,11 @@ def test_truncated_modes_hand_the_rest_to_the_residual():
         (lambda: analytic.beam(1.0, ends="free", mass=1.0, first_frequency=1.0, n_modes=3), "two words"),
         (lambda: analytic.disk(1.0, edge="open", mass=1.0, first_frequency=1.0, n_modes=3), "edge must be one of"),
         (lambda: analytic.disk(1.0, mass=float("nan"), first_frequency=1.0, n_modes=3), "mass must be finite"),
+        (lambda: modal.Modes.rigid(1.0).stretched(1.0, 0), "frequency must be positive, got 0"),
+        (lambda: modal.Modes.rigid(1.0).stretched("3", 1.0), "mass must be a number, got '3'"),
+        (lambda: modal.rayleigh(1.0, 1e-6)([1.0, 0.0]), "frequency must be positive, got 0 Hz"),
+        (lambda: modal.rayleigh(1.0, 1e-6)(10**400), "frequency must be numbers in Hz"),
+        (lambda: modal.Modes.from_arrays([], [[1.0]], points=[(0.0,)], mass=1.0), "frequencies must not be empty"),
     ],
 )
 def test_bad_input_names_argument_and_rule(call, text):

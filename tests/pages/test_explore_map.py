@@ -13,9 +13,9 @@ from fem_impact.pages import explore_map, explore_model
 
 @pytest.fixture(scope="module")
 def stand(tmp_path_factory):
-    path = tmp_path_factory.mktemp("bench") / "small.toml"
+    path = tmp_path_factory.mktemp("setup") / "small.toml"
     path.write_text(TEXT)
-    return explore_model.Bench.of(fi.load_scene(path))
+    return explore_model.Setup.of(fi.load_scene(path))
 
 
 @pytest.fixture(scope="module")
@@ -115,12 +115,12 @@ def test_maps_follow_the_other_sliders(stand, mapper, changes):
 @pytest.mark.slow
 def test_limit_under_a_hard_layer_is_where_the_contact_resonates_at_the_threshold(stand):
     law = fi.Contact.layers(5e5, 1.2, depth=2e-4, hard_stiffness=1e7)
-    bench = replace(stand, base=replace(stand.base, contact=law))
-    picture = explore_map.Mapper(bench).first(bench.start, whole(bench))
+    setup = replace(stand, base=replace(stand.base, contact=law))
+    picture = explore_map.Mapper(setup).first(setup.start, whole(setup))
     assert (picture.n_impacts > 0).all()
     told = np.flatnonzero(np.isfinite(picture.limit))
     assert len(told)
     for i in told:
-        there = replace(bench.start, mass=picture.limit_mass[i], stiffness=picture.limit[i])
+        there = replace(setup.start, mass=picture.limit_mass[i], stiffness=picture.limit[i])
         # between two rows of the map the logarithms are taken for straight
-        assert bench.case(there).resonance == pytest.approx(picture.threshold[i], rel=0.1)
+        assert setup.case(there).resonance == pytest.approx(picture.threshold[i], rel=0.1)

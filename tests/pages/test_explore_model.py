@@ -16,9 +16,9 @@ from fem_impact.scenes.schema import written
 
 @pytest.fixture(scope="module")
 def stand(tmp_path_factory):
-    path = tmp_path_factory.mktemp("bench") / "small.toml"
+    path = tmp_path_factory.mktemp("setup") / "small.toml"
     path.write_text(TEXT)
-    return explore_model.Bench.of(fi.load_scene(path))
+    return explore_model.Setup.of(fi.load_scene(path))
 
 
 def test_start_is_the_scene(stand):
@@ -46,15 +46,15 @@ LOSING = {
 def test_contacts_that_lose_start_as_the_scene_has_them(stand, kind):
     text, loss = LOSING[kind]
     tables = stand.scene.data() | {"contact": tomllib.loads(f'kind = "{kind}"\nstiffness = 5e5\n{text}')}
-    bench = replace(stand, scene=scene_of(tables, stand.scene.path, folder=stand.scene.path.parent))
-    bench = replace(bench, base=replace(stand.base, contact=bench.scene.make_contact()))
-    law = bench.scene.make_contact()
-    np.testing.assert_allclose(bench.law(bench.start).numbers, law.numbers, rtol=1e-12)  # rounding of a power
-    assert bench.start.loss == loss  # no slider for a contact that cannot have a loss factor
-    twice = bench.law(replace(bench.start, stiffness=2.0))
+    setup = replace(stand, scene=scene_of(tables, stand.scene.path, folder=stand.scene.path.parent))
+    setup = replace(setup, base=replace(stand.base, contact=setup.scene.make_contact()))
+    law = setup.scene.make_contact()
+    np.testing.assert_allclose(setup.law(setup.start).numbers, law.numbers, rtol=1e-12)  # rounding of a power
+    assert setup.start.loss == loss  # no slider for a contact that cannot have a loss factor
+    twice = setup.law(replace(setup.start, stiffness=2.0))
     assert twice.stiffness == pytest.approx(2.0 * law.stiffness) and replace(twice, stiffness=law.stiffness) == law
     path = stand.scene.path
-    saved = scene_of(bench.saved(bench.start), path, folder=path.parent).make_contact()
+    saved = scene_of(setup.saved(setup.start), path, folder=path.parent).make_contact()
     np.testing.assert_allclose(saved.numbers, law.numbers, rtol=1e-12)
 
 
@@ -105,16 +105,16 @@ ELEMENTS = TEXT.replace('source = "analytic"', 'source = "fe"').replace("stiffne
 def test_hard_blows_on_elements_are_resolved_by_vectors(tmp_path):
     """Where the first modes leave the contact unresolved; against a thousand modes in closed form."""
     (tmp_path / "elements.toml").write_text(ELEMENTS)
-    bench = explore_model.Bench.of(fi.load_scene(tmp_path / "elements.toml"))
-    seen = bench.seen(bench.start.at)
-    assert bench.told and seen.poorer and bench.base.modes.n_modes == explore_model.FIRST_LOOK
-    mesh = bench.mesh
+    setup = explore_model.Setup.of(fi.load_scene(tmp_path / "elements.toml"))
+    seen = setup.seen(setup.start.at)
+    assert setup.told and seen.poorer and setup.base.modes.n_modes == explore_model.FIRST_LOOK
+    mesh = setup.mesh
     body = fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=1000, damping_ratio=0.01)
     assert mesh.points.max() == pytest.approx(0.465)
     for changes in ({"stiffness": 100.0, "mass": 0.01}, {"damping": 0.05, "thickness": 1.5}):
-        settings = replace(bench.start, **changes)
-        case = bench.case(settings, seen=seen)
-        hit, few = explore_model.blow(case), explore_model.blow(bench.case(settings))
+        settings = replace(setup.start, **changes)
+        case = setup.case(settings, seen=seen)
+        hit, few = explore_model.blow(case), explore_model.blow(setup.case(settings))
         ratio = settings.thickness
         truth = fi.strike(
             body.scaled(mass=0.2 * ratio, first_frequency=100.0 * ratio).damped(settings.damping),

@@ -335,4 +335,4 @@ def test_the_prompt_complains_in_one_line_and_writes_nothing(scene, tmp_path, ca
 
 
 def test_the_numbers_checked_are_those_of_the_layers():
-    assert set(uncertainty._apart(np.ones(7), np.ones(7))) == set(solving.LAYERS) - {"n_impacts", "error"}
+    assert set(uncertainty._differences(np.ones(7), np.ones(7))) == set(solving.LAYERS) - {"n_impacts", "error"}

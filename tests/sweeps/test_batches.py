@@ -172,6 +172,22 @@ def test_steps_do_not_grow_with_the_modes(n_modes):
     assert engine.first_step(1e-3)[0] == 26  # h = 2**-13 s whatever the modes: 15 for 1.8 ms
 
 
+def test_a_blow_too_long_for_every_kernel_is_left_at_once(monkeypatch):
+    """Loss makes the steps short, a flight the blow long: shorter steps are longer kernels yet, and all in vain."""
+    modes = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=100, damping_ratio=0.01)
+    blows = many(modes, fi.Striker.rigid(0.05), [5e6], at=np.array([0.13, 0.11]), exponent=1.5, loss=0.3)
+    tried, run = [], batches._Engine._run
+
+    def counted(engine, cells, step, *rest):
+        tried.extend((int(cell), int(at)) for cell, at in zip(cells, step))
+        return run(engine, cells, step, *rest)
+
+    monkeypatch.setattr(batches._Engine, "_run", counted)
+    assert not batches.bounce(blows, tolerance=1e-3).done.any()
+    assert np.isnan(batches.count_impacts(blows, tolerance=1e-3, most=3)).all()
+    assert len(tried) == 2 * len(batches.LENGTHS)  # the first step of each, with kernels ever longer
+
+
 def test_only_stiffness_times_speed_to_the_power_matters():
     speed = np.array([0.1, 1.0, 10.0])
     blows = many(plate(), fi.Striker.stick(0.1, 10e3), 1e6 / np.sqrt(speed), exponent=1.5, speed=1.0)

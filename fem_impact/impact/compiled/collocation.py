@@ -14,10 +14,11 @@ from .bundles import Limits, Scene
 from .events import EVENT_LIMIT, dipped, strayed
 from .exact import freshen
 from .flight import NEVER, ONSET, SLOW, UNPROVED, made_flights
-from .law import FELT, NEAR, PLASTIC, at, corner_approach, lags, near_side, power, smooth_force, special_of, spring_of
+from .law import FELT, PLASTIC, at, corner_approach, lags, near_side, power, smooth_force, special_of, spring_of
 from .one_mode import mode_moments
 from .propagation import any_of, restore
 from .record import EXHAUSTED, FAILED, FINISHED, FULL, SETTLED, total_energy
+from .rounding import NEAR, OVERFLOW, SOLVED, STALLED
 from .schemes import solve_linear
 
 from .frame import (  # isort: skip
@@ -247,7 +248,7 @@ def solve_collocation(contacts, room, inner):
                     for b in range(s):
                         for c in range(count):
                             matrix[row, b * count + c] -= share * inner[MOVED, e, b, i, active[c]]
-        if not scale < 1e300:
+        if not scale < OVERFLOW:
             return False
         if not solve_linear(matrix, vector, s * count):
             return False
@@ -256,7 +257,7 @@ def solve_collocation(contacts, room, inner):
             for r in range(count):
                 out_f[a, active[r]] -= vector[a * count + r]
                 change = max(change, abs(vector[a * count + r]))
-        if change <= 1e-15 * scale or (change <= 1e-12 * scale and change >= 0.5 * last):
+        if change <= SOLVED * scale or (change <= STALLED * scale and change >= 0.5 * last):
             return True
         if iteration > 12 and not change < last:
             return False
@@ -315,7 +316,7 @@ def collocate(bodies, contacts, grid, room, slot, h):
     collocation_end(bodies, contacts, f, grid.free[slot], grid.last[slot])
     worst = 0.0
     for i in range(m):
-        if not abs(y[i]) < 1e300:
+        if not abs(y[i]) < OVERFLOW:
             return np.inf
         if contacts.pressed[i]:
             spring = side_of(law, i, room.contacts[BEYOND])
@@ -485,7 +486,7 @@ def follow(scene, grid, room, flights, limits, run, steps):
             count[LEVEL] += 1
         if answer != TAKEN:
             continue
-        if coarse and h > 1e-9 * grid.base:
+        if coarse and h > NEAR * grid.base:
             count[LEVEL] += 1
             while count[LEVEL] < LEVELS - 2 and grid.base * 0.5 ** count[LEVEL] > 0.6 * h:
                 count[LEVEL] += 1

@@ -3,6 +3,7 @@
 import numpy as np
 
 from .build import inner
+from .rounding import ITERATIONS, NEAR
 
 LOOKS = 8  # [-] parts of a look ahead judged apart where the whole leaves a doubt
 
@@ -21,7 +22,7 @@ def crossing(d0, v0, d1, v1):
     low = 0.0
     high = 1.0
     t = d0 / (d0 - d1)
-    for _ in range(60):
+    for _ in range(ITERATIONS):
         value, slope = cubic(d0, v0, d1, v1, t)
         if (value > 0.0) == (d1 > 0.0):
             high = t
@@ -30,7 +31,7 @@ def crossing(d0, v0, d1, v1):
         new = t - value / slope if slope != 0.0 else 0.5 * (low + high)
         if not low < new < high:
             new = 0.5 * (low + high)
-        if abs(new - t) < 1e-9:  # the next would change it by the square of that
+        if abs(new - t) < NEAR:  # the next would change it by the square of that
             return new
         t = new
     return t

@@ -17,6 +17,7 @@ from .flight import NEVER, SLOW, UNPROVED
 from .law import special_of
 from .propagation import any_of, commit, restore
 from .record import EXHAUSTED, FAILED, FINISHED, FULL, SETTLED, total_energy
+from .rounding import OVERFLOW
 from .stretched import Stretch, attempt, finish, flown, leave_open, made_room, stretching_energy, unseen
 
 from .frame import (  # isort: skip
@@ -74,7 +75,7 @@ def finite(contacts):
     total = 0.0
     for i in range(contacts.end.size):
         total += abs(contacts.end[i]) + abs(contacts.rate[i]) + contacts.force[i]
-    return total < 1e300
+    return total < OVERFLOW
 
 
 @inner(part=True)

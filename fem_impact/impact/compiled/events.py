@@ -12,7 +12,8 @@ ever before. These corners of the force are located by secants. Events that pile
 import numpy as np
 
 from .build import inner
-from .law import FELT, LAYERS, NEAR, PLASTIC, POWER, corner_approach, parting, spring_of
+from .law import FELT, LAYERS, PLASTIC, POWER, corner_approach, parting, spring_of
+from .rounding import NEAR
 
 from .layout import (  # isort: skip
     APPROACH, EXPONENT, HIGH, KIND, LOSS, LOW, MEMORY, MISSED, RATE, RELAXATION, SHARE, SIZE, SLOPE, TRIED, WIDTH,
@@ -23,7 +24,6 @@ LET_GO = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to thi
 TURNED = 1e-8  # [-] of the rates about a turn: so far from zero, the approach there errs by the square of it
 DIPPED = 1e-6  # [-] of what makes it push: a body that leaves its felt by less within a step has not left it
 AT_ONCE = 1e-3  # [-] of a step: a body that parts from its felt and meets it again within that has not parted
-LOCATE_LIMIT = 60  # [-] iterations for an event inside a step; bisection alone reaches rounding
 AGAIN = 4  # kind of corner: a body meets its felt again at once, and the step is to be taken pressed
 EVENT_LIMIT = 64  # [-] events within one step's time: chatter, passed with unlocated steps, each time for twice as long
 
@@ -89,7 +89,7 @@ def dipped(contacts, h, i):
     side = 1.0 if pressed else -1.0
     if side * v0 < 0.0 < side * v1 and (d1 > 0.0 if pressed else d1 <= 0.0):
         low = lowest(side * d0, side * v0, side * d1, side * v1, h)
-        return low < -1e-9 * max(side * d0, side * d1)
+        return low < -NEAR * max(side * d0, side * d1)
     return False
 
 
@@ -112,7 +112,8 @@ def narrow(contacts, h, limits, target, bracket):
             guess = hermite_root(now[APPROACH, i], now[RATE, i], y[i], rate[i], h)
             return i, guess if guess < h else 0.5 * h
     miss = y[target]
-    if abs(miss) <= LOCATED * bracket[SIZE] or bracket[HIGH] - bracket[LOW] <= 4e-16 * bracket[HIGH]:
+    good = max(limits.depth, LOCATED * bracket[SIZE])
+    if abs(miss) <= good or bracket[HIGH] - bracket[LOW] <= 4e-16 * bracket[HIGH]:
         return target, 0.0
     if (miss > 0.0) != pressed[target]:
         bracket[HIGH] = h
@@ -157,7 +158,7 @@ def letting_go(loss, d0, v0, d1, v1, h):
 
 @inner()
 def turn_of(d0, v0, d1, v1, h):
-    """When the cubic through both ends, rising at first and falling at last, turns back, and how high it is there."""
+    """When the cubic through both ends, rising at first and falling later, turns back, and how high it is there."""
     a = 2.0 * (d0 - d1) + h * (v0 + v1)
     b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
     c = h * v0
@@ -299,11 +300,11 @@ def strayed(contacts, h, i, side):
     if bend == np.inf or abs(d0) > near or (d1 >= -near and not (yields and v1 < 0.0)):
         return 0
     high = 0.0
-    if v1 < 0.0 < v0:
+    if v0 > 0.0 and (v1 < 0.0 or d1 < d0):
         _, high = turn_of(d0, v0, d1, v1, h)
     if high <= near:
         return 1
-    return 0 if yields else 2
+    return 0 if yields and v1 < 0.0 else 2
 
 
 @inner()
@@ -321,7 +322,7 @@ def nearer(contacts, i, which, h, bracket):
         good = 0.1 * NEAR * law[i, SHARE] * abs(memory)
     elif which == 2:
         good = TURNED * (abs(bracket[MISSED]) + abs(bracket[SLOPE]))
-    if abs(miss) <= good or bracket[HIGH] - bracket[LOW] <= 1e-9 * bracket[HIGH]:
+    if abs(miss) <= good or bracket[HIGH] - bracket[LOW] <= NEAR * bracket[HIGH]:
         return 0.0
     bracket[LOW if miss * bracket[SLOPE] > 0.0 else HIGH] = h
     guess = h - miss * (h - bracket[TRIED]) / (miss - bracket[MISSED]) if miss != bracket[MISSED] else 0.0

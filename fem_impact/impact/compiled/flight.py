@@ -14,6 +14,7 @@ from .build import LOOSE, inner
 from .bundles import Flights
 from .layout import FASTEST, HARDEST, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE
 from .propagation import N_LANE, any_of, glide, lane_table, restore
+from .rounding import REPEATED
 
 PATIENT = 4  # [-] looks of a flight that make do with the table of a step up to four times shorter than allowed
 GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before
@@ -146,7 +147,7 @@ def find_onset(bodies, offset, flights, limits, limit):
         if over:
             wait = limit - elapsed
         else:
-            if wait <= 4e-16 * (elapsed + wait) or wait <= 1e-14 * flights.shortest:
+            if wait <= REPEATED * (elapsed + wait) or wait <= 1e-14 * flights.shortest:
                 return elapsed, first, ONSET if leading > 0.0 else SLOW
             if wait < flights.shortest:
                 slow += 1

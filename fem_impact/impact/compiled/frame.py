@@ -16,9 +16,10 @@ from .bundles import Bodies, Contacts, Course, Run, Scene
 from .flight import NEVER, ONSET, SLOW, approach, find_onset
 from .law import FELT, dent, harden, rest_of
 from .record import EXHAUSTED, FULL, HORIZON, IMPACTS, total_energy
+from .rounding import ITERATIONS, NEAR
 
 from .events import (  # isort: skip
-    AGAIN, EVENT_LIMIT, LOCATE_LIMIT, LOCATED, enclose, first_corner, first_crossing, narrow, nearer,
+    AGAIN, EVENT_LIMIT, LOCATED, enclose, first_corner, first_crossing, narrow, nearer,
 )  # fmt: skip
 from .layout import (  # isort: skip
     APPROACH, BEGUN, BLINDS, CLOCKS, CONTACT_ROWS, CORNERED, COUNTERS, EVENTS, FAINT, FALLBACKS, FLYING, FRESH, HEAD,
@@ -145,6 +146,10 @@ def fly(bodies, contacts, course, flights, limits, row):
         remember(contacts, i, row)
         now[APPROACH, i], now[RATE, i] = approach(bodies.shape, contacts.offset, i, bodies.q, bodies.p)
         now[APPROACH, i] = min(0.0, now[APPROACH, i])
+        slack = max(limits.depth, LOCATED * elapsed * abs(now[RATE, i]))
+        if found == ONSET and now[APPROACH, i] >= -slack:  # contacts may close together
+            now[APPROACH, i] = 0.0
+            contacts.pressed[i] = now[RATE, i] > limits.still
         rest_of(contacts.law, i, elapsed)
     if found == ONSET:
         now[APPROACH, first] = 0.0
@@ -191,10 +196,10 @@ def locate(contacts, course, limits, h, cornered, lossy):
         else:
             guess = nearer(contacts, count[CORNERED], count[WHICH], h, bracket)
         count[TRIES] += 1
-        if guess != 0.0 and count[TRIES] < LOCATE_LIMIT:
+        if guess != 0.0 and count[TRIES] < ITERATIONS:
             count[SEEKS] = sought
             return TRY, guess
-        if sought == CROSSING and not abs(contacts.end[count[TARGET]]) <= 1e-9 * bracket[SIZE]:
+        if sought == CROSSING and not abs(contacts.end[count[TARGET]]) <= max(limits.depth, NEAR * bracket[SIZE]):
             return LOST, guess
     if sought != CORNER and cornered:
         count[CORNERED], count[WHICH], guess = first_corner(contacts, h, lossy, bracket)
@@ -210,15 +215,18 @@ def locate(contacts, course, limits, h, cornered, lossy):
 
 
 @inner(part=True)
-def settle(contacts, target, limits):
-    """Take over approaches and rates at a step's end; the number of contacts that opened, but for felt left before."""
+def settle(contacts, target, limits, base):
+    """Take over approaches and rates at a step's end; the number of contacts that opened, but for felt left before.
+
+    Contacts open or close together if they do within a tiny part of the longest step ``base``, or rounding decides.
+    """
     law, now, pressed, y, rate = contacts.law, contacts.now, contacts.pressed, contacts.end, contacts.rate
     opened = 0
     for i in range(y.size):
         was = pressed[i]
         slack = limits.depth
-        if target >= 0:  # contacts may open together
-            slack = max(limits.depth, LOCATED * abs(now[APPROACH, i]))
+        if target >= 0:
+            slack = max(limits.depth, LOCATED * max(abs(now[APPROACH, i]), base * abs(rate[i])))
         now[APPROACH, i] = y[i]
         now[RATE, i] = rate[i]
         if i == target:
@@ -245,7 +253,7 @@ def take_over(contacts, course, limits, h, base, special):
     corner = count[CORNERED]
     if corner >= 0 and count[WHICH] == 3 and law[corner, MEMORY] > 0.0:
         count[RELEASED] += 1
-    count[RELEASED] += settle(contacts, count[TARGET], limits)
+    count[RELEASED] += settle(contacts, count[TARGET], limits, base)
     if clock[TIME] - clock[RESET] > base:
         clock[RESET] = clock[TIME]
         count[EVENTS] = 0

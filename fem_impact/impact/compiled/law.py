@@ -25,14 +25,14 @@ from typing import NamedTuple
 import numpy as np
 
 from .build import inner, outer
+from .rounding import NEAR
 
 from .layout import (  # isort: skip
     COMPLIANCE, DEPTH, EXPONENT, FIRST_YIELD, HARD, HARD_EXPONENT, KIND, LOSS, MEMORY, RELAXATION, SHARE, STIFFNESS,
     WIDTH,
 )  # fmt: skip
 
-POWER, LAYERS, PLASTIC, FELT = 0.0, 1.0, 2.0, 3.0  # [-] kinds of law
-NEAR = 1e-9  # [-] of a corner's approach: nearer than this counts as at the corner
+POWER, LAYERS, PLASTIC, FELT = 0.0, 1.0, 2.0, 3.0  # kinds of law
 
 
 class Spring(NamedTuple):

@@ -18,13 +18,14 @@ from .exact import contact_sums, freshen, keep_in_mind, predict, solve_step
 from .flight import approach, motion_bounds, quadratic_wait
 from .law import at, rest_of, special_of, spring_of
 from .propagation import any_of, commit, glide, product, restore
+from .rounding import OVERFLOW
 
 from .layout import (  # isort: skip
     APPROACH, FASTEST, FREE_END, FREE_RATE, HARDEST, MEMORY, RATE, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE,
 )  # fmt: skip
 
 FULL = 1 << 20  # [-] ticks of a frame: the shortest step is one, 2e-11 s at 48 kHz
-LEVELS = 21  # [-] lengths of steps, from a frame to a tick
+LEVELS = FULL.bit_length()  # lengths of steps, from a frame to a tick
 N_ON, N_LOOKS, FRAME, FORCED = range(4)  # places of `State.place`
 LOOKS = 64  # [-] looks of a flight after which its bounds are drawn anew, as they loosen
 FAINT = 1e-140  # [-] of sqrt(J): a mode with less is at rest, before its numbers get slow to calculate with
@@ -64,6 +65,14 @@ class Limits(NamedTuple):
     period: float  # [s] of a frame
     depth: float  # [m] approaches that are rounding
     still: float  # [m/s] speeds that are rounding
+
+
+class Strokes(NamedTuple):
+    """What is struck during a block, in the order of time."""
+
+    when: np.ndarray  # (n,) frames of the block
+    pad: np.ndarray  # (n,)
+    speed: np.ndarray  # (n,) [m/s]
 
 
 class State(NamedTuple):
@@ -323,7 +332,7 @@ def tidied(body, pads, state):
     lost = False
     for n in range(state.q.size):
         size = abs(state.p[n]) + body.omega[n] * abs(state.q[n])
-        lost = lost or not size < 1e300
+        lost = lost or not size < OVERFLOW
         if size < FAINT and body.omega[n] > 0.0:
             state.q[n] = 0.0
             state.p[n] = 0.0
@@ -337,16 +346,12 @@ def tidied(body, pads, state):
 
 
 @outer()
-def play(body, pads, limits, state, when, pad, speed, n_events, gain, out):
-    """Fill a block of sound (n_frames,), and leave the state at its end.
-
-    ``when`` (ascending frames of the block), ``pad`` and ``speed`` [m/s] are the strokes, of which the first
-    ``n_events`` count; ``gain`` multiplies what is heard.
-    """
+def play(body, pads, limits, state, strokes, gain, out):
+    """Fill a block of sound (n_frames,), and leave the state at its end; ``gain`` multiplies what is heard."""
     event = 0
     for k in range(out.size):
-        while event < n_events and when[event] <= k:
-            put_on(body, pads, limits, state, pad[event], speed[event])
+        while event < strokes.when.size and strokes.when[event] <= k:
+            put_on(body, pads, limits, state, strokes.pad[event], strokes.speed[event])
             event += 1
         out[k] = gain * product(body.listen, state.p)
         for i in range(state.place[N_ON] - 1, -1, -1):

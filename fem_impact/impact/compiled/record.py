@@ -17,7 +17,7 @@ from .layout import APPROACH, CLOSED, HEAD, KIND, LENGTH, LOSS, PUSH, RATE, SPEE
 FEW, CLOSER = 3, 16  # [-] parts into which the search for a largest force cuts all steps, and what is left, thrice
 HIGH_ENOUGH = 0.95  # [-] of the largest force: only steps with so much are looked at more closely
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = range(6)  # why a run ended
-FULL = -1  # [-] it did not: its record is full
+FULL = -1  # it did not: its record is full
 
 
 @inner(allocates=True)
@@ -240,12 +240,38 @@ def largest_force(steps, now, law, n_coefficients, i):
     return time, top, rival
 
 
+@inner()
+def peak_in(steps, now, law, n_coefficients, row, i, looks):
+    """Largest force of contact i in a step: the largest of some looks, refined by parabolas."""
+    peak = 0.0
+    part = 0.0
+    for look in range(looks + 1):
+        f = force_within(steps, now, law, n_coefficients, row, i, look / looks)
+        if f > peak:
+            peak = f
+            part = look / looks
+    spread = 1.0 / looks
+    for _ in range(4):
+        middle = min(max(part, spread), 1.0 - spread)
+        low = force_within(steps, now, law, n_coefficients, row, i, middle - spread)
+        top = force_within(steps, now, law, n_coefficients, row, i, middle)
+        high = force_within(steps, now, law, n_coefficients, row, i, middle + spread)
+        bend = low - 2.0 * top + high
+        if bend >= 0.0:
+            break
+        part = middle + min(max(0.5 * (low - high) / bend, -1.0), 1.0) * spread
+        peak = max(peak, force_within(steps, now, law, n_coefficients, row, i, part))
+        spread *= 0.125
+    return peak
+
+
 @outer()
 def find_impacts(steps, now, law, n_coefficients, looks, touch):
     """Every unbroken push, (n_impacts, 5): start, end, peak force, impulse, contact; contact by contact.
 
     Bodies that touch and approach no faster than ``touch`` [m/s] before the first push press from the start of that
-    time. The peak is sought with ``looks`` per step about the largest of a few, and refined by parabolas.
+    time. The peak is sought with ``looks`` per step in the step with the largest of a few and in those beside it: where
+    it lies at the end of a step, rounding decides which holds the larger look.
     """
     n_steps = steps.shape[0]
     m = law.shape[0]
@@ -268,7 +294,6 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
             impulse = 0.0
             peak = 0.0
             peak_row = row
-            peak_part = 0.0
             while upper > lower:
                 for k in range(n_coefficients):
                     impulse += steps[row, LENGTH] * steps[row, first + PUSH + k] / (k + 1.0)
@@ -284,30 +309,12 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
                 lower, upper = pushing(steps, now, law, n_coefficients, row, i)
                 if lower > 0.0:
                     break
-            last = row - 1
-            for near in range(max(begin, peak_row - 1), min(last, peak_row + 1) + 1):
-                for look in range(looks + 1):
-                    f = force_within(steps, now, law, n_coefficients, near, i, look / looks)
-                    if f >= peak:
-                        peak = f
-                        peak_row = near
-                        peak_part = look / looks
+            for near in range(max(begin, peak_row - 1), min(row - 1, peak_row + 1) + 1):
+                peak = max(peak, peak_in(steps, now, law, n_coefficients, near, i, looks))
             if steps[begin, first] == 0.0:
                 while begin > 0 and steps[begin - 1, first] == 0.0 and abs(steps[begin - 1, first + SPEED]) <= touch:
                     begin -= 1
                     start = steps[begin, START]
-            spread = 1.0 / looks
-            for _ in range(4):
-                middle = min(max(peak_part, spread), 1.0 - spread)
-                low = force_within(steps, now, law, n_coefficients, peak_row, i, middle - spread)
-                top = force_within(steps, now, law, n_coefficients, peak_row, i, middle)
-                high = force_within(steps, now, law, n_coefficients, peak_row, i, middle + spread)
-                bend = low - 2.0 * top + high
-                if bend >= 0.0:
-                    break
-                peak_part = middle + min(max(0.5 * (low - high) / bend, -1.0), 1.0) * spread
-                peak = max(peak, force_within(steps, now, law, n_coefficients, peak_row, i, peak_part))
-                spread *= 0.125
             result[count, 0] = start
             result[count, 1] = end
             result[count, 2] = peak

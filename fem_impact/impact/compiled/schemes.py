@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .build import inner
+from .rounding import CHORD, ITERATIONS, OVERFLOW, REPEATED, SOLVED, STALLED
 
 from .law import (  # isort: skip
     FELT, Point, at, compressed, growth, memory_energy, power, slopes, soaked, spring_of, steepness,
@@ -29,7 +30,6 @@ from .layout import (  # isort: skip
     OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, RATE,
 )  # fmt: skip
 
-SOLVES = 30  # [-] iterations of the equation of a step at most
 ROUNDED = 1e-14  # [-] of the elastic energies: rounding of what a step of felt loses
 WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it
 
@@ -92,7 +92,7 @@ def solve_constant(start, e, b, loss, spring):
     if loss == 0.0 and c == 0.0 and e > 0.0 and b > 0.0:
         share = e - d0 if d0 <= 0.0 else 1.0
         y = min(high, ((a + 1.0) * e * share / (b * k)) ** (1.0 / (a + (1.0 if d0 <= 0.0 else 0.0))))
-        y *= 1.0 + 1e-15
+        y *= 1.0 + SOLVED
     low = 0.0
     f = 0.0
     end = start
@@ -106,11 +106,11 @@ def solve_constant(start, e, b, loss, spring):
         else:
             low = y
         span = y - d0
-        turn = (end.force - g) / span if abs(span) > 1e-6 * (abs(y) + abs(d0)) else 0.5 * slope
+        turn = (end.force - g) / span if abs(span) > CHORD * (abs(y) + abs(d0)) else 0.5 * slope
         new = y - r / (1.0 + b * (turn + loss * end.force))
         if not low <= new <= high:
             new = 0.5 * (low + high)
-        if abs(new - y) <= 4e-16 * abs(y):
+        if abs(new - y) <= REPEATED * abs(y):
             break
         y = new
     return end, max(0.0, f)
@@ -135,7 +135,7 @@ def felt_mean(start, y, h, spring):
         left = spring.hard / spring.stiffness
         return 0.0, 0.0, spring.memory * np.exp(-(1.0 - left) * h / spring.relaxation)
     span = y - start.approach
-    turn = (end.force - g) / span if abs(span) > 1e-6 * (abs(y) + abs(start.approach)) else 0.5 * d
+    turn = (end.force - g) / span if abs(span) > CHORD * (abs(y) + abs(start.approach)) else 0.5 * d
     if end.compression > 0.0:
         turn -= 0.25 * spring.hard * taken * a * aim / middle
     return f, turn, memory
@@ -247,7 +247,7 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
     end = start
     close = False
     last = False
-    for iteration in range(SOLVES):
+    for iteration in range(ITERATIONS):
         end = compressed(x, spring)
         y = end.approach
         g, d = slopes(start, end, spring)
@@ -267,7 +267,7 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
             f = (right * two - cross * top) / (one * two - cross * part * own.rate)
             s = (top - part * own.rate * f) / two
         r = y - free.end + own.end * f + own.end_ramp * s
-        if last or r == 0.0 or (close and abs(r) <= 1e-15 * max(scale, abs(y))):
+        if last or r == 0.0 or (close and abs(r) <= SOLVED * max(scale, abs(y))):
             work = f * (y - d0) + s * (middle - (free.mean - own.mean * f - own.mean_ramp * s))
             memory = 0.0
             if spring.kind == FELT:
@@ -280,7 +280,7 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
             span = y - d0
             turn = 0.5 * d
             bend = 0.0
-            if abs(span) > 1e-6 * (abs(y) + abs(d0)):
+            if abs(span) > CHORD * (abs(y) + abs(d0)):
                 turn = (end.force - g) / span
                 bend = (tangent - d) / span
             rise = turn + bend * (free.mean - own.mean_ramp * s - middle - own.mean * f)
@@ -289,7 +289,7 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
         else:
             slope = (r - old_r) / (x - old_x)
         step = -r / slope
-        if not abs(step) < 1e300:
+        if not abs(step) < OVERFLOW:
             break
         old_x = x
         old_r = r
@@ -342,7 +342,7 @@ def mean_force(h, y, now, law, i):
     if f <= 0.0:
         return 0.0, 0.0
     span = y - start.approach
-    turn = (end.force - g) / span if abs(span) > 1e-6 * (abs(y) + abs(start.approach)) else 0.5 * d
+    turn = (end.force - g) / span if abs(span) > CHORD * (abs(y) + abs(start.approach)) else 0.5 * d
     return f, turn + loss * end.force
 
 
@@ -380,13 +380,13 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
     for i in range(m):
         out_f[i] = 0.0
     for _ in range(4):
-        if sweep_constants(h, now, law, e, sums, out_y, out_f) <= 1e-15 or m == 1:
+        if sweep_constants(h, now, law, e, sums, out_y, out_f) <= SOLVED or m == 1:
             return
     matrix = work[0]
     step = work[2, 0]
     slope = work[2, 1]
     best = np.inf
-    for _ in range(60):
+    for _ in range(ITERATIONS):
         worst = 0.0
         for i in range(m):
             y = e[i]
@@ -396,7 +396,7 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
             step[i] = force - out_f[i]
             if step[i] != 0.0:
                 worst = max(worst, abs(step[i]) / max(force, abs(out_f[i])))
-        if worst <= 1e-15 or (worst <= 1e-11 and worst >= 0.5 * best):
+        if worst <= SOLVED or (worst <= STALLED and worst >= 0.5 * best):
             break
         best = min(best, worst)
         for i in range(m):
@@ -432,7 +432,7 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
         for i in range(m):
             out_f[i] = out_f[i] + t * step[i]
     for _ in range(200):
-        if sweep_constants(h, now, law, e, sums, out_y, out_f) <= 1e-15:
+        if sweep_constants(h, now, law, e, sums, out_y, out_f) <= SOLVED:
             break
 
 
@@ -508,7 +508,7 @@ def solve_ramps(h, contacts, sums, work):
         settled = True
         for i in range(m):
             out_y[i] -= r[i]
-            if not abs(r[i]) < 1e300:
+            if not abs(r[i]) < OVERFLOW:
                 return False
             if abs(r[i]) > 4e-15 * max(abs(out_y[i]), 1e-2 * abs(now[APPROACH, i])):
                 settled = False

@@ -25,15 +25,13 @@ from .events import LOCATED
 from .exact import made_tables, predict, solve_step
 from .frame import LEVELS, begin, course_of, made_run, moving, touching
 from .propagation import any_of, commit, lane_table, restore
+from .rounding import ITERATIONS, OVERFLOW, SOLVED, STALLED
 
 from .layout import (  # isort: skip
     A11, A12, A21, A22, APPROACH, FLYING, FREE_END, FREE_MEAN, FREE_RATE, HEAD, LENGTH, M1, M2, M3, PUSH, RATE, START,
     STEPS, TAKEOFF, TIME,
 )  # fmt: skip
 
-ITERATIONS = 60  # [-] of a step's stretching forces at most; each gains some two digits in steps that resolve them
-SETTLES = 1e-15  # [-] of the stretching forces: their change in the last iteration
-STALLS = 1e-11  # [-] a change that no longer falls below this is rounding
 UNSEEN = 1.0  # [rad] modes that turn further in a step than this are not seen by the cubic through its ends
 SHORTEST = 8  # [-] halvings of the step to see them
 RIPPLE = 1e-3  # [-] of the way of a contact in a step: such modes may close it unseen where they move it farther
@@ -207,9 +205,9 @@ def attempt(bodies, contacts, room, tables, slot, h, given):
         for i in range(room.pull.shape[1]):
             change += abs(room.pull[0, i] - room.pull[2, i]) + abs(room.pull[1, i] - room.pull[3, i])
             size += abs(room.pull[0, i]) + abs(room.pull[1, i])
-        if not change < 1e300:  # a sum keeps what is no number; a maximum may drop it
+        if not change < OVERFLOW:  # a sum keeps what is no number; a maximum may drop it
             return False, fine
-        if change <= SETTLES * size or (change <= STALLS * size and change >= 0.5 * best):
+        if change <= SOLVED * size or (change <= STALLED * size and change >= 0.5 * best):
             return True, fine
         best = min(best, change)
     return False, fine

@@ -106,16 +106,33 @@ class Table(NamedTuple):
     leaned: np.ndarray  # (n, 2, n_contacts, s) changes of `lean`
 
 
+class State(NamedTuple):
+    """The motion, and its change with each parameter."""
+
+    q: np.ndarray  # (n_modes,)
+    p: np.ndarray  # (n_modes,)
+    dq: np.ndarray  # (n, n_modes)
+    dp: np.ndarray  # (n, n_modes)
+
+
+class Pressed(NamedTuple):
+    """The contacts of a piece, or at a mark."""
+
+    acting: np.ndarray  # (up to n_contacts,) those that carry force
+    force: np.ndarray  # (n_contacts, s) [N]
+    memory: np.ndarray  # (n_contacts,)
+    yields: np.ndarray  # (n_contacts,) bool
+    deeper: np.ndarray  # (n_contacts, n) changes of what the contacts remember
+
+
 class Room(NamedTuple):
     """Room for what a piece needs."""
 
     out: np.ndarray  # (2 + 2 (SHAPES + n_contacts), n_modes), see `carry`
     work: np.ndarray  # (n_modes,)
-    acting: np.ndarray  # (n_contacts,) the contacts that carry force, first of all
     matrix: np.ndarray  # (n_contacts s, n_contacts s)
     right: np.ndarray  # (n_contacts s, n)
     slopes: np.ndarray  # (N_LAW,)
-    deeper: np.ndarray  # (n_contacts, n) changes of what the contacts remember
     by_change: np.ndarray  # (n_contacts, s, 2, n)
     column: np.ndarray  # (s,)
 
@@ -302,21 +319,15 @@ def power_series(omega, t, double, near, out_moments):
 
 @inner()
 def divisors(omega, zeta, out_per, out_own):
-    """1 / omega and 1 / (1 - zeta**2) of every mode, zero for rigid ones; the number of nearly critically damped ones,
-    for which the latter is zero, too.
-    """
-    n_critical = 0
+    """1 / omega and 1 / (1 - zeta**2) of every mode, zero for rigid ones; the latter also next to critical damping."""
     for n in range(omega.size):
         rest = (1.0 - zeta[n]) * (1.0 + zeta[n])
-        near = abs(rest) <= CRITICAL
         out_per[n] = 1.0 / omega[n] if omega[n] > 0.0 else 0.0
-        out_own[n] = 1.0 / rest if omega[n] > 0.0 and not near else 0.0
-        n_critical += 1 if omega[n] > 0.0 and near else 0
-    return n_critical
+        out_own[n] = 1.0 / rest if omega[n] > 0.0 and abs(rest) > CRITICAL else 0.0
 
 
 @inner(allocates=True)
-def moment_slopes(omega, zeta, t, moments, per, own, n_critical, out_faster, out_damped):
+def moment_slopes(omega, zeta, t, moments, per, own, out_faster, out_damped):
     """Changes of all moments but the last per unit of omega and of zeta, (count + 1, n_modes) each."""
     rows = out_faster.shape[0]
     for n in range(omega.size):
@@ -332,19 +343,23 @@ def moment_slopes(omega, zeta, t, moments, per, own, n_critical, out_faster, out
             fall = moments[k, n] - (k + 1.0) * moments[k + 1, n]
             next_fall = moments[k + 1, n] - k * moments[k + 2, n]
             out_damped[k + 1, n] = -own[n] * (zeta[n] * fall + omega[n] * t * next_fall)
-    if n_critical == 0:
-        return
+    for n in range(omega.size):
+        if omega[n] > 0.0 and own[n] == 0.0:
+            difference(omega[n], zeta[n], t, out_damped[:, n])
+
+
+@inner(allocates=True)
+def difference(omega, zeta, t, out_damped):
+    """Changes of all moments but the last per unit of zeta (count + 1,), of a mode next to critical damping."""
+    rows = out_damped.size
     near = np.empty(rows)
     work = np.empty((2, rows))
-    for n in range(omega.size):
-        if omega[n] > 0.0 and abs((1.0 - zeta[n]) * (1.0 + zeta[n])) <= CRITICAL:
-            for k in range(rows):
-                out_damped[k, n] = 0.0
-            for side in (-1.0, 1.0):
-                _, _, a22 = mode_moments(omega[n], zeta[n] + side * CRITICAL, t, near, work)
-                out_damped[0, n] += side * a22 / (2.0 * CRITICAL)
-                for k in range(rows - 1):
-                    out_damped[k + 1, n] += side * near[k] / (2.0 * CRITICAL)
+    out_damped[:] = 0.0
+    for side in (-1.0, 1.0):
+        _, _, a22 = mode_moments(omega, zeta + side * CRITICAL, t, near, work)
+        out_damped[0] += side * a22 / (2.0 * CRITICAL)
+        for k in range(rows - 1):
+            out_damped[k + 1] += side * near[k] / (2.0 * CRITICAL)
 
 
 @inner(fastmath=LOOSE)
@@ -390,12 +405,12 @@ def tangent_table(blow, grown, leans, closed, h, nodes, powers, out):
     per = np.empty(omega.size)
     own = np.empty(omega.size)
     weights = np.empty(s)
-    n_critical = divisors(omega, zeta, per, own)
+    divisors(omega, zeta, per, own)
     for a in range(0 if closed else s, s + 1):
         part = nodes[a]
         t = part * h
         moments_of(omega, zeta, t, moments)
-        moment_slopes(omega, zeta, t, moments, per, own, n_critical, faster, damped)
+        moment_slopes(omega, zeta, t, moments, per, own, faster, damped)
         free_slopes(omega, zeta, t, moments, faster, damped, out.free[a])
         if a < s:
             for c in range(m):
@@ -528,19 +543,22 @@ def take(shape, response, out):
 
 
 @inner(fastmath=LOOSE)
-def carry(blow, free, forced, force, n_acting, leans, q, p, room):
-    """State of every mode at the end of a piece, and what changes it, in ``room.out``; ``free`` is that of the end.
+def carry(blow, table, pressed, leans, state, room):
+    """State of every mode at the end of a piece, and what changes it, in ``room.out``.
 
     Rows: q and p; their changes per omega, per zeta, per bias and per shape of each contact, those of contacts that
     carry no force left as they are; those per bias are made only if there is a bias or a change of one, which ``leans``
     says.
     """
-    bias, out = blow.bias, room.out
+    q, p, bias, out = state.q, state.p, blow.bias, room.out
+    forced = table.forced
+    free = table.free[forced.shape[1]]
+    n_acting = pressed.acting.size
     for r in range(6):
         for x in range(n_acting):
-            c = room.acting[x]
+            c = pressed.acting[x]
             response = out[2 + 2 * (SHAPES + c) + r] if r < 2 else room.work
-            add_up(forced[r], force[c], response)
+            add_up(forced[r], pressed.force[c], response)
             if x == 0:
                 glide_to(free[2 * r], free[2 * r + 1], q, p, blow.shape[c], response, out[r])
             else:
@@ -669,8 +687,9 @@ def solve_many(matrix, right, s):
 
 
 @inner(allocates=True, fastmath=LOOSE)
-def look(blow, change, memory, yields, deeper, q, p, dq, dp, out_base, out_ends, out_dents):
+def look(blow, change, pressed, state, out_base, out_ends, out_dents):
     """Approaches, three rates and forces in a state, and their changes but for those of the third rate; see `Found`."""
+    q, p, memory, deeper = state.q, state.p, pressed.memory, pressed.deeper
     m = blow.offset.size
     slopes = np.empty((m, N_LAW))
     steep = np.empty((m, 3))
@@ -688,7 +707,7 @@ def look(blow, change, memory, yields, deeper, q, p, dq, dp, out_base, out_ends,
             out_dents[c, 0] = low
             for i in range(deeper.shape[1]):
                 out_dents[c, 1 + i] = low_memory * deeper[c, i] + product(slopes[c], change.law[i, c])
-        f, by_d, by_v, by_m = law_slopes(blow.offset[c] + d, v, blow.law, c, memory[c], yields[c], slopes[c])
+        f, by_d, by_v, by_m = law_slopes(blow.offset[c] + d, v, blow.law, c, memory[c], pressed.yields[c], slopes[c])
         steep[c, 0] = by_d
         steep[c, 1] = by_v
         steep[c, 2] = by_m
@@ -703,9 +722,9 @@ def look(blow, change, memory, yields, deeper, q, p, dq, dp, out_base, out_ends,
         push(blow.shape[c], steep[c, 0] * out_base[c, 1] + steep[c, 1] * out_base[c, 2], more)
     for c in range(m):
         out_base[c, 3] = product(blow.shape[c], more)
-    for i in range(dq.shape[0]):
+    for i in range(state.dq.shape[0]):
         dw, dz, db = change.omega[i], change.zeta[i], change.bias[i]
-        x, y = dq[i], dp[i]
+        x, y = state.dq[i], state.dp[i]
         for n in range(q.size):
             more[n] = db[n] - w[n] * (2.0 * z[n] * y[n] + w[n] * x[n])
             more[n] -= 2.0 * ((dz[n] * w[n] + z[n] * dw[n]) * p[n] + w[n] * dw[n] * q[n])
@@ -771,18 +790,18 @@ def span(values, out_span):
 
 
 @inner()
-def enter(shape, change, out_grown, dq, dp):
+def enter(shape, change, out_grown, out_dq, out_dp):
     """Rows that every parameter changes, and its change of the state at the start."""
     m = shape.shape[0]
-    for i in range(dq.shape[0]):
-        for k in range(dq.shape[1]):
+    for i in range(out_dq.shape[0]):
+        for k in range(out_dq.shape[1]):
             out_grown.rows[i, OMEGA, k] = change.omega[i, k]
             out_grown.rows[i, ZETA, k] = change.zeta[i, k]
             out_grown.rows[i, BIAS, k] = change.bias[i, k]
             for c in range(m):
                 out_grown.rows[i, SHAPES + c, k] = change.shape[i, c, k]
-            dq[i, k] = change.start_q[i, k]
-            dp[i, k] = change.start_p[i, k]
+            out_dq[i, k] = change.start_q[i, k]
+            out_dp[i, k] = change.start_p[i, k]
         for r in range(SHAPES + m):
             span(out_grown.rows[i, r], out_grown.spans[i, r])
         for r in range(2 + m):
@@ -792,82 +811,82 @@ def enter(shape, change, out_grown, dq, dp):
 
 
 @inner()
-def solve_forces(blow, change, grown, table, n_acting, memory, yields, force, q, p, dq, dp, room, out_force):
+def solve_forces(blow, change, grown, table, pressed, state, room, out_force):
     """Change of the forces at the inner nodes of a piece, (n_contacts, s, n), from the state at its start; those of
     contacts that carry no force are left as they are.
     """
-    n, s = dq.shape[0], force.shape[1]
-    matrix, slopes, by_change = room.matrix, room.slopes, room.by_change
+    n, s, acting = state.dq.shape[0], pressed.force.shape[1], pressed.acting
     for i in range(0, n, 2):
         j = min(i + 1, n - 1)
-        for x in range(n_acting):
+        for x in range(acting.size):
             for a in range(s):
-                d, v, other_d, other_v = see_two(table.sight[a, room.acting[x]], dq, dp, i, j)
-                by_change[x, a, 0, i] = d
-                by_change[x, a, 1, i] = v
-                by_change[x, a, 0, j] = other_d
-                by_change[x, a, 1, j] = other_v
+                by_free, sight = room.by_change[x, a], table.sight[a, acting[x]]
+                by_free[0, i], by_free[1, i], by_free[0, j], by_free[1, j] = see_two(sight, state.dq, state.dp, i, j)
     for a in range(s):
-        move_on(table.free[a], q, p, room.out)
-        for x in range(n_acting):
-            c, row = room.acting[x], x * s + a
-            d, v = seen(blow.shape[c], room.out[0], room.out[1])
-            d += table.lean[0, c, a]
-            v += table.lean[1, c, a]
-            for y in range(n_acting):
-                e = room.acting[y]
-                for b in range(s):
-                    d -= force[e, b] * table.inner[0, c, e, a, b]
-                    v -= force[e, b] * table.inner[1, c, e, a, b]
-            _, by_d, by_v, by_m = law_slopes(blow.offset[c] + d, v, blow.law, c, memory[c], yields[c], slopes)
-            for y in range(n_acting):
-                e = room.acting[y]
-                for b in range(s):
-                    matrix[row, y * s + b] = by_d * table.inner[0, c, e, a, b] + by_v * table.inner[1, c, e, a, b]
-            matrix[row, row] += 1.0
-            for i in range(n):
-                dd, dv = see_grown(grown, i, c, room.out)
-                dd += by_change[x, a, 0, i] + table.leaned[i, 0, c, a] + change.offset[i, c]
-                dv += by_change[x, a, 1, i] + table.leaned[i, 1, c, a]
-                for y in range(n_acting):
-                    e = room.acting[y]
-                    for b in range(s):
-                        dd -= force[e, b] * table.pushed[i, 0, c, e, a, b]
-                        dv -= force[e, b] * table.pushed[i, 1, c, e, a, b]
-                room.right[row, i] = by_d * dd + by_v * dv + by_m * room.deeper[c, i]
-                for k in range(N_LAW):
-                    room.right[row, i] += slopes[k] * change.law[i, c, k]
-    solve_many(matrix, room.right, n_acting * s)
-    for x in range(n_acting):
+        move_on(table.free[a], state.q, state.p, room.out)
+        for x in range(acting.size):
+            force_row(blow, change, grown, table, pressed, a, x, room)
+    solve_many(room.matrix, room.right, acting.size * s)
+    for x in range(acting.size):
         for a in range(s):
             for i in range(n):
-                out_force[room.acting[x], a, i] = room.right[x * s + a, i]
+                out_force[acting[x], a, i] = room.right[x * s + a, i]
 
 
 @inner()
-def march(grown, table, n_acting, leans, df, room, dq, dp, out_dq, out_dp):
-    """Changes of the state at the end of a piece."""
+def force_row(blow, change, grown, table, pressed, a, x, room):
+    """Row of the system of `solve_forces` for node a of the acting contact x; ``room.out`` is that of `move_on`."""
+    acting, force, s = pressed.acting, pressed.force, pressed.force.shape[1]
+    c, row = acting[x], x * s + a
+    d, v = seen(blow.shape[c], room.out[0], room.out[1])
+    d += table.lean[0, c, a]
+    v += table.lean[1, c, a]
+    for e in acting:
+        d -= product(force[e], table.inner[0, c, e, a])
+        v -= product(force[e], table.inner[1, c, e, a])
+    memory, yields = pressed.memory[c], pressed.yields[c]
+    _, by_d, by_v, by_m = law_slopes(blow.offset[c] + d, v, blow.law, c, memory, yields, room.slopes)
+    for y in range(acting.size):
+        e = acting[y]
+        for b in range(s):
+            room.matrix[row, y * s + b] = by_d * table.inner[0, c, e, a, b] + by_v * table.inner[1, c, e, a, b]
+    room.matrix[row, row] += 1.0
+    for i in range(change.omega.shape[0]):
+        dd, dv = see_grown(grown, i, c, room.out)
+        dd += room.by_change[x, a, 0, i] + table.leaned[i, 0, c, a] + change.offset[i, c]
+        dv += room.by_change[x, a, 1, i] + table.leaned[i, 1, c, a]
+        for e in acting:
+            dd -= product(force[e], table.pushed[i, 0, c, e, a])
+            dv -= product(force[e], table.pushed[i, 1, c, e, a])
+        by_law = product(room.slopes, change.law[i, c])
+        room.right[row, i] = by_d * dd + by_v * dv + by_m * pressed.deeper[c, i] + by_law
+
+
+@inner()
+def march(grown, table, acting, leans, df, room, state, out):
+    """Changes of the state at the end of a piece, in another state."""
     s = df.shape[1]
     free, column = table.free[s], room.column
-    for i in range(dq.shape[0]):
-        for x in range(n_acting):
-            c = room.acting[x]
+    for i in range(state.dq.shape[0]):
+        dq, dp, out_dq, out_dp = state.dq[i], state.dp[i], out.dq[i], out.dp[i]
+        for x in range(acting.size):
+            c = acting[x]
             for b in range(s):
                 column[b] = df[c, b, i]
             if x == 0:
-                lead(free[0], free[1], table.thrust[c, 0], column, dq[i], dp[i], out_dq[i])
-                lead(free[2], free[3], table.thrust[c, 1], column, dq[i], dp[i], out_dp[i])
+                lead(free[0], free[1], table.thrust[c, 0], column, dq, dp, out_dq)
+                lead(free[2], free[3], table.thrust[c, 1], column, dq, dp, out_dp)
                 continue
             for b in range(s):
-                push(table.thrust[c, 0, b], column[b], out_dq[i])
-                push(table.thrust[c, 1, b], column[b], out_dp[i])
-        if n_acting == 0:
-            glide(free[0], free[1], dq[i], dp[i], out_dq[i])
-            glide(free[2], free[3], dq[i], dp[i], out_dp[i])
+                push(table.thrust[c, 0, b], column[b], out_dq)
+                push(table.thrust[c, 1, b], column[b], out_dp)
+        if acting.size == 0:
+            glide(free[0], free[1], dq, dp, out_dq)
+            glide(free[2], free[3], dq, dp, out_dp)
         for r in range(SHAPES if leans else BIAS):
-            grow(grown, i, r, room.out, out_dq[i], out_dp[i])
-        for x in range(n_acting):
-            grow(grown, i, SHAPES + room.acting[x], room.out, out_dq[i], out_dp[i])
+            grow(grown, i, r, room.out, out_dq, out_dp)
+        for c in acting:
+            grow(grown, i, SHAPES + c, room.out, out_dq, out_dp)
 
 
 @inner()
@@ -881,15 +900,15 @@ def grow(grown, i, r, out, out_dq, out_dp):
 
 
 @inner()
-def deepen(blow, change, c, q, p, dq, room):
-    """Change of the compression of a plastic contact that yields, which it may remember."""
-    d, v = seen(blow.shape[c], q, p)
+def deepen(blow, change, c, state, room, out_deeper):
+    """Change (n,) of the compression of a plastic contact that yields, which it may remember."""
+    d, v = seen(blow.shape[c], state.q, state.p)
     force, by_d, _, _ = law_slopes(blow.offset[c] + d, v, blow.law, c, 0.0, True, room.slopes)
     soft = blow.law[c, COMPLIANCE]
-    for i in range(dq.shape[0]):
-        dd = change.offset[i, c] + product(blow.shape[c], dq[i]) + product(change.shape[i, c], q)
+    for i in range(out_deeper.size):
+        dd = change.offset[i, c] + product(blow.shape[c], state.dq[i]) + product(change.shape[i, c], state.q)
         df = by_d * dd + product(room.slopes, change.law[i, c])
-        room.deeper[c, i] = dd - soft * df - force * change.law[i, c, COMPLIANCE]
+        out_deeper[i] = dd - soft * df - force * change.law[i, c, COMPLIANCE]
 
 
 @outer()
@@ -901,12 +920,11 @@ def follow(blow, change, pieces, found):
         np.empty((n, 2 + m, m, n_modes)),
         np.zeros((n, SHAPES + m, 2), np.int64),
     )
-    dq, next_dq = np.empty((n, n_modes)), np.empty((n, n_modes))
-    dp, next_dp = np.empty((n, n_modes)), np.empty((n, n_modes))
-    enter(blow.shape, change, grown, dq, dp)
+    q, p = blow.start_q.copy(), blow.start_p.copy()  # those of both states
+    state = State(q, p, np.empty((n, n_modes)), np.empty((n, n_modes)))
+    after = State(q, p, np.empty((n, n_modes)), np.empty((n, n_modes)))
+    enter(blow.shape, change, grown, state.dq, state.dp)
     leans = any_of(blow.bias) or any_of(grown.spans[:, BIAS, 1])
-    q = blow.start_q.copy()
-    p = blow.start_p.copy()
     known = np.zeros(SLOTS)
     last = np.zeros(SLOTS, np.int64)
     free = np.empty((SLOTS, s + 1, 12, n_modes))
@@ -917,14 +935,13 @@ def follow(blow, change, pieces, found):
     lean = np.zeros((SLOTS, 2, m, s))
     pushed = np.empty((SLOTS, n, 2, m, m, s, s))
     leaned = np.zeros((SLOTS, n, 2, m, s))
+    acting, no_force, deeper = np.zeros(m, np.int64), np.zeros((m, s)), np.zeros((m, n))
     room = Room(
         np.zeros((2 + 2 * (SHAPES + m), n_modes)),
         np.empty(n_modes),
-        np.zeros(m, np.int64),
         np.empty((m * s, m * s)),
         np.empty((m * s, n)),
         np.empty(N_LAW),
-        np.zeros((m, n)),
         np.empty((m, s, 2, n)),
         np.zeros(s),
     )
@@ -933,21 +950,21 @@ def follow(blow, change, pieces, found):
             d, v = seen(blow.shape[c], q, p)
             found.way[j, c, 0] = blow.offset[c] + d
             found.way[j, c, 1] = v
+        end = j == pieces.length.size
+        n_acting = 0
+        for c in range(0 if end else m):
+            if pieces.closed[j, c]:
+                acting[n_acting] = c
+                n_acting += 1
+        force = no_force if end else pieces.force[j]
+        pressed = Pressed(acting[:n_acting], force, pieces.memory[j], pieces.yields[j], deeper)
         mark = pieces.mark[j]
         if mark >= 0:
-            memory, yields = pieces.memory[j], pieces.yields[j]
-            now, then, low = found.base[mark], found.ends[mark], found.dents[mark]
-            look(blow, change, memory, yields, room.deeper, q, p, dq, dp, now, then, low)
+            look(blow, change, pressed, state, found.base[mark], found.ends[mark], found.dents[mark])
             restore(q, p, found.q[mark], found.p[mark])
-        if j == pieces.length.size:
+        if end:
             break
-        h, force = pieces.length[j], pieces.force[j]
-        n_acting = 0
-        for c in range(m):
-            if pieces.closed[j, c]:
-                room.acting[n_acting] = c
-                n_acting += 1
-        closed = n_acting > 0
+        h, closed = pieces.length[j], n_acting > 0
         key = h if closed else -h
         slot = 0
         for k in range(SLOTS):
@@ -971,20 +988,16 @@ def follow(blow, change, pieces, found):
             known[slot] = key
         last[slot] = j + 1
         if closed:
-            memory, yields = pieces.memory[j], pieces.yields[j]
-            solve_forces(
-                blow, change, grown, table, n_acting, memory, yields, force, q, p, dq, dp, room, found.force[j]
-            )
+            solve_forces(blow, change, grown, table, pressed, state, room, found.force[j])
         if closed or leans:
-            carry(blow, table.free[s], table.forced, force, n_acting, leans, q, p, room)
+            carry(blow, table, pressed, leans, state, room)
         else:
             move_on(table.free[s], q, p, room.out)
-        march(grown, table, n_acting, leans, found.force[j], room, dq, dp, next_dq, next_dp)
-        dq, next_dq = next_dq, dq
-        dp, next_dp = next_dp, dp
+        march(grown, table, pressed.acting, leans, found.force[j], room, state, after)
+        state, after = after, state
         restore(room.out[0], room.out[1], q, p)
         for c in range(m):
             if pieces.yields[j, c]:
-                deepen(blow, change, c, q, p, dq, room)
+                deepen(blow, change, c, state, room, deeper[c])
     for i in range(n):
-        restore(dq[i], dp[i], found.dq[i], found.dp[i])
+        restore(state.dq[i], state.dp[i], found.dq[i], found.dp[i])

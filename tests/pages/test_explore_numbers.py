@@ -8,22 +8,22 @@ import pytest
 from test_cli import TEXT
 
 import fem_impact as fi
-from fem_impact.pages import explore_desk, explore_model
+from fem_impact.pages import explore_model, explore_numbers
 
 
 @pytest.fixture(scope="module")
-def desk(tmp_path_factory):
-    path = tmp_path_factory.mktemp("desk") / "small.toml"
+def explorer(tmp_path_factory):
+    path = tmp_path_factory.mktemp("explorer") / "small.toml"
     path.write_text(TEXT)
-    return explore_desk.Desk(explore_model.Bench.of(fi.load_scene(path)))
+    return explore_numbers.Explorer(explore_model.Setup.of(fi.load_scene(path)))
 
 
 def unpacked(text):
     return np.frombuffer(base64.b64decode(text), "<f4")
 
 
-def test_judged_blow_is_sent_whole(desk):
-    told, hit = desk.judge(desk.bench.start), explore_model.blow(desk.bench.case(desk.bench.start))
+def test_judged_blow_is_sent_whole(explorer):
+    told, hit = explorer.judge(explorer.setup.start), explore_model.blow(explorer.setup.case(explorer.setup.start))
     cells = dict(told["cells"])
     assert cells["impacts"] == str(hit.n_impacts) and cells["restitution"] == f"{hit.restitution:.3f}"
     assert told["verdict"] == hit.verdict and told["model"] == hit.model_verdict and not told["missed"]
@@ -33,27 +33,27 @@ def test_judged_blow_is_sent_whole(desk):
     assert unpacked(told["spectrum"]).max() == pytest.approx(told["top"], rel=1e-6)
 
 
-def test_answer_says_that_it_is_not_the_last_word(desk):
-    told, hit = desk.answer(desk.bench.start)
+def test_answer_says_that_it_is_not_the_last_word(explorer):
+    told, hit = explorer.answer(explorer.setup.start)
     assert dict(told["cells"])["estimated error"] == "refining …" and "verdict" not in told
-    rest = desk.rest_of(desk.bench.start, hit)
+    rest = explorer.rest_of(explorer.setup.start, hit)
     scene = tomllib.loads(base64.b64decode(rest["scene"].partition(",")[2]).decode())
-    assert scene["strike"]["at"] == list(desk.bench.start.at)
-    assert rest["limit"] == pytest.approx(explore_model.limit_of(desk.case(desk.bench.start)))
+    assert scene["strike"]["at"] == list(explorer.setup.start.at)
+    assert rest["limit"] == pytest.approx(explore_model.limit_of(explorer.case(explorer.setup.start)))
     assert "× threshold" in rest["resonates"]
 
 
-def test_only_the_latest_strike_points_are_remembered(desk):
-    for i in range(explore_desk.KNOWN + 3):
-        desk.learn((0.1, 0.01 * i), explore_desk.View(1e-6 * i, None))
-    assert len(desk.views) == explore_desk.KNOWN and (0.1, 0.0) not in desk.views
-    assert desk.rest == 1e-6 * (explore_desk.KNOWN + 2)
+def test_only_the_latest_strike_points_are_remembered(explorer):
+    for i in range(explore_numbers.KNOWN + 3):
+        explorer.learn((0.1, 0.01 * i), explore_numbers.View(1e-6 * i, None))
+    assert len(explorer.views) == explore_numbers.KNOWN and (0.1, 0.0) not in explorer.views
+    assert explorer.rest == 1e-6 * (explore_numbers.KNOWN + 2)
 
 
 @pytest.mark.slow
-def test_blows_and_rolls_are_heard_on_the_surface_and_above_it(desk):
-    start, where = desk.bench.start, desk.bench.start.at
-    on, above, roll = (desk.listen(start, where, h, rate) for h, rate in ((0.0, None), (1.5, None), (0.0, 12.0)))
+def test_blows_and_rolls_are_heard_on_the_surface_and_above_it(explorer):
+    start, where = explorer.setup.start, explorer.setup.start.at
+    on, above, roll = (explorer.listen(start, where, h, rate) for h, rate in ((0.0, None), (1.5, None), (0.0, 12.0)))
     assert "the surface at" in on["note"] and " above (" in above["note"] and "Pa; peak" in above["note"]
     assert len({on["uri"], above["uri"], roll["uri"]}) == 3
     assert all(each["uri"].startswith("data:audio/wav;base64,") for each in (on, above, roll))

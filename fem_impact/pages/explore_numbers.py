@@ -20,7 +20,7 @@ from ..show.figures import SPECTRUM_DEPTH
 from ..sweeps.grid import Case
 from . import report
 from .explore_map import Mapper, Picture, Window
-from .explore_model import MAP_TOLERANCE, Bench, Settings, blow, limit_of, quick
+from .explore_model import MAP_TOLERANCE, Settings, Setup, blow, limit_of, quick
 
 BAND = (20.0, 20e3)  # [Hz] of the spectrum: the audible range
 SPECTRUM_POINTS = 240  # [-] more points take time but show no more
@@ -39,16 +39,16 @@ class View:
     seen: Modes | None  # Ritz vectors, where these tell the blows
 
 
-class Desk:
-    """A bench, what is known of its strike points, and everything the page shows of its blows."""
+class Explorer:
+    """A setup, what is known of its strike points, and everything the page shows of its blows."""
 
-    def __init__(self, bench: Bench) -> None:
-        self.bench, self.mapper = bench, Mapper(bench)
+    def __init__(self, setup: Setup) -> None:
+        self.setup, self.mapper = setup, Mapper(setup)
         self.views: dict[Point, View] = {}
-        self.rest = bench.residual(bench.start.at)  # [m/N] of the last point known, good enough for a first answer
+        self.rest = setup.residual(setup.start.at)  # [m/N] of the last point known, good enough for a first answer
         self.limit: tuple[Any, float] = None, 0.0  # [Hz] the last threshold, and what it is of
-        if not bench.told:
-            self.learn(bench.start.at, View(self.rest, None))
+        if not setup.told:
+            self.learn(setup.start.at, View(self.rest, None))
 
     def learn(self, at: Point, view: View) -> None:
         """Remember a strike point; the oldest is forgotten."""
@@ -60,13 +60,13 @@ class Desk:
     def look(self, at: Point) -> View:
         """Find out what blows at a point see: seconds, if these are Ritz vectors."""
         if at not in self.views:
-            self.learn(at, View(self.bench.residual(at), self.bench.seen(at)))
+            self.learn(at, View(self.setup.residual(at), self.setup.seen(at)))
         return self.views[at]
 
     def case(self, settings: Settings) -> Case:
         """The blow, on the body as far as it is known."""
         view = self.views.get(settings.at)
-        return self.bench.case(settings, view.rest if view else self.rest, view.seen if view else None)
+        return self.setup.case(settings, view.rest if view else self.rest, view.seen if view else None)
 
     def answer(self, settings: Settings) -> tuple[Message, Response | None]:
         """The blow in coarse steps: some 10 ms."""
@@ -93,7 +93,7 @@ class Desk:
     def judge(self, settings: Settings) -> Message:
         """The blow to the tolerance, and what the model itself errs by."""
         view = self.look(settings.at)
-        case = self.bench.case(settings, seen=view.seen)
+        case = self.setup.case(settings, seen=view.seen)
         try:
             hit = blow(case)
         except SimulationError as error:
@@ -127,7 +127,7 @@ class Desk:
 
     def listen(self, settings: Settings, where: Point, height: float, rate: float | None) -> Message:
         """The blow, or ``rate`` [1/s] of them, as heard on the surface or ``height`` [m] above it."""
-        case = self.bench.case(settings)
+        case = self.setup.case(settings)
         try:
             rung = blow(case) if rate is None else rolled(case, rate)
             if height > 0.0:
@@ -142,7 +142,7 @@ class Desk:
 
     def said(self, settings: Settings, height: float, rate: float) -> dict[str, str]:
         """What each slider stands at, in words."""
-        law = self.bench.law(settings)
+        law = self.setup.law(settings)
         raised = "" if settings.exponent == 1.0 else f"{settings.exponent:.3g}".translate(RAISED)
         said = {
             "mass": si(settings.mass, "kg", 3),
@@ -159,7 +159,7 @@ class Desk:
         return said | {letter: si(value, "m", 3) for letter, value in zip("xy", settings.at)}
 
     def _scene(self, settings: Settings) -> str:
-        text = base64.b64encode(written(self.bench.saved(settings)).encode()).decode("ascii")
+        text = base64.b64encode(written(self.setup.saved(settings)).encode()).decode("ascii")
         return f"data:application/toml;base64,{text}"
 
 
