@@ -33,12 +33,10 @@ EDGE_TERM = {"clamped": 1.76, "hinged": 1.0, "soft hinged": 1.0, "free": -1.71}
 # [-] frequency error of Morley elements over (kh)**2: 0.09 to 0.16 on hinged, 0.12 to 0.33 on clamped rectangles
 MORLEY_ERROR = 0.2
 CLAIMED = 2.0  # [-] factor on error estimates, which are 0.3 to 4 times the true error; test_residual.py
-# [-] factor on the rounding error of K, estimated as a random walk: three standard deviations of one; half and twice
-# pass the tests
+# [-] factor on the rounding error of K, estimated as a random walk: three standard deviations of one
 ROUNDED = 3.0
 MORLEY = 0.2574578  # [-] error constant of Morley interpolation, over h**2 (Carstensen and Gallistl 2014)
-# [-] unknowns of the Morley solution for the lower bounds; cheap beside the modes themselves; ten times more or less
-# passes the tests
+# [-] unknowns of the Morley solution for the lower bounds; cheap beside the modes themselves
 MORLEY_UNKNOWNS = 20_000
 # [rad] as WAVE_PER_ELEMENT, if CHEAP_CELLS triangles suffice: error 2e-7, clamped 1e-5
 FINE_WAVE = 1.1
@@ -46,8 +44,7 @@ FINE_WAVE = 1.1
 CHEAP_CELLS = 700
 # [-] largest element under tension, in edge layers sqrt(D / tension): error of 3e-4 at most on a clamped disk
 LAYERS = 10.0
-# [-] but elements are not made smaller than the extent over this: some 4 000 triangles on a square at most; half and
-# twice pass the tests
+# [-] but elements are not made smaller than the extent over this: some 4 000 triangles on a square at most
 FINEST_LAYER = 40.0
 LOOSEST = 0.1  # [-] largest tolerance of frequencies
 MOST_UNKNOWNS = 150_000  # [-] refinement gives up beyond this size
@@ -55,19 +52,17 @@ MOST_UNKNOWNS = 150_000  # [-] refinement gives up beyond this size
 DOFS_PER_AREA = {
     "argyris": 10.4, "hermite": DEGREE - 1, "argyris and shear": 47.0, "hermite and shear": 2 * DEGREE - 1,
 }  # fmt: skip
-# [-] fraction of the tolerance that meshes after the first aim at: less makes them finer than needed, more often takes
-# another; half and twice pass the tests
+# [-] fraction of the tolerance that meshes after the first aim at: less makes them finer than needed, more often
+# takes another
 MARGIN = 0.6
 # [-] powers of the size with which the parts of the error fall: 8 of smooth shapes less a reserve, at curved rims, at
 # steps of the thickness
 ORDERS = 7.5, 5.0, 1.0
 # [-] smallest ratio of element sizes between two meshes: a tenth more triangles; with less the mesh may not change
 LEAST_STEP = 1.05
-# [-] meshes tried to meet a tolerance, each finer: where eight do not suffice, rounding or corners hold the error; half
-# and twice pass the tests
+# [-] meshes tried to meet a tolerance, each finer: where eight do not suffice, rounding or corners hold the error
 MOST_MESHES = 8
-# [-] corners are added to the estimate above this: rings leave 1e-7, or 6e-4 in a free corner of an L, 2e-3 at a slit;
-# ten times more or less passes the tests
+# [-] corners are added to the estimate above this: rings leave 1e-7, or 6e-4 in a free corner of an L, 2e-3 at a slit
 SAY = 1e-3
 
 

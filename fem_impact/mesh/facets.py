@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.special import comb
 
-# [-] iterations to find a point of a curved facet; each gains a digit or two; half and twice pass the tests
+# [-] iterations to find a point of a curved facet; each gains a digit or two
 CURVE_STEPS = 12
 
 

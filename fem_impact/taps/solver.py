@@ -18,32 +18,31 @@ from .unknowns import TIME, Setting, Unknown
 # [-] momentum over impulse of a blow that returns with two thirds of its speed, fact: 1 / (1 + 2 / 3): usual taps
 HALF_LOST = 0.6
 STEP = 1e-4  # [-] of coordinates, for derivatives by differences: blows with a fixed step are smooth to 1e-6
-# [-] the contact time is sought within this factor of the measured one: half and twice of it pass the tests
+# [-] the contact time is sought within this factor of the measured one
 TIMES = 30.0
 SCREENED = 64  # [-] starting points that are looked at: four along each of three unknowns
-# [-] of the ranges: starting points nearer than this often lead to the same minimum; half and twice pass the tests
+# [-] of the ranges: starting points nearer than this often lead to the same minimum
 NEIGHBOURS = 0.25
-# [-] frequency times contact time of modes that shape a pulse, where searches begin: half and twice pass the tests
+# [-] frequency times contact time of modes that shape a pulse, where searches begin
 FELT = 0.1, 5.0
 LOOKS = 3  # [-] Gauss-Newton steps in speed and onset while looking: nearly linear in both, so that three find them
-ENOUGH = 60  # [-] iterations of one search: ten times more or fewer pass the tests
-# [-] relative change of the sum of squares or of the values that ends a search; ten times more or less passes the tests
+ENOUGH = 60  # [-] iterations of one search
+# [-] relative change of the sum of squares or of the values that ends a search
 CLOSE = 1e-8
-# [-] iterations of a search that begins close to its end, or only shows whether to go on, and steps with derivatives of
-# a point nearby; half and twice pass the tests
+# [-] iterations of a search that begins close to its end, or only shows whether to go on, and steps with derivatives
+# of a point nearby
 QUICK = 12
-# [-] change that ends a search of which only the sum of squares counts: it errs by the square; ten times more or less
-# passes the tests
+# [-] change that ends a search of which only the sum of squares counts: it errs by the square
 NEARLY = 1e-6
-# [-] of the promised gain, with which a step by such derivatives is good enough; half and twice pass the tests
+# [-] of the promised gain, with which a step by such derivatives is good enough
 KEPT = 0.3
-# [-] of the noise variance: a gain that is not sought, as luck makes as much; half and twice pass the tests
+# [-] of the noise variance: a gain that is not sought, as luck makes as much
 SMALL = 0.05
-# [-] of the largest singular value of scaled derivatives: flatter directions may be ridges; ten times passes the tests
+# [-] of the largest singular value of scaled derivatives: flatter directions may be ridges
 FLAT = 3e-5
 # [-] logarithms of speeds in m/s and of momenta over measured impulses are sought this far from zero: all there are
 REACH = 25.0
-# [samples] the onset is sought this far from the trigger, which is set at 5 % of the peak; ten times passes the tests
+# [samples] the onset is sought this far from the trigger, which is set at 5 % of the peak
 LATEST = 60.0
 # [samples] the onset may move by at a single look: pulses are linear in it so far
 SHIFT = 3.0

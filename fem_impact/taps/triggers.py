@@ -27,7 +27,7 @@ CLIPPED = 3  # [-] equal largest samples in a row that count as clipped: two may
 BEFORE = 0.02  # [s] longest record before a tap: 20 ms tell the offset, more may reach back to the last tap's ringing
 LONGEST = 10.0  # [s] longest record of one tap: lines 0.1 Hz apart
 FEWEST = 8  # [-] samples before a tap from which an offset is estimated: to a third of the noise, fewer make it worse
-# [samples] before the onset that do not count as rest, as pulses start flat; half and twice of it pass the tests
+# [samples] before the onset that do not count as rest, as pulses start flat
 GUARD = 3
 MOST_TAPS = 10_000  # [-] of one file: more are noise
 ENDS = 0.3  # [-] of a pulse's peak: a record that begins or ends above this cuts the pulse; less is left by filters

@@ -10,7 +10,7 @@ from .records import Taps
 from .solver import Data
 
 SLIGHT = 0.002  # [-] of the largest force: a smaller offset is left, as it hardly moves a fit
-BEFORE = 12  # [samples] before the tap that are compared: the filter rings there; half and twice of it pass the tests
+BEFORE = 12  # [samples] before the tap that are compared: the filter rings there
 # [-] of the length from the first to the last pulse: what is compared after it, where the body's answer is still heard
 AFTER = 1.5
 
