@@ -44,8 +44,8 @@ AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on 
 # [-] fraction of the usual steps that averages over the blow need: errors of single instants cancel in them
 AVERAGED = 0.5
 # [-] step halvings to decide whether bodies touch or part if they do so by less than the tolerance times the deepest
-# approach: each divides the doubt by eight
-GRAZES = 3
+# approach: each divides the doubt by eight, to 4e-8 of it at the tolerance 1e-2
+GRAZES = 6
 FEW = 20  # [-] no such check after more impacts: chatter always ends with a contact that barely touches
 DOUBLINGS = 7  # [-] step halvings before the run gives up: A4 then errs 2**28 times less
 # [-] Difference of two runs over the error of the finer one: first for speeds and impulse, then for contact time and
@@ -919,7 +919,8 @@ def _grazes(history: History, least: float) -> bool:
     """
     if not 0 < len(history.contacts) <= FEW or history.bias.any():
         return False
-    return record.nearest_turn(history.steps, history.now, history.law, history.n_coefficients) < least
+    turn = record.nearest_turn(history.steps, history.now, history.law, history.n_coefficients, history.miss)
+    return turn < least
 
 
 def _force_missed(history: History) -> float:

@@ -761,6 +761,17 @@ def test_a_touch_that_barely_happens_is_decided_by_finer_steps(seed, mass):
     assert_allclose(hit.contact_time, truth.contact_time, rtol=1e-2)  # the tolerance
 
 
+@pytest.mark.parametrize(
+    ("seed", "mass"),
+    [(1, 0.0716013), (1, 0.0715942250), (8, 0.0478841312), (27, 0.139124020), (34, 0.0220161), (6, 0.135559001)],
+)
+def test_a_touch_barely_missed_in_flight_is_decided_by_finer_steps(seed, mass):
+    """Rough steps make the bodies turn back just before they touch once more, and nothing of it is in the force."""
+    hit, truth = (grazing_blow(seed, mass)(tolerance=tolerance) for tolerance in (1e-2, 1e-8))
+    assert hit.n_impacts == truth.n_impacts
+    assert_allclose(hit.contact_time, truth.contact_time, rtol=1e-2)  # the tolerance
+
+
 def test_the_tolerance_advised_is_met_and_hardly_looser_than_what_was_reached():
     blow = grazing_blow(2, 0.0933117233)
     with pytest.raises(fi.SimulationError, match="the step error stays at") as caught:

@@ -52,5 +52,5 @@ def test_piped_keys_are_played_in_time_without_a_device(scene, tmp_path, monkeyp
 def test_a_midi_file_that_is_not_there_is_told_in_one_line(scene, tmp_path, capsys, monkeypatch):
     pytest.importorskip("mido", reason="the extra play is missing")
     words = ["play", scene, "--modes", "20", "--midi", str(tmp_path / "no.mid")]
-    assert cli.main([*words, "--out", str(tmp_path / "a" / "x.wav")]) == 1
+    assert cli.main([*words, "--out", str(tmp_path / "a" / "x.wav")]) == 2
     assert capsys.readouterr().err.count("no.mid") == 1 and not (tmp_path / "a").exists()

@@ -12,6 +12,7 @@ import numpy as np
 from . import arrays
 from .build import LOOSE, inner
 from .bundles import Flights
+from .events import lowest
 from .layout import FASTEST, HARDEST, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE
 from .propagation import N_LANE, any_of, glide, lane_table, restore
 from .rounding import REPEATED
@@ -88,12 +89,12 @@ def made_flights(n_modes: int, base: float, shortest: float) -> Flights:
 
 
 @inner(allocates=True)
-def find_onset(bodies, offset, flights, limits, limit):
+def find_onset(bodies, offset, flights, limits, limit, out_miss):
     """Advance a state without contact in place to the next onset, never passing one (conservative advancement).
 
     Each look ahead is no longer than bounds on the later motion allow. Long looks take the steps of ``flights``, which
     are kept from flight to flight; the last ones before an onset are exact. A state from which nothing touches again is
-    left as it was.
+    left as it was. ``out_miss`` (1,) is raised to where an approach turns back.
 
     Returns (elapsed, contact, status): ONSET at `contact`; NEVER any contact again (proved); LATER than the limit;
     SLOW, looks shorter than `shortest`: hand over to a stepping scheme; UNPROVED within LOOK_LIMIT.
@@ -104,9 +105,12 @@ def find_onset(bodies, offset, flights, limits, limit):
     slow = 0
     pushed = any_of(bias)
     bounds = np.empty((m, 6))
+    before = np.empty((m, 2))
+    wait = 0.0
     old_q = q.copy()
     old_p = p.copy()
     for look in range(LOOK_LIMIT // (q.size + 50)):
+        last = wait
         wait = np.inf
         first = -1
         final = True
@@ -120,10 +124,19 @@ def find_onset(bodies, offset, flights, limits, limit):
             r2 = bounds[i, RIGID_ACCELERATION]
             reach = bounds[i, REACH]
             hardest = bounds[i, HARDEST]
-            if r1 <= limits.still and r2 <= 0.0 and r0 + reach <= limits.depth:
+            parted = r1 <= limits.still and r2 <= 0.0 and r0 + reach <= limits.depth
+            if parted and (look == 0 or before[i, 1] <= 0.0):
+                continue
+            d, v = approach(shape, offset, i, q, p)
+            if look > 0 and v < 0.0 < before[i, 1]:
+                out_miss[0] = max(out_miss[0], -lowest(-before[i, 0], -before[i, 1], -d, -v, last))
+            before[i, 0] = d
+            before[i, 1] = v
+            if parted:
+                if v > 0.0:  # it turns back later, at most from there
+                    out_miss[0] = max(out_miss[0], r0 + reach)
                 continue
             final = False
-            d, v = approach(shape, offset, i, q, p)
             scale = abs(r0) + reach + abs(offset[i])
             d = min(d, 0.0)
             driven = hardest > 0.0 or r2 > 0.0

@@ -23,8 +23,8 @@ from .events import (  # isort: skip
 )  # fmt: skip
 from .layout import (  # isort: skip
     APPROACH, BEGUN, BLINDS, CLOCKS, CONTACT_ROWS, CORNERED, COUNTERS, EVENTS, FAINT, FALLBACKS, FLYING, FRESH, HEAD,
-    KIND, LENGTH, LEVEL, LOOKS, MEMORY, RATE, READY, RELEASED, REMEMBERED, RESET, RESPITE, SEEKS, SIZE, SPEED, START,
-    STEPS, TARGET, TIME, TRIES, WHICH, WIDTH,
+    KIND, LENGTH, LEVEL, LOOKS, MEMORY, MISS, RATE, READY, RELEASED, REMEMBERED, RESET, RESPITE, SEEKS, SIZE, SPEED,
+    START, STEPS, TARGET, TIME, TRIES, WHICH, WIDTH,
 )  # fmt: skip
 
 LEVELS = 40  # [-] halvings of the step that may be cached, and where the table of a step of any other length is kept
@@ -49,7 +49,8 @@ def followed(follow: Callable[..., int], arguments: tuple[Any, ...], run: Run, w
         steps = np.concatenate([steps, np.empty((3 * len(steps), width))])
     now, done, time, count = run.contacts[:6], run.contacts[-1], float(run.clock[TIME]), run.counts
     steps = steps[: count[STEPS]].copy()
-    return steps, run.q, run.p, now, done, time, status, int(count[FALLBACKS]), int(count[BLINDS])
+    miss = float(run.clock[MISS])
+    return steps, run.q, run.p, now, done, time, status, int(count[FALLBACKS]), int(count[BLINDS]), miss
 
 
 @inner(part=True)
@@ -86,6 +87,7 @@ def begin(scene, bodies, contacts, course, base):
         now[APPROACH, i], now[RATE, i] = approach(bodies.shape, contacts.offset, i, bodies.q, bodies.p)
         contacts.pressed[i] = now[APPROACH, i] > 0.0 or (now[APPROACH, i] == 0.0 and now[RATE, i] > 0.0)
     course.clock[RESPITE] = base
+    course.clock[MISS] = -np.inf
     course.clock[FAINT] = 1e-24 * total_energy(bodies, contacts)
     course.counts[READY] = -1
     course.counts[FLYING] = -1
@@ -135,7 +137,8 @@ def remembered(contacts):
 def fly(bodies, contacts, course, flights, limits, row):
     """A flight, written to a row of the steps; how it ended, see `find_onset`."""
     now, count, time = contacts.now, course.counts, course.clock[TIME]
-    elapsed, first, found = find_onset(bodies, contacts.offset, flights, limits, limits.horizon - time)
+    miss, left = course.clock[MISS : MISS + 1], limits.horizon - time
+    elapsed, first, found = find_onset(bodies, contacts.offset, flights, limits, left, miss)
     count[READY] = -1
     if found == NEVER:
         return found

@@ -33,8 +33,9 @@ LOW, HIGH, SIZE, TRIED, MISSED, SLOPE = range(6)
 RIGID, RIGID_RATE, RIGID_ACCELERATION, REACH, FASTEST, HARDEST = range(6)
 
 # of a run (`bundles.Course`): times [s] now, until when events are passed, how long the next such time will be, since
-# when events are counted, and when the present flight began; energy [J] at which the bodies are at rest
-TIME, PAUSE, RESPITE, RESET, TAKEOFF, FAINT, CLOCKS = range(7)
+# when events are counted, and when the present flight began; energy [J] at which the bodies are at rest; approach [m]
+# at which bodies that nearly touched in flight turned back, the nearest of all
+TIME, PAUSE, RESPITE, RESET, TAKEOFF, FAINT, MISS, CLOCKS = range(8)
 
 # and counters: steps, of them in contact, fallen back to scheme A, and blind; releases; events since RESET; halvings of
 # the step, and those that it needs; level whose table has predicted the next step, or -1; whether what the contacts

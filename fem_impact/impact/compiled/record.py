@@ -146,9 +146,12 @@ def pushing(steps, now, law, n_coefficients, row, i):
 
 
 @outer()
-def nearest_turn(steps, now, law, n_coefficients):
-    """How near to zero an approach turns back, over the farthest it ever turns; infinity where none does."""
-    nearest = np.inf
+def nearest_turn(steps, now, law, n_coefficients, miss):
+    """How near to zero an approach turns back, over the farthest it ever turns; infinity where none does.
+
+    ``miss`` is the approach where it did so in flight, -infinity if it did not.
+    """
+    nearest = -miss
     farthest = 0.0
     for i in range(now.shape[1]):
         for row in range(steps.shape[0]):
