@@ -334,7 +334,7 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         finer = reassemble(system, mesh.refined(step), layer=found.system.layer / step)
         found = solve(finer, n_modes, max_frequency)
     mode = int(found.error.argmax())
-    least = float(f"{1.1 * found.error[mode]:.1e}")
+    least = float(f"{2.0 * found.error[mode]:.1e}")  # where corners hold the error, it differs from mesh to mesh
     advice = f"a tolerance of {least:g} is met" if least <= LOOSEST else "no tolerance is: check the units"
     raise check.SimulationError(
         f"tolerance = {tolerance:g} is not met: mode {mode + 1} is uncertain by {found.error[mode]:.1e} with "

@@ -919,8 +919,8 @@ def _grazes(history: History, least: float) -> bool:
     """
     if not 0 < len(history.contacts) <= FEW or history.bias.any():
         return False
-    turn = record.nearest_turn(history.steps, history.now, history.law, history.n_coefficients, history.miss)
-    return turn < least
+    miss = -np.inf if history.miss is None else history.miss
+    return record.nearest_turn(history.steps, history.now, history.law, history.n_coefficients, miss) < least
 
 
 def _force_missed(history: History) -> float:

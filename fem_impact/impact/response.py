@@ -107,7 +107,7 @@ class History:
     status: int  # why the run ended, see `record`
     n_fallback: int  # [-] steps in which scheme A4 fell back to A
     n_blind: int  # [-] steps that passed over contact events without locating them
-    miss: float = -np.inf  # [m] highest approach at which the bodies turned back in flight
+    miss: float | None = None  # [m] highest approach at which the bodies turned back in flight, if they did
     stretched: Stretched | None = None  # if one of the bodies stretches
     reached: dict[str, Any] = field(default_factory=dict, init=False, repr=False)  # where its motion goes on
 

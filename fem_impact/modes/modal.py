@@ -457,7 +457,9 @@ class Modes:
 
     def stretched(self, mass: float, frequency: float) -> "Modes":
         """The same body with its mass and all frequencies multiplied by these factors [-]."""
-        mass, frequency = check.positive("mass", mass), check.positive("frequency", frequency)
+        reach = check.REACH**2  # that of ratios
+        mass = check.positive("mass", mass, reach=reach)
+        frequency = check.positive("frequency", frequency, reach=reach)
         shapes = ScaledShapes(self.shapes, float(mass**-0.5), frequency)
         bounds = None if self.bounds is None else self.bounds * frequency
         poorer = {cause: modes.stretched(mass, frequency) for cause, modes in self.poorer.items()}

@@ -78,7 +78,7 @@ def test_a_flight_ends_at_its_limit():
 
 @pytest.mark.parametrize("gap, least", [(1e-9, 0.8), (1e-7, 0.8), (1e-5, 0.01)])
 def test_how_near_a_flight_passes_is_known(gap, least):
-    """A body swings up to a gap below touching and leaves. Where that is proved before it turns, a bound stands for it."""
+    """A body swings up to a gap below touching and leaves; where that is proved before it turns, a bound tells."""
     swing, w, speed = 1e-3, 2e3, 0.1
     top = brentq(lambda t: swing * w * np.cos(w * t) - speed, 0.0, 0.5 * np.pi / w, xtol=1e-18)
     highest, miss = swing * np.sin(w * top) - speed * top, np.array([-np.inf])

@@ -201,7 +201,7 @@ def run_energy(scene: Scene, stretch: Stretch | None, ramp: int, base: float, li
     Returns (steps, q, p, now, done, time, status, n_fallback, n_blind, miss). Each row of steps is a step or a flight,
     see `record`. now (6, n_contacts) ends with the last approach, .., rate and memory; done (n_contacts,) is the
     integral of force times rate [J]. A finished run ends at the last separation. miss is the highest approach [m] from
-    which bodies turned back in flight, -infinity if they did not.
+    which bodies turned back in flight, None if they did not.
     """
     m, n_modes = scene.shape.shape
     run, tables = made_run(scene), made_tables(n_modes, m, base, ramp)

@@ -49,7 +49,7 @@ def followed(follow: Callable[..., int], arguments: tuple[Any, ...], run: Run, w
         steps = np.concatenate([steps, np.empty((3 * len(steps), width))])
     now, done, time, count = run.contacts[:6], run.contacts[-1], float(run.clock[TIME]), run.counts
     steps = steps[: count[STEPS]].copy()
-    miss = float(run.clock[MISS])
+    miss = None if run.clock[MISS] == -np.inf else float(run.clock[MISS])
     return steps, run.q, run.p, now, done, time, status, int(count[FALLBACKS]), int(count[BLINDS]), miss
 
 
