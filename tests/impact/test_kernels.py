@@ -73,7 +73,7 @@ def run(
         out = collocation.run_collocation(Scene(*state), *gauss(5), h, 1e-10 * abs(speed), limits)
     else:
         out = energy.run_energy(Scene(*state), None, int(scheme == "A4"), h, limits)
-    steps, q1, p1, now, done, time, status, n_fallback, n_blind = out
+    steps, q1, p1, now, done, time, status, n_fallback, n_blind, _ = out
 
     def stored(d):
         return laws.stored(np.atleast_1d(d).astype(float), law)
