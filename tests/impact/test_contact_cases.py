@@ -46,7 +46,7 @@ def struck(n_modes=20, u_striker=10.0, u_plate=2.0):
 @pytest.mark.slow
 @pytest.mark.parametrize("exponent", [1.0, 1.5])
 def test_a_thousand_bounces_keep_their_height(exponent):
-    steps, *_, status, _, _ = run(
+    steps, *_, status, _, _, _ = run(
         [0.0], [[1.0]], [0.0], k=1e5, exponent=exponent, h=3e-3, bias=[9.81], offset=-0.05, n_max=1000
     )
     assert status == record.IMPACTS
