@@ -186,8 +186,8 @@ def by_vectors(
     views = None if keep is None else _read(keep, key)
     if views is None:
         others = {name: values for name, values in axes.items() if name != "at"}
-        rng, number = np.random.default_rng(0), max(STRUCK[1], math.ceil(STRUCK[0] / len(points)))
-        # fixed seed, so that the same map gives the same vectors
+        rng = np.random.default_rng(0)  # the same map gives the same vectors
+        number = max(STRUCK[1], math.ceil(STRUCK[0] / len(points)))
         chance = [{name: rng.choice(values) for name, values in others.items()} for _ in range(number - 2)]
         views = Sized(target, case, corners(others), chance, tolerance).views(points, stages)
         if keep is not None and views is not None:

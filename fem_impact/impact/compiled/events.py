@@ -13,7 +13,7 @@ import numpy as np
 
 from .build import inner
 from .law import FELT, LAYERS, PLASTIC, POWER, corner_approach, parting, spring_of
-from .rounding import NEAR
+from .rounding import NEAR, REPEATED
 
 from .layout import (  # isort: skip
     APPROACH, EXPONENT, HIGH, KIND, LOSS, LOW, MEMORY, MISSED, RATE, RELAXATION, SHARE, SIZE, SLOPE, TRIED, WIDTH,
@@ -113,7 +113,7 @@ def narrow(contacts, h, limits, target, bracket):
             return i, guess if guess < h else 0.5 * h
     miss = y[target]
     good = max(limits.depth, LOCATED * bracket[SIZE])
-    if abs(miss) <= good or bracket[HIGH] - bracket[LOW] <= 4e-16 * bracket[HIGH]:
+    if abs(miss) <= good or bracket[HIGH] - bracket[LOW] <= REPEATED * bracket[HIGH]:
         return target, 0.0
     if (miss > 0.0) != pressed[target]:
         bracket[HIGH] = h
@@ -130,7 +130,7 @@ def narrow(contacts, h, limits, target, bracket):
     if v != 0.0:
         wait = -miss / v
         guess = h + wait - 0.5 * turn * wait * wait / v
-    if abs(guess - h) <= 4e-16 * h:
+    if abs(guess - h) <= REPEATED * h:
         return target, 0.0
     if not bracket[LOW] < guess < bracket[HIGH]:
         guess = 0.5 * (bracket[LOW] + bracket[HIGH])

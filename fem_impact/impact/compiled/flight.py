@@ -141,7 +141,7 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
             d = min(d, 0.0)
             driven = hardest > 0.0 or r2 > 0.0
             rises = v > limits.still or (driven and (v > 0.0 or (v == 0.0 and elapsed + r2 > 0.0)))
-            if -d <= 4e-16 * scale and rises:
+            if -d <= REPEATED * scale and rises:
                 return elapsed, i, ONSET
             bound = quadratic_wait(d, v, hardest + max(r2, 0.0))
             bound = max(bound, quadratic_wait(d, max(0.0, r1 + bounds[i, FASTEST]), max(r2, 0.0)))

@@ -154,7 +154,7 @@ def solve_felt(start, e, b, h, spring):
     y = low
     side = 0
     for _ in range(200):
-        if below == above or high - low <= 4e-16 * max(abs(high), abs(low)):
+        if below == above or high - low <= REPEATED * max(abs(high), abs(low)):
             break
         y = (low * above - high * below) / (above - below)
         f, _, _ = felt_mean(start, y, h, spring)
