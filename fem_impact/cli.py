@@ -64,8 +64,11 @@ def main(arguments: list[str] | None = None) -> int:
         if not isinstance(error, fi.SimulationError):
             raise
         if plain:  # perhaps only plain Python failed: run again with compiled kernels
-            again = [sys.executable, "-m", "fem_impact", *(sys.argv[1:] if arguments is None else arguments)]
-            os.execve(sys.executable, again, {**os.environ, "NUMBA_DISABLE_JIT": "0"})
+            from ._base import child  # imported only when needed
+
+            words = sys.argv[1:] if arguments is None else arguments
+            again, environment = child.python("__main__:main", *words, NUMBA_DISABLE_JIT="0")
+            os.execve(again[0], again, environment)
         return _complain(error, FAILED)
     except KeyboardInterrupt:
         return _complain(f"interrupted; {_kept(options)}", INTERRUPTED)
@@ -407,8 +410,8 @@ def _strike(options: argparse.Namespace) -> bool:
     if scene.stroke:
         return _strike_in_turn(options, scene)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
-    display = Display()
-    with fi.export.staged(folder) as staging, Painter() if options.pictures else nullcontext() as painter:
+    display = Display(_tell)
+    with fi.export.staged(folder, "strike") as staging, Painter() if options.pictures else nullcontext() as painter:
         place = folder.resolve()  # "." has no name of its own
         keep = place.parent / f"{place.name}.modes.npz"  # not in the folder: an interrupted run leaves that alone
         motion, before = options.pictures or options.vtk, partial(_announce, display, options.verify)
@@ -509,7 +512,7 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> bool:
     began = time.perf_counter()
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
     display = Display()
-    with fi.export.staged(folder) as staging, warnings.catch_warnings():
+    with fi.export.staged(folder, "strike") as staging, warnings.catch_warnings():
         warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
         stages = Stages(display)
         found = scene.play(watch=display, strict=options.strict, **_choices(options))
@@ -562,7 +565,7 @@ def _map(options: argparse.Namespace) -> None:
     form, picture = maps.can_write(chosen.get(False, "nc"), options.out), chosen.get(True, FORMATS[0])
     scene = fi.load_scene(options.scene)
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
-    with fi.export.staged(folder) as staging:
+    with fi.export.staged(folder, "map") as staging:
         display = Display()
         with display("cells"):
             table = maps.map_scene(
@@ -599,7 +602,7 @@ def _spread(options: argparse.Namespace) -> None:
         correlation = {tuple(name.strip() for name in names.split(",")): float(value) for names, value in pairs}
     except ValueError:
         raise ValueError("--correlate must look like contact.stiffness,striker.mass=0.5") from None
-    with fi.export.staged(folder) as staging:
+    with fi.export.staged(folder, "spread") as staging:
         display = Display()
         with display("blows"):
             found = uncertainty.spread(
@@ -680,9 +683,9 @@ def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], draw
     with Display(_tell)("points"):
         plan = roving.of_scene(scene, masses, options.bandwidth, options.drop, number)
         if drawn is not None:
-            drawn.parent.mkdir(parents=True, exist_ok=True)
-            fi.figures.save(drawn, plan.figure())
-            plan.write_csv(drawn.with_suffix(".csv"))
+            with fi.export.staged(drawn.parent) as staging:
+                fi.figures.save(staging / drawn.name, plan.figure())
+                plan.write_csv((staging / drawn.name).with_suffix(".csv"))
     if options.json:
         data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
         _print_json({**data, "versions": fi.export.versions()})
@@ -697,7 +700,7 @@ def _report(options: argparse.Namespace) -> bool:
     path = options.out if options.out is not None else Path("out") / options.scene.stem / "report.html"
     changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
     with fi.export.staged(path.parent) as staging:
-        display = Display()
+        display = Display(_tell)
         before = partial(_announce, display, False)
         if scene.stroke:
             with warnings.catch_warnings():
@@ -890,7 +893,7 @@ def _add_taps(verb: Any) -> None:
     """Add the commands for measured taps."""
     files = "measured taps: .lvm, .csv, .npz, .wav, .mat or .uff"
     add = verb(_frf, "frf", "frequency responses of taps, or of a scene as a rig would measure it",
-               scene=f"{files}; or a scene, a TOML file", called="TAPS|SCENE")  # fmt: skip
+               scene=f"{files} or frequency responses; or a scene, a TOML file", called="TAPS|SCENE")  # fmt: skip
     _add_channels(add)
     add("--method", choices=("H1", "H2"), default="H1", help="H1 for noise in the response, H2 in the force")
     add("--force-window", metavar="S", type=float, help="the force counts for this time after the onset only")
@@ -935,7 +938,7 @@ def _fit(options: argparse.Namespace) -> None:
     from .taps import prompt  # imported only when needed
 
     folder = options.out if options.out is not None else Path("out") / options.scene.stem
-    with fi.export.staged(folder) as staging:
+    with fi.export.staged(folder, "fit") as staging:
         display = Display()
         with display("fit"):
             found, scene = prompt.fit(options, partial(display.report, "fits"))

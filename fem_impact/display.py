@@ -1,6 +1,7 @@
 """Shows on a terminal which stage is running, how far it is and how long it still takes."""
 
 import os
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,6 +17,7 @@ from ._base.progress import heard
 WIDE = 60  # [-] columns: a narrower terminal gets no bar
 SOON = 2.0  # [s] time left is not said before a stage has taken this long: the first counts are no guide
 LONG = 10.0  # [s] time left that is announced even if nobody sees the line
+LONGER = 2.0  # [-] over the time announced last, from which on a longer one is announced, too
 LEAST = 0.02  # [-] share of a count that must be done before the rest is estimated from it
 
 
@@ -52,8 +54,9 @@ class Count:
 class Display:
     """One line on the terminal, shown while a stage runs; without a terminal nothing is written.
 
-    A stage may run within another. Counts come from `_base.progress`, times from them or from a prediction. ``tell``
-    is called once with a sentence if a stage that counts itself turns out to take long, with or without a terminal.
+    A stage may run within another. Counts come from `_base.progress`, times from them or from a prediction. With or
+    without a terminal, ``tell`` is called with a sentence as soon as a command turns out to take long, and again each
+    time that it turns out to take twice as long as was told.
     """
 
     def __init__(self, tell: Callable[[str], object] | None = None) -> None:
@@ -63,11 +66,60 @@ class Display:
         self.running: list[tuple[str, float]] = []  # name and start [s] of each stage, the innermost last
         self.count: Count | None = None
         self.end: float | None = None  # [s] predicted end of the command, on the monotonic clock
+        self.began = time.process_time()  # [s] of what was predicted or counted; a busy machine makes nothing longer
+        self.told: float | None = None  # [s] that it takes in all, as told last
+        self.alarm: threading.Timer | None = None
         self.bar: bars.Progress | None = None
 
     def predict(self, seconds: float | None) -> None:
         """Say how long the following stages take together; None if that is not known."""
+        self.began, self.told = time.process_time(), seconds
         self.end = None if seconds is None else time.monotonic() + seconds
+        if self.running:
+            self._arm()
+
+    def foresee(self, seconds: float) -> None:
+        """Note that the rest takes so long, whatever was predicted."""
+        if self.end is not None:
+            self.end = time.monotonic() + seconds
+            self._warn(seconds, f"about {seconds:.0f} s more")
+
+    def _warn(self, left: float, said: str) -> None:
+        """Tell what is left [s] if it is long and makes the whole LONGER than was told."""
+        whole = self.spent + left
+        if self.tell is not None and left > LONG and (self.told is None or whole > LONGER * self.told):
+            self.tell(f"{'' if self.told is None else 'longer than predicted: '}{said}; Ctrl-C stops it")
+            self.told = whole
+
+    def _overdue(self) -> None:
+        """Tell that what was to end long ago still runs, and look again later."""
+        if self.tell is not None and self.told is not None and self.spent >= max(LONG, LONGER * self.told):
+            self.tell(f"longer than predicted: {self.spent:.0f} s so far; Ctrl-C stops it")
+            self.told = self.spent
+        self._arm()
+
+    def _arm(self) -> None:
+        """Look at the clock when the command is overdue, whatever stage runs then."""
+        self._disarm()
+        if self.tell is not None and self.told is not None:
+            self.alarm = threading.Timer(max(LONG, LONGER * self.told) - self.spent, self._overdue)
+            self.alarm.daemon = True
+            self.alarm.start()
+
+    def _disarm(self) -> None:
+        if self.alarm is not None:
+            self.alarm.cancel()
+        self.alarm = None
+
+    @property
+    def spent(self) -> float:
+        """Processor time [s] since it was predicted or began."""
+        return time.process_time() - self.began
+
+    @property
+    def late(self) -> bool:
+        """Whether it has taken LONGER than was told."""
+        return self.told is not None and self.spent > LONGER * self.told
 
     @contextmanager
     def __call__(self, name: str) -> Iterator[None]:
@@ -75,7 +127,9 @@ class Display:
         outer, self.count = self.count, None
         self.running.append((name, time.monotonic()))
         try:
-            with heard(self.report):
+            if len(self.running) == 1:
+                self._arm()
+            with heard(self.report, self.foresee):
                 if self.bar is None and self.console.is_terminal:
                     with undoable(_show_cursor), self._opened():
                         yield
@@ -87,6 +141,8 @@ class Display:
             self.count = outer
             if self.running:
                 self._draw()
+            else:
+                self._disarm()
 
     def report(self, what: str, done: int, total: int) -> None:
         """Note how many of something are done."""
@@ -96,9 +152,8 @@ class Display:
         else:
             count.update(done, total)
             left = count.left()
-            if self.tell is not None and what == self.running[-1][0] and left is not None and left > LONG:
-                self.tell(f"{total} {what}: about {left:.0f} s more; Ctrl-C stops it")
-                self.tell = None
+            if what == self.running[-1][0] and left is not None:
+                self._warn(left, f"{total} {what}: about {left:.0f} s more")
         self._draw()
 
     def said(self) -> str:
@@ -108,7 +163,8 @@ class Display:
         name, began = self.running[-1]
         spent, count, parts = time.monotonic() - began, self.count, []
         left = count.left() if count is not None else None if self.end is None else self.end - time.monotonic()
-        ends = [] if left is None or spent <= SOON else [f"{_clock(left)} left" if left > 0.0 else "soon done"]
+        last = "longer than predicted" if self.late else "soon done"
+        ends = [] if left is None or spent <= SOON else [f"{_clock(left)} left" if left > 0.0 else last]
         if count is not None:
             what = "" if count.what == name else f" {count.what}"
             parts.append(f"{count.done}/{count.total}{what}")

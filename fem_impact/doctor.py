@@ -94,7 +94,8 @@ def _blow() -> Response:
 
 def _kernels() -> bool:
     hit = _blow()
-    return abs(hit.restitution) < 1e-9 and hit.n_impacts == 1  # equal masses exchange their speeds
+    speed = hit.speeds[0]  # [m/s] equal masses exchange their speeds
+    return abs(speed) < 1e-9 and hit.n_impacts == 1
 
 
 def _picture() -> bool:

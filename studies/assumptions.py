@@ -90,7 +90,7 @@ def lively(ball: fi.Striker, faster: float) -> fi.Striker:
     E, nu, rho = ball.material.E, ball.material.nu, ball.material.rho
     own = LAMB * np.sqrt(E / (2.0 * (1.0 + nu) * rho)) / ball.radius / (2.0 * np.pi)  # [Hz]
     rows = [[ball.mass**-0.5, faster * (LIVELY / ball.mass) ** 0.5]]
-    modes = fi.Modes.from_arrays([0.0, faster * own], rows, points=[[0.0]], mass=ball.mass)
+    modes = fi.Modes.from_arrays([0.0, faster * own], rows, points=[[0.0]], mass=ball.mass, complete=True)
     return fi.Striker.flexible(modes, at=[0.0])
 
 

@@ -181,6 +181,7 @@ class Changing(importlib.abc.MetaPathFinder, importlib.abc.SourceLoader):
 
     def __init__(self, constant: Constant, factor: float) -> None:
         self.constant, self.factor = constant, factor
+        self.kernels = constant.package == KERNELS
         self.full = f"fem_impact.{constant.module}"
         self.path = PACKAGE / (constant.module.replace(".", "/") + ".py")
 
@@ -194,6 +195,10 @@ class Changing(importlib.abc.MetaPathFinder, importlib.abc.SourceLoader):
         return Path(path).read_bytes()
 
     def get_code(self, name):
+        return compile(ast.fix_missing_locations(self.tree()), str(self.path), "exec")
+
+    def tree(self) -> ast.Module:
+        """The changed module."""
         tree = ast.parse(self.get_data(self.path))
         for node, own, value in named(tree):
             if own == self.constant.name:
@@ -202,7 +207,7 @@ class Changing(importlib.abc.MetaPathFinder, importlib.abc.SourceLoader):
                     node.value.elts[node.value.elts.index(value)] = new
                 else:
                     node.value = new
-        return compile(ast.fix_missing_locations(tree), str(self.path), "exec")
+        return tree
 
 
 class First:
@@ -244,7 +249,7 @@ def first_failure(tests: list[str], change: Changing | None) -> str:
     import pytest
     import warming
 
-    kernels = change is not None and change.constant.package == KERNELS
+    kernels = change is not None and change.kernels
     seconds = KERNEL_SECONDS if kernels else SECONDS
     folder = tempfile.TemporaryDirectory()
     answer, told = os.pipe()

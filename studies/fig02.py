@@ -28,7 +28,7 @@ class Cradle:
 def cradle(n_balls: int, duration: float = 1.3 * SWING) -> Cradle:
     """Equal balls on pendulums in a row; the first one swings down onto the others, which are at rest."""
     ball = fi.Striker.sphere(fi.Material(**STEEL), RADIUS)
-    pendulum = fi.Modes.from_arrays([1.0 / SWING], [[ball.mass**-0.5]], points=[[0.0]], mass=ball.mass)
+    pendulum = fi.Modes.from_arrays([1.0 / SWING], [[ball.mass**-0.5]], points=[[0.0]], mass=ball.mass, complete=True)
     stiffness = 4.0 / 3.0 * np.sqrt(0.5 * RADIUS) * STEEL["E"] / (2.0 * (1.0 - STEEL["nu"] ** 2))
     law = fi.Contact.hertz(stiffness, gap=GAP)
     touches = [Touch(law, i, i + 1, [0.0], [0.0]) for i in range(n_balls - 1)]

@@ -74,7 +74,9 @@ def random_case(rng: np.random.Generator):
     elif kind.startswith("mode"):
         frequency, felt = float(rng.uniform(0.3, 2.0)) / duration, mass * float(np.exp(rng.uniform(-1.0, 2.0)))
         truth |= {"mode1.frequency": frequency, "mode1.mass": felt}
-        target = fi.Modes.from_arrays([frequency], [[felt**-0.5]], points=[[0.0]], mass=felt, damping_ratio=0.02)
+        target = fi.Modes.from_arrays(
+            [frequency], [[felt**-0.5]], points=[[0.0]], mass=felt, damping_ratio=0.02, complete=True
+        )
         at = [0.0]
     if kind != "mode":
         truth["striker.mass"] = mass
@@ -139,7 +141,9 @@ def five_taps(kind: str):
         given |= {"target": target, "at": guess}
         ranges |= {"striker.mass": (0.02, 0.5), "target.x": (0.1, 0.4), "target.y": (0.08, 0.32)}
     else:
-        target = fi.Modes.from_arrays([700.0], [[0.8**-0.5]], points=[[0.0]], mass=0.8, damping_ratio=0.03)
+        target = fi.Modes.from_arrays(
+            [700.0], [[0.8**-0.5]], points=[[0.0]], mass=0.8, damping_ratio=0.03, complete=True
+        )
         at = [0.0]
         ranges |= {"mode1.frequency": (200.0, 3e3), "mode1.mass": (0.1, 5.0), "mode1.damping": (0.005, 0.2)}
     with warnings.catch_warnings():

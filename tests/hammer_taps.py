@@ -6,7 +6,9 @@ RATE = 25600.0  # [Hz]
 MASS, LAW = 0.2, fi.Contact.power(5e8, 1.7)
 SPEEDS = (0.4, 0.8, 1.2)  # m/s
 RANGES = {"contact.stiffness": (1e6, 1e11), "contact.exponent": (1.0, 4.0), "striker.mass": (0.05, 0.8)}
-STRUCTURE = fi.Modes.from_arrays([900.0, 2300.0], [[2.0, 1.5]], points=[[0.0]], mass=1.0, damping_ratio=0.02)
+STRUCTURE = fi.Modes.from_arrays(
+    [900.0, 2300.0], [[2.0, 1.5]], points=[[0.0]], mass=1.0, damping_ratio=0.02, complete=True
+)
 
 
 def taps_of(target, place, *, mass=MASS, law=LAW, speeds=SPEEDS, noise=0.005, **rig):

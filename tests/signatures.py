@@ -198,9 +198,9 @@ def table() -> dict[str, dict[str, Any]]:
         "Modes.from_arrays": {
             "frequencies": [0.0, 10.0], "shapes": [[1.0, 0.5], [1.0, -0.5]], "points": [[0.0, 0.0], [0.1, 0.1]],
             "mass": 1.0, "damping_ratio": 0.01, "compliance": [[1e-3, 0.0], [0.0, 1e-3]],
-            "cells": [[0, 1, 1]],
+            "cells": [[0, 1, 1]], "free": False, "complete": False,
         },
-        "Modes.from_uff": {"path": t["uff"], "mass": 0.2, "direction": "z"},
+        "Modes.from_uff": {"path": t["uff"], "mass": 0.2, "direction": "z", "compliance": None, "free": False},
         "Modes.rigid": {"mass": 1.0},
         "Modes.shape_at": {"self": t["modes"], "points": [at]},
         "Modes.rigid_motion": {"self": t["free"], "at": None},

@@ -88,12 +88,25 @@ ELSEWHERE = {  # advice followed in a test of its own: the test, and patterns of
     "impact/test_promise.py::test_impacts_that_cannot_be_told_leave_the_first_one": (
         "give max_impacts = 1 for the first impact alone",
     ),
+    "modes/test_unstated.py::test_what_is_stated_as_advised_meets_the_tolerance": (
+        "^make .* with free = True or False",
+        "^give the compliance of",
+    ),
+    "modes/test_unstated.py::test_what_contradicts_itself_works_as_advised": (
+        "carries .* of the mass along, .* leave it out, or check mass",
+        "give these as modes of 0 Hz instead",
+        "complete must be False .*; leave it out",
+    ),
     "impact/test_state.py::test_errors_of_the_blow_before_count": ("^give the blow before a smaller tolerance$",),
     "impact/test_state.py::test_the_motion_of_a_system_goes_on_in_its_modes": (
         "^start needs modes, taken as they are",
     ),
     "scenes/test_templates.py::test_a_new_scene_replaces_no_file": ("exists already; name another file with --out",),
     "sweeps/test_borders.py::test_borders_that_were_not_looked_for_are_none": ("make the map with borders=True",),
+    "sweeps/test_store.py::test_a_store_keeps_the_results_of_its_functions_only": (
+        "; leave out store, or pass a function",
+    ),
+    "sweeps/test_store.py::test_a_worker_of_another_version_is_refused": ("; install the same one everywhere",),
     "sweeps/test_store.py::test_a_local_cluster_gives_the_same_map": ("the cluster dropped the map",),
     "test_interrupt.py::test_stored_cells_are_kept_and_used": ("run the same command again to continue",),
     "test_extras.py::test_core_commands_need_no_extra": (

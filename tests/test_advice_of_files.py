@@ -101,6 +101,11 @@ def functions_of(folder, first="   0.00000000000e+00"):
     return transfer.read_frf(folder / "h.uff")
 
 
+def functions_as_taps(folder):
+    functions_of(folder)
+    return fi.read_taps(folder / "h.uff")
+
+
 def matlab(folder, version):
     if version == "-v7":
         savemat(folder / "taps.mat", tap_of(4000))
@@ -319,6 +324,11 @@ FILES = {  # what fails, the message, and what it advises
         lambda f: svg(f, '<path d="M0 0 H1e17 V1 Z"/>'),
         "coordinates beyond .*; correct the drawing",
         svg,
+    ),
+    "frequency responses for taps": (
+        functions_as_taps,
+        "no time records; export those, or give the path of frequency responses to fi.frf",
+        lambda f: fi.frf(f / "h.uff"),
     ),
     "an empty drawing": (
         lambda f: svg(f, ""),

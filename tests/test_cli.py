@@ -31,7 +31,7 @@ def scene(tmp_path):
 
 def test_strike_writes_every_file_and_prints_a_summary(scene, tmp_path, capsys):
     assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out")]) == 0
-    written = sorted(path.name for path in (tmp_path / "out").iterdir())
+    written = sorted(path.name for path in (tmp_path / "out").glob("[!.]*"))
     assert written == ["force.csv", "force.png", "modes", "modes.pvd", "response.json", "strike.wav"]
     printed = capsys.readouterr().out
     data = json.loads((tmp_path / "out" / "response.json").read_text())
@@ -42,6 +42,18 @@ def test_strike_writes_every_file_and_prints_a_summary(scene, tmp_path, capsys):
     assert data["response"]["n_impacts"] == len(data["impacts"]) > 0
     reader = pyvista.get_reader(tmp_path / "out" / "modes.pvd")
     assert reader.time_values[0] == pytest.approx(100.0, rel=1e-9)
+    rigid = ["strike", str(scene), "--out", str(tmp_path / "out"), "--target", "rigid"]
+    assert cli.main(rigid) in (0, 3)  # no modes, no sound
+    written = sorted(path.name for path in (tmp_path / "out").glob("[!.]*"))
+    assert written == ["force.csv", "force.png", "response.json"]
+
+
+def test_a_strike_writes_nothing_where_one_file_cannot_be_written(scene, tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "modes").write_text("mine")
+    assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out")]) == cli.FAILED
+    assert capsys.readouterr().err == f"fem-impact: {tmp_path / 'out' / 'modes'}: Not a directory\n"
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["modes"]
 
 
 def hear(scene, folder, speed=2.0):
@@ -152,6 +164,8 @@ def test_missing_scene_is_a_sentence_with_the_nearest_name(scene, tmp_path, caps
     assert cli.main(["strike", str(tmp_path / "smal.toml")]) == 2
     said = capsys.readouterr().err
     assert said == f"fem-impact: {tmp_path / 'smal.toml'}: there is no such file; did you mean 'small.toml'?\n"
+    assert cli.main(["strike", str(tmp_path / "other.toml")]) == 2  # alike only in the ending
+    assert capsys.readouterr().err.endswith("there is no such file\n")
     assert cli.main(["modes", str(tmp_path / "no" / "x.toml")]) == 2
     assert capsys.readouterr().err == f"fem-impact: {tmp_path / 'no' / 'x.toml'}: there is no such file\n"
 
@@ -365,5 +379,5 @@ def test_a_map_takes_a_format_of_its_numbers_and_one_of_its_pictures(tmp_path, c
     path = tmp_path / "map.toml"
     path.write_text(TEXT + '[map.over]\n"striker.mass" = [0.03, 0.05]\n"contact.stiffness" = [1e5, 2e5]\n')
     assert cli.main(["map", str(path), "--out", str(tmp_path / "map"), "--format", "nc", "--format", "svg"]) == 0
-    endings = {file.suffix for file in (tmp_path / "map").iterdir()}
+    endings = {file.suffix for file in (tmp_path / "map").glob("[!.]*")}
     assert endings == {".nc", ".csv", ".svg"}

@@ -9,7 +9,7 @@ from scenes import SMALL
 
 import fem_impact as fi
 from fem_impact import cli, display
-from fem_impact._base.progress import heard, report
+from fem_impact._base.progress import foresee, heard, report
 from fem_impact.display import Display
 
 
@@ -20,6 +20,8 @@ class Clock:
 
     def monotonic(self):
         return self.now
+
+    process_time = monotonic
 
 
 @pytest.fixture
@@ -111,6 +113,45 @@ def test_what_takes_long_is_announced_once_with_or_without_a_terminal(clock):
             report("hammers", i, 10)
             clock.now += 4.0
     assert said == ["10 hammers: about 36 s more; Ctrl-C stops it"]
+
+
+def test_a_command_that_takes_twice_as_long_as_predicted_says_so_at_once_and_again_when_that_doubles(clock):
+    said = []
+    shown = Display(said.append)
+    shown.predict(12.0)
+    with shown("vectors"):
+        clock.now += 6.0
+        foresee(15.0)  # less than twice as long
+        assert not said and shown.end == clock.now + 15.0
+        foresee(30.0)
+        assert said == ["longer than predicted: about 30 s more; Ctrl-C stops it"]
+        foresee(40.0)  # nor is 46 s twice as long as 36
+        clock.now += 67.0
+        shown._overdue()  # by the alarm
+        assert said[1:] == ["longer than predicted: 73 s so far; Ctrl-C stops it"]
+        assert shown.alarm.interval == pytest.approx(73.0) and shown.alarm.daemon
+    assert shown.alarm is None
+
+
+def test_the_line_itself_says_what_takes_longer_than_predicted(clock):
+    shown = on_terminal(100)
+    shown.predict(12.0)
+    with shown("strike"):
+        clock.now += 20.0
+        assert shown.said() == "0:20, soon done"
+        clock.now += 10.0
+        assert shown.said() == "0:30, longer than predicted"
+
+
+def test_hammers_that_take_longer_than_the_first_ones_are_announced_again(clock):
+    said = []
+    shown = Display(said.append)
+    with shown("hammers"):
+        for i, seconds in enumerate([4.0, 4.0, 4.0, 40.0, 60.0]):
+            report("hammers", i, 6)
+            clock.now += seconds
+    assert said[0] == "6 hammers: about 20 s more; Ctrl-C stops it"
+    assert said[1:] == ["longer than predicted: 6 hammers: about 26 s more; Ctrl-C stops it"]
 
 
 def test_nothing_is_written_where_stderr_is_not_a_terminal(tmp_path, capsys):

@@ -73,6 +73,20 @@ def test_effectivity_tells_what_it_could_not_judge(tmp_path, monkeypatch, capsys
     assert (tmp_path / "effectivity_by_elements.png").stat().st_size > 1e4
 
 
+def test_attacks_go_on_where_they_stopped(tmp_path, capsys):
+    attack = study("attack")
+    run = ["--file", str(tmp_path / "cases.csv"), "--truths", str(tmp_path / "truths")]
+    attack.main([*run, "--count", "2"])
+    first = (tmp_path / "cases.csv").read_text()
+    assert "| everyday | 2 | 0 | 0 |" in capsys.readouterr().out
+    cases = attack.main([*run, "--count", "3"])
+    assert (tmp_path / "cases.csv").read_text().startswith(first)
+    assert [case.number for case in cases] == [0, 1, 2] and str(cases) == str(attack.main(run))
+    kept = attack.attack_blows.Truths(tmp_path / "truths" / "1")
+    assert len(kept.known) == 3
+    kept.of("everyday", "0 ", None)  # known: no blow is needed
+
+
 @pytest.mark.slow
 def test_extremes_are_right_flagged_or_refused():
     extremes = study("extremes")

@@ -222,6 +222,26 @@ def array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "", 
     return finite(name, result, unit)
 
 
+def places(name: str, value: Any, dimension: int) -> np.ndarray:
+    """Return one point or several on a body of a dimension as a new array (n_points, dimension) [m]."""
+    raw = numbers(name, value, "m")
+    if dimension == 1 and (raw.ndim < 2 or raw.shape[-1] != 1):
+        raw = raw.reshape(-1, 1)
+    if raw.ndim < 2 and raw.shape != (dimension,):
+        point = "(x, y)" if dimension == 2 else f"of {dimension} coordinates"
+        raise ValueError(f"{name} must be a point {point} in m, got {shown(value)}")
+    return array(name, raw, (None, dimension), "m", lift=True)
+
+
+def on_body(name: str, points: np.ndarray, inside: np.ndarray, corners: np.ndarray) -> None:
+    """Raise ValueError unless every point (n_points, dimension) [m] is inside; the corners tell how far the body is."""
+    if not inside.all():
+        lost = ", ".join(f"{x:g}" for x in points[~inside][0])
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        extent = " x ".join(f"[{a:g}, {b:g}]" for a, b in zip(low, high))
+        raise ValueError(f"{name} must lie on the body, got ({lost}) m; the body extends over {extent} m")
+
+
 def band(name: str, value: Any, unit: str) -> tuple[float, float]:
     """Return ``value`` as two positive floats in ascending order."""
     low, high = (positive(name, end, unit) for end in array(name, value, (2,), unit))
@@ -287,9 +307,12 @@ def one_of(name: str, value: Any, allowed: Iterable[str]) -> str:
 
 
 def nearest(word: Any, known: Iterable[str]) -> str:
-    """Return '; did you mean ...?' for a near miss, else an empty string."""
-    close = difflib.get_close_matches(str(word), list(known), n=1, cutoff=0.6)
-    return f"; did you mean {close[0]!r}?" if close else ""
+    """Return '; did you mean ...?' for a near miss, else an empty string; an ending that all share tells nothing."""
+    ending, known = Path(str(word)).suffix, list(known)
+    ending = ending if all(name.endswith(ending) for name in known) else ""
+    names = {name.removesuffix(ending): name for name in known}
+    close = difflib.get_close_matches(str(word).removesuffix(ending), list(names), n=1, cutoff=0.6)
+    return f"; did you mean {names[close[0]]!r}?" if close else ""
 
 
 def brief(instance: Any) -> str:

@@ -1,5 +1,7 @@
-"""Write a file completely or not at all: write it under a temporary name, then rename it."""
+"""Write files completely or not at all: write them under temporary names, then rename them."""
 
+import hashlib
+import json
 import os
 import platform
 import re
@@ -12,6 +14,7 @@ from pathlib import Path
 
 PARTIAL = ".partial-"  # prefix of every temporary name, which goes on with machine, process and a random number
 MACHINE = re.sub(r"[^A-Za-z0-9.]", "_", platform.node())
+LIST = ".fem-impact.json"  # in an output folder: the files that each command wrote last, with digests of their contents
 OURS: set[str] = set()  # temporary names in use by this process
 
 UNDONE: list[Callable[[], object]] = []  # functions that remove unfinished work, called newest first
@@ -57,11 +60,12 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 
 @contextmanager
-def staged(folder: str | Path) -> Iterator[Path]:
-    """Yield an empty folder; move its files into ``folder`` if the block succeeds.
+def staged(folder: str | Path, command: str | None = None) -> Iterator[Path]:
+    """Yield an empty folder; move all its files into ``folder`` if the block succeeds, none if it fails.
 
     ``folder`` and its parents are created first, so a location without write access fails before the work starts. If
-    the block fails, the folders created here are deleted again. Other files in ``folder`` are left alone.
+    the block fails, the folders created here are deleted again. Other files in ``folder`` are left alone, except those
+    that an earlier run of the same ``command`` wrote there, if nobody has changed them since.
     """
     folder = Path(folder)
     new = [path for path in (folder, *folder.parents) if not path.exists()]
@@ -81,13 +85,37 @@ def staged(folder: str | Path) -> Iterator[Path]:
             yield staging
             FINISHING.append(folder)
             try:
-                _move(staging, folder)
+                _move(staging, folder, [] if command is None else _stale(staging, folder, command))
             finally:
                 FINISHING.remove(folder)
             shutil.rmtree(staging, ignore_errors=True)
         except BaseException:  # includes Ctrl-C, which must leave nothing behind either
             undo()
             raise
+
+
+@contextmanager
+def created(folder: Path) -> Iterator[Path]:
+    """Yield an empty folder that becomes ``folder`` if the block succeeds, unless another process was first.
+
+    ``folder`` must not exist or be empty; afterwards it is complete, made here or there.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    _tidy(folder.parent)
+    with _named() as name, undoable(lambda: shutil.rmtree(new, ignore_errors=True)):
+        new = folder.with_name(f"{name}-{folder.name}")
+        try:
+            new.mkdir()
+            yield new
+            with suppress(OSError):  # it does not exist, or is not empty
+                folder.rmdir()
+            try:
+                os.rename(new, folder)
+            except OSError:
+                if not folder.is_dir():
+                    raise
+        finally:
+            shutil.rmtree(new, ignore_errors=True)
 
 
 @contextmanager
@@ -144,11 +172,76 @@ def _placed(path: Path) -> None:
         raise FileExistsError(17, "Not a regular file", str(path))
 
 
-def _move(staging: Path, folder: Path) -> None:
-    """Move every file below ``staging`` to the same relative path below ``folder``."""
-    files = sorted(path.relative_to(staging) for path in staging.rglob("*") if path.is_file())
+def _files(folder: Path) -> list[Path]:
+    """Every file below a folder, relative to it."""
+    return sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+
+
+def _stale(staging: Path, folder: Path, command: str) -> list[Path]:
+    """The files in ``folder`` that this command wrote last time and not now; writes the new list into ``staging``."""
+    try:
+        lists = json.loads((folder / LIST).read_text("utf-8"))
+        before = dict(lists.get(command, {}))
+    except (OSError, ValueError, TypeError, AttributeError, RecursionError):  # none yet, or damaged
+        lists, before = {}, {}
+    new = {name.as_posix(): _digest(staging / name) for name in _files(staging)}
+    # what the user had there already, such as the mesh of the scene, which is written again unchanged, stays the user's
+    listed = {name: digest for name, digest in new.items()
+              if before.get(name) == digest or _digest(folder / name) != digest}  # fmt: skip
+    (staging / LIST).write_text(json.dumps({**lists, command: listed}, indent=1), encoding="utf-8")
+    home = folder.resolve()
+    ours = [Path(name) for name, digest in before.items() if name not in new and _digest(folder / name) == digest]
+    found = [name for name in ours if (folder / name).resolve() == home / name]  # no links
+    return [name for name in found if home in (home / name).parents]
+
+
+def _digest(path: Path) -> str | None:
+    if not path.is_file():
+        return None
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _move(staging: Path, folder: Path, stale: list[Path]) -> None:
+    """Move every file below ``staging`` to the same path below ``folder`` and remove ``stale`` ones; all or nothing."""
+    files, old = _files(staging), staging / PARTIAL
+    within = {parent for name in files for parent in name.parents}
+    made = [folder / name for name in sorted(within, reverse=True) if not (folder / name).exists()]
+    for name in within:
+        if not (folder / name).is_dir() and folder / name not in made:
+            raise NotADirectoryError(20, "Not a directory", str(folder / name))
     for name in files:
         _placed(folder / name)
-    for name in files:
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        os.replace(staging / name, folder / name)
+    moved: list[Path] = []
+    try:
+        for name in [*stale, *files]:
+            (old / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            if (folder / name).exists():
+                _copy(folder / name, old / name)
+            moved.append(name)
+            if name in files:
+                os.replace(staging / name, folder / name)
+            else:
+                (folder / name).unlink()
+    except OSError:
+        for name in moved:
+            if (old / name).exists():
+                os.replace(old / name, folder / name)
+            else:
+                (folder / name).unlink(missing_ok=True)
+        for path in made:
+            with suppress(OSError):
+                path.rmdir()
+        raise
+    for name in stale:
+        with suppress(OSError):  # it holds something else
+            (folder / name).parent.rmdir()
+
+
+def _copy(path: Path, copy: Path) -> None:
+    """A second name of a file, or a copy where files can have only one."""
+    try:
+        os.link(path, copy)
+    except OSError:
+        shutil.copy2(path, copy)

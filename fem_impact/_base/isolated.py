@@ -8,7 +8,6 @@ files, as the includes of an Abaqus deck do. Read files of unknown origin in a c
 import importlib
 import io
 import logging
-import os
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout, suppress
@@ -16,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import check
+from . import check, child
 
 PATIENCE = 8.0  # [s] time limit for a small file: a valid file of 1 MB takes less than a tenth of this
 RATE = 2e5  # [byte/s] adds file size / RATE to the time limit: a third of the slowest reader's speed
@@ -69,14 +68,15 @@ def read(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.nd
 
 def run(path: Path, reader: str, arguments: tuple[str, ...], patience: float) -> tuple[int, bytes, bytes]:
     """Run the reader process: its exit status, the arrays as npz bytes, and the error text if it failed."""
-    command = [sys.executable, "-m", __name__, str(path), reader, *arguments]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "OPENBLAS_NUM_THREADS": "1"}
+    command, environment = child.python(
+        "_base.isolated:process", str(path), reader, *arguments, OPENBLAS_NUM_THREADS="1"
+    )
     done = subprocess.run(command, capture_output=True, timeout=patience, env=environment, check=False)
     return done.returncode, done.stdout, done.stderr
 
 
 def main(path: Path, reader: str, arguments: list[str]) -> tuple[int, bytes]:
-    """The reader process itself: exit status, and the arrays as npz bytes or the error text."""
+    """What the reader process answers: exit status, and the arrays as npz bytes or the error text."""
     said = io.StringIO()
     logging.disable()
     try:
@@ -109,8 +109,9 @@ def limit_memory() -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-if __name__ == "__main__":
+def process() -> int:
+    """The reader process itself."""
     limit_memory()
     status, answer = main(Path(sys.argv[1]), sys.argv[2], sys.argv[3:])
     (sys.stderr if status else sys.stdout).buffer.write(answer)
-    sys.exit(status)
+    return status

@@ -1,4 +1,4 @@
-"""Tables for the terminal and for notebooks, and small SVG pictures without a drawing library."""
+"""Tables for the terminal and for notebooks, small SVG pictures without a drawing library, and text in pictures."""
 
 import base64
 import html
@@ -17,6 +17,11 @@ INK, BODY, STROKE, STRIKE = (
     "var(--line-strong, #0072b2)",
     "var(--strike, #d55e00)",
 )
+
+
+def literal(text: str) -> str:
+    """Text of the user's for a picture by matplotlib, which takes what stands between dollar signs for a formula."""
+    return text.replace("$", r"\$")
 
 
 def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = ()) -> str:

@@ -1,11 +1,13 @@
-"""How far long work is: loops report a count, and whoever shows it listens."""
+"""How far long work is: loops report a count or what is left to do, and whoever shows it listens."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
 Listener = Callable[[str, int, int], object]
+Oracle = Callable[[float], object]
 LISTENER: ContextVar[Listener | None] = ContextVar("LISTENER", default=None)  # of the work in this thread
+ORACLE: ContextVar[Oracle | None] = ContextVar("ORACLE", default=None)  # the same, of what is left
 
 
 def report(what: str, done: int, total: int) -> None:
@@ -15,11 +17,19 @@ def report(what: str, done: int, total: int) -> None:
         listener(what, done, total)
 
 
+def foresee(seconds: float) -> None:
+    """Say how many more seconds work takes that was not planned, or was planned otherwise."""
+    oracle = ORACLE.get()
+    if oracle is not None:
+        oracle(seconds)
+
+
 @contextmanager
-def heard(listener: Listener | None) -> Iterator[None]:
-    """Send the reports of the block to a listener; None silences them."""
-    token = LISTENER.set(listener)
+def heard(listener: Listener | None, oracle: Oracle | None = None) -> Iterator[None]:
+    """Send the reports of the block to a listener and an oracle; None silences them."""
+    tokens = LISTENER.set(listener), ORACLE.set(oracle)
     try:
         yield
     finally:
-        LISTENER.reset(token)
+        LISTENER.reset(tokens[0])
+        ORACLE.reset(tokens[1])

@@ -16,6 +16,7 @@ from .._base.check import SimulationError, ToleranceWarning
 from .._base.rounding import SAME
 from ..fe.variation import SectionChange
 from ..impact import gradient, promise
+from ..impact.quantities import rebound
 from ..impact.response import Response
 from ..model import planner, target
 from ..modes import varied
@@ -488,7 +489,10 @@ def _of_hit(hit: Response, goal: Goal) -> float:
         return gradient.level_of(hit.spectrum(np.array([0.0, float(band)])))
     if name == "peak_time":
         return float(hit.time[int(np.argmax(hit.force))])
-    return float(hit.spectral_centroid(float(band)) if band else getattr(hit, name))
+    value = hit.spectral_centroid(float(band)) if band else getattr(hit, name)
+    if value is None:
+        raise SimulationError(f"no {name}: {rebound(hit, 5)}")
+    return float(value)
 
 
 def _mode_slopes(modes: Modes, some: list[Goal], rate: Rate) -> np.ndarray:

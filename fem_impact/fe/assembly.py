@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import qr
+from scipy.linalg import eigh, qr
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, eye_array, vstack
 
 from .._base import check, markup
@@ -17,7 +17,7 @@ from ..mesh.facets import Curves
 from ..mesh.meshes import Mesh, aligned, pierced
 from . import beam_elements, plausible, shear_beam, thick
 from .beam_elements import HermiteSpace
-from .corners import around_corners
+from .corners import SAY, around_corners
 from .elements import CHUNK, ArgyrisSpace, Bent, MorleySpace, numbering, quadrature, triangles
 from .section import KINDS, SOFT, Beam, Elastic, Plate, directional, evaluate
 from .shear_beam import TimoshenkoSpace
@@ -130,7 +130,11 @@ class System:
     element_dofs: np.ndarray = field(repr=False)  # (n_local, n_cells) unknowns of each cell, among all
     space: ArgyrisSpace | HermiteSpace | MorleySpace | MindlinSpace | TimoshenkoSpace = field(repr=False)
     rigid: np.ndarray = field(repr=False)  # (n_dofs, n_rigid) [-] mass-normalised rigid motions
-    held: np.ndarray = field(repr=False)  # (n_rigid,) unknowns that, when fixed, just prevent rigid motion
+    # those that only weak springs resist, (n_dofs, n_sprung) [-] mass-normalised, and the forces of these springs
+    sprung: np.ndarray = field(repr=False)
+    pull: np.ndarray = field(repr=False)
+    # (n_rigid + n_sprung,) unknowns that, when fixed, just prevent these motions
+    held: np.ndarray = field(repr=False)
     graded: bool = True  # whether rings of shrinking triangles surround singular corners
     rim: Rim | None = field(default=None, repr=False)  # boundary of the triangles used, in the frame; None on a beam
     order: float = np.inf  # [-] power of the element size with which corners let the frequency error fall
@@ -167,6 +171,9 @@ class System:
     def notes(self) -> tuple[str, ...]:
         """What mesh and theory assumed, and numbers that are probably a slip of a unit."""
         assumed = plausible.rolling(self.section.material) if self.theory == "mindlin" else ()
+        if self.unresolved > SAY:
+            corner = f"corners leave the frequencies uncertain by {100.0 * self.unresolved:.2g} %, whatever the mesh"
+            assumed = (*assumed, f"{corner}: hinged edges that meet near or beyond 180 degrees do, and free notches")
         return plausible.together(notes_on(self.mesh, self.section), assumed)
 
     def contains(self, points: np.ndarray) -> np.ndarray:
@@ -253,7 +260,7 @@ def assemble(
     if clamps:
         mesh, supports = pierced(mesh, clamps), clamped(supports, len(clamps))
     masses = Attached(check_masses(point_masses, mesh.dimension), posts)
-    near = None if near is None else check.array("near", near, (None, mesh.dimension), "m", lift=True)
+    near = None if near is None else check.places("near", near, mesh.dimension)
     near, coarseness = None if near is None or not len(near) else near, check.number("coarseness", coarseness)
     if coarseness < 1.0:
         raise ValueError(f"coarseness must be at least 1, got {coarseness:g}")
@@ -447,21 +454,21 @@ def _supported(attached: Attached, matrices: tuple, maps: tuple, **known: Any) -
         M = M + rows.T @ diags(weights / frame.mass) @ rows
         known["mass"] += float(weights.sum())
     across = _across(space.origin[:, 0], dofs, expand)
-    rigid = _rigid(space.linear(dofs, n_all), springs, expand, project)[across]
+    moving = _rigid(space.linear(dofs, n_all), expand, project)[across]
     expand = expand[:, across].tocsr()
     K, M = (expand.T @ (K + springs) @ expand).tocsc(), (expand.T @ M @ expand).tocsc()
+    rigid, sprung = _resisted(moving, expand.T @ (springs @ (expand @ moving)), M)
+    held = qr(np.hstack([rigid, sprung]).T, pivoting=True, mode="economic")[2][: rigid.shape[1] + sprung.shape[1]]
     size = 1.0 / np.sqrt(K.diagonal())
     even = diags(size)
+    pull = even @ (expand.T @ (springs @ (expand @ sprung)))
     K, M = ((even @ matrix @ even).tocsc() for matrix in (K, M))
-    held = qr(rigid.T, pivoting=True, mode="economic")[2][: rigid.shape[1]]
-    rigid = rigid / size[:, None]
-    if rigid.shape[1]:
-        factor = np.linalg.cholesky(rigid.T @ (M @ rigid))
-        rigid = np.linalg.solve(factor, rigid.T).T
+    rigid, sprung = rigid / size[:, None], sprung / size[:, None]
     K, M = (0.5 * (matrix + matrix.T).tocsc() for matrix in (K, M))
     expand = (expand @ even).tocsr()
     masses, posts = (tuple(each) for each in attached)
-    return System(K=K, M=M, expand=expand, rigid=rigid, held=held, point_masses=masses, point_supports=posts, **known)
+    motions = {"rigid": rigid, "sprung": sprung, "pull": pull, "held": held}
+    return System(K=K, M=M, expand=expand, point_masses=masses, point_supports=posts, **motions, **known)
 
 
 def _on_posts(posts: list, springs: csc_matrix, expand: csr_matrix, project: csr_matrix, known: dict[str, Any]):
@@ -489,18 +496,26 @@ def _on_posts(posts: list, springs: csc_matrix, expand: csr_matrix, project: csr
     return springs.tocsc(), expand.tocsr(), project.tocsr()
 
 
-def _rigid(every: np.ndarray, springs: csc_matrix, expand: csr_matrix, project: csr_matrix) -> np.ndarray:
-    """Those rigid motions (n_dofs, n_rigid), of ``every`` one (n_all, n), that the supports allow without strain."""
+def _rigid(every: np.ndarray, expand: csr_matrix, project: csr_matrix) -> np.ndarray:
+    """Those rigid motions (n_dofs, n), of ``every`` one (n_all, n_motions), that no support but springs resists."""
     left = project @ every
     lost = every - expand @ left
     scale = np.abs(every).max()
     _, lengths, turn = np.linalg.svd(lost.T @ lost / scale**2)
-    kept = turn[np.sqrt(lengths) < SAME * np.sqrt(len(every))].T  # (n_motions, n_rigid)
-    if springs.nnz and kept.shape[1]:
-        moving = every @ kept
-        energy, turn = np.linalg.eigh(moving.T @ (springs @ moving))
-        kept = kept @ turn[:, energy <= SAME * energy[-1]]
-    return left @ kept
+    return left @ turn[np.sqrt(lengths) < SAME * np.sqrt(len(every))].T
+
+
+def _resisted(moving: np.ndarray, force: np.ndarray, M: Sparse) -> tuple[np.ndarray, np.ndarray]:
+    """Mass-normalised motions (n_dofs, n_rigid) that springs do not resist, and weakly (n_dofs, n_sprung).
+
+    ``force`` (n_dofs, n) is that of the springs against rigid motions ``moving`` (n_dofs, n). Weakly means an
+    eigenvalue below one in the units of the frame, where those of bending are hundreds.
+    """
+    if not moving.shape[1]:
+        return moving, moving
+    values, turn = eigh(moving.T @ force, moving.T @ (M @ moving))
+    free = values <= SAME * max(values[-1], 0.0)
+    return moving @ turn[:, free], moving @ turn[:, ~free & (values < 1.0)]
 
 
 def _across(origin: np.ndarray, element_dofs: np.ndarray, expand: csr_matrix) -> np.ndarray:

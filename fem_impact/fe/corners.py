@@ -24,6 +24,8 @@ MILD_FREE = 2.5  # [-] the same between free edges, where the singular part is s
 # [-] roots mu that lie closer, over their imaginary part, are taken apart: those of an isotropic plate are equal, and
 # exponents change by 1e-7
 APART = 3e-4
+# [-] corners are added to the estimate above this: rings leave 1e-7, or 6e-4 in a free corner of an L, 2e-3 at a slit
+SAY = 1e-3
 
 
 def _roots(D: np.ndarray) -> np.ndarray:

@@ -62,34 +62,72 @@ def count_below(K: Sparse, M: Sparse, shift: float) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Flexibility:
-    """Inverse of K without rigid motions; K is factorised on first use, and again after unpickling."""
+    """Inverse of K without rigid motions; K is factorised on first use, and again after unpickling.
+
+    Motions that only weak springs resist are ``sprung``: K, in which bending is so much stiffer that rounding hides
+    the springs, is not asked for the forces on them.
+    """
 
     K: Sparse
     M: Sparse
     rigid: np.ndarray  # (n_dofs, n_rigid) mass-normalised
-    held: np.ndarray  # (n_rigid,) unknowns that, when fixed, just prevent rigid motion
+    sprung: np.ndarray  # (n_dofs, n_sprung) mass-normalised
+    pull: np.ndarray  # (n_dofs, n_sprung) forces of the springs on them
+    held: np.ndarray  # (n_rigid + n_sprung,) unknowns that, when fixed, just prevent all these motions
 
-    def __reduce__(self) -> tuple[type["Flexibility"], tuple[Sparse, Sparse, np.ndarray, np.ndarray]]:
-        return Flexibility, (self.K, self.M, self.rigid, self.held)
+    @classmethod
+    def of(cls, system: Any) -> "Flexibility":
+        """That of a `System`."""
+        return cls(system.K, system.M, system.rigid, system.sprung, system.pull, system.held)
+
+    def __reduce__(self) -> tuple[type["Flexibility"], tuple[Any, ...]]:
+        return Flexibility, (self.K, self.M, self.rigid, self.sprung, self.pull, self.held)
 
     @cached_property
-    def _factors(self) -> tuple[Any, Any]:
-        """Unknowns kept, and the factorisation of their stiffness."""
-        if not self.rigid.shape[1]:
-            return slice(None), factorise(self.K)
+    def _factors(self) -> tuple[Any, Any, np.ndarray]:
+        """Unknowns kept, the factorisation of their stiffness, and their answer to the springs' forces."""
+        if not len(self.held):
+            return slice(None), factorise(self.K), self.pull
         keep = np.setdiff1d(np.arange(self.K.shape[0]), self.held)
-        return keep, factorise(self.K[keep][:, keep])
+        lu = factorise(self.K[keep][:, keep])
+        return keep, lu, lu.solve(self.pull[keep]) if self.pull.size else self.pull[keep]
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Static deflection under loads (n_dofs, n); inertia balances them if the body can move rigidly."""
-        keep, lu = self._factors
-        if not self.rigid.shape[1]:
+        keep, lu, answer = self._factors
+        if not len(self.held):
             return lu.solve(np.ascontiguousarray(loads))
         moving = self.M @ self.rigid  # (n_dofs, n_rigid)
         balanced = loads - moving @ (self.rigid.T @ loads)
         result = np.zeros_like(balanced)
         result[keep] = lu.solve(np.ascontiguousarray(balanced[keep]))
+        if self.pull.size:  # the springs balance what the loads do on the sprung motions
+            moved = self.sprung.T @ balanced - self.pull.T @ result
+            moved = np.linalg.solve(self.sprung.T @ self.pull - self.pull[keep].T @ answer, moved)
+            result[keep] -= answer @ moved
+            result += self.sprung @ moved
         return result - self.rigid @ (moving.T @ result)
+
+    @cached_property
+    def _whole(self) -> Any:
+        return factorise(self.K + self.M)
+
+    def shifted(self, loads: np.ndarray) -> np.ndarray:
+        """The inverse (n_dofs, n) of K + M, without rigid motions."""
+        result = self._whole.solve(np.ascontiguousarray(loads))
+        return result - self.rigid @ (self.rigid.T @ (self.M @ result))
+
+    def bent(self, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Vectors (n_dofs, n) without the sprung motions in them, and how much of each (n_sprung, n)."""
+        part = self.sprung.T @ (self.M @ vectors)
+        return vectors - self.sprung @ part, part
+
+    def products(self, vectors: np.ndarray) -> np.ndarray:
+        """Twice the mutual strain energy (n, n) of vectors (n_dofs, n)."""
+        rest, part = self.bent(vectors)
+        cross = part.T @ (self.pull.T @ rest)
+        whole = rest.T @ (self.K @ rest) + cross + cross.T + part.T @ (self.sprung.T @ self.pull) @ part
+        return 0.5 * (whole + whole.T)
 
 
 @one_thread
@@ -99,6 +137,10 @@ def lowest(flexibility: Flexibility, n: int, residual: float = RESIDUAL) -> tupl
     size, n_rigid = K.shape[0], flexibility.rigid.shape[1]
     if n == 0:
         return np.zeros(0), np.zeros((size, 0))
+    solve = flexibility.solve
+    if flexibility.sprung.size:  # one, the scale of bending, keeps K definite and the lowest modes within some decades
+        K = K + M
+        solve = flexibility.shifted
     if n > size - n_rigid:
         raise ValueError(f"n_modes must not exceed the {size} unknowns of this mesh; refine it")
     if size <= DENSE or 3 * (n + n_rigid) >= size:
@@ -107,20 +149,26 @@ def lowest(flexibility: Flexibility, n: int, residual: float = RESIDUAL) -> tupl
         rest = moving @ moving.T
         vectors = eigh(M.toarray() - rest, K.toarray() + rest, subset_by_index=[size - n, size - 1])[1][:, ::-1]
     else:
-        vectors = _krylov(flexibility.solve, M, n, size - n_rigid, residual)
+        vectors = _krylov(solve, M, n, size - n_rigid, residual)
+    few = min(n, flexibility.sprung.shape[1])
+    if few:  # bending left in these by an inexact search would be far stiffer than their springs
+        answer = flexibility.solve(M @ vectors[:, :few])
+        vectors[:, :few] = answer / np.linalg.norm(answer, axis=0)
     if n_rigid:
         vectors = vectors - flexibility.rigid @ (flexibility.rigid.T @ (M @ vectors))
-    return _ritz(K, M, vectors)
+    return _ritz(flexibility, vectors)
 
 
-def _ritz(K: csc_matrix, M: csc_matrix, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _ritz(flexibility: Flexibility, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Best eigenvalues, ascending (n,), and mass-normalised eigenvectors (n_dofs, n) in the span of ``vectors``."""
+    M = flexibility.M
     gram = vectors.T @ (M @ vectors)
     vectors = solve_triangular(np.linalg.cholesky(gram), vectors.T, lower=True).T
-    stiffness = vectors.T @ (K @ vectors)
-    vectors = vectors @ eigh(0.5 * (stiffness + stiffness.T))[1]
-    # eigh's error scales with the largest eigenvalue; Rayleigh quotients make small eigenvalues accurate too
-    values = np.einsum("ij,ij->j", vectors, K @ vectors) / np.einsum("ij,ij->j", vectors, M @ vectors)
+    # eigh's error scales with the largest eigenvalue; so those of sprung motions, far smaller, are told apart again
+    for some in (slice(None), slice(min(flexibility.sprung.shape[1], vectors.shape[1]))):
+        vectors[:, some] = vectors[:, some] @ eigh(flexibility.products(vectors[:, some]))[1]
+    # Rayleigh quotients make small eigenvalues accurate too
+    values = np.diag(flexibility.products(vectors)) / np.einsum("ij,ij->j", vectors, M @ vectors)
     order = np.argsort(values, kind="stable")
     return values[order], vectors[:, order]
 
@@ -148,7 +196,7 @@ def by_slices(flexibility: Flexibility, n: int) -> tuple[np.ndarray, np.ndarray]
         shift = 0.5 * (low + high)
         lu = factorise(K - shift * M)
         with progress.heard(None):  # this counts modes, not the vectors of a slice
-            found = _ritz(K, M, _krylov(lu.solve, M, inside, K.shape[0], RESIDUAL, NARROW))
+            found = _ritz(flexibility, _krylov(lu.solve, M, inside, K.shape[0], RESIDUAL, NARROW))
         kept = (found[0] > low) & (found[0] < high)
         if np.count_nonzero(kept) != inside:
             raise check.SimulationError(

@@ -90,7 +90,7 @@ def _solved(system: System, mesh: Mesh, loads: np.ndarray) -> Deflection:
         system = replace(system, element="argyris")
     fine = reassemble(system, mesh, loads)
     rows = fine.interpolate(loads)
-    flexibility = Flexibility(fine.K, fine.M, fine.rigid, fine.held)
+    flexibility = Flexibility.of(fine)
     forces = rows.toarray().T
     vectors = flexibility.solve(forces)
     compliance = np.asarray(rows @ vectors)

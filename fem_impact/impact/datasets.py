@@ -9,6 +9,7 @@ if TYPE_CHECKING:
 
 SCALARS = {  # attribute of a response: unit
     "n_impacts": "1",
+    "margin": "1",
     "contact_time": "s",
     "impulse": "N s",
     "peak_force": "N",
@@ -16,18 +17,21 @@ SCALARS = {  # attribute of a response: unit
     "speed": "m/s",
     "energy_error": "1",
 }
-PARTS = {"start": "s", "end": "s", "peak_force": "N", "impulse": "N s", "contact": "1"}  # of an impact: unit
+PARTS = {  # of an impact: unit
+    "start": "s", "end": "s", "peak_force": "N", "impulse": "N s", "contact": "1", "restitution": "1",
+}  # fmt: skip
 
 
 def dataset(hit: "Response") -> Any:
-    """The response as an `xarray.Dataset`, see `Response.to_xarray`."""
+    """The response as an `xarray.Dataset`, see `Response.to_xarray`; NaN where there is no restitution."""
     import xarray  # takes as long to load as a blow to compute
 
     dims = ("time",) if hit.force.ndim == 1 else ("time", "contact")
     about = {"units": "N", "long_name": "contact force"}
     data: dict[str, Any] = {"force": (dims, hit.force, about)}
     for name, unit in SCALARS.items():
-        data[name] = ((), getattr(hit, name), {"units": unit})
+        value = getattr(hit, name)
+        data[name] = ((), np.nan if value is None else value, {"units": unit})
     for name, unit in PARTS.items():
         values = np.array([getattr(impact, name) for impact in hit.impacts], int if name == "contact" else float)
         data[f"impact_{name}"] = (("impact",), values, {"units": unit})
@@ -36,4 +40,5 @@ def dataset(hit: "Response") -> Any:
     data |= {f"energy_{name}": ((), value, {"units": "J"}) for name, value in hit.energies.items()}
     places = {"time": ("time", hit.time, {"units": "s"})}
     told = {"tolerance": hit.tolerance, "tolerance_met": int(hit.tolerance_met), "verdict": hit.verdict}
-    return xarray.Dataset(data, places, {**told, "outcome": hit.outcome, "notes": "\n".join(hit.notes)})
+    ended = {"outcome": hit.outcome, "in_contact": int(hit.in_contact), "notes": "\n".join(hit.notes)}
+    return xarray.Dataset(data, places, told | ended)

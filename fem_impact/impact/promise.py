@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._base.check import SimulationError, ToleranceWarning
-from ..modes.modal import FieldShapes
+from ..modes.modal import FieldShapes, Modes
 from . import accuracy
 from .quantities import words
 
@@ -28,11 +28,14 @@ SPARE = 1.1  # [-] modes advised over modes estimated: Weyl's law counts them on
 CAUTION = 0.5, 0.05
 # [-] modes above which other ways out are told: ten times as many as the planner finds by elements
 MOST_ADVISED = 20_000
+UNSTATED = {"compliance": "static compliance", "free": "whether it moves freely"}  # see `Modes.unstated`
 
 
 def verdict(hit: "Response") -> str:
     """One sentence: whether the tolerance is met and, if not, why and what would meet it."""
     error, what = hit.error, words(hit.quantities)
+    for name, modes in _unstated(hit):
+        what += f" (not stated of {name}: {', '.join(UNSTATED[each] for each in modes.unstated)})"
     if hit.tolerance_met:
         return f"tolerance {hit.tolerance:g} met: estimated error {error.total:.1e} of {what}"
     if not error.resolvable:
@@ -49,7 +52,9 @@ def remedy(hit: "Response") -> str:
     allowed = SHARE * hit.tolerance
     advice: list[str] = []
     if error.truncation > allowed or not error.resolvable:
-        advice += _more_modes(hit)
+        loose = [name for name, modes in _unstated(hit) if "free" in modes.unstated]
+        advice += [f"make {name} with free = True or False, as it is" for name in loose] or _more_modes(hit)
+        advice += [f"give the compliance of {name}" for name, modes in _unstated(hit) if "compliance" in modes.unstated]
     if error.idealisation > allowed:
         advice.append("give target = 'modal'")
     if error.mesh > allowed:
@@ -90,6 +95,12 @@ def _above(error: float) -> float:
 
 def _names(hit: "Response") -> list[str]:
     return ["the striker", "the target"] if len(hit.bodies) == 2 else [f"body {i}" for i in range(len(hit.bodies))]
+
+
+def _unstated(hit: "Response") -> list[tuple[str, Modes]]:
+    """Name and modes of every body of which something is not stated that the blow may depend on."""
+    found = zip(_names(hit), hit.bodies, hit.ends)
+    return [(name, modes) for name, modes, ends in found if modes.unstated and ends.doubtful]
 
 
 def _more_modes(hit: "Response") -> Iterator[str]:

@@ -20,7 +20,7 @@ from .compiled import law, layout, propagation, record
 from .compiled.bundles import Scene
 from .contact import Contact, sunk
 from .free_motion import swing
-from .quantities import USUAL, words
+from .quantities import USUAL, rebound, words
 from .state import State
 from .stretched import Stretched
 from .striker import Striker
@@ -28,28 +28,48 @@ from .striker import Striker
 CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more than this factor: three digits are lost
 # [-] two descriptions of one body may differ by this in mass and compliance: meshes do by less, other bodies by more
 ONE_BODY = 1e-2
+# [-] of the largest force of a blow: a push that stays below is rounding; a steep law gives 1e-24 to a touch of 1e-8
+# of the deepest approach
+FAINT = 1e-30
+# [-] of the largest approach: bodies nearer than this touch, an atom's width in most blows; errors of the first step
+# part bodies that are pressed from rest by less
+TOUCH = 1e-6
 PEAK_LOOKS = 16  # [-] samples per step in the search for the peak force; misses (pi/11/16)**2/8 before the parabola
 # [-] largest difference of descriptions up to which Ritz vectors tell a motion: as much as modes err that are found
 # as far as the force reaches
 MOVED = {"displacement": 1e-2, "velocity": 3e-2}
+CLEAR = 0.05  # [-] margins are told up to this: no error that meets a tolerance moves a blow across more
 LASTS = 2.0  # [-] and no longer than this many times the run, as later echoes may be missing from all of them
 LOOKED_AT = 200  # [-] times at which this error is estimated, evenly among those asked for; more only cost time
 
 
 @dataclass(frozen=True)
 class Impact:
-    """One impact: an unbroken contact."""
+    """One impact: the time in which a contact carries force without a break."""
 
     start: float  # [s]
     end: float  # [s]
     peak_force: float  # [N]
     impulse: float  # [N s]
     contact: int = 0  # index of the contact
+    approach_speed: float = 0.0  # [m/s] with which its points met; 0 if they touched already
+    separation_speed: float | None = None  # [m/s] with which they parted; None if they still press each other
 
     @property
     def duration(self) -> float:
         """Time in contact [s]."""
         return self.end - self.start
+
+    @property
+    def restitution(self) -> float | None:
+        """Speed with which the points of the contact parted over that with which they met [-].
+
+        Both are relative speeds, so what the struck surface does counts. None while the bodies still press each other,
+        and where they touched already when the force began.
+        """
+        if self.separation_speed is None or not self.approach_speed:
+            return None
+        return self.separation_speed / self.approach_speed
 
 
 @dataclass(frozen=True)
@@ -229,16 +249,61 @@ class History:
 
     @cached_property
     def contacts(self) -> np.ndarray:
-        """All impacts, (n_impacts, 5): start, end, peak force, impulse, contact index; sorted by contact."""
+        """All impacts, (n_impacts, 7), sorted by contact.
+
+        Columns are start, end, peak force, impulse, contact index, and with what speed the bodies meet and part.
+        """
+        size = np.abs(self.shape)
         rate = np.abs(self._column(1)).max(initial=0.0)
-        return record.find_impacts(self.steps, self.now, self.law, self.n_coefficients, PEAK_LOOKS, ROUNDING * rate)
+        way = (size @ (np.abs(self.start_q) + self.end_time * np.abs(self.start_p))).max()
+        slack = float(max(ROUNDING * way, TOUCH * self._column(0).max(initial=0.0)))
+        found = record.find_impacts(
+            self.steps, self.now, self.law, self.n_coefficients, PEAK_LOOKS, ROUNDING * rate, slack
+        )
+        found = found[found[:, 2] > FAINT * found[:, 2].max(initial=0.0)]
+        if (found[:, 7] < np.inf).any():
+            found[:, 0] = self._force_begins(found, size)
+        return found[:, :7]
+
+    def _force_begins(self, pushes: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """When the force of each push begins [s], (n,), for those of `record.find_impacts`.
+
+        Bodies that touch at rest press each other as soon as a force acts on one of them: a constant one, or that of a
+        push at another contact. ``size`` (n_contacts, n_modes) is that of the shapes.
+        """
+        which, seen, end, since = pushes[:, 4].astype(int), pushes[:, 0], pushes[:, 1], pushes[:, 7]
+        driven = np.abs(self.shape @ self.bias) > ROUNDING * (size @ np.abs(self.bias))
+        start = np.where(since == np.inf, seen, np.where(driven[which], since, np.inf))
+        acts = (size @ size.T > 0.0)[np.ix_(which, which)] & (end >= seen[:, None])
+        for _ in start:  # a force reaches one more contact at a time
+            start = np.minimum(start, np.maximum(np.where(acts, start, np.inf).min(axis=1), since))
+        return np.where(start < end, start, seen)
 
     @cached_property
     def impacts(self) -> tuple[Impact, ...]:
         """All impacts in order of their start."""
         rows = self.contacts.tolist()
-        found = [Impact(start, end, peak, impulse, int(i)) for start, end, peak, impulse, i in rows]
+        found = [
+            Impact(start, end, peak, impulse, int(i), met, None if np.isnan(left) else left)
+            for start, end, peak, impulse, i, met, left in rows
+        ]
         return tuple(sorted(found, key=lambda impact: (impact.start, impact.contact)))
+
+    @cached_property
+    def margin(self) -> float:
+        """How near the run is to one impact more or fewer; see `Response.margin`."""
+        if self.bias.any():
+            return CLEAR
+        miss = -np.inf if self.miss is None else self.miss
+        return min(CLEAR, record.nearest_turn(self.steps, self.now, self.law, self.n_coefficients, miss))
+
+    @cached_property
+    def force_missed(self) -> float:
+        """Error [-] of the peak force if steps are too long for its ripples, on which two runs may agree by chance."""
+        if self.n_coefficients > 2 or not len(self.contacts):
+            return 0.0
+        peak = float(self.contacts[:, 2].max())
+        return float(record.force_missed(self.steps, self.now, self.law, self.n_coefficients, peak))
 
     def samples(self, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
         """Times [s], (n_times,), dense enough for a tolerance, and the forces [N] there, (n_times, n_contacts)."""
@@ -292,6 +357,7 @@ class Ends:
     forms: slice = field(default_factory=lambda: slice(0))  # modes of the run that stand for these; empty for a spring
     dip_force: float = 0.0  # [N] that constant force if it makes a spring that stands for them deflect
     speed: float = 0.0  # [m/s] with which the body arrives in rigid motion, at its first point
+    doubtful: bool = False  # whether more than rounding is estimated of what is left out there
 
     def __repr__(self) -> str:
         return check.brief(self)
@@ -396,6 +462,16 @@ class Response(Totals):
         place = () if self.at is None else at_rest(self.bodies[-1], self.at[None])
         speed = tuple(plausible.number("speed", abs(self.speed)))
         return plausible.together(*(modes.notes for modes in reversed(self.bodies)), striker, speed, place)
+
+    @property
+    def margin(self) -> float:
+        """How near the number of impacts is to another [-].
+
+        Over the deepest approach: how far the bodies at least come apart between contacts, press each other in one, or
+        stay apart where they nearly touch once more. Told up to 0.05; that much, too, for blows under constant forces.
+        A margin below its error counts as a missed tolerance.
+        """
+        return float(self.history.margin)
 
     @property
     def tolerance_met(self) -> bool:
@@ -789,27 +865,60 @@ class Response(Totals):
     @property
     def speeds(self) -> tuple[float, ...]:
         """Final speed [m/s] of each body's rigid motion at its first contact point."""
+        return tuple(float(row @ self.history.end_p) for row in map(self._rigid_row, range(len(self.bodies))))
+
+    def _rigid_row(self, body: int) -> np.ndarray:
+        """Shape (n_modes,) of a body's rigid motion at its first contact point, zero in all other modes."""
+        h, part, found = self.history, self.body_slice(body), np.zeros(len(self.history.omega))
+        rows = self._touched(body)
+        if rows:
+            n_rigid = 1 if self._held and body == 0 else self.bodies[body].n_rigid
+            rigid = slice(part.start, part.start + n_rigid)
+            found[rigid] = self._sign(body, rows[0]) * h.shape[rows[0], rigid]
+        return found
+
+    def _touched(self, body: int) -> list[int]:
+        """The contacts of a body."""
         h = self.history
-        result = []
-        for body, modes in enumerate(self.bodies):
-            held = body == 0 and self.striker is not None and self.striker.hand is not None
-            part = slice(self.body_slice(body).start, self.body_slice(body).start + (1 if held else modes.n_rigid))
-            rows = [i for i in range(h.n_contacts) if (h.shape[i, self.body_slice(body)] != 0.0).any()]
-            sign = self._sign(body, rows[0]) if rows else 1.0
-            result.append(sign * float(h.shape[rows[0], part] @ h.end_p[part]) if rows else 0.0)
-        return tuple(result)
+        return [i for i in range(h.n_contacts) if (h.shape[i, self.body_slice(body)] != 0.0).any()]
+
+    @property
+    def _held(self) -> bool:
+        return self.striker is not None and self.striker.hand is not None
 
     def _sign(self, body: int, contact: int) -> float:
         later = any((self.history.shape[contact, self.body_slice(other)] != 0.0).any() for other in range(body))
         return -1.0 if later else 1.0
 
     @property
-    def restitution(self) -> float:
-        """Minus final over initial speed of the striker's rigid motion, at its contact point [-].
+    def in_contact(self) -> bool:
+        """Whether the striker, or the first body, still presses another at the end of the run."""
+        mine = self._touched(0)
+        return any(each.separation_speed is None for each in self.impacts if each.contact in mine)
 
-        On a body that moved before it may exceed 1. A held striker has no final speed but that at the end of the run.
+    @cached_property
+    def _pushed(self) -> bool:
+        """Whether a constant force or a hand changes the speed of the first body's rigid motion in flight."""
+        return self._held or bool((self._rigid_row(0) * self.history.bias).any())
+
+    @cached_property
+    def restitution(self) -> float | None:
+        """Minus the striker's speed after its last separation over that before its first contact [-].
+
+        Both are those of its rigid motion at its contact point; a constant force or a hand that acts in flight does not
+        count. On a body that moved before it may exceed 1. None while the striker is still in contact (`in_contact`),
+        and for one that did not arrive. See `Impact.restitution` for that of each impact.
         """
-        return -self.speeds[0] / self.speed if self.speed else 0.0
+        if self.in_contact:
+            return None
+        before, after = self.speed, self.speeds[0]
+        if self._pushed:
+            mine = [each for each in self.impacts if each.contact in self._touched(0)]
+            if not mine:
+                return -1.0 if before else None
+            times = np.array([mine[0].start, max(each.end for each in mine)])
+            before, after = (self.history.states(times)[1] @ self._rigid_row(0)).tolist()
+        return -after / before if before else None
 
     @cached_property
     def _balance(self) -> dict[str, float]:
@@ -906,7 +1015,7 @@ class Response(Totals):
             ("peak force", f"{self.peak_force:.5g} N"),
             ("contact time", f"{self.contact_time:.5g} s"),
             ("impulse", f"{self.impulse:.5g} N s"),
-            ("restitution", f"{self.restitution:.5f}"),
+            ("restitution", rebound(self, 5)),
             ("estimated error", f"{self.error.total:.1e} of {self.tolerance:g} accepted"),
         ]
         end = self.impacts[-1].end if self.impacts else np.inf
@@ -932,13 +1041,15 @@ class Response(Totals):
         ]
         if self.n_impacts > 20:
             lines.append(f"  ... and {self.n_impacts - 20} more")
+        if self.margin < CLEAR:
+            lines.append(f"margin {self.margin:.1g}: so much of the deepest approach decides the number of impacts")
         total = self._balance["start"]
         shares = ", ".join(f"{name} {value / total:.2%}" for name, value in self.energies.items()) if total else "none"
         error = self.error
         lines += [
             f"contact time {self.contact_time * 1e3:.5g} ms, peak force {self.peak_force:.5g} N, "
             f"impulse {self.impulse:.5g} N s",
-            f"restitution {round(self.restitution, 5) + 0.0:.5f} at {self.speed:g} m/s",
+            f"restitution {rebound(self, 5)} at {self.speed:g} m/s",
             f"energy {total:.5g} J: {shares}",
             f"estimated error {error.total:.1e} of {words(self.quantities)}: step {error.step:.1e}, truncation "
             f"{error.truncation:.1e}, mesh {error.mesh:.1e}, idealisation {error.idealisation:.1e}"
@@ -961,7 +1072,7 @@ class Response(Totals):
             )
         if self.audit is not None:
             lines += [f"Model: {self.model_verdict[0]}", *(f"  {line}" for line in self.model_verdict[1:])]
-        lines += [f"Note: {note}" for note in self.notes]
+        lines[1:1] = [f"Note: {note}" for note in self.notes]  # a slip of a unit makes all that follows wrong
         return "\n".join(lines)
 
     def to_xarray(self) -> Any:

@@ -157,17 +157,20 @@ class Sensitivity:
         dd, dv = self.found.ends[mark, c, :2] - [self.found.dents[mark, c, 1:], np.zeros(len(self.change.offset))]
         still = np.zeros(dd.shape)
         near = abs(d) <= AT_ZERO * self.deepest[c]
-        if k == 0:
+        resting = abs(v) <= ROUNDING * np.abs(self.found.way[:, :, 1]).max()
+        if k == 0 or (near and resting):
             h = self.history
-            parts = (np.abs(dd) > ROUNDING * self._start_terms(c, h.start_q, self.change.start_q)).any()
-            resting = abs(v) <= ROUNDING * np.abs(self.found.way[:, :, 1]).max()
-            parts |= resting and (np.abs(dv) > ROUNDING * self._start_terms(c, h.start_p, self.change.start_p)).any()
+            drift = self._start_terms(c, h.start_p, self.change.start_p)
+            way = self._start_terms(c, h.start_q, self.change.start_q) + time * drift
+            parts = (np.abs(dd) > ROUNDING * way).any() or (resting and (np.abs(dv) > ROUNDING * drift).any())
             if near and parts:
                 raise SimulationError(
                     "no gradient: the bodies touch at the start already, and a change would press or part them; "
                     "give a gap"
                 )
-            return still
+            pushes = (each.contact for each in h.impacts if each.start == time and each.approach_speed)
+            other = c if k == 0 else next(pushes, c)
+            return still if other == c else self._moved(time, other)
         if near:
             return -dd / v
         if k == 0 or (k == len(self.time) - 1 and self.history.status == record.HORIZON):
@@ -271,6 +274,22 @@ class Sensitivity:
         """Change (n,) of the final speed [m/s] of the point of contact c in some modes."""
         u, p = self.history.shape[c, modes], self.found.p[-1, modes]
         return np.asarray(self.change.shape[:, c, modes] @ p + u @ self.end_speeds[modes])
+
+    def rebound(self, rigid: np.ndarray, contacts: Sequence[int]) -> tuple[float, np.ndarray, np.ndarray]:
+        """Speed [m/s] of a body under constant forces before its impacts, and the changes (n,) of it and of that after.
+
+        It is that of the point of the first of its contacts in its rigid motions.
+        """
+        h, change, c = self.history, self.change, contacts[0]
+        u, bias = h.shape[c, rigid], h.bias[rigid]
+        pull, pulls = float(u @ bias), change.shape[:, c, rigid] @ bias + change.bias[:, rigid] @ u  # [m/s^2]
+        mine = [(each, *moved) for each, moved in zip(h.impacts, self.events) if each.contact in contacts]
+        first, sooner, _ = min(mine, key=lambda row: row[0].start)
+        last, _, later = max(mine, key=lambda row: row[0].end)
+        before = change.shape[:, c, rigid] @ h.start_p[rigid] + change.start_p[:, rigid] @ u
+        after = self.speed(rigid, c) - pulls * (h.end_time - last.end) - pull * (self.end - later)
+        speed = float(u @ h.start_p[rigid]) + pull * first.start
+        return speed, before + pulls * first.start + pull * sooner, after
 
     def energies(self, modes: slice) -> np.ndarray:
         """Change (n_modes, n) of the energy left in each of some modes at the end [J]."""

@@ -230,6 +230,7 @@ class Striker:
             points=[[0.0], [1.0]],  # head and handle
             mass=mass,
             damping_ratio=[0.0, 0.5 * damping / (reduced * omega)],
+            complete=True,
         )
         return cls(replace(modes, thick=True), np.zeros(1))  # nothing bends: no shear is left out
 
@@ -248,8 +249,8 @@ class Striker:
     def held(self, hand: Hand) -> "Striker":
         """The same striker held by a hand, which brings it back after each bounce.
 
-        Such a blow may never end by itself: give it a duration, or a number of impacts. The ``restitution`` then counts
-        the speed at the end of the run.
+        Such a blow may never end by itself: give it a duration, or a number of impacts. The ``restitution`` counts the
+        speed at its last separation.
 
         Examples
         --------

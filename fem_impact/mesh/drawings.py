@@ -174,6 +174,7 @@ def _svg(path: Path, unit: str | None, notes: list[str]) -> list[Loop]:
         scale = width / pixels if pixels else math.nan
     else:
         notes.append(f"{path.name} states no unit; assumed px of 1/96 inch, pass unit= to change that")
+    notes.append(f"{path.name}: y points down in an SVG file and up here: the drawing's y is taken as -y")
     if not (math.isfinite(scale) and scale > 0.0):
         raise ValueError(f"{path.name} has no usable width and viewBox; set both to positive numbers")
     return _chained(path.name, _unpacked(path.name, drawn, np.diag([scale, -scale])), notes)

@@ -76,11 +76,13 @@ def _plane_points(path: Path, data: meshio_reader.Raw, unit: str | None) -> tupl
     if points.shape[1] == 3:
         spread = np.ptp(points[used], axis=0) if used.size else np.zeros(3)
         flat = int(spread.argmin())
-        if spread[flat] > 1e-6 * spread.max():
+        if spread[flat] > 1e-5 * spread.max():  # less is noise, as of coordinates with six digits
             raise ValueError(
                 f"{name} is not flat: it extends over {spread[0]:g} x {spread[1]:g} x {spread[2]:g}; "
                 "a plate needs triangles in one plane z = constant"
             )
+        if spread[flat] > SAME * spread.max():
+            notes.append(f"the nodes lie up to {spread[flat]:.1g} apart across the plane of the mesh, which is ignored")
         if flat != 2:
             notes.append(f"the mesh lies in the plane {'xyz'[flat]} = constant; its other two coordinates are used")
         points = np.delete(points, flat, axis=1)

@@ -36,6 +36,7 @@ from ..modes.analytic import BeamShapes, DiskShapes, RectangleShapes
 from ..modes.modal import FieldShapes, Modes, ScaledShapes, Shapes
 from ..modes.ritz import RitzShapes
 from ..modes.timoshenko import TimoshenkoShapes
+from ..modes.unstated import lumps
 
 # [-] flexible modes that are integrated: a blow depends on few others one by one, which follow from TOP of them
 LOW = 40
@@ -56,6 +57,7 @@ class Bending:
     rotary: np.ndarray | None  # [-] rotary inertia over inertia; None if the thickness is not known
     shear: np.ndarray | None  # [-] energy of shear over that of bending
     edge: np.ndarray | None  # [-] energy of twist that free edges give up, over that of bending
+    turning: np.ndarray | None = None  # (n_rigid, n_rigid) [-] rotary inertia of the rigid motions, see `heavier`
 
     @property
     def thick(self) -> np.ndarray | None:
@@ -63,6 +65,17 @@ class Bending:
         if self.rotary is None or self.shear is None or self.edge is None:
             return None
         return self.rotary + self.shear + self.edge
+
+    def heavier(self, rows: np.ndarray) -> np.ndarray:
+        """Shapes (n_points, n_modes) of rigid motions whose inertia has the rotary one, too, and elastic ones as given.
+
+        The thin theory gives a body that turns none. It is known exactly: ``int rho h**3 / 12 grad w . grad w``.
+        """
+        result = rows.copy()
+        if self.turning is not None and self.turning.size:
+            share, turn = np.linalg.eigh(self.turning)
+            result[:, : len(turn)] = rows[:, : len(turn)] @ (turn / np.sqrt(1.0 + share)) @ turn.T
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +200,22 @@ def bending(body: Known) -> Bending:
         found = _beam_shapes(shapes, low, body, amplitude)
     left = _mixture(modes.shapes, low)
     found[:3] *= np.stack([left**2, left, left**2])
-    return _extended(modes, low, found, body.per_extent, thick)
+    extended = _extended(modes, low, found, body.per_extent, thick)
+    return replace(extended, turning=_turning(body)) if thick and n_rigid else extended
+
+
+def _turning(body: Known) -> np.ndarray | None:
+    """Rotary inertia of the rigid motions of a thin body over their inertia, (n_rigid, n_rigid) [-]."""
+    modes, section = body.modes, body.section
+    points, cells = modes.shapes.grid()
+    found = lumps(points, cells)
+    if found is None or section is None:
+        return None
+    pairs, weight = found
+    rotary = body.extent * float(weight @ section.rotary(points[pairs].mean(axis=1)))
+    level = np.column_stack([np.ones(len(points)), points])
+    slope = np.linalg.lstsq(level, modes.shapes.take(modes.n_rigid).at(points), rcond=None)[0][1:]
+    return rotary * slope.T @ slope
 
 
 def _extended(modes: Modes, low: slice, found: np.ndarray, per_extent: float, thick: bool) -> Bending:

@@ -37,6 +37,10 @@ ASSEMBLY = 4.6e-5  # [s] per unknown, with the mesh
 FACTORS = 4.5e-6, 1.05e-7  # [s] per unknown of a factorisation, and per unknown times the root of their number
 SOLVE, TURN = 5.7e-7, 6e-10  # [s] per unknown of a solution, and of making it orthogonal to another vector
 DENSE = 4e-9  # [s] of all small eigenvalue problems, over their size cubed
+AIR = 1e-4  # [s] of the air around a plate, per mode squared
+# [-] time steps of collocation per contact at a tolerance of 1e-9, power of 1e-9 / tolerance with which they grow, and
+# work of each over that of another scheme's step
+COLLOCATED = 300.0, 0.2, 10.0
 LANCZOS = 4.0  # [-] work per mode, over that per Ritz vector
 ATTEMPTS = 3.0  # [-] blows on the way to a tolerance
 # As the runs of studies/cost_predictions.py need; it compares the numbers predicted with those done.
@@ -111,14 +115,24 @@ def strikes(n_steps: float, n_modes: int) -> Work:
     return Work(steps=START + RUNS * n_steps * step, memory=PROCESS)
 
 
+def in_air(n_modes: float) -> Work:
+    """Air around the modes of a plate."""
+    return Work(dense=AIR * n_modes**2)
+
+
+def collocated(tolerance: float) -> float:
+    """Time steps of an undisturbed contact as `strikes` takes them, by collocation to a tolerance."""
+    return COLLOCATED[0] * (1e-9 / tolerance) ** COLLOCATED[1] * COLLOCATED[2]
+
+
 def by_modes(n_dofs: float, n_modes: float) -> Work:
     """Modes on one mesh, their number checked."""
-    return _mesh(n_dofs, LANCZOS * n_modes, n_modes)
+    return on_mesh(n_dofs, LANCZOS * n_modes, n_modes)
 
 
 def compliance(n_dofs: float) -> Work:
     """Static deflection that stands for the modes left out, on elements that shrink towards the blow."""
-    return _mesh(n_dofs, 2.0, 2.0) + Work(memory=ELEMENTS)
+    return on_mesh(n_dofs, 2.0, 2.0) + Work(memory=ELEMENTS)
 
 
 def grown(n_vectors: float, lasts: float) -> float:
@@ -132,11 +146,11 @@ def by_vectors(n_dofs: Sequence[float], n_vectors: float, lasts: float) -> Work:
     Each vector must be made orthogonal to all before, so that the work grows with the square of their number.
     """
     n_vectors = grown(n_vectors, lasts)
-    every = sum((_mesh(n, n_vectors, n_vectors) for n in n_dofs), NOTHING)
+    every = sum((on_mesh(n, n_vectors, n_vectors) for n in n_dofs), NOTHING)
     return every + Work(dense=DENSE * n_vectors**3, steps=ATTEMPTS * START, memory=ELEMENTS)
 
 
-def _mesh(n_dofs: float, n_solved: float, n_kept: float) -> Work:
+def on_mesh(n_dofs: float, n_solved: float, n_kept: float) -> Work:
     """Assembly, two factorisations and solutions, each made orthogonal to those before, on one mesh."""
     factors = 2.0 * (FACTORS[0] + FACTORS[1] * math.sqrt(n_dofs))
     sparse = n_dofs * (ASSEMBLY + factors + n_solved * (SOLVE + 0.5 * TURN * n_kept))

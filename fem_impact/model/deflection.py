@@ -63,7 +63,7 @@ def of_target(struck: Struck) -> Assumption:
             remedy = f"{OTHER} and {BETTER}" if quadratic(body.modes) else BETTER
         if struck.bodies[1].stretches if struck.foreseen else struck.hit.history.stretched is not None:
             return Assumption("small deflections", value, GONG, effect, quantities, LOCAL, NUMBER, unknown)
-        remedy = "give material and section" if unknown else A_GONG if value is not None and value > GONG else remedy
+        remedy = "give material and section" if unknown else remedy
         return Assumption("small deflections", value, limit, effect, quantities, remedy, NUMBER, unknown)
 
     if struck.bodies[1].dimension == 0:

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from scipy.special import ellipkm1
 
-from .._base import check
 from .._base.rounding import ROUNDING, SAME
 from ..fe.assembly import support_of_facets
 from ..fe.section import Material, Plate
@@ -274,10 +273,10 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
     Parameters
     ----------
     target : Target
-    at : strike point, (dimension,) [m]
+    at : strike point on the body, (dimension,) [m]
     mass, duration : as in `rigid_error`
     """
-    mesh, section, find = target.mesh, target.section, target.closed
+    mesh, section, find, at = target.mesh, target.section, target.closed, np.asarray(at, float)
     if mesh is None or section is None:
         return None
     stretch, rigid = 1.0, np.inf
@@ -286,8 +285,6 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
         first = find(n_modes=FIRST_LOOK)
         modes = target.finished(first)
         stretch = modes.frequencies[-1] / first.frequencies[-1]
-        with target.blame("strike"):
-            at = modes.point("at", at)[0]
         notes = at_rest(modes, at[None])
         most = modes.frequencies[-1] * (MOST_LOOKED_AT / FIRST_LOOK) ** (2.0 / modes.dimension)
         limit = min(LOOK * 0.5 / duration, most)
@@ -300,8 +297,6 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
         return None
     kinds = support_of_facets(mesh, dict(target.supports))
     free = any(kind not in ("clamped", "hinged") for kind in kinds)
-    with target.blame("strike"):
-        at = check.array("at", at, (2,), "m", lift=True)
     view = Surroundings.seen(mesh, at)
     if view is None:
         return None

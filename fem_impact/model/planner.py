@@ -1,7 +1,7 @@
 """Choose the smallest model of a blow that meets its tolerance, and run it."""
 
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from inspect import signature
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .._base import check, markup
+from .._base import check, markup, progress
 from ..fe import plausible, refinement
 from ..fe.assembly import System
 from ..fe.section import Plate
@@ -18,7 +18,7 @@ from ..impact import accuracy, assumption, collision, promise
 from ..impact.assumption import Assumption
 from ..impact.collision import BAND_POINTS
 from ..impact.contact import Contact
-from ..impact.quantities import words
+from ..impact.quantities import apart, words
 from ..impact.response import LOOKED_AT, Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, FieldShapes, Modes, at_rest
@@ -57,6 +57,7 @@ TARGETS = ("rigid", "infinite", "vectors", "mixed", "modal")
 RINGING = ("modal", "vectors")  # those of a target that rings
 # [-] modes times steps of one run of a plate that is infinite above a frequency: a time limit of ten seconds
 MOST_MIXED = 2e8
+NO_MESH = "a mesh that resolves the frequency up to which a plate of 'mixed' keeps its modes has too many unknowns"
 COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced: longer than one likes to wait
 
 
@@ -186,7 +187,7 @@ class Plan:
         wanted = words(self.quantities)
         kept = "met" if self.meets else "MISSED"
         first = f"tolerance {self.tolerance:g} of {wanted} will be {kept}: predicted error {self.error:.1e}"
-        lines = [first, *(f"  {line}" for line in self.reasons)]
+        lines = [first, *(f"Note: {note}" for note in self.notes), *(f"  {line}" for line in self.reasons)]
         lines.append("Predicted errors:")
         errors = [*self.errors.items(), ("total", self.error)]
         lines += [f"  {line}" for line in markup.columns([(name, f"{error:.1e}") for name, error in errors])]
@@ -195,7 +196,6 @@ class Plan:
         lines.append(f"Cost: {self.cost}")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")
-        lines += [f"Note: {note}" for note in self.notes]
         return "\n".join(lines)
 
 
@@ -236,7 +236,10 @@ class _Asked:
     def checked(cls, blow: Blow, changes: Mapping[str, Any]) -> "_Asked":
         changes = {name: value for name, value in changes.items() if value is not None}
         pieces = {name: changes[name] for name in PIECES if name in changes}
-        values = {**blow.arguments, **{name: value for name, value in changes.items() if name not in PIECES}}
+        values: dict[str, Any] = {
+            **blow.arguments,
+            **{name: value for name, value in changes.items() if name not in PIECES},
+        }
         for name, value in pieces.items():
             if name == "target":
                 check.one_of("target", value, TARGETS)
@@ -255,6 +258,7 @@ class _Asked:
             values["stretching"] = check.flag("stretching", values.get("stretching", False)) or blow.target.stretching
             for name in ("striker_force", "target_force"):
                 values[name] = check.number(name, values.get(name, 0.0), "N")
+        values["at"] = _struck_at(blow.target, values["at"], changes)
         duration = accuracy.contact_duration(blow.contact, blow.striker.felt_mass, speed)
         return cls(blow, changes, values, pieces, options.tolerance, options.quantities, duration)
 
@@ -278,6 +282,11 @@ class _Asked:
         """Mass [kg] of the striker felt at its contact point."""
         return self.blow.striker.felt_mass
 
+    @property
+    def fast(self) -> tuple[str, ...]:
+        """A note if the speed is probably a slip of a unit."""
+        return tuple(plausible.number("speed", self.values["speed"]))
+
     @cached_property
     def seen(self) -> idealisation.Outside | None:
         """What is known of the target without finite elements."""
@@ -287,6 +296,25 @@ class _Asked:
         """Modes of the target, see `Target.find`."""
         size, limit = self.pieces.get("size"), 2.0 * CHEAP * self.tolerance / self.fineness
         return self.blow.target.find(n_modes, max_frequency, tolerance=limit, size=size, **how)
+
+
+def _struck_at(target: Target, at: Any, changes: Mapping[str, Any]) -> Any:
+    """The strike point (dimension,) [m], checked to lie on the body."""
+    mesh, blame = target.mesh, partial(target.blame, "strike", changes)
+    if mesh is None:
+        assert target.modes is not None
+        with blame():
+            return target.modes.point("at", at)[0] if target.modes.dimension else at
+    with blame():
+        place = check.places("at", at, mesh.dimension)
+        if len(place) != 1:
+            raise ValueError(f"at must be one point, got {len(place)}")
+    along = mesh.dimension == 1 and mesh.points.min() <= place[0, 0] <= mesh.points.max()
+    if not along and (mesh.dimension == 1 or idealisation.Surroundings.seen(mesh, place[0]) is None):
+        inside = target.assembled(Stages()).contains(place)  # perhaps between a curved edge and its chord
+        with blame():
+            check.on_body("at", place, inside, mesh.points)
+    return place[0]
 
 
 def plan_of(
@@ -311,7 +339,27 @@ def plan_of(
 def make(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
     """Choose the model of a blow; see `fi.plan`."""
     asked = _Asked.checked(blow, changes)
-    target = asked.pieces.get("target")
+    with _noted(asked):
+        return _chosen(asked, stages)
+
+
+@contextmanager
+def _noted(asked: _Asked) -> Iterator[None]:
+    """Put numbers that are probably a slip of a unit in front of an error, which is then hardly about anything else."""
+    try:
+        yield
+    except check.SimulationError as error:
+        target = asked.blow.target
+        assumed = () if target.mesh is None else target.mesh.notes
+        slips = [note for note in (*target.notes, *asked.blow.striker.notes, *asked.fast) if note not in assumed]
+        if not slips or str(error).startswith(slips[0]):
+            raise
+        raise check.SimulationError(f"{'; '.join(slips)}: {error}") from None
+
+
+def _chosen(asked: _Asked, stages: Stages) -> Plan:
+    """The smallest model that meets the tolerance, or the one asked for."""
+    blow, target = asked.blow, asked.pieces.get("target")
     held = blow.striker.hand is not None  # it comes back when the body has long answered
     stated = blow.target.modes is not None or {"size", "n_modes", "max_frequency"} & set(asked.pieces)
     if target is None and (held or stated):
@@ -324,13 +372,16 @@ def make(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
 
 def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     """Run the plan, and then with the better model of the target that the tolerance requires, if it may be chosen."""
-    run = _carry_out(plan, stages, keep)
+    with _noted(_Asked.checked(plan.blow, plan.changes)):
+        run = _carry_out(plan, stages, keep)
     better = audit.required(plan.blow.target, run.response)
     if better is None:
         return run
     target, why = better
     try:
-        again = carry_out(make(replace(plan.blow, target=target), plan.changes, stages), stages)
+        better_plan = make(replace(plan.blow, target=target), plan.changes, stages)
+        progress.foresee(better_plan.seconds)
+        again = carry_out(better_plan, stages)
     except (check.SimulationError, ValueError) as error:
         return replace(run, notes=(*run.notes, f"{why}; that was not computed: {error}"))
     return replace(again, notes=(why, *again.notes))
@@ -360,13 +411,15 @@ def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:
             first = run(**{**asked.values, "tolerance": SHARE * asked.tolerance})
             response = within(asked.tolerance, first, run, asked.values)
         short = response.error.truncation > SHARE * asked.tolerance
+        more = _finer_air(response, asked.tolerance) if blow.target.air else 1.0
         coarse = not given and response.error.total > asked.tolerance and response.error.mesh > CHEAP * asked.tolerance
-        if plan.target != "modal" or fixed or not (short or coarse) or attempt == ATTEMPTS - 1:
+        if plan.target != "modal" or fixed or not (short or coarse or more > 1.0) or attempt == ATTEMPTS - 1:
             break
         margin *= vectors.NOTCH if short else 1.0
         asked = replace(asked, fineness=asked.fineness * (vectors.NOTCH if coarse else 1.0))
         try:
-            plan = _modal(asked, stages, None if coarse else plan.first, margin)
+            plan = _modal(asked, stages, None if coarse else plan.first, margin, more)
+            progress.foresee(plan.seconds)
         except check.SimulationError:  # too many modes or too fine a mesh: what there is has missed the tolerance
             break
     error = replace(response.error, idealisation=idealised)
@@ -413,9 +466,10 @@ def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) 
                 if found is None:
                     raise
                 break
-        error = found[0].error
+        error, before = found[0].error, seen.count
         if not seen.improved(error, asked.tolerance - error.step):
             break
+        progress.foresee(seen.work(before).seconds)
     response, run, number, size, n_dofs, whole = found
     response = within(asked.tolerance, response, run, values)
     if not response.tolerance_met and "target" not in asked.pieces:
@@ -438,6 +492,7 @@ def _carry_out_mixed(plan: Plan, asked: _Asked, stages: Stages) -> Run:
     assert frequency is not None
     by_parts = _mixed_by_modes if plan.size is None else _mixed_by_vectors
     found: Any = None
+    other = None if plan.size is None or "target" in asked.pieces else _all_by_vectors(asked, stages)
     while True:
         try:
             found = *by_parts(plan, asked, frequency, stages), frequency
@@ -451,6 +506,14 @@ def _carry_out_mixed(plan: Plan, asked: _Asked, stages: Stages) -> Run:
         if hit.error.idealisation <= allowed or work > MOST_MIXED or many:
             break
         frequency *= 2.0
+        if plan.size is not None:
+            more = _mixed_work(asked, plan.mobility, frequency, stages).seconds
+            if other is not None and other.seconds < more:
+                progress.foresee(other.seconds)
+                instead, other = _carry_out(other, stages, None), None
+                if instead.response.tolerance_met:
+                    return instead
+            progress.foresee(more)
     response, run, frequency = found
     response = within(asked.tolerance, response, run, values)
     plan = replace(plan, n_modes=response.bodies[-1].n_modes, max_frequency=frequency)
@@ -483,9 +546,8 @@ def _mixed_by_vectors(
     plan: Plan, asked: _Asked, frequency: float, stages: Stages
 ) -> tuple[Response, Callable[..., Response]]:
     target, elements = plan.blow.target, _mixed_elements(asked, frequency)
-    assert target.mesh is not None
-    if elements.size < refinement.smallest_size("argyris", target.mesh):
-        raise check.SimulationError("a mesh that resolves the frequency has too many unknowns")
+    if not _mixed_mesh(asked, frequency):
+        raise check.SimulationError(NO_MESH)
     shift, count = 2.0 * np.pi * mixed.REACH * frequency, _mixed_vectors(asked, plan.mobility, frequency)
     seen = vectors.Seen(
         target,
@@ -571,7 +633,7 @@ def verify(run: Run, watch: Watch | None = None) -> Run:
 def differences(one: Response, two: Response, quantities: Mapping[str, float | None]) -> dict[str, float]:
     """Differences [-] of two runs of one blow: absolute in the restitution and the count, relative in the others."""
     true = {
-        "restitution": abs(one.restitution - two.restitution),
+        "restitution": apart(one.restitution, two.restitution),
         "n_impacts": float(abs(one.n_impacts - two.n_impacts)),
     }
     for name in ("impulse", "contact_time", "peak_force"):
@@ -675,6 +737,10 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, heavy: bool = Fals
     ):
         return None
     frequency = mixed.first_frequency(asked.mass, seen.mobility, seen.echo, asked.duration)
+    if blow.target.kind == "fe" and not _mixed_mesh(asked, frequency):
+        if target is None:
+            return None
+        raise check.SimulationError(f"{blow.name}{NO_MESH}")
     number = _mixed_count(asked, frequency)
     kept = (
         f"the target keeps its modes up to about {frequency:.3g} Hz, or higher if the echoes left out show; above, it "
@@ -688,9 +754,8 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, heavy: bool = Fals
             first = asked.find(FIRST_LOOK, stages=stages)
     else:
         elements, element = _mixed_elements(asked, frequency), "argyris"
-        size, n_dofs = elements.size, blow.target.unknowns(np.atleast_2d(values["at"]), elements, stages)
-        count = _mixed_vectors(asked, seen.mobility, frequency)
-        work = cost.by_vectors([n_dofs, n_dofs / refinement.COARSER**2], count, 1.0)
+        size, n_dofs = elements.size, blow.target.unknowns(values["at"][None], elements, stages)
+        work = _mixed_work(asked, seen.mobility, frequency, stages)
     return _plan(
         asked, target="mixed", errors={"echoes left out": SHARE * asked.tolerance}, reasons=(why, kept),
         mass=seen.mass, mobility=seen.mobility, n_modes=number, max_frequency=frequency, first=first, size=size,
@@ -716,6 +781,28 @@ def _mixed_elements(asked: _Asked, frequency: float) -> Elements:
     return vectors.elements_for(target, size, asked.mass, reach, asked.tolerance)
 
 
+def _mixed_work(asked: _Asked, mobility: float, frequency: float, stages: Stages) -> cost.Work:
+    """Work for a blow by Ritz vectors, for the infinite plate above a frequency [Hz]."""
+    elements, target = _mixed_elements(asked, frequency), asked.blow.target
+    n_dofs = target.unknowns(asked.values["at"][None], elements, stages)
+    return cost.by_vectors([n_dofs, n_dofs / refinement.COARSER**2], _mixed_vectors(asked, mobility, frequency), 1.0)
+
+
+def _all_by_vectors(asked: _Asked, stages: Stages) -> Plan | None:
+    """The plan with Ritz vectors and no infinite plate, for a blow whose echoes matter; None if no mesh allows it."""
+    with suppress(check.SimulationError):
+        plan = _by_vectors(asked, None, stages)
+        return plan if plan is not None and plan.target == "vectors" else None
+    return None
+
+
+def _mixed_mesh(asked: _Asked, frequency: float) -> bool:
+    """Whether a mesh may be so fine, for the infinite plate above a frequency [Hz]."""
+    mesh = asked.blow.target.mesh
+    assert mesh is not None
+    return _mixed_elements(asked, frequency).size >= refinement.smallest_size("argyris", mesh)
+
+
 def _mixed_vectors(asked: _Asked, mobility: float, frequency: float) -> int:
     """Number of Ritz vectors tried first, for the infinite plate above a frequency [Hz]."""
     lasts = max(asked.duration, mixed.LASTING * asked.mass * mobility)
@@ -728,10 +815,6 @@ def _unfit(asked: _Asked) -> str:
     target = asked.blow.target
     if target.mesh is None or target.mesh.dimension == 1:
         return "is not known for this body"
-    at = check.array("at", asked.values["at"], (2,), "m", lift=True)
-    if idealisation.Surroundings.seen(target.mesh, at) is None:
-        with target.blame("strike"):
-            raise ValueError(f"at must lie on the body, got {check.shown(asked.values['at'])} m")
     if "first_frequency" in target.scale:
         return "needs E, nu, rho and thickness: first_frequency gives the rigidity only once the modes are known"
     return "is known for plates of constant thickness only, without tension, point masses and point supports"
@@ -802,8 +885,7 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
             f"{blow.name}this blow needs about {needs:.2g} unknowns, elements of {size:.2g} m, more than the limit of "
             f"{refinement.MOST_UNKNOWNS}; take a contact with stiffness = {float(f'{0.9 * soft:.1e}'):g}"
         )
-    with blow.target.blame("strike"):
-        at = check.array("at", values["at"], (2,), "m", lift=True)[None]
+    at = values["at"][None]
     lasts, impacts = _foreseen(asked)
     elements, fixed = _elements(asked, size), blow.target.size_stated or "size" in asked.pieces
     n_dofs = blow.target.unknowns(at, elements, stages)
@@ -835,7 +917,7 @@ def _elements(asked: _Asked, size: float) -> Elements:
 
 def _foreseen(asked: _Asked) -> tuple[float, int]:
     """How long the blow lasts on an infinite plate, in undisturbed contacts, and its impacts; (1, 1) if not known."""
-    at, striker = np.atleast_1d(np.asarray(asked.values["at"], float)), asked.blow.striker
+    at, striker = asked.values["at"], asked.blow.striker
     seen = asked.seen
     if seen is None or not np.isfinite(seen.mobility):
         return 1.0, 1
@@ -861,8 +943,21 @@ def _ringing_count(asked: _Asked) -> int:
     return max(FIRST_LOOK, min(MOST_MODES["fe"] if band else MOST_RINGING, round(number)))
 
 
-def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: float = 1.0) -> Plan:
-    """The plan with a modal target; finds its first modes, because they tell how many are needed."""
+def _finer_air(hit: Response, tolerance: float) -> float:
+    """How many times more modes make the air err so little that a blow meets its tolerance; 1 if it does or cannot.
+
+    The error goes as the area of the cells on which the pressure is found, whose number goes as that of the modes.
+    """
+    own = hit.error.mesh
+    left = vectors.MET * (tolerance - (hit.error.total - own))
+    return 1.0 if hit.error.total <= tolerance or left <= 0.0 else max(1.0, own / left)
+
+
+def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: float = 1.0, more: float = 1.0) -> Plan:
+    """The plan with a modal target; finds its first modes, because they tell how many are needed.
+
+    ``more`` times as many are taken.
+    """
     target, at, mass = asked.blow.target, asked.values["at"], asked.mass
     with stages("modes"):
         first = asked.find(FIRST_LOOK, stages=stages) if first is None else first
@@ -876,6 +971,7 @@ def _modal(asked: _Asked, stages: Stages, first: Modes | None = None, margin: fl
         limit = asked.pieces.get("max_frequency", limit)
         # the first modes are kept even if fewer are enough
         number = max(modes.n_modes, round(modes.n_modes * target.growth(modes.frequencies[-1], limit)))
+        limit, number = limit * more ** (2.0 / max(1, modes.dimension)), round(number * more)
     else:
         limit = modes.frequencies[min(number, modes.n_modes) - 1] * max(1.0, number / modes.n_modes) ** (
             2.0 / modes.dimension
@@ -963,7 +1059,10 @@ def _plan(
     lasts = asked.values.get("duration")
     end = "until the final separation" if lasts is None else f"for {lasts:g} s"
     count = asked.duration / dt
-    work = work + cost.strikes(count, n_modes + kept)
+    refined = scheme == "collocation" and not fixed[1]  # its first step says little of those it takes in the end
+    if asked.blow.target.air:
+        work = work + cost.in_air(n_modes)
+    work = work + cost.strikes(cost.collocated(steps * asked.tolerance) if refined else count, n_modes + kept)
     reasons = (*reasons, f"scheme {scheme}, steps of {dt:.3g} s ({count:.0f} per contact), {until}; run {end}")
     return Plan(
         asked.blow,
@@ -980,9 +1079,7 @@ def _plan(
         reasons=reasons,
         seconds=work.seconds,
         memory=work.memory,
-        notes=plausible.together(
-            notes, asked.blow.striker.notes, tuple(plausible.number("speed", asked.values["speed"]))
-        ),
+        notes=plausible.together(notes, asked.blow.striker.notes, asked.fast),
     )
 
 
@@ -1002,7 +1099,7 @@ def struck(plan: Plan, stages: Stages, keep: Any = None) -> Modes:
     keep = keep if plan.costly and plan.n_dofs else None
     target, asked = plan.blow.target, _Asked.checked(plan.blow, plan.changes)
     if plan.target != "modal":
-        at = np.atleast_1d(np.asarray(asked.values["at"], float))
+        at = asked.values["at"]
         if plan.target == "rigid":
             found = idealisation.unyielding(at, plan.mass)
         else:

@@ -73,10 +73,12 @@ class Strokes(Totals):
                 same = (i for i, old in enumerate(found) if old.contact == stroke and each.start == 0.0)
                 i = next((i for i in same if found[i].end >= begin), None)  # the run was cut while this one lasted
                 if i is None:
-                    found.append(Impact(begin, end, each.peak_force, each.impulse, stroke))
+                    found.append(replace(each, start=begin, end=end, contact=stroke))
                 else:
                     peak = max(found[i].peak_force, each.peak_force)
-                    found[i] = Impact(found[i].start, end, peak, found[i].impulse + each.impulse, stroke)
+                    whole = found[i].impulse + each.impulse
+                    last = each.separation_speed
+                    found[i] = replace(found[i], end=end, peak_force=peak, impulse=whole, separation_speed=last)
         return tuple(sorted(found, key=lambda impact: (impact.start, impact.contact)))
 
     @cached_property

@@ -11,6 +11,7 @@ from .._base.check import SimulationError
 from .._base.rounding import SAME
 from ..impact import accuracy, collision
 from ..impact.compiled import layout
+from ..impact.quantities import apart
 from ..impact.response import History, Response
 from ..modes.modal import Modes
 from .bending import Bending, Known, bending, known
@@ -134,7 +135,7 @@ class Struck:
 
 def _change(name: str, band: float | None, one: Response, two: Response) -> float:
     if name == "restitution":
-        return abs(one.restitution - two.restitution)
+        return apart(one.restitution, two.restitution)
     if name == "n_impacts":
         return abs(one.n_impacts - two.n_impacts) / max(1, one.n_impacts)
     if name == "spectrum":

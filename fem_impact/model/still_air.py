@@ -23,12 +23,15 @@ from .bending import Bending, Known, known
 from .restrike import Struck
 from .thinness import plane_wave, wavenumber
 
-LIMIT = 0.02  # [-] mass of the air over that of the body at which frequencies drop by 1 %
+# [-] mass of the air over that of the body at which frequencies drop by 1 %; a damping ratio so large takes a fifth of
+# the energy in each period
+LIMIT = 0.02
 # [-] of k**2: k**2 - k_0**2 does not get smaller, as the waves of a finite plate are not straight; a choice
 ROUNDED = 0.1
 RIM = 0.5  # [-] of perimeter / (k area): the air that a finite plate moves beside its waves; with SWELL within 11 %
 SWELL = 0.6  # [-] of (int w)**2 / (area int w**2): what its volume adds (`fi.in_air`, five rectangles and two disks)
 NUMBER = "mass of the air moved over that of the body"
+RADIATED = "damping ratio by the sound radiated, beyond that stated,"
 IN_AIR = 'take the modes in air: air = "both sides" under [target], or `fi.in_air`'
 
 
@@ -37,9 +40,9 @@ def of_target(struck: Struck) -> Assumption:
     body, quantities = struck.target, struck.quantities
     plate = body is None or body.modes.dimension == 2
 
-    def told(value: float | None, effect: dict, unknown: str = "") -> Assumption:
+    def told(value: float | None, effect: dict, unknown: str = "", number: str = NUMBER) -> Assumption:
         remedy = "give material and section" if unknown else IN_AIR if plate else "the air around beams is not modelled"
-        return Assumption("still air", value, LIMIT, effect, quantities, remedy, NUMBER, unknown)
+        return Assumption("still air", value, LIMIT, effect, quantities, remedy, number, unknown)
 
     if struck.bodies[1].air:
         return Assumption("still air", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
@@ -73,8 +76,10 @@ def of_target(struck: Struck) -> Assumption:
 
     effect = struck.heard(struck.changes(**changed), shift)
     weight = struck.energy.sum()
-    value = float(struck.energy @ carried / weight) if weight else 0.0
-    return told(value, effect, "the shapes heard" if effect.get("sound", 0.0) is None else "")
+    beyond = np.maximum(sound - history.zeta[mine], 0.0)
+    mass, radiated = (float(struck.energy @ each / weight) if weight else 0.0 for each in (carried, beyond))
+    unknown = "the shapes heard" if effect.get("sound", 0.0) is None else ""
+    return told(mass, effect, unknown) if mass >= radiated else told(radiated, effect, unknown, RADIATED)
 
 
 def _ahead(struck: Struck, body: Known | None) -> tuple[float | None, dict, str]:

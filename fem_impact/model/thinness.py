@@ -64,7 +64,9 @@ def of_target(struck: Struck) -> Assumption:
     assert integrals.rotary is not None
     changed = {
         "omega": struck.of_target(history.omega[struck.mine] * lowered(integrals.thick)),
-        "shape": struck.of_target(history.shape[:, struck.mine] / np.sqrt(1.0 + integrals.rotary), "shape"),
+        "shape": struck.of_target(
+            integrals.heavier(history.shape[:, struck.mine] / np.sqrt(1.0 + integrals.rotary)), "shape"
+        ),
     }
     if body.plate is not None and history.law[0, layout.COMPLIANCE] > 0.0:
         changed |= softer(history, _give(struck, body, body.plate, integrals))
@@ -161,8 +163,10 @@ def of_striker(struck: Struck) -> Assumption:
         value, effect, unknown = _ahead(body, wavenumber(body, integrals, struck.omega))
         return Assumption("thin striker", value, LIMIT, effect, quantities, SLENDER, NUMBER, unknown)
     omega[columns] *= lowered(integrals.thick)
-    h = hit.history
+    h, shape = hit.history, hit.history.shape.copy()
+    shape[:, columns] = integrals.heavier(shape[:, columns])
     end = h.states(np.array([max((impact.end for impact in hit.impacts), default=0.0)]))
     energy = 0.5 * (end[1][0, columns] ** 2 + (h.omega[columns] * end[0][0, columns]) ** 2) * flexible
     weighed = body.thickness * float(np.sqrt(energy @ integrals.wave**2 / (energy.sum() or 1.0)))
-    return Assumption("thin striker", weighed, LIMIT, dict(struck.changes(omega=omega)), quantities, SLENDER, NUMBER)
+    effect = dict(struck.changes(omega=omega, shape=shape))
+    return Assumption("thin striker", weighed, LIMIT, effect, quantities, SLENDER, NUMBER)

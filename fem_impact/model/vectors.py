@@ -16,6 +16,7 @@ from ..fe.splitting import DEPTH
 from ..impact.response import Error
 from ..modes.modal import Modes
 from ..modes.ritz import Krylov
+from . import cost
 from .target import Elements, Stages, Target
 
 # the next five: value at a tolerance of 1e-2 or more, and power of 1e-2 / tolerance with which it grows
@@ -228,6 +229,13 @@ class Seen:
             return False
         self._refine()
         return True
+
+    def work(self, before: int) -> cost.Work:
+        """Work for the next blow, of which ``before`` vectors are known: of all of them on a new mesh."""
+        fine, new = self.fine.system.n_dofs, self.count - before
+        if not new:
+            return cost.on_mesh(fine, self.count, self.count)
+        return cost.on_mesh(fine, new, self.count) + cost.on_mesh(self.coarse.system.n_dofs, new, self.count)
 
     def _refine(self) -> None:
         """Take a finer mesh; the last one is then the coarser."""

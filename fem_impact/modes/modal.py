@@ -17,7 +17,7 @@ from ..fe import plausible, point_load, refinement
 from ..fe.assembly import THICK, System
 from ..fe.eigenvalues import Flexibility
 from ..fe.section import Beam, Plate
-from . import universal_files, viewing
+from . import universal_files, unstated, viewing
 
 LOG = logging.getLogger(__name__)
 
@@ -26,6 +26,10 @@ SHOWN = 10  # [-] modes listed in a notebook: a table without scrolling
 REMEMBERED = 16  # [-] points whose shapes and static deflections a body keeps, because one blow needs them many times
 # [-] error of a mode's compliance over that of its frequency, cautious: 2 by omega**-2, the rest for its shape
 SHAPE_ERROR = 10.0
+UNSTATED = {  # by argument of `Modes.from_arrays`
+    "compliance": "the static compliance is not given: what the modes left out yield is estimated from those given",
+    "free": "no rigid motion is given, and no mode shows that the body is held: it is taken as held",
+}
 
 
 class Shapes(Protocol):
@@ -51,6 +55,10 @@ class Shapes(Protocol):
 
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Static deflection (n_points, n_loads) [m/N] of the complete body under unit forces at ``loads``."""
+
+    def loose(self, points: np.ndarray) -> np.ndarray:
+        """Shapes (n_points, n) [kg**-0.5] of rigid motions that the modes lack if nothing holds the body."""
+        return np.zeros((len(points), 0))
 
     def take(self, n_modes: int) -> "Shapes":
         """The same body with its first ``n_modes`` modes only."""
@@ -127,6 +135,9 @@ class ScaledShapes(Shapes):
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         return (self.amplitude / self.frequency) ** 2 * self.base.deflection(loads, points)
 
+    def loose(self, points: np.ndarray) -> np.ndarray:
+        return self.amplitude * self.base.loose(points)
+
     def take(self, n_modes: int) -> "ScaledShapes":
         return replace(self, base=self.base.take(n_modes))
 
@@ -166,6 +177,9 @@ class SampledShapes(Shapes):
     values: np.ndarray  # (n_points, n_modes) [kg**-0.5]
     static: np.ndarray  # (n_points, n_points) [m/N] static compliance of the complete body
     cells: np.ndarray | None = None  # (n_cells, dimension + 1) lines or triangles between the points, for drawing
+    # (n_points, 2) [m/N] what the modes left out yield if that is estimated, with its error; nothing between the points
+    rest: np.ndarray | None = None
+    rigid: np.ndarray | None = None  # (n_points, n) [kg**-0.5] see `loose`
 
     def __repr__(self) -> str:
         return check.brief(self)
@@ -192,11 +206,43 @@ class SampledShapes(Shapes):
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         return self.static[np.ix_(self._index(points)[0], self._index(loads)[0])]
 
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        """Of an estimate; between two points the modes left out yield at most the geometric mean of both."""
+        index = self._index(points)[0]
+        if self.rest is None:
+            return np.zeros(len(index))
+        middle, error = self.rest[index].T
+        root = np.sqrt(middle)
+        doubt = error + root * (root.sum() - root)
+        return doubt / np.maximum(self.static[index, index], np.finfo(float).tiny)
+
+    def loose(self, points: np.ndarray) -> np.ndarray:
+        return super().loose(points) if self.rigid is None else self.rigid[self._index(points)[0]]
+
     def take(self, n_modes: int) -> "SampledShapes":
         return replace(self, values=self.values[:, :n_modes].copy())
 
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
         return self.points, np.arange(len(self.points))[:, None] if self.cells is None else self.cells
+
+
+def _loose(points: np.ndarray, cells: np.ndarray | None, values: np.ndarray, mass: float, free: Any) -> Any:
+    """Rigid motions (n_points, n) that modes without any may lack; None if these are the modes of a held body."""
+    share, rigid = unstated.carried(points, cells, values, mass), unstated.rigid(points, cells, mass)
+    if free:
+        if share >= unstated.HELD:
+            raise ValueError(
+                f"free must be False: one of the modes carries {share:.0%} of the mass along, as only those of a held "
+                "body do; leave it out, or check mass and the scale of shapes"
+            )
+        if rigid is None:
+            raise ValueError(
+                "free needs points that span the body, to tell its rigid motions; give these as modes of 0 Hz instead"
+            )
+        return rigid
+    if share >= unstated.HELD:
+        return None
+    return np.full((len(points), 1), mass**-0.5) if rigid is None else rigid
 
 
 def _connected(cells: Any, points: np.ndarray) -> np.ndarray | None:
@@ -234,6 +280,7 @@ class Modes:
     thick: bool = field(default=False, repr=False)  # whether shear and rotary inertia are in them
     air: bool = field(default=False, repr=False)  # whether the air around the body is in them
     stretches: bool = field(default=False, repr=False)  # whether a blow lets them stretch the body, see `stretching`
+    unstated: tuple[str, ...] = field(default=(), repr=False)  # of "compliance" and "free": what nobody said of it
 
     def __repr__(self) -> str:
         return check.brief(self)
@@ -270,6 +317,8 @@ class Modes:
         damping_ratio: Any = 0.0,
         compliance: ArrayLike | None = None,
         cells: ArrayLike | None = None,
+        free: bool | None = None,
+        complete: bool = False,
     ) -> "Modes":
         """Modes known only at points, as from a modal test.
 
@@ -281,14 +330,22 @@ class Modes:
         mass : float [kg] of the whole body
         damping_ratio : float, array (n_modes,) or function of frequency [Hz]
         compliance : array_like, shape (n_points, n_points) [m/N], optional
-            Static compliance of the complete body; by default that of the given modes alone.
+            Static compliance of the complete body, with inertia relief if it is free. Without it, what the modes left
+            out yield is estimated from those given, and a blow counts the error of that estimate.
         cells : array_like, shape (n_cells, dimension + 1), optional
             Numbers of the points that lines or triangles connect, from 0; pictures need them.
+        free : bool, optional
+            Whether nothing holds the body. True adds its rigid motions if none are among the modes: those of a uniform
+            body over its points. Without it, a body without rigid motions is taken as held if one of its modes carries
+            along a quarter of its mass; otherwise a blow counts what rigid motions would change as an error.
+        complete : bool
+            Whether these modes are all there is, as of masses on springs: nothing is left out, nothing else is free.
 
         Raises
         ------
         ValueError
-            If lengths disagree, a number is not finite or frequencies do not ascend.
+            If lengths disagree, a number is not finite or frequencies do not ascend; or if a free body has a mode that
+            carries its mass along, or points that do not tell its rigid motions.
 
         Examples
         --------
@@ -302,16 +359,40 @@ class Modes:
             raise ValueError("frequencies must not be empty")
         points = check.array("points", points, (None, None), "m")
         values = check.array("shapes", shapes, (len(points), len(omega)), "kg**-0.5")
-        if compliance is None:
-            static = _carried(omega, values)
-        else:
-            static = check.array("compliance", compliance, (len(points), len(points)), "m/N")
+        mass, connected = check.positive("mass", mass, "kg"), _connected(cells, points)
         damping = damping_ratios(damping_ratio, omega)
-        sampled = SampledShapes(points, values, static, _connected(cells, points))
-        return cls(omega, damping, sampled, check.positive("mass", mass, "kg"), notes=damping_notes(damping, omega))
+        complete = check.flag("complete", complete)
+        if complete and (compliance is not None or free):
+            raise ValueError("complete must be False if compliance is given or free is True; leave it out")
+        loose = None
+        if not complete and omega[0] > 0.0 and points.shape[1] and (free is None or check.flag("free", free)):
+            loose = _loose(points, connected, values, mass, free)
+        if free and loose is not None:
+            omega, damping = (np.append(np.zeros(loose.shape[1]), each) for each in (omega, damping))
+            values, loose = np.hstack([loose, values]), None
+        rest = None
+        static = _carried(omega, values)
+        if compliance is not None:
+            static = check.array("compliance", compliance, (len(points), len(points)), "m/N")
+        elif not complete and omega[-1] > 0.0:
+            rest = np.column_stack(unstated.left_out(omega, values, mass, points.shape[1]))
+            static = static + np.diag(rest[:, 0])
+        sampled = SampledShapes(points, values, static, connected, rest, loose)
+        gaps = {"compliance": rest, "free": loose}
+        missing = tuple(name for name, what in gaps.items() if what is not None)
+        notes = damping_notes(damping, omega) + tuple(UNSTATED[name] for name in missing)
+        return cls(omega, damping, sampled, mass, notes=notes, unstated=missing)
 
     @classmethod
-    def from_uff(cls, path: Any, *, mass: float, direction: str = "z") -> "Modes":
+    def from_uff(
+        cls,
+        path: Any,
+        *,
+        mass: float,
+        direction: str = "z",
+        compliance: ArrayLike | None = None,
+        free: bool | None = None,
+    ) -> "Modes":
         """Read measured modes from a universal file (nodes in data set 15 or 2411, shapes in 55, elements in 2412).
 
         Needs pyuff.
@@ -321,6 +402,8 @@ class Modes:
         path : str or Path
         mass : float [kg] of the whole body
         direction : "x", "y" or "z", the direction of the strike and of the measurement
+        compliance, free : optional
+            As in `from_arrays`; no universal file holds them.
 
         Returns
         -------
@@ -328,9 +411,10 @@ class Modes:
             Known only at the measured points, with the elements between them if the file has some; shapes are divided
             by the root of the modal mass in the file.
         """
-        found = universal_files.read(path, direction)
-        cells = found.pop("cells")
-        return cls.from_arrays(**found, mass=mass, cells=cells if len(cells) else None)
+        found: dict[str, Any] = universal_files.read(path, direction)
+        if not len(found["cells"]):
+            found["cells"] = None
+        return cls.from_arrays(**found, mass=mass, compliance=compliance, free=free)
 
     @property
     def n_modes(self) -> int:
@@ -380,17 +464,8 @@ class Modes:
         if self.dimension == 0:
             n_points = 1 if points is None else len(np.atleast_2d(check.numbers(name, points, "m")))
             return np.zeros((max(1, n_points), 0))
-        raw = check.numbers(name, points, "m")
-        if self.dimension == 1 and (raw.ndim < 2 or raw.shape[-1] != 1):
-            raw = raw.reshape(-1, 1)
-        array = check.array(name, raw, (None, self.dimension), "m", lift=True)
-        inside = self.shapes.contains(array)
-        if not inside.all():
-            lost = ", ".join(f"{x:g}" for x in array[~inside][0])
-            corner = self.shapes.grid()[0]
-            low, high = corner.min(axis=0), corner.max(axis=0)
-            extent = " x ".join(f"[{a:g}, {b:g}]" for a, b in zip(low, high))
-            raise ValueError(f"{name} must lie on the body, got ({lost}) m; the body extends over {extent} m")
+        array = check.places(name, points, self.dimension)
+        check.on_body(name, array, self.shapes.contains(array), self.shapes.grid()[0])
         return array
 
     def shape_at(self, points: Any) -> np.ndarray:

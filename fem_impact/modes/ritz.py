@@ -66,10 +66,8 @@ def ritz_modes(
     >>> seen.n_modes, round(float(seen.frequencies[0]), 2)
     (40, 105.78)
     """
-    place = check.array("points", points, (None, system.mesh.dimension), "m", lift=True)
-    inside = system.contains(place)
-    if not inside.all():
-        raise ValueError(f"points must lie on the body, got {check.shown(place[~inside][0].tolist())} m")
+    place = check.places("points", points, system.mesh.dimension)
+    check.on_body("points", place, system.contains(place), system.mesh.points)
     shift = np.pi * check.positive("max_frequency", max_frequency, "Hz")
     krylov = Krylov(system, place, shift)
     if (krylov.compliance.diagonal() <= point_load.RESTS).any():
@@ -105,7 +103,7 @@ class Krylov:
         self._shifted = system.K + self.shift * system.M
         self._solve = factorise(self._shifted).solve
         self._moving = system.M @ system.rigid
-        self._flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
+        self._flexibility = Flexibility.of(system)
         self._begin(points)
 
     def _begin(self, points: np.ndarray) -> None:
@@ -116,8 +114,10 @@ class Krylov:
         self.vectors = np.empty((0, system.n_dofs))  # (room, n_dofs) mass-orthonormal rows
         self.projected = np.zeros((0, 0))  # (room, room) of (K + s**2 M)**-1 M
         self.count, self.full = 0, False
-        self._next = self._flexibility.solve(self.loads)  # the static deflection, so that the compliance is exact
-        self.compliance = self.loads.T @ self._next  # (n_points, n_points) in the frame
+        still = self._flexibility.solve(self.loads)
+        self.compliance = self.loads.T @ still  # (n_points, n_points) in the frame
+        # the static deflection, so that the compliance is exact; but on weak springs bending is lost beside it
+        self._next = self._solve(self.loads) if system.sprung.size else still
         self._carried = np.zeros((system.n_dofs, 0))  # M times the two latest blocks of vectors
         self._latest = 0, 0, 0  # where the two latest blocks of vectors begin, and where they end
         self._period, self._due = 1, 1  # [-] blocks between two looks at all vectors, and blocks until the next one
@@ -206,7 +206,17 @@ class Krylov:
         else:
             value, turn = np.linalg.eigh(inverse)
         value, turn = value[::-1], turn[:, ::-1]
-        return 1.0 / np.maximum(value, np.finfo(float).eps * value[0]) - self.shift, turn
+        value = 1.0 / np.maximum(value, np.finfo(float).eps * value[0]) - self.shift
+        few = min(
+            count, self.system.sprung.shape[1]
+        )  # on weak springs, so far below the shift that rounding hides them
+        if few:
+            low = self.vectors[:count].T @ turn[:, :few]
+            back = np.linalg.eigh(self._flexibility.products(low))[1]
+            lowest = np.diag(self._flexibility.products(low @ back))
+            order = np.argsort(lowest, kind="stable")
+            value[:few], turn[:, :few] = lowest[order], turn[:, :few] @ back[:, order]
+        return value, turn
 
     def _inverse(self, count: int) -> np.ndarray:
         """Inverse of the stiffness K + s**2 M projected onto the first vectors, (count, count).

@@ -98,7 +98,10 @@ def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:
     modes = [s for s in sets if s["type"] == 55 and s.get("analysis_type") in (2, 3)]
     if not nodes or not modes:
         found = ", ".join(str(kind) for kind in sorted(set(kinds))) or "none"
-        raise ValueError(f"{path.name} must hold nodes (15 or 2411) and mode shapes (55); its data sets are {found}")
+        functions = ", of which 58 are time records or frequency responses, no modes" if 58 in kinds else ""
+        raise ValueError(
+            f"{path.name} must hold nodes (15 or 2411) and mode shapes (55); its data sets are {found}{functions}"
+        )
     numbers = np.concatenate([np.asarray(s["node_nums"], int) for s in nodes])
     place = np.concatenate([np.column_stack([s["x"], s["y"], s["z"]]) for s in nodes]).astype(float)
     measured = np.asarray(modes[0]["node_nums"], int)

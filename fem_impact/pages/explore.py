@@ -15,9 +15,10 @@ from . import report
 from .explore_model import Setup
 from .explore_numbers import Explorer
 from .explore_session import Session
-from .explore_view import page
+from .explore_view import page, parsed
 from .explore_worker import Worker
 
+LOG = logging.getLogger(__name__)
 LOCAL = "127.0.0.1"
 LARGEST_REQUEST = 64 * 1024  # [byte] of a request or a message: a slider's value takes a few hundred
 LARGEST_HEADER = 16 * 1024  # [byte] of a request: browsers send one or two thousand
@@ -114,17 +115,24 @@ def _server(explorer: Explorer, workers: list[Worker], port: int) -> tuple[Any, 
             self.session = Session(explorer, workers[0], workers[1], self._say)
 
         def on_message(self, message: str | bytes) -> None:
+            if self.session.closed:
+                return
             try:
-                self.session.take(json.loads(message))
+                self.session.take(parsed(message))
             except ValueError as error:  # no page of ours sends this
+                LOG.warning("a page is refused: %s", check.line(str(error)))
+                self.session.close()
                 self.close(1003, str(error)[:120])
 
         def on_close(self) -> None:
+            if not self.session.closed:
+                LOG.info("a page has gone")
             self.session.close()
 
         def _say(self, message: dict[str, Any]) -> None:
             with suppress(WebSocketClosedError):
-                self.write_message(json.dumps(message))
+                sent: Any = self.write_message(json.dumps(message))
+                sent.add_done_callback(lambda sent: sent.cancelled() or sent.exception())  # it may go before it listens
 
     class Refused(RequestHandler):
         """Refuses other host names: with one of its own, a foreign site could make the browser read this page."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .._base.rounding import SAME
 from ..fe import refinement
 from ..impact import accuracy, collision, threshold
 from ..impact.contact import Contact, acting_stiffness, wall_time
@@ -206,6 +207,11 @@ class Setup:
                 if isinstance(tables["section"].get(key), float):
                     tables["section"] = {**tables["section"], key: settings.thickness * tables["section"][key]}
         return tables
+
+    def at_rest(self, point: tuple[float, ...]) -> bool:
+        """Whether the body does not move at a point, as on an edge that is held, but for rounding."""
+        shape = self.base.modes.shape_at([point]) if point else np.ones(1)
+        return bool(np.abs(shape).max() * np.sqrt(self.base.modes.mass) < SAME)
 
     def place(self, x: float, y: float) -> tuple[float, ...] | None:
         """The strike point under a click; None if the click misses the body."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._base.check import SimulationError, ToleranceWarning
 from ..impact import force_spectrum
+from ..impact.quantities import rebound
 from ..impact.response import Response
 from ..model.playing import Strokes, strokes
 from ..modes.modal import Modes
@@ -52,10 +53,9 @@ class Explorer:
 
     def learn(self, at: Point, view: View) -> None:
         """Remember a strike point; the oldest is forgotten."""
-        self.views[at] = view
+        known = {**self.views, at: view}
+        self.views = {place: known[place] for place in list(known)[-KNOWN:]}  # new: the old may be on its way elsewhere
         self.rest = view.rest
-        while len(self.views) > KNOWN:
-            del self.views[next(iter(self.views))]
 
     def look(self, at: Point) -> View:
         """Find out what blows at a point see: seconds, if these are Ritz vectors."""
@@ -128,6 +128,9 @@ class Explorer:
     def listen(self, settings: Settings, where: Point, height: float, rate: float | None) -> Message:
         """The blow, or ``rate`` [1/s] of them, as heard on the surface or ``height`` [m] above it."""
         case = self.setup.case(settings)
+        for point in (settings.at, where)[: 1 if height > 0.0 else 2]:
+            if self.setup.at_rest(point):
+                return {"uri": "", "note": f"Nothing is heard: the body does not move at {place(point)}."}
         try:
             rung = blow(case) if rate is None else rolled(case, rate)
             if height > 0.0:
@@ -207,7 +210,7 @@ def _told(hit: Response, exact: bool) -> list[tuple[str, str]]:
         ("impacts", str(hit.n_impacts)),
         ("peak force", si(hit.peak_force, "N", 3)),
         ("time in contact", si(hit.contact_time, "s", 3)),
-        ("restitution", f"{hit.restitution:.3f}".replace("-", "−")),
+        ("restitution", rebound(hit, 3).replace("-", "−")),
         ("estimated error", error),
     ]
 

@@ -7,16 +7,19 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 from .._base.check import SimulationError
+from ..scenes.sentences import place
 from .explore_map import Picture, Window
 from .explore_model import Settings, Setup
 from .explore_numbers import Explorer, Message, Point, View, drawn
-from .explore_view import RATES, checked, pair
+from .explore_view import RATES, checked, ends, pair
 
 REST = 0.15  # [s] without a change before the blow is judged and the map drawn again
 
 
 class Asks(Protocol):
     """What a `Worker` does."""
+
+    ended: int
 
     def ask(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]": ...
 
@@ -28,78 +31,104 @@ class _Superseded(Exception):
 class Session:
     """The settings of one open page, and what of it is still being computed.
 
-    Everything runs on the event loop; ``judge`` and ``mapper`` are processes that hold a `Explorer` each.
+    Everything runs on the event loop; ``judge`` and ``mapper`` are processes that hold a `Explorer` each. What a page
+    asks for waits until all other pages had their turn, and then only the last of it is computed.
     """
 
     def __init__(self, explorer: Explorer, judge: Asks, mapper: Asks, send: Callable[[Message], Any]) -> None:
         self.explorer, self.judge, self.mapper, self.send = explorer, judge, mapper, send
         self.setup: Setup = explorer.setup
         self.settings: Settings = self.setup.start
+        self.ends = ends(self.setup)
         self.height, self.rate = 0.0, RATES[2]
         self.heard_at: Point = tuple(float(x) for x in self.setup.scene.points[0])
         self.window = Window.of(self.setup, None, None)
-        self.number = 0  # of the last request
+        self.number = self.last = 0  # of the last request that was answered, and of the last one
+        self.turned: dict[str, float] = {}  # sliders moved since the last answer
+        self.ear: tuple[float, float] | None = None  # where the page wants to listen since then
+        self.asked: asyncio.Handle | None = None  # the answer to come
         self.resting: asyncio.TimerHandle | None = None
         self.tasks: dict[str, asyncio.Task[None]] = {}  # judging, mapping, listening
         self.judged: Any = None  # what the numbers on the page are exact for
         self.mapped: Any = None  # what the map on the page was drawn for
+        self.roll: bool | None = None  # whether to play a roll or a blow next
+        self.closed = False
 
     def close(self) -> None:
         """The page is gone."""
-        if self.resting is not None:
-            self.resting.cancel()
-        for task in self.tasks.values():
-            task.cancel()
+        self.closed = True
+        for handle in (self.asked, self.resting, *self.tasks.values()):
+            if handle is not None:
+                handle.cancel()
 
     def take(self, message: Any) -> None:
         """Do what the page asks for; ValueError if that makes no sense."""
         if not isinstance(message, dict):
             raise ValueError("a message must be a table")
-        turned = checked(self.setup, message.get("turn", {}))
-        number = message.get("number", 0)
+        turned = checked(self.ends, message.get("turn", {}))
         if "play" in message:
             self._listen(bool(message["play"] == "roll"))
         elif "view" in message:
             view = message["view"]
             if view is not None and not isinstance(view, dict):
                 raise ValueError("view must be a table of mass and stiffness")
-            ends = [None, None] if view is None else [pair("view", view.get(name)) for name in ("mass", "stiffness")]
-            self.window = Window.of(self.setup, *ends)
+            window = [None, None] if view is None else [pair("view", view.get(name)) for name in ("mass", "stiffness")]
+            self.window = Window.of(self.setup, *window)
             self._start("map", self._map)
         else:
             if "ear" in message:
-                self.heard_at = self.setup.place(*pair("ear", message["ear"])) or self.heard_at
-            self._answer(number, self._turn(turned))
+                self.ear = pair("ear", message["ear"])
+            self.turned |= turned
+            number = message.get("number", 0)
+            self.last = number if isinstance(number, int) else 0
+            if self.asked is None:
+                self.asked = asyncio.get_running_loop().call_soon(self._answer)
 
-    def _turn(self, turned: dict[str, float]) -> bool:
-        """Take over the sliders; whether the blow changes."""
-        before = self.settings
+    def _turn(self) -> tuple[bool, list[str]]:
+        """Take over what the hand did; whether the blow changes, and what is to be said of it."""
+        before, turned, notes = self.settings, self.turned, []
+        self.turned = {}
+        if self.ear is not None:
+            heard_at = self.setup.place(*self.ear)
+            if heard_at is None:
+                notes.append(f"{place(self.ear[: len(before.at)])} is beside the body: the listening point stays.")
+            self.heard_at, self.ear = heard_at or self.heard_at, None
         self.height = turned.pop("height", self.height)
         self.rate = turned.pop("rate", self.rate)
         at = [turned.pop(letter, None) for letter in "xy"]
         if any(value is not None for value in at):
             point = [old if new is None else new for old, new in zip(before.at, at)]
             turned_at = self.setup.place(*point, *([0.0] * (2 - len(point))))
+            if turned_at is None:
+                notes.append(f"{place(point)} is beside the body: the strike point stays.")
+            elif self.setup.at_rest(turned_at):
+                notes.append(f"The body does not move at {place(turned_at)}: it is held there.")
             self.settings = replace(self.settings, at=turned_at or before.at)
         changes: dict[str, Any] = dict(turned)
         self.settings = replace(self.settings, **changes)
-        return self.settings != before or not self.number
+        return self.settings != before or not self.number, notes
 
-    def _answer(self, number: Any, again: bool) -> None:
+    def _answer(self) -> None:
         """What the hand looks at first: force and numbers; spectrum, threshold and scene follow at once."""
-        self.number = number = number if isinstance(number, int) else 0
+        self.asked = None
+        again, notes = self._turn()
+        self.number = number = self.last
         explorer, settings = self.explorer, self.settings
         said = explorer.said(settings, self.height, self.rate)
-        about = {"number": number, "said": said, "at": settings.at, "ear": self.heard_at}
+        about = {"number": number, "said": said, "at": settings.at, "ear": self.heard_at, "note": " ".join(notes)}
         about |= {"mass": settings.mass, "stiffness": settings.stiffness}
         if not again:
             self.send({"kind": "blow", **about})
             self.send({"kind": "rest", "number": number})
             return
         self.judged = None
-        message, hit = explorer.answer(settings)
-        self.send({"kind": "blow", **about, **message})
-        self.send({"kind": "rest", "number": number, **explorer.rest_of(settings, hit)})
+        try:
+            message, hit = explorer.answer(settings)
+            self.send({"kind": "blow", **about, **message})
+            self.send({"kind": "rest", "number": number, **explorer.rest_of(settings, hit)})
+        except (SimulationError, ValueError) as error:
+            self.send({"kind": "blow", **about, "failed": str(error)})
+            self.send({"kind": "rest", "number": number})
         if self.resting is not None:
             self.resting.cancel()
         self.resting = asyncio.get_running_loop().call_later(REST, self._rested)
@@ -113,18 +142,34 @@ class Session:
         """Begin a piece of work unless it is under way: then it looks itself whether there is more to do."""
         task = self.tasks.get(name)
         if task is None or task.done():
-            self.tasks[name] = asyncio.get_running_loop().create_task(work())
+            self.tasks[name] = asyncio.get_running_loop().create_task(self._guarded(work))
+
+    async def _guarded(self, work: Callable[[], Any]) -> None:
+        try:
+            await work()
+        except (SimulationError, ValueError) as error:
+            self.send({"kind": "note", "text": f"{error}."})
+
+    async def _ask(self, worker: Asks, function: Callable[..., Any], *arguments: Any) -> Any:
+        """The answer of a process; the page is told if that had to be replaced."""
+        ended = worker.ended
+        answer = await asyncio.wrap_future(worker.ask(function, *arguments))
+        if worker.ended > ended:
+            self.send(
+                {"kind": "note", "text": "A process beside this page had ended; another one has taken its place."}
+            )
+        return answer
 
     async def _judge(self) -> None:
         """The exact blow, until it is the one on the page; finds out about a new strike point first."""
         while self.judged != self.settings and self.resting is None:
             settings = self.settings
             if settings.at not in self.explorer.views:
-                view: View = await asyncio.wrap_future(self.judge.ask(Explorer.look, settings.at))
+                view: View = await self._ask(self.judge, Explorer.look, settings.at)
                 self.explorer.learn(settings.at, view)
                 self.mapper.ask(Explorer.learn, settings.at, view)
                 self._start("map", self._map)
-            message = await asyncio.wrap_future(self.judge.ask(Explorer.judge, settings))
+            message = await self._ask(self.judge, Explorer.judge, settings)
             if settings == self.settings:
                 self.judged = settings
                 self.send({"kind": "blow", "number": self.number, "exact": True, **message})
@@ -154,7 +199,7 @@ class Session:
         """One map by a rough tolerance: coarse, finer, and with sharp borders; then these are struck pixel by pixel."""
 
         async def made(function: Callable[..., Picture], *arguments: Any) -> Picture:
-            found: Picture = await asyncio.wrap_future(self.mapper.ask(function, settings, *arguments))
+            found: Picture = await self._ask(self.mapper, function, settings, *arguments)
             if about != self._about_map():
                 raise _Superseded
             return found
@@ -171,10 +216,17 @@ class Session:
         sent(picture, exact=True)
 
     def _listen(self, roll: bool) -> None:
-        async def work() -> None:
-            rate = self.rate if roll else None
-            asked = self.mapper.ask(Explorer.listen, self.settings, self.heard_at, self.height, rate)
-            self.send({"kind": "sound", **await asyncio.wrap_future(asked)})
-
+        self.roll = roll
         self.send({"kind": "sound", "uri": "", "note": "Computing the sound …"})
-        self._start("listen", work)
+        self._start("listen", self._play)
+
+    async def _play(self) -> None:
+        """The sound that was asked for last."""
+        while self.roll is not None:
+            rate, self.roll = self.rate if self.roll else None, None
+            try:
+                sound = await self._ask(self.mapper, Explorer.listen, self.settings, self.heard_at, self.height, rate)
+            except SimulationError as error:
+                sound = {"uri": "", "note": f"{error}."}
+            if self.roll is None:
+                self.send({"kind": "sound", **sound})

@@ -1,10 +1,13 @@
 """Lays out the live page: sliders, the body to click on, the plots that follow, and the sound."""
 
+import json
 import math
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
+from .._base.rounding import SAME
 from ..mesh.meshes import Mesh
 from ..show.figures import SPECTRUM_DEPTH
 from .explore_map import NARROWEST
@@ -24,12 +27,13 @@ CARDS = {  # which sliders stand beside which picture
 LOGARITHMIC = {"mass", "stiffness", "speed", "bending", "thickness"}
 STEPS = 400  # [-] per slider: about one per pixel
 HIGHEST = 3.0  # [m] of the listener above the plate; at zero the sound is the motion of the surface
+Ends = dict[str, tuple[float, float, float]]  # slider: lowest, highest and first value
 RATES = (2.0, 30.0, 12.0)  # [1/s] strokes of a roll: least, most and at first
 
 
-def ends(setup: Setup) -> dict[str, tuple[float, float, float]]:
+def ends(setup: Setup) -> Ends:
     """Lowest, highest and first value of every slider of a setup."""
-    found = {"rate": RATES}
+    found: Ends = {"rate": RATES}
     low, high = setup.mesh.points.min(axis=0), setup.mesh.points.max(axis=0)
     for letter, *three in zip("xy", low, high, setup.start.at):
         found[letter] = (float(three[0]), float(three[1]), float(three[2]))
@@ -88,23 +92,41 @@ def loops(mesh: Mesh) -> list[list[list[float]]]:
     return found
 
 
-def checked(setup: Setup, turned: Any) -> dict[str, float]:
-    """What a page says of its sliders: finite numbers within their ends; ValueError if it is anything else."""
-    known = ends(setup)
+def parsed(message: str | bytes) -> Any:
+    """What a page sends; ValueError if that is not JSON, or too deep."""
+    try:
+        return json.loads(message)
+    except RecursionError:
+        raise ValueError("a message must not be nested so deeply") from None
+
+
+def checked(known: Ends, turned: Any) -> dict[str, float]:
+    """What a page says of its sliders: finite numbers within their ends; ValueError if it is anything else.
+
+    A click may lie beyond the ends of x and y: then it is beside the body, and no other point is meant.
+    """
     if not isinstance(turned, dict) or not set(turned) <= set(known):
         raise ValueError(f"sliders must be some of {', '.join(known)}")
-    return {name: _number(name, value, *known[name][:2]) for name, value in turned.items()}
+    found = {}
+    for name, value in turned.items():
+        low, high, _ = known[name]
+        number = _number(name, value)
+        held = min(max(number, low), high)
+        found[name] = number if name in ("x", "y") and abs(held - number) > SAME * (high - low) else held
+    return found
 
 
-def _number(name: str, value: Any, low: float, high: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ValueError(f"{name} must be a number")
-    return min(max(float(value), low), high)
+def _number(name: str, value: Any) -> float:
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        with suppress(OverflowError):  # an integer beyond all floats
+            if math.isfinite(number := float(value)):
+                return number
+    raise ValueError(f"{name} must be a number")
 
 
 def pair(name: str, values: Any) -> tuple[float, float]:
     """Two finite numbers; ValueError if they are anything else."""
     if not isinstance(values, list) or len(values) != 2:
         raise ValueError(f"{name} must be two numbers")
-    first, second = (_number(name, value, -math.inf, math.inf) for value in values)
+    first, second = (_number(name, value) for value in values)
     return first, second

@@ -1,5 +1,6 @@
 """Computes beside the live page, in a process of its own, what would keep its sliders waiting."""
 
+import logging
 import os
 import pickle
 import signal
@@ -8,25 +9,34 @@ import sys
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
+from threading import Lock
 from typing import Any, BinaryIO
 
+from .._base import child
 from .._base.check import SimulationError
 
+LOG = logging.getLogger(__name__)
 NICE = 10  # [-] the page and the browser go first where cores are short
-CODE = "from fem_impact.pages import explore_worker; explore_worker.main()"
 
 
 class Worker:
-    """A process that holds one object and answers one question about it after the other."""
+    """A process that holds one object and answers one question about it after the other.
+
+    If it ends, as when the system kills it for its memory, another one takes its place and the question is asked again;
+    ``ended`` counts that.
+    """
 
     def __init__(self, held: Any) -> None:
-        # not multiprocessing, which would run the user's script again in the new process
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", CODE], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment
-        )
+        self.held, self.ended, self.stopped = held, 0, False
+        self.lock = Lock()  # between a new process and the end of all
         self.thread = ThreadPoolExecutor(1)
+        self._begin()
         self.thread.submit(self._send, held)
+
+    def _begin(self) -> None:
+        # not multiprocessing, which would run the user's script again in the new process
+        command, environment = child.python("pages.explore_worker:main")
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
 
     def ask(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """What ``function(held, *arguments)`` returns there; it raises ValueError and SimulationError here, too."""
@@ -34,9 +44,14 @@ class Worker:
 
     def stop(self) -> None:
         """End the process, whatever it is doing."""
-        self.process.kill()
+        with self.lock:
+            self.stopped = True
+            self.process.kill()
         self.process.wait()
         self.thread.shutdown(cancel_futures=True)
+        self._close()
+
+    def _close(self) -> None:
         for pipe in (self.process.stdin, self.process.stdout):
             assert pipe is not None
             with suppress(BrokenPipeError):  # something was still to be sent
@@ -48,15 +63,30 @@ class Worker:
         self.process.stdin.flush()
 
     def _ask(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-        assert self.process.stdout is not None
-        try:
-            self._send((function, arguments))
-            answer, error = pickle.load(self.process.stdout)
-        except (EOFError, OSError, pickle.UnpicklingError):
-            raise SimulationError("the process that computes beside the page has ended") from None
-        if error is not None:
-            raise error
-        return answer
+        for first in (True, False):
+            with suppress(EOFError, OSError, pickle.UnpicklingError):
+                if not first:
+                    self._replace()
+                self._send((function, arguments))
+                assert self.process.stdout is not None
+                answer, error = pickle.load(self.process.stdout)
+                if error is not None:
+                    raise error
+                return answer
+        raise SimulationError("the process that computes beside the page has ended, and so has the one in its place")
+
+    def _replace(self) -> None:
+        """Another process in the place of one that has ended."""
+        with self.lock:
+            if self.stopped:
+                raise SimulationError("the process that computes beside the page has ended")
+            self.process.kill()  # it may only have lost its voice
+            status = self.process.wait()
+            self._close()
+            self._begin()
+        self.ended += 1
+        LOG.warning("a process beside the page has ended (status %d), another one takes its place", status)
+        self._send(self.held)
 
 
 def main() -> None:

@@ -12,9 +12,9 @@ from .._base import check
 from .._base.check import SimulationError
 from .._base.files import replacing
 from ..scenes.sentences import si
-from ..show import export, figures
+from ..show import export, figures, plots
 from ..show.figures import BLUE, GREEN, SKY, VERMILION
-from ..taps.found import Found, differ
+from ..taps.found import Found, along, differ, stated
 from ..taps.unknowns import unit_of
 from . import report
 
@@ -63,10 +63,10 @@ def profiles(found: Found) -> Any:
             axes.axhline(level, color=VERMILION, ls="--", lw=1.0)
             if profile.told != "open":
                 axes.axvspan(*profile.interval(), color=SKY, alpha=0.2, lw=0)
-            if profile.log and profile.values[-1] > WIDE * profile.values[0]:
-                axes.set_xscale("log")
-            if profile.told == "told":
-                axes.set_xlim(*_around(profile))
+            low, high = _around(profile) if profile.told == "told" else (profile.values[0], profile.values[-1])
+            plots.set_ticks(axes, low, high, profile.log and high > WIDE * low)
+            if high > low:
+                axes.set_xlim(low, high)
             axes.set_ylim(0.0, SHOWN)
             unit = unit_of(name)
             axes.set_title(f"{name}{f' [{unit}]' if unit else ''}")
@@ -132,18 +132,16 @@ def write(
     told = []
     for name in found.names:
         profile = found.profiles[name]
-        low, high = profile.interval()
-        value = {"open": "not told", "limited": "a limit only"}.get(profile.told, f"{profile.value:.4g}")
-        told.append((name, value, "" if profile.told == "open" else f"{low:.4g} to {high:.4g}", unit_of(name)))
+        value, interval = stated(profile)
+        told.append((name, value, interval, unit_of(name)))
     left_out = [f"{100 * one.error:.2g} %" for one in found.left_out()] if len(found.used) > 1 else []
     page = report.template("fit.html").render(
         title=title,
         summary=found.summary().splitlines(),
         told=told,
-        untold=found.unidentifiable,
+        verdict=found.verdict,
         spreads={name: differ(each) for name, each in found.spreads.items()},
-        ridges={name: ", ".join(f"{k} with power {v:.2g}" for k, v in found.ridges[name].items())
-                for name in found.unidentifiable},
+        ridges={name: along(found.ridges[name]) for name in found.unidentifiable},
         tiles=[
             ("taps used", str(len(found.used))), ("rms residual", f"{100 * found.error:.2g} %"),
             ("left-out taps, worst", max(left_out, key=lambda text: float(text[:-2])) if left_out else "one tap only"),
@@ -163,5 +161,5 @@ def write(
 
 def _uri(figure: Any) -> str:
     file = io.BytesIO()
-    figure.savefig(file, format="png", dpi=120)
+    figure.savefig(file, format="png", dpi=120, transparent=True)
     return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode("ascii")

@@ -19,6 +19,7 @@ from .._base.files import replacing
 from ..impact import spectra
 from ..impact.assumption import SILENT, Assumption
 from ..impact.quantities import NAMES as QUANTITY_NAMES
+from ..impact.quantities import rebound
 from ..impact.response import Response
 from ..mesh.mesh_files import boundary
 from ..model.playing import Strokes
@@ -132,7 +133,7 @@ def _of_blow(scene: Scene, run: Run) -> dict[str, Any]:
     """What the page tells of a single blow only."""
     response = run.response
     return {
-        "words": (*words(scene, response), *(f"Note: {note}" for note in run.notes)),
+        "words": (*(f"Note: {note}" for note in run.notes), *words(scene, response)),
         "strokes": (), "outcome": response.outcome, "error": response.error.total,
         "energy_error": response.energy_error,
         "budget": _budget(response),
@@ -168,7 +169,7 @@ def _of_strokes(scene: Scene, run: Played) -> dict[str, Any]:
     played = f"It is struck {len(strokes)} times in {si(found.strokes[-1].when - found.strokes[0].when, 's')}."
     energies = {name: found.energies[name] for name in ("target", "dissipated", "taken away")}
     return {
-        "words": (body(scene, found.target), played, *laws, *(f"Note: {note}" for note in found.notes)),
+        "words": (*(f"Note: {note}" for note in found.notes), body(scene, found.target), played, *laws),
         "strokes": strokes, "outcome": found.hits[-1].outcome, "error": found.error,
         "energy_error": max(hit.energy_error for hit in found.hits),
         "budget": budget[:LISTED],
@@ -204,7 +205,7 @@ def _tiles(response: Response | Strokes) -> list[tuple[str, str]]:
         total, own = power(response.error), ("strokes", str(len(response.strokes)))
     else:
         total = power(response.error.total) if response.error.resolvable else "not resolvable"
-        own = "restitution", f"{response.restitution:.4f}"
+        own = "restitution", rebound(response, 4)
     return [
         ("impacts", str(response.n_impacts)),
         ("peak force", si(response.peak_force, "N")),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from .._base import check
+from .._base import check, markup
 from ..fe import plausible
 from ..impact import threshold
 from ..impact.contact import acting_stiffness, wall_time
@@ -255,12 +255,12 @@ def draw(
     chosen: dict[str, Any] = {
         "x": _axis(table, values.dims[1]),
         "y": _axis(table, values.dims[0]),
-        "colour": plots.Axis(label, _unit(values), log=bool(log), limits=limits),
+        "colour": plots.Axis(markup.literal(label), _unit(values), log=bool(log), limits=limits),
         "contours": _contours(table, values),
         "borders": _borders(table, values),
         "shades": _shades(table, values),
         "marks": marks,
-        "title": str(table.attrs.get("title", "")),
+        "title": markup.literal(str(table.attrs.get("title", ""))),
     }
     return plots.colour_map(_in_grams(values.where(table.n_impacts >= 0)), **{**chosen, **wanted})
 

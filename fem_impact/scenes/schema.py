@@ -3,6 +3,7 @@
 import inspect
 import json
 import math
+import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,6 +27,8 @@ from ..show import sound
 from ..sweeps.cells import along
 from .fields import over_frequency, varying
 
+WORD = r"""(?:[\w-]++|"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+"?|'[^'\n]*+'?)"""  # unclosed, too: each is passed once
+DOTTED = re.compile(rf"{WORD}(?:[ \t]*+\.[ \t]*+{WORD}){{0,15}}+(?P<more>[ \t]*+\.[ \t]*+{WORD})?")  # a scene has two
 LARGEST_FILE = 1_000_000  # [byte] a scene is written by hand, so a larger file is a mistake
 
 
@@ -234,7 +237,11 @@ def read_tables(path: Path) -> dict[str, Any]:
     """Tables of a TOML file as plain dicts; ValueError of one line if it is not valid TOML."""
     raw = read_bytes(path)
     try:
-        return tomllib.loads(raw.decode("utf-8"))
+        text = raw.decode("utf-8")
+        for key in DOTTED.finditer(text):
+            if key["more"]:  # the time to parse it grows with the square of its length
+                raise fault(path, f"a key must have at most 16 parts between dots, got {check.shown(key[0])} and more")
+        return tomllib.loads(text)
     except UnicodeDecodeError:
         raise fault(path, "a scene must be UTF-8 text; save it in that encoding") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:

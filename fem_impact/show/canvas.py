@@ -19,10 +19,6 @@ from .._base import progress
 from .._base.files import replacing
 
 NAMES = ("modes", "wave")  # of the pictures of a blow, besides wave.gif
-PROBE = (
-    "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=(16, 16)); p.add_mesh(pyvista.Sphere()); "
-    "assert p.screenshot(None).std() > 0"
-)
 WINDOW = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
 SIZE = (720, 480)  # [px] size of a frame: a GIF stays below a few megabytes
 FINER = 2  # [-] a frame is drawn with so many pixels for one in each direction, which makes its lines smooth
@@ -61,9 +57,19 @@ class Gallery(NamedTuple):
     columns: int
 
 
+def probe() -> None:
+    """End the process if nothing renders here; a signal may end it, too."""
+    import pyvista
+
+    plotter: Any = pyvista.Plotter(off_screen=True, window_size=[16, 16])
+    plotter.add_mesh(pyvista.Sphere())
+    if not plotter.screenshot(None).std() > 0:
+        sys.exit(1)
+
+
 def main() -> None:
     """The process: reads folder, film and shapes, writes the pictures, and prints the progress."""
-    exec(PROBE, {})  # takes seconds, during which the response is computed; dies here if nothing renders
+    probe()  # takes seconds, during which the response is computed
     folder, film, shapes, form = pickle.load(sys.stdin.buffer)
     with progress.heard(lambda _, done, total: print(f"{done}/{total}", flush=True)):
         draw(folder, film, shapes, form)
@@ -223,7 +229,3 @@ def _look(plotter: Any, plane: np.ndarray, zoom: float = 1.35) -> None:
 
 def _extent(plane: np.ndarray) -> float:
     return float(np.ptp(plane, axis=0).max())
-
-
-if __name__ == "__main__":
-    main()

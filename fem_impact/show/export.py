@@ -128,7 +128,8 @@ def write_uff(path: str | Path, modes: Modes) -> None:
     """Write mode shapes as a universal file for modal-test programs: nodes (15, 2411), cells (2412), shapes (55).
 
     The deflection is in z, normalised to modal mass 1; numbers have six digits. Needs pyuff:
-    ``pip install 'fem-impact[uff]'``. `Modes.from_uff` reads the file back.
+    ``pip install 'fem-impact[uff]'``. `Modes.from_uff` reads the file back, without the static compliance, which has no
+    place in it: a blow then counts the error of an estimate.
 
     Examples
     --------
@@ -217,11 +218,11 @@ def write_json(path: str | Path, data: dict[str, Any]) -> None:
 
 
 SCALARS = (
-    "n_impacts", "contact_time", "peak_force", "impulse", "restitution", "speed", "energies", "dissipated",
-    "energy_error", "momentum_error", "tolerance", "tolerance_met", "verdict", "finished", "scheme",
+    "n_impacts", "margin", "contact_time", "peak_force", "impulse", "restitution", "speed", "energies", "dissipated",
+    "energy_error", "momentum_error", "tolerance", "tolerance_met", "verdict", "finished", "in_contact", "scheme",
 )  # fmt: skip
 ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "inherited", "sensitivity", "total", "resolvable")
-IMPACT_PARTS = ("start", "end", "peak_force", "impulse", "contact")
+IMPACT_PARTS = ("start", "end", "peak_force", "impulse", "contact", "restitution")
 
 
 @check.typed

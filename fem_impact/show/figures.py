@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, MaxNLocator
 from matplotlib.tri import Triangulation
 
-from .._base import check
+from .._base import check, markup
 from .._base.files import replacing
 from .._base.rounding import SAME
 from ..impact import spectra
@@ -46,6 +46,7 @@ STYLE: Any = {
     "lines.linewidth": 1.5,
     "legend.frameon": False,
     "savefig.dpi": 150.0,
+    "text.usetex": False,  # a matplotlibrc in the working folder may say otherwise, with commands of its own
 }
 SPECTRUM_BAND = (10.0, 20e3)  # [Hz] default band: about what people hear
 SPECTRUM_POINTS = 1200  # [-] frequencies in a spectrum: about one per pixel
@@ -378,9 +379,11 @@ def edges(mesh: Mesh) -> Figure:
                 ends = mesh.points[mesh.facets[facets]]
                 lines = np.stack([ends[:, 0], middles, ends[:, 1]], axis=1)  # (n_facets, 3, 2)
                 colour = PALETTE[len(axes.collections) % len(PALETTE)]
-                axes.add_collection(LineCollection(list(lines), colors=colour, linewidths=2.5, label=edge.name))
+                axes.add_collection(
+                    LineCollection(list(lines), colors=colour, linewidths=2.5, label=markup.literal(edge.name))
+                )
             else:
-                axes.plot(*middles.T, "o", ms=8, label=edge.name)
+                axes.plot(*middles.T, "o", ms=8, label=markup.literal(edge.name))
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         axes.set(xlabel="x", ylabel="y" if mesh.dimension == 2 else "")
         axes.set_xlim(low[0] - MARGIN * size[0] / 2, low[0] + (1.0 + MARGIN / 2) * size[0])
@@ -414,9 +417,16 @@ def spread(found: Spread) -> Figure:
         kind = "variance explained (Sobol)" if found.shares else "squared rank correlation"
         for panel, title in zip(panels[0], ("distribution, median, 90 %", "against the leading input, 90 %", kind)):
             panel.set_title(title)
+        keys = next((named for panel in panels[:, 2] if (named := panel.get_legend_handles_labels())[0]), None)
+        if keys is not None:
+            figure.legend(*keys, loc="outside lower right", ncols=2, fontsize=8)  # beside the bars of the same colours
         twice = found.chance()
         said = f"double hit {100 * twice.value:.3g} % ({100 * twice.low:.3g} to {100 * twice.high:.3g} %)"
-        figure.suptitle(f"{found.title or 'Spread'}: {len(found.own)} independent blows, {said}", fontsize=11)
+        if twice.value == 0.0:
+            said = f"no double hit (at most {100 * twice.high:.2g} %)"
+        figure.suptitle(
+            f"{markup.literal(found.title or 'Spread')}: {len(found.own)} independent blows, {said}", fontsize=11
+        )
     return figure
 
 
@@ -473,7 +483,6 @@ def _bars(axes: Any, found: Spread, name: str) -> None:
             value, high = 100.0 * np.array([(one.value, one.high) for one in each]).T
             bars: dict[str, Any] = {"xerr": high - value, "ecolor": "#555555", "error_kw": {"lw": 1.0}}
             axes.barh(place, value, height, color=colour, label=f"{kind} order", **bars)
-        axes.legend(loc="lower right", fontsize=8)
     else:
         axes.barh(place, [100.0 * share for _, share in order], 0.6, color=BLUE)
     names = [key if len(key) <= LONGEST else f"{key[:LONGEST]}..." for key, _ in order]

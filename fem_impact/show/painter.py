@@ -7,14 +7,12 @@ with Painter() as painter:
     missing = painter.finish()
 """
 
-import os
 import pickle
 import subprocess
-import sys
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
-from .._base import progress
+from .._base import child, progress
 from .._base.files import undoable
 from ..impact.response import Response
 from . import canvas, pictures
@@ -39,15 +37,10 @@ class Painter:
         self.process: subprocess.Popen[bytes]
 
     def __enter__(self) -> "Painter":
-        environment = {
-            **os.environ,
-            **canvas.WINDOW,
-            "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
-        }
+        command, environment = child.python("show.canvas:main", **canvas.WINDOW)
         self.process = subprocess.Popen(
-            [sys.executable, "-m", canvas.__name__], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        )  # fmt: skip
+            command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        )
         self.stack.enter_context(undoable(self.process.kill))
         return self
 

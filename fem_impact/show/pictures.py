@@ -1,9 +1,7 @@
 """3D pictures of mode shapes and of the wave of a blow, rendered without a screen; flat ones if rendering fails."""
 
 import io
-import os
 import subprocess
-import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -12,7 +10,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from .._base import check, progress
+from .._base import check, child, progress
 from .._base.files import replacing
 from ..impact.response import Response
 from ..mesh.mesh_files import boundary
@@ -28,8 +26,7 @@ FRAMES = 48  # [-] default length of an animation: four seconds
 @cache
 def can_render() -> bool:
     """Whether pyvista can render here; tested once, in a process that may die from a signal, as `try` cannot catch."""
-    command = [sys.executable, "-c", canvas.PROBE]
-    environment = {**os.environ, **canvas.WINDOW}
+    command, environment = child.python("show.canvas:probe", **canvas.WINDOW)
     try:
         run = subprocess.run(command, env=environment, capture_output=True, timeout=PATIENCE, check=False)
     except subprocess.TimeoutExpired:

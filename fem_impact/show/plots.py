@@ -20,7 +20,7 @@ from ..mesh.mesh_files import boundary
 from ..modes.modal import Modes
 from ..sweeps.hammers import Hammer, half_sine_reach
 from . import sampling
-from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, styled
+from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, TICKS, VERMILION, styled
 
 BLACK, GREY = "#222222", "#777777"
 PALETTE = "cividis"  # perceptually uniform, also for colour-blind readers
@@ -296,3 +296,14 @@ def _coordinates(axes: Any, dimension: int) -> None:
         axes.set_yticks([])
     else:
         axes.set_ylabel("y")
+
+
+def set_ticks(axes: Any, low: float, high: float, log: bool) -> None:
+    """Few labels along x, from ``low`` to ``high``, so that none touch; on a logarithmic axis if ``log``."""
+    if not log:
+        axes.xaxis.set_major_locator(MaxNLocator(TICKS))
+        return
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(numticks=TICKS, subs=(1.0, 3.0) if high < 100.0 * low else (1.0,)))
+    axes.xaxis.set_major_formatter("{x:.0e}")
+    axes.xaxis.set_minor_formatter("")

@@ -24,7 +24,10 @@ STEPS = 12.0  # [-] steps per contact at tolerance 1e-3, rounded up by at most s
 STEP_ORDER = 3.5  # [-] order of the error in the step: between 3 (linear contact) and 4 (Hertz)
 REFINEMENTS = 6  # [-] runs after the first one; a blow that then still misses the tolerance goes to the modal engine
 ORDER = 2.0  # [-] order assumed when two runs are compared; cautious, as 3 and more was measured
-ALLOWED = 0.5  # [-] largest estimated error accepted, as a share of the tolerance
+# [-] what time steps may err: this share of the tolerance, as with half of it two runs agreed by chance in 8 of 7 000
+# cells; or half of a tolerance so small that it comes to less than FINE, as there they did not
+ALLOWED, FINE = 0.1, 2e-5
+COUNTED = 1e-2  # [-] largest tolerance used: looser ones save no time and miscount impacts
 PER_PERIOD = 2.0  # [-] steps per period of the highest frequency in the centroid's band
 # [-] an error below this many times the accepted one cuts the step by sqrt(2) instead of 2: always 2 leaves 13 % of
 # stiff blows at 3e-5 undone instead of 8 %, always sqrt(2) a third of those with loss
@@ -225,6 +228,11 @@ def bounce(
     return Bounces(*_in_pieces(blows, follow, workers, kernels))
 
 
+def allowed(tolerance: float) -> float:
+    """Largest estimated error [-] of the time steps that a tolerance accepts."""
+    return max(ALLOWED * tolerance, min(0.5 * tolerance, FINE))
+
+
 def count_impacts(
     blows: Blows, *, tolerance: float, most: int, workers: int | None = None, kernels: Kernels | None = None
 ) -> np.ndarray:
@@ -257,7 +265,7 @@ def _in_pieces(
 def _follow(blows: Blows, tolerance: float, band: float, kernels: Kernels) -> tuple[np.ndarray, ...]:
     """The columns of `Bounces` for some blows."""
     engine = _Engine(blows, band, kernels)
-    final, error = _refined(engine, tolerance)
+    final, error = _refined(engine, min(tolerance, COUNTED))
     v = blows.speed
     return (
         final[FOUND_IMPACTS], final[FOUND_TIME], final[FOUND_IMPULSE] * engine.own_rigid - 1.0,
@@ -286,11 +294,11 @@ def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarra
         slack = SLACK * tolerance * 2.0 ** (0.5 * STEP_ORDER * (first[todo] - step))
         fine = engine.run(todo, step, slack, ratio * coarse[FOUND_STEPS])
         found = engine.error(coarse, fine, todo, ratio)
-        met = found <= ALLOWED * tolerance
+        met = found <= allowed(tolerance)
         final[:, todo[met]] = fine[:, met]
         error[todo[met]] = found[met]
         coarse, todo = fine[:, ~met], todo[~met]
-        finer = np.where(found[~met] < MILD * ALLOWED * tolerance, 1, 2)
+        finer = np.where(found[~met] < MILD * allowed(tolerance), 1, 2)
         step = step[~met] + finer
     return final, error
 
@@ -298,6 +306,7 @@ def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarra
 def _counted(blows: Blows, tolerance: float, most: int, kernels: Kernels) -> tuple[np.ndarray]:
     """Numbers of impacts on which two runs agree, the finer one with half the step."""
     engine = _Engine(blows, 0.0, kernels)
+    tolerance = min(tolerance, COUNTED)
     step, todo = engine.first_step(tolerance), np.arange(blows.n_cases)
     number, before = np.full(len(todo), np.nan), None
     for turn in range(REFINEMENTS):

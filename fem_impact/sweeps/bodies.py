@@ -3,7 +3,6 @@
 import hashlib
 import json
 import math
-import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -12,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .._base import check
-from .._base.files import replacing
+from .._base import check, identity, kept
 from .._base.rounding import HALVINGS
 from ..fe import refinement
 from ..fe.eigenvalues import Flexibility
@@ -25,7 +23,7 @@ from ..model import planner, vectors
 from ..model.target import CLOSE, FIRST_FLEXIBLE, FIRST_LOOK, Elements, Stages, Target
 from ..model.views import TOGETHER, Views
 from ..modes.modal import FieldShapes, Modes, SampledShapes, damping_ratios
-from .batches import ALLOWED
+from .batches import allowed
 from .cells import REACH, Case, checked_axes, sampled
 
 # [-] cells in all, and at each strike point at least, by which vectors are judged: each costs several whole blows
@@ -85,7 +83,7 @@ def _started(modes: Modes, striker: Striker, contact: Contact, at: Any, speed: f
 def outline(target: Target, stages: Stages) -> Modes:
     """What stands for a plate until its vectors are known: it has its points, its mass and one frequency, 1 rad/s."""
     system = target.system or target.assembled(stages)
-    flexibility = Flexibility(system.K, system.M, system.rigid, system.held)
+    flexibility = Flexibility.of(system)
     shapes = FieldShapes(system, np.zeros((system.n_dofs, 1)), flexibility)
     return Modes(np.ones(1), np.zeros(1), shapes, target.mass)
 
@@ -271,7 +269,7 @@ class Sized:
                 seen.tried.clear()  # the others have not been tried as often
             worst = np.sort(np.array(errors or [(0.0, 0.0)]), axis=0)  # (n_struck, 2)
             error = Error(0.0, *worst[len(worst) - 1 - int(SPARED * len(worst))].tolist())
-            if not seen.improved(error, (1.0 - ALLOWED) * self.tolerance):
+            if not seen.improved(error, self.tolerance - allowed(self.tolerance)):
                 return found
 
     def _cutoff(self, point: np.ndarray) -> Callable[[Modes, float], float]:
@@ -318,6 +316,7 @@ def _key(target: Target, case: Case, axes: Axes, tolerance: float) -> str:
         "target": [target.mass, dict(target.scale), target.size_stated],
         "damping": damping_ratios(ratio, np.geomspace(1.0, 1e7, 50)).tolist(),
         "axes": {name: values.tolist() for name, values in axes.items()},
+        "program": identity.program(),
     }
     body = hashlib.sha256(json.dumps(told, sort_keys=True).encode())
     for matrix in (system.K, system.M):
@@ -328,33 +327,29 @@ def _key(target: Target, case: Case, axes: Axes, tolerance: float) -> str:
 
 def _write(path: Path, key: str, views: Views_) -> None:
     """Save the vectors at the points that they started from."""
-    arrays: dict[str, Any] = {"key": key, "places": np.array(list(views))}
+    arrays: dict[str, Any] = {"places": np.array(list(views))}
     for i, modes in enumerate(views.values()):
         arrays |= {f"{i} mass": modes.mass, f"{i} notes": np.array(modes.notes, dtype=str)}
         for cause, some in {"": modes, **modes.poorer}.items():
             assert isinstance(some.shapes, SampledShapes)
             columns = some.omega, some.damping_ratio, some.shapes.values, some.shapes.static
             arrays |= {f"{i} {cause} {n}": column for n, column in enumerate(columns)}
-    with replacing(path) as temporary, open(temporary, "wb") as file:
-        np.savez(file, **arrays)
+    kept.write(path, key, arrays)
 
 
 def _read(path: Path, key: str) -> Views_ | None:
     """What `_write` saved for the same map; None if there is no such file, or it is damaged."""
-    try:
-        with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
-            if str(file["key"]) != key:
-                return None
-            views = {}
-            for i, place in enumerate(file["places"]):
-                mass, notes = float(file[f"{i} mass"]), tuple(map(str, file[f"{i} notes"]))
-                found = {}
-                for cause in ("", "mesh", "truncation"):
-                    if f"{i} {cause} 0" in file:
-                        omega, zeta, rows, static = (file[f"{i} {cause} {n}"] for n in range(4))
-                        found[cause] = Modes(omega, zeta, SampledShapes(place[None], rows, static), mass, notes=notes)
-                whole = found.pop("")
-                views[tuple(place.tolist())] = replace(whole, poorer=found)
-            return views
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError, MemoryError):
-        return None  # find the vectors again and overwrite it
+    file = kept.read(path, key)
+    if file is None:
+        return None
+    views = {}
+    for i, place in enumerate(file["places"]):
+        mass, notes = float(file[f"{i} mass"]), tuple(map(str, file[f"{i} notes"]))
+        found = {}
+        for cause in ("", "mesh", "truncation"):
+            if f"{i} {cause} 0" in file:
+                omega, zeta, rows, static = (file[f"{i} {cause} {n}"] for n in range(4))
+                found[cause] = Modes(omega, zeta, SampledShapes(place[None], rows, static), mass, notes=notes)
+        whole = found.pop("")
+        views[tuple(place.tolist())] = replace(whole, poorer=found)
+    return views

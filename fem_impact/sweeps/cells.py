@@ -181,9 +181,14 @@ class Case:
 
 def sampled(modes: Modes, points: np.ndarray) -> Modes:
     """Modes at the given points only; leaves out the compliance between different points, which no blow needs."""
-    static = np.diag([float(modes.shapes.compliance(point[None])[0, 0]) for point in points])
+    static = np.array([float(modes.shapes.compliance(point[None])[0, 0]) for point in points])
     poorer = {cause: sampled(other, points) for cause, other in modes.poorer.items()}
-    return replace(modes, shapes=SampledShapes(points, modes.shape_at(points), static), poorer=poorer)
+    rest = None
+    if modes.unstated:
+        error = static * np.concatenate([modes.shapes.compliance_error(point[None]) for point in points])
+        rest = np.column_stack([np.zeros(len(points)), error])  # nothing between the points, as in the compliance
+    known = SampledShapes(points, modes.shape_at(points), np.diag(static), None, rest, modes.shapes.loose(points))
+    return replace(modes, shapes=known, poorer=poorer)
 
 
 def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:

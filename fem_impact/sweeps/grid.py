@@ -15,6 +15,7 @@ import xarray
 
 from .._base import check
 from .._base.check import SimulationError
+from .._base.files import PARTIAL
 from .._base.rounding import ROUNDING
 from ..fe import plausible
 from ..fe.assembly import System
@@ -256,8 +257,10 @@ def sweep(
     client : dask.distributed.Client or address of a scheduler, optional
         Cluster that computes the map instead of this process.
     store : path, optional
-        Zarr folder for finished cells; a run that was killed resumes from it. The workers of a cluster write to it
-        themselves, so it must have the same path on every machine.
+        Zarr folder for finished cells; a run that was killed resumes from it, with the bits of an undisturbed run. It
+        serves this map only: the same blow, the same functions in ``layers`` and the same version of the program. What
+        it lost or what was damaged is computed again. The workers of a cluster write to it themselves, so it must have
+        the same path on every machine.
     watch : callable, optional
         Called from time to time with the number of cells done and the total.
     max_cells : float
@@ -404,9 +407,10 @@ def _tell_interpolated(table: xarray.Dataset, computed: np.ndarray) -> None:
     n, share = int(computed.sum()), computed.mean()
     table.attrs["cells"] = f"{n} of {computed.size} cells computed ({share:.0%}), the others interpolated between them"
     meaning = "whether the cell was interpolated between others, to within the tolerance"
+    left = table.attrs["tolerance"] - batches.allowed(table.attrs["tolerance"])
     for name, weight in refined.ROUGH.items():
         if name in table:
-            table[name].attrs["interpolation_error"] = (1.0 - batches.ALLOWED) * table.attrs["tolerance"] / weight
+            table[name].attrs["interpolation_error"] = left / weight
     table["interpolated"] = (table.n_impacts.dims, ~computed, {"units": "1", "long_name": meaning})
 
 
@@ -425,13 +429,18 @@ class Way:
         place = self.store / turn if self.store is not None and turn else self.store
         return solve_all(blows, work, self.workers, self.client, place, None if turn else self.watch)
 
+    def _held(self) -> set[str]:
+        """Names in the folder of the store, but for what is not finished."""
+        if self.store is None or not self.store.exists():
+            return set()
+        return {name for name in os.listdir(self.store) if not name.startswith(PARTIAL)}
+
     def refined(self, grid: Grid, refine: bool | None, tell: Tell | None) -> refined.Refined | None:
         """Compute a map where its answer changes; None if all cells are predicted to be quick, unless ``refine``."""
-        whole = self.store is not None and (self.store / "zarr.json").exists()
-        if whole and not refine:
+        held = self._held()
+        if "zarr.json" in held and not refine:
             return None
-        going_on = self.store is not None and (self.store / "round-1").exists()
-        if self.store is not None and not going_on and self.store.exists() and any(self.store.iterdir()):
+        if self.store is not None and held and "round-1" not in held:
             raise not_free(self.store)
         first = replace(grid, chosen=np.unique(refined.first_blocks(grid.shape).cells(grid.shape[1])))
         here = replace(self, store=None, watch=None)
@@ -439,7 +448,7 @@ class Way:
         began = time.process_time()
         start = here.solved(first)
         seconds = (time.process_time() - began) / first.n_cases * grid.n_cases / (self.workers or os.cpu_count() or 1)
-        if not refine and not going_on and self.client is None:
+        if not refine and "round-1" not in self._held() and self.client is None:
             some = seconds > DENSE
             if tell is not None:
                 cost = f"all {grid.n_cases} cells are expected to take {seconds:.2g} s"
@@ -461,16 +470,18 @@ class Way:
 
 
 def described(grid: Grid, numbers: np.ndarray, workers: int | None = None) -> np.ndarray:
-    """Error [-] of too few Ritz vectors and of their mesh in each cell, in the shape of the grid; zero for modes.
+    """Error [-] of too few Ritz vectors and of their mesh in each cell, in the shape of the grid; zero for most modes.
 
     Evenly spaced cells, at most DOUBTED, are struck again on the body described less well (`Modes.poorer`); any other
     cell has the error of the nearest of them. Too few vectors may agree on a final separation that is none; therefore
-    cells with several impacts are also struck alone, because `strike` looks for that.
+    cells with several impacts are also struck alone, because `strike` looks for that; so are the cells of a body of
+    which something is not stated (`Modes.unstated`).
     """
     causes = list(dict.fromkeys(cause for modes in grid.base.views.values() for cause in modes.poorer))
-    if not causes:
+    unstated = grid.residual and bool(grid.base.modes.unstated or grid.base.striker.modes.unstated)
+    if not causes and not unstated:
         return np.zeros(grid.shape)
-    most = DOUBTED[grid.quick]
+    most = DOUBTED[grid.quick and not unstated]
     thinner = max(1.0, (grid.n_cases / most) ** (1.0 / len(grid.shape)))
     chosen = [np.unique(np.round(np.linspace(0, n - 1, max(1, int(n / thinner)))).astype(int)) for n in grid.shape]
     axes = {name: values[some] for (name, values), some in zip(grid.axes.items(), chosen)}
@@ -483,7 +494,7 @@ def described(grid: Grid, numbers: np.ndarray, workers: int | None = None) -> np
         other, _ = solve(replace(few, base=grid.base.poorer(cause), kernels={}), 0, few.n_cases, workers=workers)
         before, better = other.reshape(mine.shape), before
         total += _largest_difference(few.layers, better, before)
-    several = np.flatnonzero(mine[few.layers.index("n_impacts")] > 1)
+    several = np.flatnonzero((mine[few.layers.index("n_impacts")] > 1) | unstated)
     several = several[:: max(1, -(-len(several) // DOUBTED[False]))]
     with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
         total.flat[several] = np.maximum(total.flat[several], list(pool.map(few.doubt, several)))
@@ -554,7 +565,8 @@ def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> t
         kinds, first, family = np.unique(kind[cells], return_index=True, return_inverse=True)
         families = {}
         for which, i in zip(kinds, cells[first]):
-            case = grid.case(start + i)
+            chosen = {name: grid.axes[name][place[name][i]] for name in FAMILY_AXES if name in place}
+            case = grid.base.with_values(chosen)  # nothing else of the cell, so that no block is rounded differently
             families[int(which)] = batches.Family.of(case.modes, case.at, case.striker, grid.residual, bool(which % 2))
         blows = batches.Blows(
             families,

@@ -271,7 +271,7 @@ def _hammer(
     if high <= low:
         return Hammer(float(mass), (), (), high, None, None, modes.notes)
     tips = _series(low, high, PER_DECADE[0])
-    case = Case(modes, striker, Contact.linear(1.0), modes.point("at", at)[0], 1.0)
+    case = Case(alone, striker, Contact.linear(1.0), modes.point("at", at)[0], 1.0)  # `once` looks at the others
     series = grid.Grid(case, {"stiffness": tips}, TOLERANCE, True, None, {}, max_impacts=2)
     counts = grid.solve(series, 0, len(tips))[0][series.layers.index("n_impacts")]
     single = _ranges(tips, counts == 1, once)

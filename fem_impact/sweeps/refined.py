@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .batches import ALLOWED
+from .batches import allowed
 from .store import Texts
 
 BLOCK = 16  # [-] cells along the sides of the first blocks; islands narrower than a quarter of it can be missed
@@ -208,7 +208,7 @@ def refine(
         sheet.add(quarters.cells(shape[1]), compute, f"round-{turn}")
         off = sheet.missed(blocks, quarters, of)
         split = np.zeros(len(blocks.along), bool)
-        np.logical_or.at(split, of, off > (1.0 - ALLOWED) * tolerance)
+        np.logical_or.at(split, of, off > tolerance - allowed(tolerance))
         sheet.fill(quarters.some(~split[of]), off[~split[of]])
         blocks = quarters.some(split[of])
         blocks = blocks.some((blocks.along[:, :, 1] - blocks.along[:, :, 0] > 1).any(axis=1))

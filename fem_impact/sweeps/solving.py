@@ -21,7 +21,7 @@ LOG = logging.getLogger(__name__)
 LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
     "n_impacts": ("", "number of separate contacts"),
     "contact_time": ("s", "total time in contact"),
-    "restitution": ("", "minus the speed after the blow over the speed before, at the contact point"),
+    "restitution": ("", "minus the speed after the blow over the speed before, at the contact point; NaN in contact"),
     "impulse": ("N s", "total impulse of the contact force"),
     "peak_force": ("N", "largest contact force"),
     "error": ("", "estimated time-step error: absolute for restitution, relative for the others"),

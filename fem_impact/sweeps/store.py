@@ -2,25 +2,36 @@
 
 import hashlib
 import json
+import logging
 import math
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .._base import check
+from .._base import check, identity
+from .._base.files import created
 
+LOG = logging.getLogger(__name__)
 LARGEST_BLOCK = 2**17  # [-] cells computed together at most, to limit the memory to 30 MB: half a second of work
 BLOCKS = 64  # [-] fewest blocks of a large map: a killed run loses at most one block per worker
+ARRAYS = ("numbers", "failures", "done")  # of a store; the last one holds the proofs and is written last
 TEXT = 240  # [byte] longer error texts are cut, because every cell has room for one
 EXTRA = "pip install 'fem-impact[cluster]'"
 
 Texts = dict[int, str]  # failed cell: error text
 Solve = Callable[[Any, int, int], tuple[np.ndarray, Texts]]  # grid, start, stop: numbers (n_layers, n_cells), texts
 Watch = Callable[[int, int], Any]
+Mark = dict[str, str]  # digests, from `fingerprint`
+OTHERS = {  # what is told of a store whose digests are others
+    "program": "made by another version of this program or its libraries",
+    "map": "other bodies, axes or tolerance",
+    "functions": "other functions in layers",
+}
 
 
 def block_size(n_cases: int) -> int:
@@ -29,31 +40,39 @@ def block_size(n_cases: int) -> int:
 
 
 class Store:
-    """Results of a map on disk, block by block; a block counts as done once its flag is set, which is written last.
+    """Results of a map on disk, block by block.
+
+    Each block has a proof: a digest of its results, its place, and all that determines them, see `fingerprint`. What
+    does not match its proof, because it was lost, damaged or moved, is computed again.
 
     Parameters
     ----------
     path : folder, under the same path on every machine that works on the map
+    mark : dict, from `fingerprint`
+    n_layers, n_cases : int
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, mark: Mark, n_layers: int, n_cases: int) -> None:
+        self.path, self.mark = path, mark
+        self.n_layers, self.n_cases, self.block = n_layers, n_cases, block_size(n_cases)
         with _needed("a store"):
             import zarr
         with _intact(path):
-            self.group: Any = zarr.open_group(str(path), mode="r")
-            attributes: Any = self.group.attrs
-            self.n_cases: int = int(attributes["n_cases"])
-            self.block: int = int(attributes["block"])
-            fresh = _made(zarr, {}, self.n_layers, self.n_cases, self.block)
-            for name in fresh:
-                if self.group[name].metadata.to_dict() != fresh[name].metadata.to_dict():
+            group: Any = zarr.open_group(str(path), mode="r")
+            found = dict(group.attrs)
+            if not set(OTHERS) <= set(found):
+                raise ValueError("it does not say what it was made for")
+        for name, others in OTHERS.items():
+            if found[name] != mark[name]:
+                raise ValueError(f"store holds another map ({others}): {path}; name a new folder")
+        if mark["program"] != identity.program():
+            raise ValueError("client: a worker runs another version of this program; install the same one everywhere")
+        with _intact(path):
+            self.arrays = {name: group[name] for name in ARRAYS}
+            fresh = _made(zarr, {}, mark, n_layers, n_cases)
+            for name in ARRAYS:
+                if self.arrays[name].metadata.to_dict() != fresh[name].metadata.to_dict():
                     raise ValueError(f"the array {name} has another shape, type or chunk size than this program writes")
-
-    @property
-    def n_layers(self) -> int:
-        """Number of layers of each cell."""
-        return int(self.group["numbers"].shape[0])
 
     @classmethod
     def open(cls, path: str | Path, grid: Any) -> "Store":
@@ -62,92 +81,135 @@ class Store:
         with _needed("a store"):
             import zarr
         mark = fingerprint(grid)
-        if path.exists() and any(path.iterdir()):
-            if not (path / "zarr.json").exists():
-                raise not_free(path)
-            store = cls(path)
-            if store.group.attrs.get("fingerprint") != mark:
-                raise ValueError(
-                    f"store holds another map (other bodies, axes or tolerance): {path}; name a new folder"
-                )
-            if (store.n_layers, store.n_cases) != (len(grid.layers), grid.n_cases):
-                raise _damaged(path, "its size does not match this map")
-            return store
-        group = _made(zarr, str(path), len(grid.layers), grid.n_cases, block_size(grid.n_cases))
-        group.attrs.update({"n_cases": grid.n_cases, "block": block_size(grid.n_cases), "fingerprint": mark})
-        return cls(path)
+        if not path.exists() or (path.is_dir() and not any(path.iterdir())):
+            with created(path) as new:
+                _made(zarr, str(new), mark, len(grid.layers), grid.n_cases)
+        if not (path / "zarr.json").exists():
+            raise not_free(path)
+        return cls(path, mark, len(grid.layers), grid.n_cases)
+
+    @property
+    def blocks(self) -> range:
+        """Numbers of all blocks."""
+        return range(math.ceil(self.n_cases / self.block))
 
     def missing(self) -> list[int]:
-        """Blocks that are not done yet."""
-        with _intact(self.path):
-            return np.flatnonzero(self.group["done"][:] == 0).tolist()
+        """Blocks that are not in the store, or not as they were written."""
+        return [block for block in self.blocks if self.read(block) is None]
 
     def bounds(self, block: int) -> tuple[int, int]:
         """First cell of a block and the one after its last."""
         return block * self.block, min((block + 1) * self.block, self.n_cases)
 
-    def write(self, block: int, numbers: np.ndarray, texts: Texts) -> None:
-        """Save a block."""
+    @cached_property
+    def _writable(self) -> list[Any]:
+        """The arrays, opened for writing."""
         import zarr
 
         group: Any = zarr.open_group(str(self.path), mode="r+")
+        return [group[name] for name in ARRAYS]
+
+    def write(self, block: int, numbers: np.ndarray, texts: Texts) -> tuple[np.ndarray, Texts]:
+        """Save a block; return it as it will be read."""
         start, stop = self.bounds(block)
-        group["numbers"][:, start:stop] = numbers
-        if texts:
-            raw = np.zeros((stop - start, TEXT), np.uint8)
-            for i, text in texts.items():
-                encoded = text.encode()[:TEXT]
-                raw[i - start, : len(encoded)] = list(encoded)
-            group["failures"][start:stop] = raw
-        group["done"][block] = 1
+        numbers = np.where(np.isnan(numbers), math.nan, numbers)  # a chunk of these is not written, and read as these
+        raw = np.zeros((stop - start, TEXT), np.uint8)
+        for i, text in texts.items():
+            encoded = text.encode()[:TEXT]
+            raw[i - start, : len(encoded)] = list(encoded)
+        kept, failures, done = self._writable
+        kept[:, start:stop] = numbers
+        failures[start:stop] = raw
+        done[block] = self._proof(block, numbers, raw)
+        return numbers, _texts(raw, start)
 
-    def read(self) -> tuple[np.ndarray, Texts]:
-        """Numbers (n_layers, n_cases) and error texts of all cells."""
-        found: Texts = {}
-        with _intact(self.path):
-            for block in range(math.ceil(self.n_cases / self.block)):
-                start, stop = self.bounds(block)
-                raw = self.group["failures"][start:stop]
-                for i in np.flatnonzero(raw.any(axis=1)):
-                    found[start + int(i)] = bytes(raw[i]).rstrip(b"\0").decode("utf-8", "ignore")
-            return self.group["numbers"][:], found
+    def read(self, block: int) -> tuple[np.ndarray, Texts] | None:
+        """Numbers (n_layers, n_cells) and error texts of a block; None if they are not what was written there."""
+        start, stop = self.bounds(block)
+        try:
+            proof = int(self.arrays["done"][block])
+            numbers, raw = self.arrays["numbers"][:, start:stop], self.arrays["failures"][start:stop]
+        except Exception:  # what zarr cannot read raises many kinds of error
+            proof, numbers, raw = 1, np.empty(0), np.empty(0)
+        if proof == self._proof(block, numbers, raw):
+            return numbers, _texts(raw, start)
+        if proof:
+            LOG.warning("block %d of %s is damaged and is computed again", block, self.path)
+        return None
 
-
-def _made(zarr: Any, place: Any, n_layers: int, n_cases: int, block: int) -> Any:
-    """Empty arrays of a store, with checksums; uncompressed, so that a bad chunk cannot expand and fill the memory."""
-    group = zarr.open_group(place, mode="w")
-    for name, shape, chunks, kind, empty in (
-        ("numbers", (n_layers, n_cases), (n_layers, block), "f8", math.nan),
-        ("failures", (n_cases, TEXT), (block, TEXT), "u1", 0),
-        ("done", (math.ceil(n_cases / block),), (1,), "u1", 0),
-    ):
-        group.create_array(
-            name, shape=shape, chunks=chunks, dtype=kind, fill_value=empty, compressors=zarr.codecs.Crc32cCodec()
+    def _proof(self, block: int, numbers: np.ndarray, raw: np.ndarray) -> np.uint64:
+        """Digest of a block's place, origin and content; never zero, which stands for nothing."""
+        body = hashlib.sha256(
+            json.dumps([self.mark, block], sort_keys=True).encode() + numbers.tobytes() + raw.tobytes()
         )
+        return np.uint64(int.from_bytes(body.digest()[:8]) | 1)
+
+
+def _texts(raw: np.ndarray, start: int) -> Texts:
+    """Error texts of the failed cells of a block that begins with a cell."""
+    return {
+        start + int(i): bytes(raw[i]).rstrip(b"\0").decode("utf-8", "ignore") for i in np.flatnonzero(raw.any(axis=1))
+    }
+
+
+def _made(zarr: Any, place: Any, mark: Mark, n_layers: int, n_cases: int) -> Any:
+    """Empty arrays of a store; uncompressed, so that a bad chunk cannot expand and fill the memory."""
+    group, block = zarr.open_group(place, mode="w", attributes=mark), block_size(n_cases)
+    for name, (shape, chunks, kind, empty) in zip(ARRAYS, (
+        ((n_layers, n_cases), (n_layers, block), "f8", math.nan),
+        ((n_cases, TEXT), (block, TEXT), "u1", 0),
+        ((math.ceil(n_cases / block),), (1,), "u8", 0),
+    )):  # fmt: skip
+        group.create_array(name, shape=shape, chunks=chunks, dtype=kind, fill_value=empty, compressors=None)
     return group
 
 
-def fingerprint(grid: Any) -> str:
-    """Hash of everything that determines the results of a map."""
+def fingerprint(grid: Any) -> Mark:
+    """Digests of everything that determines the results of a map: the blow, the functions and the program."""
     body = hashlib.sha256(json.dumps(grid.scene(), sort_keys=True).encode())
     for name, values in grid.axes.items():
-        body.update(name.encode() + np.ascontiguousarray(values, float).tobytes())
-    body.update(repr((grid.tolerance, grid.residual, grid.band, grid.layers)).encode())
-    return body.hexdigest()
+        body.update(f"{name} {values.shape}".encode() + np.ascontiguousarray(values, float).tobytes())
+    striker = grid.base.striker
+    told = grid.tolerance, grid.residual, grid.band, grid.layers, grid.max_impacts, striker.hand, grid.base.first
+    body.update(repr(told).encode())
+    for modes, places in _seen(grid.base, grid.axes.get("at", grid.base.at[None])):
+        for each in (modes, *modes.poorer.values()):
+            yields = [float(each.shapes.compliance(place[None])[0, 0]) for place in places]
+            body.update(repr((each.n_modes, each.stretches, each.thick, each.air, each.unstated, yields)).encode())
+            body.update(each.omega.tobytes() + each.shape_at(places).tobytes())
+    functions = {}
+    for name, function in grid.extra.items():
+        try:
+            functions[name] = identity.of(function)
+        except ValueError as error:
+            raise ValueError(
+                f"layers: {name!r} cannot be told from other functions ({error}), so that a store may mix them up; "
+                "leave out store, or pass a function that does not use it"
+            ) from None
+    return {"map": body.hexdigest(), "functions": identity.of(functions), "program": identity.program()}
+
+
+def _seen(base: Any, places: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
+    """Each description of the struck body, and the strike points (n_points, dimension) [m] that it is for."""
+    for place, modes in base.views.items():
+        yield modes, np.array([place])
+    if not base.views:
+        yield base.modes, places
 
 
 def by_store(grid: Any, path: str | Path, solve: Solve, watch: Watch | None) -> tuple[np.ndarray, Texts]:
-    """Compute the blocks missing from a store in this process; return the whole map."""
+    """Read a map from a store, and compute in this process what is missing there."""
     store = Store.open(path, grid)
-    missing = store.missing()
-    done = grid.n_cases - sum(np.diff(store.bounds(block))[0] for block in missing)
-    for block in missing:
+    numbers = np.empty((store.n_layers, store.n_cases))
+    texts: Texts = {}
+    for block in store.blocks:
         start, stop = store.bounds(block)
-        store.write(block, *solve(grid, start, stop))
-        done += stop - start
+        found = store.read(block)  # only now: another process may be at work on the same map
+        numbers[:, start:stop], new = found or store.write(block, *solve(grid, start, stop))
+        texts |= new
         if watch is not None:
-            watch(int(done), grid.n_cases)
-    return store.read()
+            watch(stop, grid.n_cases)
+    return numbers, texts
 
 
 def by_cluster(
@@ -167,14 +229,11 @@ def by_cluster(
         store = None if path is None else Store.open(path, grid)
         block = block_size(grid.n_cases)
         todo = store.missing() if store is not None else list(range(math.ceil(grid.n_cases / block)))
+        at = None if store is None else (str(store.path), store.mark)
         # New keys for data (not its hash) and tasks: the scheduler may still be about to forget those of the last run
         shared = connected.scatter(grid.sampled(), broadcast=True, hash=False)
         name = f"map-{uuid.uuid4().hex[:12]}"
-        futures = {
-            connected.submit(_work, shared, i, block, solve, None if store is None else str(store.path),
-                             key=f"{name}-{i}", pure=False): i
-            for i in todo
-        }  # fmt: skip
+        futures = {connected.submit(_work, shared, i, block, solve, at, key=f"{name}-{i}", pure=False): i for i in todo}
         numbers = np.empty((len(grid.layers), grid.n_cases)) if store is None else np.empty((0, 0))
         texts: Texts = {}
         done = grid.n_cases - sum(min(block, grid.n_cases - i * block) for i in todo)
@@ -190,17 +249,18 @@ def by_cluster(
             if watch is not None:
                 watch(done, grid.n_cases)
             future.release()
-        return (numbers, texts) if store is None else Store(store.path).read()
+        return (numbers, texts) if path is None else by_store(grid, path, solve, None)
 
 
-def _work(grid: Any, block: int, size: int, solve: Solve, path: str | None) -> tuple[np.ndarray, Texts] | None:
-    """Compute one block on a worker; return None if it is, or goes, in a store."""
-    if path is None:
+def _work(
+    grid: Any, block: int, size: int, solve: Solve, at: tuple[str, Mark] | None
+) -> tuple[np.ndarray, Texts] | None:
+    """Compute one block on a worker; return None if it is, or goes, in a store, of which path and mark are given."""
+    if at is None:
         return solve(grid, block * size, min((block + 1) * size, grid.n_cases))
-    store = Store(check.path("store", path))
-    if block not in store.missing():  # another worker saved it and died before it could report
-        return None
-    store.write(block, *solve(grid, *store.bounds(block)))
+    store = Store(check.path("store", at[0]), at[1], len(grid.layers), grid.n_cases)
+    if store.read(block) is None:  # otherwise another worker saved it and died before it could report
+        store.write(block, *solve(grid, *store.bounds(block)))
     return None
 
 

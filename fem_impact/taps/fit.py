@@ -1,6 +1,7 @@
 """`fit`: the hammer, contact and structure that explain measured taps."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +14,7 @@ from ..impact.striker import Striker
 from ..modes.modal import Modes
 from . import arguments, predictions, solver, windows
 from .found import Found, Watch, profiled
+from .profiles import DOUBTED, variance
 from .records import Taps
 from .rig import Rig
 from .solver import Problem
@@ -27,6 +29,8 @@ OUTLIER = 4.0
 # [-] ratio of noise over peak from which taps count differently: less is how well the noise of short rests is known
 UNEQUAL = 1.5
 MOST_OUTLIERS = 0.34  # [-] of the taps may disagree: with more, nobody knows which ones are right
+BETTER = 2.0  # [-] ratio of residuals from which a stiffness for each tap is proposed: the rest may be luck
+PLACES = 0.2, 0.5, 0.8  # [-] of the range of its frequency, where a further mode is sought
 FEWEST = 3  # [-] taps, to tell which one disagrees: of two, either may be wrong
 
 
@@ -203,6 +207,10 @@ def _fit(
         raise ValueError(f"taps hold {data.values.size} samples, too few for {problem.n_values} values")
     used = list(range(cut.n_taps))
     best, minima = _search(problem, cut, length, starts, rng, watch)
+    if len(minima) > 1 and best.cost > min(minima) * (1.0 + solver.NEARLY):
+        notes.append(
+            f"a model without mode{_modes(problem)} explains the taps better: the search may have missed the best"
+        )
     part = problem.residual(best.x).reshape(data.values.shape)
     if n_points:
         spread = np.sqrt(np.square(part).mean(axis=(0, 2)))
@@ -213,6 +221,7 @@ def _fit(
         problem = replace(problem, data=data, _last={})
         best = solver.solve(problem, best.x)
         minima = (best.cost,)
+    notes += _apart(problem, best)
     outliers: dict[str, float] = {}
     while robust and len(used) > max(FEWEST, (1.0 - MOST_OUTLIERS) * cut.n_taps):
         each = np.array([one.error for one in predictions.left_out(problem, best.x, cut.pick(used))])
@@ -238,8 +247,61 @@ def _sureness(residual: np.ndarray, noise: np.ndarray) -> np.ndarray:
     return weights if weights.max() > UNEQUAL * weights.min() else np.ones(len(noise))
 
 
+def _apart(problem: Problem, best: solver.Solution) -> list[str]:
+    """A note if taps that share a stiffness, and leave more than noise, are explained better with one each."""
+    if problem.own or problem.data.n_taps < FEWEST or TIME not in [each.name for each in problem.free]:
+        return []
+    white = variance(problem.residual(best.x).reshape(-1, problem.data.n_times), problem.n_values)[2]
+    if white >= DOUBTED:
+        return []
+    each = replace(problem, own=(TIME,), _last={})
+    freed = solver.solve(each, np.append(best.x, np.zeros(problem.data.n_taps)), solver.QUICK, solver.NEARLY)
+    if freed.cost > best.cost / BETTER**2:
+        return []
+    whole = float(np.square(problem.data.values).sum())
+    one, own = (100.0 * np.sqrt(cost / whole) for cost in (best.cost, freed.cost))
+    return [
+        f"one contact.stiffness for all taps leaves {one:.2g} %; with one for each (per_tap), {own:.2g} % would be left"
+    ]
+
+
+def _modes(problem: Problem) -> int:
+    """Number of unknown modes of the structure."""
+    return max((int(each.name[4]) for each in problem.free if each.name.startswith("mode")), default=0)
+
+
+def _simpler(problem: Problem, taps: Taps, length: float, rng: Any) -> tuple[list[np.ndarray], tuple[float, ...]]:
+    """Starting points at the best fit without the last mode, which begins too heavy to move; and its sum of squares."""
+    last = f"mode{_modes(problem)}."
+    if last == "mode0.":
+        return [], ()
+    kept = [i for i, each in enumerate(problem.free) if not each.name.startswith(last)]
+    names = tuple(each for each in problem.setting.unknown if not each.name.startswith(last))
+    less = replace(
+        problem, setting=replace(problem.setting, unknown=names), free=tuple(problem.free[i] for i in kept),
+        fixed={name: value for name, value in problem.fixed.items() if not name.startswith(last)}, _last={},
+    )  # fmt: skip
+    best, _ = _search(less, taps, length, 1, rng, None)
+    begun = []
+    low, high = (bound[: problem.n_shared] for bound in problem.bounds)
+    for share in PLACES:
+        shared = low + share * (high - low)
+        for i, each in enumerate(problem.free):
+            if each.name == last + "mass":
+                shared[i] = high[i]
+            elif each.name == last + "frequency":
+                ends = np.clip(np.log(np.array(solver.FELT) / length), low[i], high[i])
+                shared[i] = ends[0] + share * (ends[1] - ends[0])
+        shared[kept] = best.x[: less.n_shared]
+        begun.append(np.append(shared, best.x[less.n_shared :]))
+    return begun, (best.cost,)
+
+
 def _search(problem: Problem, taps: Taps, length: float, starts: int, rng: Any, watch: Watch | None):
-    """The best of several searches, and the sums of squares of all; they begin with what all taps share."""
+    """The best of several searches, and the sums of squares of all; they begin with what all taps share.
+
+    A mode more never fits worse: searches begin where the model without the last mode ends, too.
+    """
     common = replace(problem, own=(), _last={})
     begun = solver.starts(common, length, taps.impulse, rng)
     found: list[solver.Solution] = []
@@ -254,6 +316,10 @@ def _search(problem: Problem, taps: Taps, length: float, starts: int, rng: Any, 
         finally:
             if watch is not None:
                 watch(min(i + 1, starts), starts)
+    nested, without = _simpler(common, taps, length, rng)
+    for x in nested:
+        with suppress(SimulationError):
+            found.append(solver.solve(common, x, solver.QUICK, solver.NEARLY))
     if not found:
         raise SimulationError("no search ended: blows in the ranges of unknown do not end; narrow the ranges")
     found.sort(key=lambda one: one.cost)
@@ -261,4 +327,4 @@ def _search(problem: Problem, taps: Taps, length: float, starts: int, rng: Any, 
     going = found[:1] + [one for one in found[1:2] if not one.ended]
     finished = [solver.solve(problem, np.append(one.x, apart)) for one in going]
     best = min(finished, key=lambda one: one.cost)
-    return best, tuple(one.cost for one in [*finished, *found[len(finished) :]])
+    return best, (*(one.cost for one in [*finished, *found[len(finished) :]]), *without)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
+from .._base.rounding import SAME
 from ..impact.collision import strike
 from ..impact.contact import Contact
 from ..impact.response import Response
@@ -22,6 +23,7 @@ from .solver import Problem, Solution
 from .unknowns import changed, unit_of
 
 LUCK = 0.05  # [-] probability of a spread by noise alone, above which taps do not count as different: the usual level
+STEEP = 10.0  # [-] exponent of a ridge above which it says only that the value itself hardly moves
 REPEATS = 3  # [-] times that profiles may find a better fit and begin again; a sound fit needs none
 
 Watch = Callable[[int, int], Any]
@@ -36,7 +38,8 @@ class Found:
     outliers: Mapping[str, float]  # label of a tap that disagrees -> its error when predicted from the others [-]
     problem: Problem
     best: Solution
-    minima: tuple[float, ...]  # [-] sums of squares at the ends of all searches
+    # [-] sums of squares at the ends of all searches, and of the best without the last of the unknown modes
+    minima: tuple[float, ...]
     notes: tuple[str, ...]
     compared: Mapping[str, float]  # contact law -> root mean square of its errors at left-out taps [-]; if several
     watch: Watch | None = None
@@ -225,8 +228,9 @@ class Found:
             part = {key: values.get(f"striker.{key}") for key in ("mass", "first_frequency")}
             return Striker.flexible(given.modes.scaled(**part), at=given.at)
         modes = Modes.from_arrays(
-            body.omega / (2.0 * np.pi), body.row[None], points=[[0.0]], mass=body.mass, damping_ratio=body.zeta
-        )
+            body.omega / (2.0 * np.pi), body.row[None], points=[[0.0]], mass=body.mass, damping_ratio=body.zeta,
+            complete=True,
+        )  # fmt: skip
         return Striker.flexible(modes, at=[0.0])
 
     @property
@@ -240,7 +244,7 @@ class Found:
         return Modes.from_arrays(
             body.omega[order] / (2.0 * np.pi), body.row[None, order], points=[[0.0]],
             mass=body.mass if np.isfinite(body.mass) else float(1.0 / np.square(body.row).max()),
-            damping_ratio=body.zeta[order], compliance=[[carried + body.rest]],
+            damping_ratio=body.zeta[order], compliance=[[carried + body.rest]], free=False,
         )  # fmt: skip
 
     @check.typed
@@ -290,6 +294,14 @@ class Found:
             )  # fmt: skip
         return strike(body, hammer, law, at=place, speed=typical if speed is None else speed, tolerance=1e-3)
 
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """What stands against trusting the values: what the data do not tell, and what the model lacks; else none."""
+        said = [f"The data do not tell {', '.join(self.unidentifiable)}"] if self.unidentifiable else []
+        if self.whiteness < profiles.DOUBTED:
+            said.append("The residual is not noise: the model lacks something; intervals are widened for it")
+        return tuple(said)
+
     def summary(self) -> str:
         """What was found in a few readable lines; what the data do not tell is said first."""
         lines = [
@@ -299,22 +311,11 @@ class Found:
         if self.outliers:
             each = ", ".join(f"{name} ({100.0 * error:.2g} %)" for name, error in self.outliers.items())
             lines.append(f"left out, because the other taps predict them badly: {each}")
+        lines += self.verdict
         for name in self.unidentifiable:
-            along = ", ".join(f"{other}^{power:.2g}" for other, power in self.ridges[name].items())
-            said = f"; along its ridge, per power of it, go {along}" if along else ""
-            lines.append(f"The data do not tell {name}{said}")
-        rows = []
-        for name in self.names:
-            profile = self.profiles[name]
-            low, high = profile.interval()
-            unit = unit_of(name)
-            if profile.told == "open":
-                rows.append((name, "not told", "", unit))
-            elif profile.told == "limited":
-                limit = f"at least {low:.4g}" if profile.open[1] else f"at most {high:.4g}"
-                rows.append((name, limit, "", unit))
-            else:
-                rows.append((name, f"{profile.value:.4g}", f"{low:.4g} to {high:.4g}", unit))
+            if self.ridges[name]:
+                lines.append(f"If {name} grows, {along(self.ridges[name])}, and the taps are explained as well")
+        rows = [(name, *stated(self.profiles[name]), unit_of(name)) for name in self.names]
         lines += markup.columns(rows, ("", "value", "90 % interval", "unit"))
         for spread in self.spreads.values():
             lines.append(f"{spread.name} is the mean of the taps, which {differ(spread)}")
@@ -322,8 +323,6 @@ class Found:
             for end, other in zip(("below", "above"), self.profiles[name].held_by):
                 if other:
                     lines.append(f"Note: {name} is limited {end} only by the range given for {other}")
-        if self.whiteness < profiles.DOUBTED:
-            lines.append("Note: the residual is not noise: the model lacks something; intervals are widened for it")
         lines += [f"Note: {note}" for note in self.notes]
         return "\n".join(lines)
 
@@ -357,6 +356,31 @@ class Found:
             "compared": dict(self.compared),
             "notes": list(self.notes),
         }
+
+
+def stated(profile: Profile) -> tuple[str, str]:
+    """A value and its 90 % interval in words, with no more digits than the interval leaves sure."""
+    low, high = profile.interval()
+    if profile.told == "open":
+        return "not told", ""
+    if profile.told == "limited":
+        return (f"at least {low:.2g}" if profile.open[1] else f"at most {high:.2g}"), ""
+    size = max(abs(low), abs(high))
+    digits = int(np.clip(1 + np.ceil(-np.log10(max((high - low) / (2.0 * size), SAME))), 1, 6)) if size else 1
+    ends = max(digits, 2)
+    return f"{profile.value:.{digits}g}", f"{low:.{ends}g} to {high:.{ends}g}"
+
+
+def along(ridge: Mapping[str, float]) -> str:
+    """How other values go along with one that the data do not tell, from their exponents, in words."""
+    said = []
+    for name, power in ridge.items():
+        way = "grows" if power > 0.0 else "falls"
+        if abs(power) > STEEP:
+            said.append(f"{name} {way} far faster")
+        else:
+            said.append(f"{name} {way} with its power {abs(power):.2g}")
+    return ", ".join(said)
 
 
 def differ(each: Scatter) -> str:

@@ -1,5 +1,6 @@
 """What `fem-impact frf` and `fem-impact fit` do, apart from printing."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +43,12 @@ def frf(options: Any) -> tuple[xr.Dataset, tuple[str, ...]]:
         rate = RATE if options.rate is None else options.rate
         taps = measure(hit, rate=rate, at=scene.points, duration=DURATION)
     else:
-        taps = _taps(options)
+        try:
+            taps = _taps(options)
+        except ValueError:  # a universal file may hold frequency responses already
+            with suppress(ValueError):
+                return transfer.frf(options.scene), ()
+            raise
     found = transfer.frf(
         taps, method=options.method, force_window=options.force_window, response_window=options.response_window
     )
@@ -57,7 +63,7 @@ def peaks(found: xr.Dataset) -> tuple[list[tuple[str, ...]], tuple[str, ...]]:
         places = find_peaks(np.log(np.maximum(size, 1e-300)), prominence=STEEP)[0]
         largest = np.sort(places[np.argsort(-size[places])][:MOST_PEAKS])
         for i in largest:
-            coherence = f"{float(found['coherence'].values[1 + i, k]):.3f}"
+            coherence = f"{float(found['coherence'].values[1 + i, k]):.3f}" if "coherence" in found else ""
             frequency = f"{float(found['frequency'].values[1 + i]):.5g} Hz"
             rows.append((str(name), frequency, f"{size[i]:.4g} {found['units'].values[k]}", coherence))
     return rows, ("response", "peak at", "magnitude", "coherence")
@@ -74,7 +80,8 @@ def write_frf(path: Path, found: xr.Dataset) -> None:
         for k, name in enumerate(found["channel"].values):
             values, unit = found["H"].values[:, k], found["units"].values[k]
             columns |= {f"{name} real [{unit}]": values.real, f"{name} imaginary [{unit}]": values.imag}
-            columns[f"{name} coherence"] = found["coherence"].values[:, k]
+            if "coherence" in found:
+                columns[f"{name} coherence"] = found["coherence"].values[:, k]
         (staging / path.name).write_text(export.csv_text(**columns), encoding="utf-8")
 
 

@@ -30,7 +30,12 @@ EXCITATION, ACCELERATION, VELOCITY, DISPLACEMENT = 13, 12, 11, 8  # codes of qua
 UFF_UNITS = {EXCITATION: "N", 9: "N", ACCELERATION: "m/s^2", VELOCITY: "m/s", DISPLACEMENT: "m"}
 UFF_HEAD = 13  # lines of a data set 58 before its numbers
 UFF_END = re.compile(rb" {4}-1(?=\r|\n|\Z| {74})")  # begins and ends a data set, also right behind binary numbers
-TIME_RESPONSE = 1  # function type of data set 58
+TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6  # function types of data set 58
+UFF_TYPES = {  # function types of data set 58 -> what it holds
+    1: "time records", 2: "auto spectra", 3: "cross spectra", 4: "frequency responses", 5: "transmissibilities",
+    6: "coherences", 7: "auto-correlations", 8: "cross-correlations", 9: "power spectral densities",
+    10: "energy spectral densities", 11: "probability densities", 12: "spectra",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -444,13 +449,16 @@ def wav(path: Path) -> Recording:
         warnings.simplefilter("always")
         rate, values = wavfile.read(path)
     cut = any("EOF" in str(each.message) for each in said)
-    notes = ("the file is cut off: it holds fewer samples than its header states",) if cut else ()
+    notes = ["the file is cut off: it holds fewer samples than its header states"] if cut else []
     if values.dtype.kind in "iu":
         low, high = np.iinfo(values.dtype).min, np.iinfo(values.dtype).max
         values = (values.astype(float) - 0.5 * (low + high + 1)) / (0.5 * (float(high) - low + 1))
     values = np.asarray(values, float).reshape(len(values), -1)
     names = tuple(f"channel {i + 1}" for i in range(values.shape[1]))
-    return Recording((values,), names, ("full scale",) * len(names), float(rate), notes)
+    for name, peak in zip(names, np.abs(values).max(axis=0, initial=0.0)):
+        if peak > 1.0:
+            notes.append(f"{name} reaches {peak:.3g}, but full scale is 1: it has a unit of its own, or is damaged")
+    return Recording((values,), names, ("full scale",) * len(names), float(rate), tuple(notes))
 
 
 def _universal(head: bytes) -> bool:
@@ -469,8 +477,11 @@ def universal(path: Path) -> Recording:
     kinds = [int(kind) for kind in file.get_set_types()]
     sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
     if not any(int(one.get("func_type", 0)) == TIME_RESPONSE for one in sets):
-        raise ValueError(f"{path.name} holds no time records (data set 58, function type 1); its data sets are {kinds}")
-    factors = _uff_factors([file.read_sets(i) for i, kind in enumerate(kinds) if kind == 164])
+        raise ValueError(
+            f"{path.name} holds {uff_holds(kinds, sets)}, no time records; export those, or give the path of frequency "
+            "responses to fi.frf"
+        )
+    factors = uff_factors([file.read_sets(i) for i, kind in enumerate(kinds) if kind == 164])
     channels: dict[tuple[Any, ...], list[np.ndarray]] = {}
     rates, unit, notes = [], {}, []
     for one, block in zip(sets, (file._block_ind[i] for i, kind in enumerate(kinds) if kind == 58)):
@@ -481,7 +492,7 @@ def universal(path: Path) -> Recording:
         code = int(one.get("ordinate_spec_data_type", 0))
         stated = str(one.get("ordinate_axis_units_lab") or "").strip()
         stated, kind = "" if stated == "NONE" else stated, UFF_UNITS.get(code)
-        key = (_uff_name(one), int(one.get("rsp_node", 0)), int(one.get("rsp_dir", 0)), code)
+        key = (uff_name(one), int(one.get("rsp_node", 0)), int(one.get("rsp_dir", 0)), code)
         known = units.known(stated)
         if known and kind and known[0] != kind:
             raise ValueError(
@@ -511,12 +522,20 @@ def universal(path: Path) -> Recording:
     )
 
 
-def _uff_name(one: dict) -> str:
+def uff_holds(kinds: list[int], sets: list[dict]) -> str:
+    """What a universal file of data sets ``kinds`` holds, in words; ``sets`` are those of kind 58."""
+    types = sorted({int(one.get("func_type", 0)) for one in sets})
+    said = [f"{UFF_TYPES.get(each, 'functions')} (data set 58, function type {each})" for each in types]
+    others = ", ".join(str(kind) for kind in sorted(set(kinds) - {58}))
+    return " and ".join(said + [f"data sets {others}"] * bool(others)) or "no data sets"
+
+
+def uff_name(one: dict) -> str:
     name = str(one.get("id1", "")).strip()
     return name if name not in ("", "NONE") else f"node {one.get('rsp_node', 0)} direction {one.get('rsp_dir', 0)}"
 
 
-def _uff_factors(sets: list[dict]) -> dict[str, float]:
+def uff_factors(sets: list[dict]) -> dict[str, float]:
     """By what data of a unit's kind are divided to be in SI, from data sets 164."""
     found: dict[str, float] = {}
     for one in sets:
@@ -527,7 +546,7 @@ def _uff_factors(sets: list[dict]) -> dict[str, float]:
 
 def _check_uff(path: Path, one: dict, raw: bytes) -> None:
     """ValueError if a data set 58 holds fewer samples than stated, or numbers that its reader would replace by zero."""
-    count, name = int(one["num_pts"]), _uff_name(one)
+    count, name = int(one["num_pts"]), uff_name(one)
     if len(one["data"]) != count:
         raise ValueError(
             f"{path.name} states {count} samples of {name!r} and holds {len(one['data'])}; export it again"

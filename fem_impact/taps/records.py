@@ -39,6 +39,7 @@ class Taps:
         overload: Any = None,
         labels: Sequence[str] | None = None,
         notes: Iterable[str] = (),
+        pulse: float | None = None,
     ) -> "Taps":
         """Taps from arrays in SI units, as other programs hold them.
 
@@ -53,6 +54,8 @@ class Taps:
             Of the force and the responses; by default, a channel with three equal largest samples in a row is cut off.
         labels : sequence of str, optional
             Of the taps; by default "tap 1" and so on.
+        pulse : float [N], optional
+            A rise of the force above this counts as a pulse; by default one above its noise and ringing.
 
         Examples
         --------
@@ -112,7 +115,7 @@ class Taps:
                 "units": ("channel", unit),
                 "sensor": ["force", *names],
             },
-            {"rate": rate},
+            {"rate": rate} | ({} if pulse is None else {"pulse": check.positive("pulse", pulse, "N")}),
         )
         return cls(table, tuple(said))
 
@@ -162,8 +165,13 @@ class Taps:
 
     @cached_property
     def n_pulses(self) -> np.ndarray:
-        """Pulses of each tap, (n_taps,); more than one of a double hit."""
-        return np.array([triggers.n_pulses(row, noise) for row, noise in zip(self.force, self.noise)])
+        """Pulses of each tap, (n_taps,); more than one of a double hit, however small above noise and ringing."""
+        return np.array([len(each) for each in self._pulses])
+
+    @cached_property
+    def _pulses(self) -> list[list[tuple[int, int]]]:
+        least = self.table.attrs.get("pulse")
+        return [triggers.pulses(row, noise, least) for row, noise in zip(self.force, self.noise)]
 
     @property
     def peak(self) -> np.ndarray:
@@ -174,8 +182,7 @@ class Taps:
     def impulse(self) -> np.ndarray:
         """Impulse of each tap from the begin of its first to the end of its last pulse, (n_taps,) [N s]."""
         found = np.zeros(self.n_taps)
-        for i, (row, noise) in enumerate(zip(self.force, self.noise)):
-            each = triggers.pulses(row, noise)
+        for i, (row, each) in enumerate(zip(self.force, self._pulses)):
             found[i] = row[max(0, each[0][0] - 1) : each[-1][1] + 1].sum() / self.rate if each else 0.0
         return found
 
@@ -262,6 +269,7 @@ def read_taps(
     length: float | None = None,
     together: float = 0.05,
     full_scale: float | None = None,
+    pulse: float | None = None,
 ) -> Taps:
     """Read the taps of an instrumented hammer from a file, and find them in long records.
 
@@ -288,6 +296,9 @@ def read_taps(
         Pulses closer than this are one tap, as those of a double hit; nobody taps twice within a twentieth of a second.
     full_scale : float [N], optional
         A force that reaches this is cut off.
+    pulse : float [N], optional
+        A rise of the force above this counts as a pulse; by default one above 6 standard deviations of the noise and
+        twice the largest pull: contacts never pull, so that a negative force shows how far sensor and filter ring.
 
     Returns
     -------
@@ -345,8 +356,9 @@ def read_taps(
         for row, other, top in zip(rows, responses, full)
     ]
     taps = Taps.from_arrays(
-        rows, responses, rate=stated, names=[found.names[i] for i in others], units=kinds, overload=cut, labels=labels
-    )
+        rows, responses, rate=stated, names=[found.names[i] for i in others], units=kinds, overload=cut, labels=labels,
+        pulse=pulse,
+    )  # fmt: skip
     double = [label for label, n in zip(taps.labels, taps.n_pulses) if n > 1]
     said += [f"{', '.join(double)}: more than one pulse, kept as one tap"] if double else []
     late = [label for label, cut_short in zip(taps.labels, taps.cut_short) if cut_short]

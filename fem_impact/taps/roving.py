@@ -297,8 +297,9 @@ def _modes(target: Target, bandwidth: float, stages: Stages) -> Modes:
         return target.surrounded(target.modes)
     with stages("modes"):
         found = target.find(FIRST_LOOK, tolerance=CLOSE, stages=stages)
-        if found.frequencies[-1] < BEYOND * bandwidth:
-            found = target.find(FIRST_LOOK, BEYOND * bandwidth, tolerance=CLOSE, first=found, stages=stages)
+        reach = BEYOND * bandwidth / target.stretch  # modes are found before the body is scaled
+        if found.frequencies[-1] < reach:
+            found = target.find(FIRST_LOOK, reach, tolerance=CLOSE, first=found, stages=stages)
         return target.surrounded(found)
 
 

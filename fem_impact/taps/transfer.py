@@ -11,6 +11,7 @@ from scipy.optimize import linear_sum_assignment
 from .._base import check, isolated, markup
 from .._base.files import replacing
 from ..modes.modal import Modes
+from . import readers
 from .records import Taps
 from .windows import joined
 
@@ -18,7 +19,7 @@ METHODS = ("H1", "H2")
 MOST_TIMES = 2**24  # [-] samples of a transform
 TAPER = 0.25  # [-] of the force window that falls as a cosine, so that no edge is heard
 UNITS = {"m/s^2": "accelerance", "m/s": "mobility", "m": "receptance"}
-FUNCTION, RESPONSE_CODE = 4, {"m/s^2": 12, "m/s": 11, "m": 8}  # codes of data set 58
+RESPONSE_CODE = {"m/s^2": readers.ACCELERATION, "m/s": readers.VELOCITY, "m": readers.DISPLACEMENT}
 
 
 def frf(
@@ -29,11 +30,13 @@ def frf(
     response_window: float | None = None,
     n_times: int | None = None,
 ) -> xr.Dataset:
-    """Frequency responses of a structure from taps, averaged.
+    """Frequency responses of a structure from taps, averaged, or as a universal file holds them.
 
     Parameters
     ----------
-    records : Taps or sequence of Taps, with responses
+    records : Taps or sequence of Taps, with responses, or path of a universal file
+        With the path of a file that holds frequency responses (data set 58, function type 4) they are read as they
+        stand; the other arguments are for taps.
     method : "H1" or "H2"
         H1 holds for noise in the response, H2 for noise in the force.
     force_window : float [s], optional
@@ -48,7 +51,8 @@ def frf(
     -------
     xarray.Dataset
         ``H`` (frequency, channel), complex, in the response's unit per N; ``coherence`` (frequency, channel);
-        ``force`` (frequency), the mean amplitude spectrum [N s]; attributes ``averages``, ``method``, ``rate``.
+        ``force`` (frequency), the mean amplitude spectrum [N s]; attributes ``averages``, ``method``, ``rate``. Of a
+        file ``H``, and ``coherence`` if it holds one for each.
 
     References
     ----------
@@ -64,6 +68,8 @@ def frf(
     >>> round(float(found.frequency.values[peak]))  # Hz
     700
     """
+    if isinstance(records, (str, Path)):
+        return read_frf(records)
     taps = joined(records, "records")
     check.one_of("method", method, METHODS)
     if not taps.response.shape[2]:
@@ -155,7 +161,7 @@ class Pair:
         return self.computed_frequency / self.measured_frequency - 1.0
 
 
-def matched(measured: Any, computed: Any, *, points: Any = None) -> tuple[Pair, ...]:
+def matched(measured: Any, computed: Any, *, points: Any = None, which: Any = None) -> tuple[Pair, ...]:
     """Pairs of measured and computed modes, in order of the measured frequencies.
 
     Parameters
@@ -165,6 +171,8 @@ def matched(measured: Any, computed: Any, *, points: Any = None) -> tuple[Pair, 
     points : array_like, (n_points, dimension) [m], optional
         Where both shapes are compared, for two `Modes`; by default the points of the measured ones. With shapes, modes
         are paired by MAC and frequency together; without, by frequency in ascending order.
+    which : sequence of int, optional
+        Numbers of the measured modes that are paired; the others, such as peaks of the rig, stay alone.
 
     Examples
     --------
@@ -176,23 +184,25 @@ def matched(measured: Any, computed: Any, *, points: Any = None) -> tuple[Pair, 
         x.frequencies if isinstance(x, Modes) else check.ascending(name, x, "Hz")
         for name, x in (("measured", measured), ("computed", computed))
     )
+    used = np.arange(len(one)) if which is None else np.atleast_1d(np.arange(len(one))[which])
+    one = one[used]
     if not len(one) or len(two) < len(one):
         raise ValueError(f"computed must have at least the {len(one)} modes of measured, got {len(two)}")
     gap = np.abs(np.log(np.maximum(two, 1e-300) / np.maximum(one[:, None], 1e-300)))
     if isinstance(measured, Modes) and isinstance(computed, Modes):
         place = measured.shapes.grid()[0] if points is None else points
-        likeness = mac(measured.shape_at(place), computed.shape_at(place))
+        likeness = mac(measured.shape_at(place)[:, used], computed.shape_at(place))
         rows, columns = linear_sum_assignment(1.0 - likeness + np.minimum(gap, 10.0))  # mostly shapes decide
         values: list[float | None] = [float(likeness[i, j]) for i, j in zip(rows, columns)]
     else:
-        rows, columns = np.arange(len(one)), _in_order(gap)
+        rows, columns = np.arange(len(one)), in_order(gap)
         values = [None] * len(one)
     return tuple(
-        Pair(int(i), int(j), float(one[i]), float(two[j]), value) for i, j, value in zip(rows, columns, values)
+        Pair(int(used[i]), int(j), float(one[i]), float(two[j]), value) for i, j, value in zip(rows, columns, values)
     )
 
 
-def _in_order(gap: np.ndarray) -> np.ndarray:
+def in_order(gap: np.ndarray) -> np.ndarray:
     """Ascending columns that make the sum of a table (n_rows, n_columns) smallest, by dynamic programming."""
     n, m = gap.shape
     best = np.full((n + 1, m + 1), np.inf)
@@ -250,7 +260,7 @@ def _time_sets(taps: Taps) -> list[dict[str, Any]]:
 
 
 def _function_sets(data: xr.Dataset) -> list[dict[str, Any]]:
-    codes = {"func_type": FUNCTION, "ord_data_type": 6, "abscissa_spec_data_type": 18}
+    codes = {"func_type": readers.FREQUENCY_RESPONSE, "ord_data_type": 6, "abscissa_spec_data_type": 18}
     frequency, sets = data["frequency"].values, []
     for k, name in enumerate(data["channel"].values):
         unit = str(data["units"].values[k]).removesuffix("/N")
@@ -266,7 +276,8 @@ def read_frf(path: Any) -> xr.Dataset:
     found = isolated.read(check.path("path", path), "frequency responses", "taps.transfer:arrays")
     coords = {"frequency": ("frequency", found["frequency"], {"units": "Hz"}), "channel": found["names"].astype(str)}
     coords["units"] = ("channel", found["units"].astype(str))
-    return xr.Dataset({"H": (("frequency", "channel"), found["H"])}, coords)
+    kept = [name for name in ("H", "coherence") if name in found]
+    return xr.Dataset({name: (("frequency", "channel"), found[name]) for name in kept}, coords)
 
 
 def arrays(path: Path) -> dict[str, np.ndarray]:
@@ -275,19 +286,35 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
 
     file = pyuff.UFF(str(path))
     kinds = [int(kind) for kind in file.get_set_types()]
-    sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
-    sets = [one for one in sets if int(one.get("func_type", 0)) == FUNCTION]
+    functions = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
+    sets = [one for one in functions if int(one.get("func_type", 0)) == readers.FREQUENCY_RESPONSE]
     if not sets:
-        raise ValueError(f"{path.name} holds no frequency responses (data set 58, function type 4)")
-    length = min(len(one["data"]) for one in sets)
-    units = {code: unit for unit, code in RESPONSE_CODE.items()}
-    names = [str(one.get("id1", "")).strip() or f"node {one.get('rsp_node')}" for one in sets]
-    columns = np.column_stack([np.asarray(one["data"], complex)[:length] for one in sets])
-    if not np.isfinite(columns).all():
+        raise ValueError(f"{path.name} holds {readers.uff_holds(kinds, functions)}, no frequency responses")
+    factors = readers.uff_factors([file.read_sets(i) for i, kind in enumerate(kinds) if kind == 164])
+    frequency = np.asarray(sets[0]["x"], float)
+    names: list[str] = []
+    units: list[str] = []
+    columns: list[np.ndarray] = []
+    for one in sets:
+        name, code = readers.uff_name(one), int(one.get("ordinate_spec_data_type", 0))
+        unit = readers.UFF_UNITS.get(code)
+        if unit not in RESPONSE_CODE or int(one.get("orddenom_spec_data_type", 0)) not in (0, 9, readers.EXCITATION):
+            raise ValueError(f"{path.name} has a response {name!r} that is no motion per force (quantity code {code})")
+        x = np.asarray(one["x"], float)
+        if len(x) != len(frequency) or not np.allclose(x, frequency, rtol=1e-5, atol=0.0):
+            raise ValueError(f"{path.name} has responses at other frequencies for {name!r} than for {names[0]!r}")
+        names.append(check.line(name))
+        units.append(f"{unit}/N")
+        columns.append(np.asarray(one["data"], complex) * (factors.get("N", 1.0) / factors.get(str(unit), 1.0)))
+    found = {"frequency": frequency, "H": np.column_stack(columns), "names": np.array(names, dtype=str)}
+    sure = {_way(one): np.real(one["data"]) for one in functions if one.get("func_type") == readers.COHERENCE}
+    if all(_way(one) in sure and len(sure[_way(one)]) == len(frequency) for one in sets):
+        found["coherence"] = np.column_stack([sure[_way(one)] for one in sets]).astype(float)
+    if not all(np.isfinite(found[name]).all() for name in found if name != "names"):
         raise ValueError(f"{path.name} holds values that are no finite numbers; export it again")
-    return {
-        "frequency": np.asarray(sets[0]["x"], float)[:length],
-        "H": columns,
-        "names": np.array([check.line(name) for name in names], dtype=str),
-        "units": np.array([f"{units.get(int(one.get('ordinate_spec_data_type', 12)), 'm/s^2')}/N" for one in sets]),
-    }
+    return found | {"units": np.array(units)}
+
+
+def _way(one: dict[str, Any]) -> tuple[int, ...]:
+    """From where to where a function of data set 58 is measured."""
+    return tuple(int(one.get(f"{end}_{part}") or 0) for end in ("rsp", "ref") for part in ("node", "dir"))

@@ -15,10 +15,15 @@ LOW = 0.25  # [-] quantile of a record of one tap that is at rest: no pulse fill
 # [-] standard deviations of the noise that the trigger stays above at least: never by chance, in any record
 NOISE = 8.0
 GAUSS = 1.4826  # [-] fact: standard deviation over median absolute deviation of Gaussian noise
-PULSE = 0.1  # [-] of a tap's largest force: a pulse rises above this and ends below half of it; filters ring less
+# [-] of the largest pull: a pulse rises above this, as ringing that decays pushes less than it pulled before
+RINGS = 2.0
+# [-] of a tap's largest force: pulses above this are apart where the force falls below half of it, smaller ones below
+# half of their own
+PULSE = 0.1
 # [-] standard deviations of the noise: the same, if they are larger, and those of its mean that an offset exceeds; two
 # fewer, as a pulse or a tap is already sure
 CLEAR = 6.0
+LUCKY = 4.5  # [-] standard deviations that noise alone pulls: more in a hundred thousand samples is ringing
 MOST = 0.5  # [-] of a tap's largest force: a pulse rises above this at most, so that a tap in strong noise has one
 DRIFT = 0.2  # [-] of the trigger: less drift within a record is not mentioned, as it moves no tap
 # [s] over which the force is at rest for more than half the time: slower changes are drift, a tap lasts some ms
@@ -60,31 +65,35 @@ def starts(force: np.ndarray, trigger: float, together: int) -> np.ndarray:
     return above[np.concatenate([[True], np.diff(above) > together])]
 
 
-def pulses(force: np.ndarray, noise: float = 0.0) -> list[tuple[int, int]]:
+def pulses(force: np.ndarray, noise: float = 0.0, least: float | None = None) -> list[tuple[int, int]]:
     """First sample of every pulse of a tap (n_times,), and the one after its last; two of a double hit.
 
-    Samples of noise, of standard deviation ``noise`` [N], are no pulses.
+    A pulse rises above ``least`` [N]; by default above the noise, of standard deviation ``noise`` [N], and above what
+    sensor and filter ring: contacts never pull, so that a negative force measures it.
     """
     peak = float(force.max(initial=0.0))
     if peak <= 0.0:
         return []
-    up = min(max(PULSE * peak, CLEAR * noise), MOST * peak)
-    down = 0.5 * up
-    state = np.where(force > up, 1, np.where(force < down, -1, 0))
-    last = np.maximum.accumulate(np.where(state != 0, np.arange(len(force)), 0))
-    inside = state[last] == 1
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
-    quiet = np.flatnonzero(force < down)
+    if least is None:
+        ringing, bit = -float(force.min()), float(np.diff(np.unique(force)).min(initial=peak))
+        least = max(CLEAR * max(noise, bit), RINGS * ringing if ringing > LUCKY * noise else 0.0, SAME * peak)
+    up = min(least, MOST * peak)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], force > 0.5 * up, [0]]).astype(int)))
+    tops = np.maximum.reduceat(np.append(force, 0.0), edges)[::2]
     found = []
-    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist()):
-        before = quiet[quiet < first]
-        found.append((int(before[-1]) + 1 if before.size else 0, end))
+    for first, end in edges.reshape(-1, 2)[tops > up].tolist():
+        top, low = 0.0, first
+        for k, value in enumerate(force[first:end].tolist(), first):
+            if value < force[low]:
+                low = k
+            fell = force[low] < 0.5 * min(PULSE * peak, top)
+            if fell and value > max(up, 2.0 * force[low]) and top > up:
+                found.append((first, low))
+                first, top = low, value
+            if value >= top:
+                top, low = value, k
+        found.append((first, end))
     return found
-
-
-def n_pulses(force: np.ndarray, noise: float = 0.0) -> int:
-    """Number of pulses of one tap (n_times,): two of a double hit."""
-    return len(pulses(force, noise))
 
 
 def level_of_rest(force: np.ndarray, block: int) -> np.ndarray:

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import t
+from scipy.stats import f, qmc, t
 
 from .._base import check
 from .._base.check import SimulationError
@@ -15,6 +16,7 @@ from ..fe.assembly import System
 from ..modes.modal import Modes, find_modes
 from ..scenes.scene import Scene, load_scene
 from . import arguments, transfer
+from .profiles import DOUBTED
 from .solver import CLOSE
 from .transfer import Pair
 from .unknowns import Unknown
@@ -24,6 +26,9 @@ STEP = 0.01
 MOST_SOLVES = 200  # [-] of the body
 MORE = 2  # [-] modes computed beyond those measured, so that as many may be missed in the measurement
 TABLES = ("mesh", "material", "section", "target", "supports")  # of a scene: what its modes depend on
+# [-] measured frequencies, and their share, that may belong to no mode: with more, nobody knows which ones are right
+MOST_SPURIOUS, SPURIOUS = 2, 0.34
+LOOKS, STEPS = 16, 4  # [-] starts over the ranges, and steps of each, where frequencies go by powers of the constants
 POOR = 0.1  # [-] half width of an interval, in logarithms: a constant known to no better than 10 % is called not told
 
 
@@ -36,6 +41,7 @@ class Updated:
     pairs: tuple[Pair, ...]
     modes: Modes
     n_solves: int
+    unpaired: tuple[float, ...] = ()  # [Hz] measured frequencies that belong to no mode of the body
 
     def __repr__(self) -> str:
         return check.brief(self)
@@ -61,7 +67,9 @@ class Updated:
             )
             for name, value in self.values.items()
         ]
-        return "\n".join([*lines, transfer.table(self.pairs), f"{self.n_solves} solves"])
+        left = ", ".join(f"{frequency:.5g} Hz" for frequency in self.unpaired)
+        told = [f"without a mode of the body, left out: {left}"] if left else []
+        return "\n".join([*lines, transfer.table(self.pairs), *told, f"{self.n_solves} solves"])
 
 
 def update(
@@ -81,7 +89,9 @@ def update(
         ``section.thickness`` or ``supports.left.stiffness``; its modes are found to the tolerance of its strike. A
         function takes a dict of values and returns the assembled `System` or its `Modes`.
     measured : array_like, (n_modes,) [Hz], or Modes
-        Ascending frequencies; `Modes` of a measurement are paired with the computed ones by their shapes too.
+        Ascending frequencies; `Modes` of a measurement are paired with the computed ones by their shapes too. Up to two
+        that belong to no mode of the body are left out and told, if as many frequencies as unknowns are spare without
+        them and chance hardly meets the others so well.
     unknown : mapping of name to (low, high), both positive
     start : mapping of name to value, optional
         By default the middle of each range.
@@ -133,9 +143,10 @@ def update(
     if isinstance(build, Scene):
         _check_names(build, ranges)
     rigid = [0]  # motions of the body, which the measurement does not have
-    kept: dict[bytes, tuple[Modes, tuple[Pair, ...]]] = {}
+    kept: dict[bytes, Modes] = {}
+    used = np.arange(len(target))  # numbers of the measured modes that are paired
 
-    def computed(x: np.ndarray) -> tuple[Modes, tuple[Pair, ...]]:
+    def modes_at(x: np.ndarray) -> Modes:
         key = x.tobytes()
         if key not in kept:
             if len(kept) >= MOST_SOLVES:
@@ -146,13 +157,17 @@ def update(
             if modes.n_rigid > rigid[0]:
                 rigid[0] = modes.n_rigid
                 modes = find(len(target) + MORE + rigid[0])
-            flexible = modes.omega > 0.0
-            own: Any = modes if isinstance(measured, Modes) else modes.frequencies[flexible]
-            kept[key] = modes, transfer.matched(measured, own, points=points)
+            kept[key] = modes
         return kept[key]
 
+    def paired(x: np.ndarray) -> tuple[Pair, ...]:
+        modes = modes_at(x)
+        if isinstance(measured, Modes):
+            return transfer.matched(measured, modes, points=points, which=used)
+        return transfer.matched(target, modes.frequencies[modes.omega > 0.0], which=used)
+
     def misfit(x: np.ndarray) -> np.ndarray:
-        return np.log([1.0 + pair.difference for pair in computed(x)[1]])
+        return np.log([1.0 + pair.difference for pair in paired(x)])
 
     def slopes(x: np.ndarray) -> np.ndarray:
         here, columns = misfit(x), []
@@ -167,9 +182,32 @@ def update(
     first = np.array([float(each.inside(check.between(f"start[{each.name!r}]", middle[each.name], each.low, each.high)))
                       for each in ranges])  # fmt: skip
     inside = np.clip(first, bounds[0] + 1e-9, bounds[1] - 1e-9)
-    found = least_squares(misfit, inside, slopes, bounds, ftol=CLOSE, xtol=CLOSE, gtol=1e-12, max_nfev=40)
-    modes, pairs = computed(found.x)
-    spare = len(target) - len(ranges)
+    options = {"ftol": CLOSE, "xtol": CLOSE, "gtol": 1e-12, "max_nfev": 40}
+    found = least_squares(misfit, inside, slopes, bounds, **options)
+    every = used
+    for count in range(MOST_SPURIOUS + 1):
+        spare = len(every) - count - len(ranges)
+        if spare < len(ranges) or count > SPURIOUS * len(every):
+            break
+        table = _logs(modes_at(found.x))
+        moved = [_logs(modes_at(found.x + step)) for step in STEP * np.eye(len(ranges))]
+        steep = (np.column_stack(moved) - table[:, None]) / STEP
+        rests = [np.setdiff1d(every, out) for out in combinations(every, count)]
+        looks = [_look(np.log(target[rest]), table, steep, found.x, bounds) for rest in rests]
+        best = int(np.argmin([cost for cost, _ in looks]))
+        used = rests[best]
+        again = least_squares(misfit, np.clip(looks[best][1], bounds[0] + 1e-9, bounds[1] - 1e-9), slopes, bounds,
+                              **options)  # fmt: skip
+        if not count:  # of all frequencies, from starts all over the ranges
+            found = min(found, again, key=lambda one: one.cost)
+            continue
+        ratio = (found.cost - again.cost) / count / max(again.cost / spare, 1e-300)
+        if len(rests) * float(f.sf(ratio, count, spare)) < DOUBTED:  # the best of so many choices by chance
+            found = again
+            break
+        used = every
+    modes, pairs = modes_at(found.x), paired(found.x)
+    spare = len(used) - len(ranges)
     spread = {each.name: np.inf for each in ranges}
     if spare > 0:
         inverse = np.linalg.pinv(found.jac.T @ found.jac) * 2.0 * found.cost / spare
@@ -178,7 +216,30 @@ def update(
         half = float(t.ppf(0.95, spare)) * np.sqrt(np.diag(inverse))
         spread = {each.name: float(x) if told else np.inf for each, x in zip(ranges, half)}
     values = {each.name: float(each.outside(z)) for each, z in zip(ranges, found.x)}
-    return Updated(values, spread, pairs, modes, len(kept))
+    unpaired = tuple(float(target[i]) for i in np.setdiff1d(np.arange(len(target)), used))
+    return Updated(values, spread, pairs, modes, len(kept), unpaired)
+
+
+def _logs(modes: Modes) -> np.ndarray:
+    return np.log(modes.frequencies[modes.omega > 0.0])
+
+
+def _look(
+    target: np.ndarray, table: np.ndarray, steep: np.ndarray, x: np.ndarray, bounds: np.ndarray
+) -> tuple[float, np.ndarray]:
+    """Sum of squares and constants for logarithms of measured frequencies (n,), by those computed at ``x``, (n_modes,),
+    which go along with the constants as ``steep`` (n_modes, n_constants); the best of starts over the bounds."""
+    best = np.inf, x
+    for start in (x, *qmc.scale(qmc.Sobol(len(x), scramble=False).random(LOOKS), *bounds)):
+        here = start
+        for _ in range(STEPS):
+            now = table + steep @ (here - x)
+            order = np.argsort(now)
+            columns = order[transfer.in_order(np.abs(now[order] - target[:, None]))]
+            here = np.clip(x + np.linalg.lstsq(steep[columns], target - table[columns], rcond=None)[0], *bounds)
+        miss = float(np.square(table[columns] + steep[columns] @ (here - x) - target).sum())
+        best = min(best, (miss, here), key=lambda pair: pair[0])
+    return best
 
 
 def _check_names(scene: Scene, ranges: list[Unknown]) -> None:

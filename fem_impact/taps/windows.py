@@ -32,6 +32,7 @@ def joined(taps: Any, name: str = "taps") -> Taps:
         names=several[0].table["channel"].values.tolist(),
         units=several[0].units,
         overload=np.concatenate([each.table["overload"].values for each in several]),
+        pulse=several[0].table.attrs.get("pulse"),
         notes=[note for each in several for note in each.notes],
     )
 
@@ -73,7 +74,8 @@ def cut(taps: Taps, window: Any) -> Taps:
         ends = []
         for row, onset, noise in zip(taps.force, taps.onset, taps.noise):
             begin = int(onset * taps.rate)
-            later = triggers.pulses(row[begin:], noise)
+            large = max(triggers.PULSE * float(row.max()), triggers.CLEAR * noise)  # a small one is no reason to wait
+            later = triggers.pulses(row[begin:], noise, large)
             ends.append(later[-1][1] if later else 1)
         last = (1.0 + AFTER) * max(max(ends), BEFORE) / taps.rate
     starts = np.round(taps.onset * taps.rate).astype(int)
@@ -87,6 +89,7 @@ def cut(taps: Taps, window: Any) -> Taps:
     made = Taps.from_arrays(
         force, response, rate=taps.rate, names=taps.table["channel"].values.tolist(), units=taps.units,
         overload=taps.table["overload"].values, labels=taps.labels, notes=taps.notes,
+        pulse=taps.table.attrs.get("pulse"),
     )  # fmt: skip
     made.table["onset"] = ("tap", np.full(len(starts), before / taps.rate))
     return made

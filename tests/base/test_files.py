@@ -1,5 +1,6 @@
 """Files are complete or absent, whatever goes wrong while they are written."""
 
+import json
 import os
 import signal
 import subprocess
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import fem_impact
-from fem_impact._base.files import MACHINE, PARTIAL, replacing, staged
+from fem_impact._base.files import LIST, MACHINE, PARTIAL, replacing, staged
 
 
 def names(folder):
@@ -59,6 +60,88 @@ def test_staged_moves_nothing_where_a_folder_is_in_the_way(tmp_path):
         (staging / "a.txt").write_text("a")
         (staging / "b.txt").write_text("b")
     assert names(tmp_path) == ["b.txt"]
+
+
+def test_staged_moves_nothing_where_a_file_stands_for_a_folder(tmp_path):
+    (tmp_path / "modes").write_text("mine")
+    with pytest.raises(NotADirectoryError, match="modes"), staged(tmp_path) as staging:
+        (staging / "a.txt").write_text("a")
+        (staging / "modes").mkdir()
+        (staging / "modes" / "b.txt").write_text("b")
+    assert names(tmp_path) == ["modes"]
+
+
+@pytest.mark.parametrize("linked", [True, False])
+def test_staged_puts_everything_back_if_a_file_cannot_be_moved(tmp_path, monkeypatch, linked):
+    """The third of three cannot; the first was there, the second is new."""
+    with staged(tmp_path, "strike") as staging:
+        (staging / "a.txt").write_text("old")
+        (staging / "gone.txt").write_text("old")
+    move = os.replace
+    monkeypatch.setattr(os, "replace", lambda old, new: move(old, new if Path(new).name != "z.txt" else "/dev/null/z"))
+    if not linked:
+        monkeypatch.delattr(os, "link")
+        monkeypatch.setattr(os, "link", lambda *_: (_ for _ in ()).throw(PermissionError), raising=False)
+    before = names(tmp_path)
+    with pytest.raises(NotADirectoryError), staged(tmp_path, "strike") as staging:
+        (staging / "new").mkdir()
+        for name in ("a.txt", "new/b.txt", "z.txt"):
+            (staging / name).write_text("new")
+    assert names(tmp_path) == before and (tmp_path / "a.txt").read_text() == "old"
+    assert "gone.txt" in (tmp_path / LIST).read_text()
+
+
+def write(folder, command, **files):
+    with staged(folder, command) as staging:
+        for name, text in files.items():
+            (staging / name).parent.mkdir(exist_ok=True)
+            (staging / name).write_text(text)
+
+
+def test_a_second_run_removes_what_the_first_alone_wrote(tmp_path):
+    write(tmp_path, "map", e="map")
+    write(tmp_path, "strike", **{"a": "1", "b": "1", "c": "1", "d/d": "1", "e": "strike"})
+    (tmp_path / "c").write_text("edited")
+    (tmp_path / "mine").write_text("1")
+    write(tmp_path, "strike", a="2")
+    assert names(tmp_path) == [LIST, "a", "c", "mine"] and (tmp_path / "a").read_text() == "2"
+    write(tmp_path, "strike", b="3")
+    assert names(tmp_path) == [LIST, "b", "c", "mine"]
+
+
+def test_a_mesh_written_over_itself_stays_the_users(tmp_path):
+    (tmp_path / "plate.msh").write_text("mesh")
+    write(tmp_path, "strike", **{"plate.msh": "mesh", "a": "1"})
+    write(tmp_path, "strike", **{"plate.msh": "mesh", "a": "1"})
+    write(tmp_path, "strike", b="1")
+    assert names(tmp_path) == [LIST, "b", "plate.msh"]
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", '{"strike": 1}', "[" * 100_000, '{"strike": {"a": 1, "\\u0000": 2}}'])
+def test_a_damaged_list_names_nothing(tmp_path, text):
+    (tmp_path / "a").write_text("1")
+    (tmp_path / LIST).write_text(text)
+    write(tmp_path, "strike", b="1")
+    assert names(tmp_path) == [LIST, "a", "b"]
+
+
+def test_a_list_names_nothing_outside_its_folder(tmp_path):
+    folder = tmp_path / "out"
+    write(folder, "strike", a="1")
+    (digest,) = json.loads((folder / LIST).read_text())["strike"].values()
+    for name in ("secret", "out/b"):
+        (tmp_path / name).write_text("1")
+    (folder / "link").symlink_to(tmp_path / "secret")
+    (folder / "up").symlink_to(tmp_path)
+    wanted = ["../secret", str(tmp_path / "secret"), "up/secret", "link", "x/../b"]
+    (folder / LIST).write_text(json.dumps({"strike": dict.fromkeys(wanted, digest)}))
+    write(folder, "strike", c="1")
+    assert names(tmp_path) == [
+        "out",
+        f"out/{LIST}",
+        *(f"out/{name}" for name in ("a", "b", "c", "link", "up")),
+        "secret",
+    ]
 
 
 def test_staged_finds_a_place_that_cannot_be_written_to_before_the_work_begins(tmp_path):

@@ -87,3 +87,16 @@ def test_triangles_at_a_singular_corner_are_narrow_and_not_narrower():
         np.arccos(u @ v / np.linalg.norm(u) / np.linalg.norm(v)) for u, v in zip((a - at)[there], (b - at)[there])
     ]
     assert 0.4 < max(angles) < 0.7
+
+
+def test_hinged_edges_in_line_are_told():
+    """At 179 degrees the exponent is next to one: no mesh resolves it, and no unit is to blame."""
+    angle = np.radians(np.linspace(0.0, 179.0, 13))
+    corners = [(0.0, 0.0), *zip(0.2 * np.cos(angle), 0.2 * np.sin(angle))]
+    body = fi.assemble(
+        fi.mesh.polygon(corners), fi.Plate(fi.Material(E=70e9, nu=0.3, rho=2700.0), 2e-3), {"boundary": "hinged"}
+    )
+    modes = fi.find_modes(body, n_modes=1)
+    assert any("corners leave the frequencies uncertain by 77 %" in note for note in modes.notes)
+    with pytest.raises(fi.SimulationError, match="no tolerance is, as corners hold that error on any mesh"):
+        fi.find_modes(body, n_modes=1, tolerance=1e-2)

@@ -40,7 +40,7 @@ def test_inertia_counts_the_values_below_a_shift(repeated):
 def test_lowest_values_and_their_vectors(search, repeated):
     K, M, values = pencil(150, 5, repeated)
     nothing = np.zeros((150, 0))
-    found, vectors = search(Flexibility(K, M, nothing, np.zeros(0, int)), 20)
+    found, vectors = search(Flexibility(K, M, nothing, nothing, nothing, np.zeros(0, int)), 20)
     assert_allclose(found[:20], values[:20], rtol=1e-9)  # of values spread over six decades
     gram = vectors[:, :20].T @ (M @ vectors[:, :20])
     assert_allclose(gram, np.eye(20), atol=1e-9)
@@ -64,7 +64,8 @@ def test_a_beam_whose_slice_misses_modes_is_found_with_another_number(monkeypatc
     """A search that loses a mode of the last slice is noticed; fewer modes need no such slice."""
     whole = eigenvalues._krylov
     stiff = np.diag((1.0 + np.arange(400.0)) ** 4)
-    body = Flexibility(csc_matrix(stiff), csc_matrix(np.eye(400)), np.zeros((400, 0)), np.zeros(0, int))
+    nothing = np.zeros((400, 0))
+    body = Flexibility(csc_matrix(stiff), csc_matrix(np.eye(400)), nothing, nothing, nothing, np.zeros(0, int))
 
     def loses(solve, M, n, available, allowed, width=eigenvalues.BLOCK):
         found = whole(solve, M, n, available, allowed, width)

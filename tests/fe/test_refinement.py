@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
+from fem_impact._base import identity
 from fem_impact.fe import refinement
 
 PLATE = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), thickness=2e-3)
@@ -111,6 +112,9 @@ def test_a_kept_spectrum_is_read_and_a_damaged_or_foreign_one_replaced(tmp_path,
     other = fi.assemble(fi.mesh.rectangle(0.5, 0.3, size=0.1), PLATE, {"left": "hinged"})
     assert refinement.kept(other, 7, None, path).omega[0] < again.omega[0]  # another body
     assert len(solved) == 4
+    monkeypatch.setattr(identity, "program", lambda: "another version")
+    refinement.kept(other, 7, None, path)
+    assert len(solved) == 5
 
 
 @pytest.mark.parametrize(("thickness", "size", "rho"), [(4e-3, 1.0, 2700.0), (2e-3, 2.0, 2700.0), (2e-3, 1.0, 2800.0)])

@@ -187,3 +187,31 @@ def test_a_beam_on_an_end_spring():
 def test_refuses_what_cannot_be_attached(act, text):
     with pytest.raises(ValueError, match=text):
         act()
+
+
+@pytest.mark.parametrize("stiffness", [1e-4, 1.0, 10.0])
+def test_a_body_on_weak_springs_moves_as_a_rigid_one(stiffness):
+    """Heave and tilt by Newton, far below bending; a spring that is hardly felt must not be lost in rounding."""
+    a, thick = 0.3, Plate(STEEL, 0.02)
+    feet = [((x, y), stiffness) for x in (0.0, a) for y in (0.0, a)]
+    modes = find_modes(assemble(mesh.rectangle(a, a), thick, {}, point_supports=feet), n_modes=4)
+    heave = np.sqrt(4.0 * stiffness / modes.mass)
+    tilt = np.sqrt(3.0) * heave  # 4 k (a / 2)**2 over m a**2 / 12
+    # a corner gives way by some 4e-8 of what a spring of 1 N/m does
+    assert_allclose(modes.omega[:3], [heave, tilt, tilt], rtol=1e-8 + 3e-8 * stiffness)
+    free = find_modes(assemble(mesh.rectangle(a, a), thick, {}), n_modes=4)
+    assert modes.omega[3] == pytest.approx(free.omega[3], rel=1e-6) and modes.frequency_error.max() < 1e-6
+
+
+def test_an_edge_on_weak_springs_is_found():
+    shape, weak = mesh.rectangle(0.3, 0.3), 1e-6 * D / 0.3**3
+    modes = find_modes(assemble(shape, PLATE, {"boundary": Elastic(weak)}), n_modes=4)
+    heave = np.sqrt(4.0 * 0.3 * weak / modes.mass)
+    tilt = heave * np.sqrt(2.0)  # k (2 a (a / 2)**2 + 2 a**3 / 12) over m a**2 / 12
+    assert_allclose(modes.omega[:3], [heave, tilt, tilt], rtol=1e-6)
+
+
+def test_a_beam_on_a_weak_spring_is_found():
+    modes = find_modes(assemble(mesh.line(1.0), BAR, {"left": "hinged", "right": Elastic(1e-3)}), n_modes=2)
+    assert modes.omega[0] == pytest.approx(np.sqrt(3.0 * 1e-3 / modes.mass), rel=1e-6)
+    assert modes.omega[1] == pytest.approx(3.9266023**2 * np.sqrt(EI / PER_LENGTH), rel=1e-6)

@@ -71,7 +71,7 @@ def test_stick_on_half_a_million_kilograms_rings_like_a_third_of_its_mass():
 def test_sixty_modes_meet_the_eigen_solution():
     """Separation and rebound of the linear case from the roots of the secular equation (computed apart)."""
     frequencies = 1500.0 * np.arange(1, 60) / (2.0 * np.pi)
-    target = fi.Modes.from_arrays(frequencies, np.full((1, 59), 1.5), points=[[0.0]], mass=1.0)
+    target = fi.Modes.from_arrays(frequencies, np.full((1, 59), 1.5), points=[[0.0]], mass=1.0, complete=True)
     striker, law = fi.Striker.rigid(0.01), fi.Contact.linear(1e6)
     for scheme, slope in (("A", 2.0), ("A4", 4.0)):
         errors = []
@@ -150,7 +150,9 @@ def measured(n_modes, seed, damping=0.0, n_rigid=0):
     frequencies = np.sort(rng.uniform(100.0, 3000.0, n_modes))
     frequencies[:n_rigid] = 0.0
     shapes = rng.normal(0.0, 2.0, (3, n_modes))
-    return fi.Modes.from_arrays(frequencies, shapes, points=[[0.0], [1.0], [2.0]], mass=0.3, damping_ratio=damping)
+    return fi.Modes.from_arrays(
+        frequencies, shapes, points=[[0.0], [1.0], [2.0]], mass=0.3, damping_ratio=damping, complete=True
+    )
 
 
 HEAVY = np.array([0.02, 0.5, 0.95, 1.0, 1.3, 3.0, 0.01, 0.0, 0.0, 0.1, 0.2, 10.0])
@@ -241,7 +243,9 @@ def target_of(n_modes):
     """Evenly spaced modes, all alike at the point: what a struck plate looks like from there."""
     spacing = 1500.0 * 59.0 / n_modes
     frequencies = spacing * np.arange(1, n_modes + 1) / (2.0 * np.pi)
-    return fi.Modes.from_arrays(frequencies, np.full((1, n_modes), 11.5 * n_modes**-0.5), points=[[0.0]], mass=1.0)
+    return fi.Modes.from_arrays(
+        frequencies, np.full((1, n_modes), 11.5 * n_modes**-0.5), points=[[0.0]], mass=1.0, complete=True
+    )
 
 
 @pytest.mark.parametrize("n_modes", [12, 2500])
@@ -315,7 +319,7 @@ def test_both_schemes_meet_the_exact_linear_blow():
 
 def test_one_rigid_mass_on_one_mode_meets_its_eigen_solution():
     """Two by two eigenvalue problem; the separation by bisection on the closed form."""
-    target = fi.Modes.from_arrays([400.0], [[3.0]], points=[[0.0]], mass=1.0)
+    target = fi.Modes.from_arrays([400.0], [[3.0]], points=[[0.0]], mass=1.0, complete=True)
     omega, u, k = 2.0 * np.pi * 400.0, np.array([10.0, -3.0]), 1e5
     square, vectors = np.linalg.eigh(np.diag([0.0, omega**2]) + k * np.outer(u, u))
     start = vectors.T @ np.array([0.1, 0.0])
@@ -625,7 +629,9 @@ def test_collocation_finds_the_peak_wherever_in_its_steps_it_lies(mass, loss):
 )
 def test_contacts_that_open_and_close_together_stay_together(frequency, gap, mass):
     """Two springs at one point are one of both; rounding lets one touch or part first, for a time no step resolves."""
-    target = fi.Modes.from_arrays([0.0, frequency, 3.1 * frequency], [[1.0, 0.8, -0.5]], points=[[0.0]], mass=mass)
+    target = fi.Modes.from_arrays(
+        [0.0, frequency, 3.1 * frequency], [[1.0, 0.8, -0.5]], points=[[0.0]], mass=mass, complete=True
+    )
     springs = fi.Contact.hertz(1e8, gap=gap), fi.Contact.linear(2e5, gap=gap)
     both = fi.Contact.layers(2e5, 1.0, depth=0.0, hard_stiffness=1e8, gap=gap)
     two, one = (
@@ -731,10 +737,10 @@ def test_a_blow_at_the_usual_tolerance_is_told_by_few_steps(seed):
     hit, averaged = (fi.strike(body, *how, **where, residual=False, quantity=asked) for asked in (None, "restitution"))
     assert hit.tolerance_met
     assert averaged.tolerance_met
-    assert len(hit.history.steps) < 40  # 25 were measured
-    assert len(averaged.history.steps) < 20  # 13 were measured
+    assert len(hit.history.steps) < 60  # 44 were measured
+    assert len(averaged.history.steps) < 30  # 22 were measured
     truth = fi.strike(body, *how, **where, residual=False, tolerance=1e-8)
-    assert worst(hit, truth) < hit.error.total < 0.5 * hit.tolerance
+    assert worst(hit, truth) < hit.error.total < 0.1 * hit.tolerance
     assert abs(averaged.restitution - truth.restitution) < averaged.error.total
 
 
@@ -793,3 +799,45 @@ def test_the_end_advised_to_a_run_without_end_leaves_room_for_finer_steps(monkey
     most = float(re.search(rf"{given} of at most (\S+)", str(caught.value))[1])
     hit = collide(bodies, touches, **swing, **{given: type(2.0 if given == "duration" else 2)(most)})
     assert hit.tolerance_met  # a run twice as long would need more steps than there may be
+
+
+THRESHOLD = 38186.134448119745  # [N/m] where the blow below gets a second impact, by bisection with collocation at 1e-9
+
+
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-3, 1e-5])
+def test_the_margin_is_how_far_the_blow_is_from_another_number_of_impacts(tolerance):
+    plate = fi.analytic.rectangle(1.0, 0.7, mass=0.2, first_frequency=100.0, n_modes=30, damping_ratio=0.005)
+    for offset in (-1e-2, -1e-3, -1e-4, -1e-5, -1e-6, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2):
+        law = fi.Contact.linear(THRESHOLD * (1.0 + offset))
+        blow = {"at": (0.3, 0.2), "speed": 1.0, "residual": False, "tolerance": tolerance}
+        hit = fi.strike(plate, fi.Striker.rigid(0.1), law, **blow)
+        assert hit.n_impacts == 1 + (offset > 0.0)
+        assert hit.tolerance_met
+        # 0.2171 by all runs at 1e-9; a count is trusted from four times the change of the margin on
+        assert_allclose(hit.margin / abs(offset), 0.2171, rtol=0.25)
+
+
+def test_a_number_of_impacts_that_the_modes_left_out_may_change_is_doubted_aloud():
+    """Forty modes of a plate see one impact, all modes two; a spring for the others does not decide it."""
+    plate, how, blow = thin_plate_blow()
+    few, many = (fi.strike(plate(n), *how, **blow, tolerance=1e-2) for n in (40, 3000))
+    assert few.n_impacts == 1 and many.n_impacts == 2
+    assert many.tolerance_met and not few.tolerance_met
+    assert "how often the bodies touch" in few.verdict or "modes" in few.verdict
+    averaged = fi.strike(plate(40), *how, **blow, tolerance=1e-2, quantity="impulse")
+    assert averaged.error.total < few.error.total  # what does not ask for the number is not told to doubt it
+
+
+def thin_plate_blow():
+    g = np.random.default_rng(777 + 216)
+    width, zeta = g.uniform(0.5, 1.0), float(g.choice([0.0, 0.002, 0.01]))
+    at = (g.uniform(0.05, 0.95), g.uniform(0.05, 0.95) * width)
+    mass, speed = 10 ** g.uniform(-2.0, 0.0), 10 ** g.uniform(-0.5, 0.5)
+    exponent = float(g.choice([1.0, 1.5, 1.5]))
+    stiffness = 10 ** (g.uniform(3.5, 5.7) if exponent == 1.0 else g.uniform(5.0, 7.5))
+
+    def plate(n_modes):
+        kept = {"mass": 0.2, "first_frequency": 100.0, "n_modes": n_modes, "damping_ratio": zeta}
+        return fi.analytic.rectangle(1.0, width, **kept)
+
+    return plate, (fi.Striker.rigid(mass), fi.Contact.power(stiffness, exponent)), {"at": at, "speed": speed}

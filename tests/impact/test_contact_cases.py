@@ -96,7 +96,7 @@ def test_ever_heavier_plate_becomes_a_wall(law):
 def test_ever_heavier_striker_drives_the_plate_at_its_own_speed(mass):
     """One mode behind a spring, pushed at constant speed: q'' + (w2 + k u2) q = k u v t has a closed form."""
     omega, u, k, v, end = 2000.0, 2.0, 1e5, 1.0, 1.2e-3
-    target = fi.Modes.from_arrays([omega / (2.0 * np.pi)], [[u]], points=[[0.0]], mass=1.0)
+    target = fi.Modes.from_arrays([omega / (2.0 * np.pi)], [[u]], points=[[0.0]], mass=1.0, complete=True)
     hit = fi.strike(
         target, fi.Striker.rigid(mass), fi.Contact.linear(k), at=[0.0], speed=v, duration=end, tolerance=1e-9
     )  # fmt: skip
@@ -183,7 +183,7 @@ def test_endless_beam_kernel_grows_with_the_root_of_time():
 
 def sixty():
     frequencies = 1500.0 * np.arange(1, 60) / (2.0 * np.pi)
-    return fi.Modes.from_arrays(frequencies, np.full((1, 59), 1.5), points=[[0.0]], mass=1.0)
+    return fi.Modes.from_arrays(frequencies, np.full((1, 59), 1.5), points=[[0.0]], mass=1.0, complete=True)
 
 
 @pytest.mark.parametrize("stiffness", [1e5, 3e5, 1e6, 3e6])
@@ -365,7 +365,7 @@ def contacts(result):
     """Start, end, peak force, impulse, contact of every contact of a run."""
     steps, now = result[0], result[3]
     law = np.array([[1e6, 1.5, 0.0, 0.0]])
-    return record.find_impacts(steps, np.atleast_2d(now), law, 2, 16, 0.0)
+    return record.find_impacts(steps, np.atleast_2d(now), law, 2, 16, 0.0, 0.0)
 
 
 def energy_of(result):

@@ -354,7 +354,7 @@ def crowded(seed, n_modes, loss, exponent):
     frequencies = np.sort(rng.uniform(50.0, 2e4, n_modes))
     target = fi.Modes.from_arrays(
         frequencies, rng.normal(0.0, 20.0 * n_modes**-0.5, (1, n_modes)), points=[[0.0]], mass=1.0,
-        damping_ratio=rng.choice([0.0, 0.01]),
+        damping_ratio=rng.choice([0.0, 0.01]), complete=True,
     )  # fmt: skip
     mass, speed = 10.0 ** rng.uniform(-3.0, -1.5), 10.0 ** rng.uniform(-1.0, 1.0)
     duration = 10.0 ** rng.uniform(-3.7, -2.7)  # [s] on a rigid wall

@@ -83,7 +83,7 @@ def test_why_a_number_has_no_gradient():
     with pytest.raises(fi.SimulationError, match=r"no gradient in material\.E: section and material of the target"):
         hit.gradient("impulse", "material.E")
     points = [(0.1, 0.1), (0.3, 0.1)]
-    tested = fi.Modes.from_arrays([110.0, 340.0], [[1.2, 0.4], [0.9, -1.1]], points=points, mass=0.5)
+    tested = fi.Modes.from_arrays([110.0, 340.0], [[1.2, 0.4], [0.9, -1.1]], points=points, mass=0.5, complete=True)
     hit = fi.strike(tested, rigid, law, at=points[0], speed=1.0)
     with pytest.raises(
         fi.SimulationError, match=r"no gradient in strike\.x: the shapes of the target are known at single"

@@ -56,7 +56,9 @@ def test_many_points_are_reciprocal_and_agree_with_single_ones():
 
 
 def test_an_undamped_mode_is_infinite_at_its_frequency_but_at_its_nodes():
-    modes = analytic.Modes.from_arrays([100.0, 300.0], [[1.0, 1.0], [0.0, 1.0]], points=[[0.0], [1.0]], mass=1.0)
+    modes = analytic.Modes.from_arrays(
+        [100.0, 300.0], [[1.0, 1.0], [0.0, 1.0]], points=[[0.0], [1.0]], mass=1.0, complete=True
+    )
     found = np.abs(spectra.mobility(modes, [[0.0], [1.0]], [[0.0], [1.0]], [100.0, 200.0]))
     assert np.isinf(found[0]).tolist() == [[True, False], [False, False]]
     s = 2.0 * np.pi

@@ -154,7 +154,7 @@ def test_energy_is_kept_over_ten_thousand_steps():
     (steps, q, p, now), status = result[:4], result[6]
     for array in (steps, now):
         array.setflags(write=False)  # as a history has them
-    impacts = record.find_impacts(steps, now, law, 2, 16, 0.0)
+    impacts = record.find_impacts(steps, now, law, 2, 16, 0.0, 0.0)
     assert len(steps) > 10_000 and status == record.HORIZON and len(impacts) > 20
     stored = 0.4 * 1e7 * max(0.0, now[0, 0]) ** 2.5
     parts = 0.5 * (p @ p + (omega * q) @ (omega * q)), energies_of_stretching(Stretch(form, 1), q[None])[0], stored

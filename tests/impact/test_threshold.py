@@ -50,7 +50,7 @@ def test_few_modes_and_their_residual_give_the_infinite_plate():
 
 
 def test_body_without_enough_modes_never_stops_the_hammer():
-    modes = analytic.Modes.from_arrays([100.0], [[1.0]], points=[[0.0]], mass=1.0)
+    modes = analytic.Modes.from_arrays([100.0], [[1.0]], points=[[0.0]], mass=1.0, complete=True)
     assert threshold.threshold_frequency(modes, [0.0], 0.5) == np.inf
 
 

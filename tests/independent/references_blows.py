@@ -1,9 +1,7 @@
 """Blows worked out apart from the package: own modes, own contact laws, own integrator, and their own error.
 
 The motion is a sum of modes, each struck by one force F(d, d'): q'' + 2 zeta omega q' + omega**2 q = -s F and
-d = sum s q, with signed shapes s. In contact F is a quartic in each step, found by collocation of the law at Lobatto
-points, and every mode answers to it in closed form; steps shrink towards onset and release, where F is not smooth. In
-flight all modes move exactly and every step is searched for a touch.
+d = sum s q, with signed shapes s; `modal_motion` follows it.
 
 Of modes far above the contact, narrow bands of frequencies act as one mode each, with the same static compliance and
 the same moment of order omega**-4; so hundreds of thousands take part. What lies beyond is one mode with the compliance
@@ -13,42 +11,52 @@ that is left. Each blow is followed twice, with other steps, bands and numbers o
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numba
+import modal_motion as motion
 import numpy as np
 from scipy import special
 from scipy.optimize import brentq
 
 import fem_impact as fi
 
-NODES = np.array([0.0, 0.5 - np.sqrt(21.0) / 14.0, 0.5, 0.5 + np.sqrt(21.0) / 14.0, 1.0])  # Lobatto on 0 ... 1
-TO_POWERS = np.linalg.inv(np.vander(NODES, increasing=True))  # (5, 5) from values at the nodes to coefficients
-LEVELS = 15  # [-] sizes of step, each half of the one before: the least is 1e-6 of a contact
-COARSE, FINE = 40.0, 80.0  # [-] longest steps in a contact on a rigid wall
+STEPS = 4.0, 8.0  # [-] longest steps in a contact on a rigid wall
+ACCURACY = 1e-9, 1e-11  # [-] share of the force on a rigid wall by which that of a longest step may depart from the law
 WIDE, NARROW = 0.006, 0.003  # [-] relative width of the bands
 APART = 12.0, 24.0  # [-] of the contact frequency up to which every mode stands for itself
-FLIGHT = 48.0  # [-] steps of free flight per contact
-MOST_FLIGHT = 60_000  # [-] of them
 TAIL = 1.73  # [-] frequency of the mode for the rest over the last: density of u**2 is even in omega on a plate
 RECTANGLE_MODES = 150_000, 300_000
 DISK_MODES = 5_000, 10_000
 BEAM_MODES = 1_500, 3_000
 STICK_MODES = 400, 800
-DONE, UNDECIDED, MANY, CUT, STUCK = range(5)  # how a run ends; CUT: the loss would pull although still pressed
+DONE = motion.DONE
 
 
 @dataclass(frozen=True)
 class Law:
-    """F = stiffness d**exponent (1 + loss d') while that pushes."""
+    """F = (stiffness d**exponent + hard (d - depth)**hard_exponent) (1 + loss d') while that pushes."""
 
     stiffness: float
     exponent: float
     loss: float = 0.0
+    depth: float = 0.0
+    hard: float = 0.0
+    hard_exponent: float = 1.5
 
     def duration(self, mass, speed):
-        """Time [s] a mass rests against a rigid wall, loss left out: from the energy integral."""
+        """Time [s] a mass rests against a rigid wall by the soft layer, loss left out: from the energy integral."""
         p1 = self.exponent + 1.0
         depth = (0.5 * p1 * mass * speed**2 / self.stiffness) ** (1.0 / p1)
         return 2.0 * depth / speed * special.beta(1.0 / p1, 0.5) / p1
+
+    def wall(self, mass, speed):
+        """Force [N] and time [s] of a mass on a rigid wall, loss left out; of two layers the time is a mean of both."""
+        p1, q1, energy = self.exponent + 1.0, self.hard_exponent + 1.0, 0.5 * mass * speed**2
+        low, high = 0.0, (p1 * energy / self.stiffness) ** (1.0 / p1)
+        for _ in range(200):
+            d = 0.5 * (low + high)
+            stored = self.stiffness * d**p1 / p1 + self.hard * max(d - self.depth, 0.0) ** q1 / q1
+            low, high = (d, high) if stored < energy else (low, d)
+        force = self.stiffness * d**self.exponent + self.hard * max(d - self.depth, 0.0) ** self.hard_exponent
+        return force, np.pi * mass * speed / force
 
 
 def loss_for(restitution):
@@ -285,297 +293,45 @@ def gathered(part, apart, width):
     return found, size, np.full(len(found), part.zeta)
 
 
+def follow(one, two, law, speed, *, finer, most):
+    """Follow a rigid or flexible striker on a target, all modes as they are given as (omega, squared shapes, zeta)."""
+    omega, squared, zeta = (np.ascontiguousarray(np.concatenate(pair)) for pair in zip(one, two))
+    order = np.argsort(np.where(np.arange(len(omega)) == 0, -1.0, omega), kind="stable")
+    force, time = law.wall(1.0 / one[1][0], speed)
+    status, found = motion.follow(
+        omega[order], zeta[order], np.sqrt(squared[order]),
+        (law.stiffness, law.exponent, law.loss, law.depth, law.hard, law.hard_exponent), speed, force,
+        time / STEPS[finer], ACCURACY[finer], most, motion.ROWS, motion.TO_POWERS,
+    )  # fmt: skip
+    return Outcome(int(status), float(-found[0] / speed), *map(float, found[1:4]), int(found[4]))
+
+
 def blow(striker, target, law, speed, *, finer, most):
     """Follow one blow until the bodies part for good; ``striker`` and ``target`` give a Part, coarse or finer."""
-    one, two = striker(finer), target(finer)
-    felt = 1.0 / one.squared[0]
-    duration = law.duration(felt, speed)
-    parts = [gathered(part, APART[finer] * np.pi / duration, NARROW if finer else WIDE) for part in (one, two)]
-    omega, squared, zeta = (np.concatenate(pair) for pair in zip(*parts))
-    order = np.argsort(np.where(np.arange(len(omega)) == 0, -1.0, omega), kind="stable")
-    shape = np.sqrt(squared)
-    status, found = _follow(
-        omega[order], zeta[order], shape[order], law.stiffness, law.exponent, law.loss, speed,
-        duration / (FINE if finer else COARSE), duration / FLIGHT, most, NODES, TO_POWERS,
-    )  # fmt: skip
-    return Outcome(int(status), -found[0] / speed, *found[1:4], int(found[4]))
+    parts = striker(finer), target(finer)
+    apart = APART[finer] * np.pi / law.duration(1.0 / parts[0].squared[0], speed)
+    few = [gathered(part, apart, NARROW if finer else WIDE) for part in parts]
+    return follow(*few, law, speed, finer=finer, most=most)
 
 
-def reference(striker, target, law, speed, *, most=4):
-    """The finer outcome, and its error: the difference to the coarser one."""
-    coarse = blow(striker, target, law, speed, finer=0, most=most)
+def on_modes(modes, mass, law, at, speed, *, finer=1, most=30):
+    """A rigid striker on the modes as they are, and nothing beyond them."""
+    shape = modes.shape_at([at])[0]
+    target = modes.omega, shape**2, np.broadcast_to(modes.damping_ratio, shape.shape)
+    return follow((np.zeros(1), np.array([1.0 / mass]), np.zeros(1)), target, law, speed, finer=finer, most=most)
+
+
+def sure(run):
+    """The finer of two runs, and its error: the difference to the coarser one; ``run`` takes whether it is finer."""
+    coarse = run(0)
     if coarse.status != DONE:
         return coarse, np.inf
-    fine = blow(striker, target, law, speed, finer=1, most=most)
+    fine = run(1)
     if fine.status != DONE or fine.n_impacts != coarse.n_impacts:
         return fine, np.inf
     return fine, fine.difference(coarse)
 
 
-# --- the integrator --------------------------------------------------------------------------------------------------
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _advance(w, z, t):
-    """State transition of one mode over a time: q = c q + s p, p = e q + f p."""
-    if w == 0.0:
-        return 1.0, t, 0.0, 1.0
-    root = np.sqrt(1.0 - z * z)
-    decay = np.exp(-z * w * t)
-    cos, sin = decay * np.cos(w * root * t), decay * np.sin(w * root * t) / root
-    return cos + z * sin, sin / w, -w * sin, cos - z * sin
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _answer(w, z, h, x, out_q, out_p):
-    """Motion at the fraction x of a step h after rest, to forces (t/h)**m, m = 0 ... 4."""
-    big = w * h
-    for m in range(5):
-        if big < 2.0:  # Taylor series in t/h, to rounding
-            previous, current = 0.0, 0.0
-            q, p, power = 0.0, 0.0, 1.0
-            for j in range(34):
-                following = ((1.0 if j == m else 0.0) - 2.0 * z * big * (j + 1.0) * current - big * big * previous) / (
-                    (j + 1.0) * (j + 2.0)
-                )
-                p += following * (j + 2.0) * power * x
-                power *= x
-                q += following * power * x
-                previous, current = current, following
-            out_q[m], out_p[m] = h * h * q, h * p
-            continue
-        a = np.zeros(7)  # the polynomial solution, then the free motion that brings it to rest at the start
-        for j in range(m, -1, -1):
-            a[j] = (
-                (1.0 if j == m else 0.0) - 2.0 * z * big * (j + 1.0) * a[j + 1] - (j + 2.0) * (j + 1.0) * a[j + 2]
-            ) / big**2
-        q, p = 0.0, 0.0
-        for j in range(m, -1, -1):
-            p = p * x + q
-            q = q * x + a[j]
-        c, s, e, f = _advance(w, z, x * h)
-        out_q[m] = h * h * (q - c * a[0] - s * a[1] / h)
-        out_p[m] = h * (p - h * e * a[0] - f * a[1])
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _tables(omega, zeta, shape, h, nodes):
-    """Of one step size: free motion to the nodes, answer at its end, and the approach's answer at the nodes."""
-    n = len(omega)
-    free = np.empty((n, 16))
-    end = np.empty((n, 10))
-    d, v = np.zeros((4, 5)), np.zeros((4, 5))
-    q, p = np.empty(5), np.empty(5)
-    for k in range(n):
-        for i in range(4):
-            x = nodes[i + 1]
-            free[k, 4 * i], free[k, 4 * i + 1], free[k, 4 * i + 2], free[k, 4 * i + 3] = _advance(
-                omega[k], zeta[k], x * h
-            )
-            _answer(omega[k], zeta[k], h, x, q, p)
-            d[i] += shape[k] ** 2 * q
-            v[i] += shape[k] ** 2 * p
-        end[k, :5], end[k, 5:] = q, p
-    return free, end, d, v
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _law(k, exponent, loss, d, v):
-    """Force, its slopes in approach and rate, and whether the loss would pull."""
-    if d <= 0.0:
-        return 0.0, 0.0, 0.0, False
-    force = k * d**exponent
-    factor = 1.0 + loss * v
-    if factor <= 0.0:
-        return 0.0, 0.0, 0.0, True
-    return force * factor, exponent * force / d * factor, force * loss, False
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _at(omega, zeta, shape, q, p, t):
-    """Approach and rate after a time of free flight."""
-    d, v = 0.0, 0.0
-    for k in range(len(omega)):
-        c, s, e, f = _advance(omega[k], zeta[k], t)
-        d += shape[k] * (c * q[k] + s * p[k])
-        v += shape[k] * (e * q[k] + f * p[k])
-    return d, v
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _fly(omega, zeta, shape, q, p, t):
-    """Move all modes freely by a time, in place."""
-    for k in range(len(omega)):
-        c, s, e, f = _advance(omega[k], zeta[k], t)
-        q[k], p[k] = c * q[k] + s * p[k], e * q[k] + f * p[k]
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _touch(omega, zeta, shape, q, p, low, high):
-    """Time of the crossing of d from below to above zero between two times, by bisection and then to rounding."""
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if _at(omega, zeta, shape, q, p, middle)[0] > 0.0:
-            high = middle
-        else:
-            low = middle
-    return high
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _next_touch(omega, zeta, shape, q, p, h, most):
-    """Fly to the next touch; 1 there, 0 where the bodies part for good, -1 where neither comes in time."""
-    n = len(omega)
-    move = np.empty((n, 4))
-    for k in range(n):
-        move[k, 0], move[k, 1], move[k, 2], move[k, 3] = _advance(omega[k], zeta[k], h)
-    before, rate = _at(omega, zeta, shape, q, p, 0.0)
-    for step in range(most):
-        if step % 32 == 0:
-            away, speed, swing = 0.0, 0.0, 0.0
-            for k in range(n):
-                if omega[k] == 0.0:
-                    away += shape[k] * q[k]
-                    speed += shape[k] * p[k]
-                else:  # the envelope of a damped mode is at most 1.06 times this for damping up to 0.05
-                    swing += 1.06 * shape[k] * np.sqrt(q[k] ** 2 + (p[k] / omega[k]) ** 2)
-            if speed < 0.0 and away + swing < 0.0:
-                return 0
-        after, later = 0.0, 0.0
-        for k in range(n):
-            after += shape[k] * (move[k, 0] * q[k] + move[k, 1] * p[k])
-            later += shape[k] * (move[k, 2] * q[k] + move[k, 3] * p[k])
-        if after > 0.0:
-            _fly(omega, zeta, shape, q, p, _touch(omega, zeta, shape, q, p, 0.0, h))
-            return 1
-        # nearer than the step can bridge, or turning within it: look at eight points in between
-        if max(before, after) + 0.5 * h * (abs(rate) + abs(later)) > 0.0 or (rate > 0.0 and later < 0.0):
-            for i in range(1, 8):
-                if _at(omega, zeta, shape, q, p, i * h / 8.0)[0] > 0.0 and (i > 1 or step > 0):
-                    _fly(omega, zeta, shape, q, p, _touch(omega, zeta, shape, q, p, (i - 1) * h / 8.0, i * h / 8.0))
-                    return 1
-        for k in range(n):
-            q[k], p[k] = move[k, 0] * q[k] + move[k, 1] * p[k], move[k, 2] * q[k] + move[k, 3] * p[k]
-        before, rate = after, later
-    return -1
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _solve(k, exponent, loss, d_free, v_free, d_table, v_table, to_powers, first, force, d, v):
-    """Forces at the nodes by Newton, into ``force``; approach and rate there. False where it does not settle."""
-    d_nodes, v_nodes = d_table @ to_powers, v_table @ to_powers  # (4, 5) answers to forces at the nodes
-    force[0] = first
-    for i in range(4):
-        force[i + 1] = _law(k, exponent, loss, d_free[i], v_free[i])[0]
-    jacobian, miss = np.empty((4, 4)), np.empty(4)
-    cut = False
-    for _ in range(60):
-        largest, size = 0.0, 1e-300
-        cut = False
-        for i in range(4):
-            d[i], v[i] = d_free[i], v_free[i]
-            for j in range(5):
-                d[i] -= d_nodes[i, j] * force[j]
-                v[i] -= v_nodes[i, j] * force[j]
-            value, by_d, by_v, pulls = _law(k, exponent, loss, d[i], v[i])
-            cut |= pulls
-            miss[i] = force[i + 1] - value
-            for j in range(4):
-                jacobian[i, j] = (1.0 if i == j else 0.0) + by_d * d_nodes[i, j + 1] + by_v * v_nodes[i, j + 1]
-            largest, size = max(largest, abs(miss[i])), max(size, abs(force[i + 1]))
-        change = np.linalg.solve(jacobian, miss)
-        for i in range(4):
-            force[i + 1] -= change[i]
-        if largest <= 1e-13 * size:
-            return True, cut
-    return largest <= 1e-9 * size, cut
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _follow(omega, zeta, shape, stiffness, exponent, loss, speed, longest, flight, most, nodes, to_powers):
-    """All contacts; status and (striker's speed, impulse, contact time, peak force, number of impacts)."""
-    n = len(omega)
-    q, p = np.zeros(n), np.zeros(n)
-    p[0] = speed / shape[0]
-    tables = [_tables(omega, zeta, shape, longest * 0.5**level, nodes) for level in range(LEVELS)]
-    result = np.zeros(5)
-    force, d, v = np.zeros(5), np.zeros(4), np.zeros(4)
-    d_free, v_free = np.empty(4), np.empty(4)
-    while True:
-        result[4] += 1.0
-        if result[4] > most:
-            return MANY, result
-        elapsed, before, level, steps = 0.0, 0.0, LEVELS - 1, 0
-        here, rate = 0.0, _at(omega, zeta, shape, q, p, 0.0)[1]
-        while True:
-            steps += 1
-            if steps > 20_000:
-                return STUCK, result
-            limit = 0.5 * elapsed
-            if rate < 0.0:
-                limit = min(limit, -0.5 * here / rate)
-            level = 0
-            while level < LEVELS - 1 and longest * 0.5**level > limit:
-                level += 1
-            done = False
-            while True:
-                h = longest * 0.5**level
-                free, end, d_table, v_table = tables[level]
-                d_free[:], v_free[:] = 0.0, 0.0
-                for k in range(n):
-                    x, y, s = q[k], p[k], shape[k]
-                    for i in range(4):
-                        d_free[i] += s * (free[k, 4 * i] * x + free[k, 4 * i + 1] * y)
-                        v_free[i] += s * (free[k, 4 * i + 2] * x + free[k, 4 * i + 3] * y)
-                settled, cut = _solve(
-                    stiffness, exponent, loss, d_free, v_free, d_table, v_table, to_powers, before, force, d, v
-                )
-                if settled and not cut and d.min() > 0.0:
-                    break
-                if level < LEVELS - 1:
-                    level += 1
-                    continue
-                if cut:
-                    return CUT, result
-                if not settled and d.min() > 0.0:
-                    return STUCK, result
-                done = True
-                break
-            if done:  # the release: the last step is 1e-6 of the contact, a straight line does
-                low, high, at_low = 0.0, h, here
-                for i in range(4):
-                    if d[i] <= 0.0:
-                        high = nodes[i + 1] * h
-                        part = low + (high - low) * at_low / max(at_low - d[i], 1e-300)
-                        break
-                    low, at_low = nodes[i + 1] * h, d[i]
-                kick = 0.5 * before * part
-                for k in range(n):
-                    p[k] -= shape[k] * kick
-                _fly(omega, zeta, shape, q, p, part)
-                result[1] += kick
-                result[2] += elapsed + part
-                break
-            power = to_powers @ force
-            for k in range(n):
-                dq, dp = 0.0, 0.0
-                for m in range(5):
-                    dq += end[k, m] * power[m]
-                    dp += end[k, 5 + m] * power[m]
-                x, y = q[k], p[k]
-                q[k] = free[k, 12] * x + free[k, 13] * y - shape[k] * dq
-                p[k] = free[k, 14] * x + free[k, 15] * y - shape[k] * dp
-            for m in range(5):
-                result[1] += h * power[m] / (m + 1.0)
-            for i in range(65):
-                x = i / 64.0
-                value = power[0] + x * (power[1] + x * (power[2] + x * (power[3] + x * power[4])))
-                result[3] = max(result[3], value)
-            elapsed += h
-            before, here, rate = force[4], d[3], v[3]
-        result[0] = shape[0] * p[0]
-        found = _next_touch(omega, zeta, shape, q, p, flight, MOST_FLIGHT)
-        if found == 0:
-            return DONE, result
-        if found < 0:
-            return UNDECIDED, result
+def reference(striker, target, law, speed, *, most=4):
+    """The finer outcome of whole bodies, and its error: the difference to the coarser one."""
+    return sure(lambda finer: blow(striker, target, law, speed, finer=finer, most=most))

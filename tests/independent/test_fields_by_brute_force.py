@@ -313,7 +313,7 @@ def test_spectrum_of_a_blow_solved_by_runge_kutta(law):
     omega, shapes = hinged_rectangle(1.55, 1.0, 0.2, 100.0, 12)
     shape, zeta, tolerance = shapes(AT)[0], np.full(12, 0.02), 1e-4
     modes = fi.Modes.from_arrays(
-        omega / (2.0 * np.pi), shape[None], points=np.array([AT]), mass=0.2, damping_ratio=zeta
+        omega / (2.0 * np.pi), shape[None], points=np.array([AT]), mass=0.2, damping_ratio=zeta, complete=True
     )
     contact = LAWS_SOLVED[law]
     hit = fi.strike(modes, fi.Striker.rigid(0.05), contact, at=AT, speed=1.0, tolerance=tolerance)

@@ -68,7 +68,7 @@ def test_svg_keeps_size_names_and_holes_and_turns_y_upward(tmp_path):
     assert_allclose(np.ptp(shape.points, axis=0), [0.3, 0.2], rtol=1e-9)
     hole = shape.points[shape.facets[shape.edges["hole"]][:, 0]]
     assert_allclose(hole.mean(axis=0), [0.08, -0.05], atol=1e-4)  # y upward
-    assert not shape.notes
+    assert shape.notes == ("plate.svg: y points down in an SVG file and up here: the drawing's y is taken as -y",)
 
 
 def test_svg_without_a_unit_says_what_was_taken(tmp_path):

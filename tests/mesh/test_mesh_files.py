@@ -285,3 +285,12 @@ def test_marimba_bar_is_tuned_to_two_octaves(monkeypatch):
 
     modes = find_modes(assemble(*marimba_bar.bar()), n_modes=4)
     assert_allclose(modes.frequencies[3] / modes.frequencies[2], 4.0, rtol=0.02)  # what its script promises
+
+
+def test_noise_across_the_plane_is_ignored_and_told(tmp_path):
+    height = 6e-7 / 0.3 * np.ptp(GOOD.points[:, 0]) * (np.arange(len(GOOD.points)) % 2)
+    path = tmp_path / "noisy.vtk"
+    meshio.write(path, meshio.Mesh(np.column_stack([GOOD.points, height]), [("triangle", GOOD.cells)]))
+    noisy = mesh.load(path)
+    assert any("across the plane of the mesh, which is ignored" in note for note in noisy.notes)
+    assert noisy.area == pytest.approx(GOOD.area, rel=1e-12)

@@ -121,7 +121,7 @@ def test_modes_alone_are_foreseen_as_the_body_they_come_from():
 
 def test_what_measured_modes_cannot_tell_is_not_known_before_the_blow():
     shapes = np.array([[1.2, 0.4], [0.9, -1.1]])
-    modes = fi.Modes.from_arrays([110.0, 340.0], shapes, points=[(0.1, 0.1), (0.3, 0.1)], mass=0.5)
+    modes = fi.Modes.from_arrays([110.0, 340.0], shapes, points=[(0.1, 0.1), (0.3, 0.1)], mass=0.5, complete=True)
     stick = fi.Striker.stick(mass=0.1, first_frequency=2e3)
     plan = fi.plan(modes, stick, fi.Contact.hertz(1e8), at=(0.1, 0.1), speed=1.0, tolerance=1e-2)
     states = {each.name: each.state for each in plan.assumptions}
@@ -163,8 +163,9 @@ def test_a_beam_is_foreseen_as_it_is_found():
     plan = fi.plan(system, BALL, fi.Contact.between(BALL, STEEL), at=(0.1,), speed=1.0, tolerance=1e-2)
     before, after = named(plan.assumptions), named(plan.strike().assumptions)
     assert before["no yielding"].known and before["thin target"].doubtful
-    for name in ("thin target", "small deflections", "still air", "local contact"):
+    for name in ("thin target", "small deflections", "local contact"):
         assert before[name].value == pytest.approx(after[name].value, rel=0.3)
+    assert before["still air"].value < after["still air"].value  # what sound damps is known after the blow
     assert before["stated damping"].state == "not known"
 
 

@@ -163,7 +163,7 @@ def test_ritz_pairs_are_as_thick_as_modes():
 def test_bodies_without_shapes_are_not_known(body):
     modes = fi.Modes.rigid(1.0)
     if body == "measured":
-        modes = fi.Modes.from_arrays([100.0], [[1.0]], points=[(0.1, 0.1)], mass=0.5)
+        modes = fi.Modes.from_arrays([100.0], [[1.0]], points=[(0.1, 0.1)], mass=0.5, complete=True)
     assert module.known(modes) is None
 
 

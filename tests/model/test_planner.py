@@ -9,10 +9,12 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact._base import check
+from fem_impact._base.progress import heard
 from fem_impact.fe import assembly, refinement
 from fem_impact.impact import collision
-from fem_impact.model import planner
+from fem_impact.model import cost, planner
 from fem_impact.modes import analytic
+from fem_impact.scenes import templates
 
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 BALL = """
@@ -320,3 +322,79 @@ def test_the_modes_that_ring_reach_to_where_the_force_is_sixty_decibels_down(sce
     beyond = frequencies > 1.1 * last
     assert force[beyond].max() < 2e-3 * force[0]
     assert force[(frequencies > 0.8 * last) & ~beyond].max() > 5e-4 * force[0]  # and no farther
+
+
+@pytest.mark.parametrize("at, words", [((0.9, 0.09), r"at must lie on the body, got \(0.9, 0.09\) m; the body extends"),
+                                       (0.13, r"at must be a point \(x, y\) in m, got 0.13"),
+                                       ([(0.1, 0.1), (0.2, 0.1)], "at must be one point, got 2")])  # fmt: skip
+def test_a_point_beside_the_body_is_refused_before_anything_is_planned(at, words):
+    corners = [(0.0, 0.0), (0.4, 0.0), (0.4, 0.3), (0.1, 0.2)]
+    body = fi.assemble(fi.mesh.polygon(corners), fi.Plate(fi.Material(10e9, 0.3, 450.0), 3e-3))
+    for target in (None, "vectors", "modal"):
+        with pytest.raises(ValueError, match=words):
+            fi.plan(body, fi.Striker.rigid(0.02), fi.Contact.hertz(1e7), at=at, speed=1.0, target=target)
+
+
+def test_an_error_begins_with_what_is_probably_a_slip_of_a_unit():
+    body = fi.assemble(fi.mesh.rectangle(0.4, 0.3), fi.Plate(fi.Material(10.0, 0.3, 450.0), 3e-3), {"left": "clamped"})
+    with pytest.raises(check.SimulationError, match=r"^E = 10 Pa is softer than rubber; .* 210e9: this blow needs"):
+        fi.plan(body, fi.Striker.rigid(0.02), fi.Contact.hertz(1e7), at=(0.13, 0.1), speed=1.0, target="modal")
+
+
+def test_a_slip_of_a_unit_is_told_before_what_follows_from_it():
+    body = fi.assemble(fi.mesh.rectangle(0.4, 0.3), fi.Plate(fi.Material(10e9, 0.3, 450.0), 3.0), {"left": "clamped"})
+    plan = fi.plan(body, fi.Striker.rigid(0.02), fi.Contact.hertz(1e7), at=(0.13, 0.1), speed=1.0)
+    for told in (str(plan), plan.strike().summary()):
+        assert told.splitlines()[1].startswith("Note: thickness 3 m is 10 times the shortest side")
+
+
+@pytest.mark.slow  # half a minute
+def test_the_new_plate_in_air_meets_its_own_tolerance(tmp_path):
+    """As its assumption 'still air' advises; the air of the modes that the blow alone needs errs too much."""
+    templates.write(tmp_path / "plate.toml", "plate")
+    text = (tmp_path / "plate.toml").read_text()
+    first = fi.load_scene(tmp_path / "plate.toml").strike()
+    assert any('air = "both sides" under [target]' in each.remedy for each in first.assumptions)
+    (tmp_path / "plate.toml").write_text(text.replace("[target]", '[target]\nair = "both sides"'))
+    hit = fi.load_scene(tmp_path / "plate.toml").strike()
+    assert hit.tolerance_met and hit.target.air
+
+
+@pytest.mark.slow  # ten seconds
+def test_a_plate_that_is_infinite_only_far_up_is_described_by_vectors_after_all():
+    """Its echoes matter up to 100 kHz; vectors cost less than modes up to there."""
+    a, b = 0.0985, 0.0592
+    sheet = fi.assemble(
+        fi.mesh.rectangle(a, b), fi.Plate(fi.Material(210e9, 0.3, 7850.0), 0.681e-3), {"boundary": "hinged"}
+    )
+    blow = fi.Striker.rigid(0.05339), fi.Contact.power(6.3057e17, 2.7703)
+    plan = fi.plan(sheet, *blow, at=(0.5013 * a, 0.3378 * b), speed=0.34734, tolerance=1e-2)
+    told = []
+    with heard(None, told.append):
+        run = plan.run()
+    assert plan.target == "mixed" and run.plan.target == "vectors" and run.response.tolerance_met
+    assert run.response.n_impacts == 2 and max(told) > 2.0 * plan.seconds  # what was not foreseen is told
+
+
+def test_a_mesh_too_fine_for_the_echoes_is_known_before_the_blow():
+    glass = fi.Material(70e9, 0.22, 2500.0)
+    pane = fi.assemble(fi.mesh.rectangle(1.0, 1.0), fi.Plate(glass, 3e-3), {"boundary": "hinged"})
+    ball = fi.Striker.sphere(fi.Material(210e9, 0.3, 7850.0), 0.005)
+    blow = {"at": (0.5, 0.5), "speed": 1.0, "tolerance": 1e-3}
+    for target, words in (
+        (None, "take a contact with stiffness ="),
+        ("mixed", "its modes has too many unknowns"),
+    ):
+        with pytest.raises(check.SimulationError, match=words):
+            fi.plan(pane, ball, fi.Contact.between(ball, glass), **blow, target=target)
+
+
+def test_steps_of_a_tight_tolerance_are_in_the_predicted_time():
+    """Collocation starts with two steps in each contact and ends with hundreds: 30 000 modes took 40 s, not 0.01."""
+    plate = fi.Plate(fi.Material(10e9, 0.3, 450.0), 3e-3)
+    modes = fi.analytic.rectangle(0.4, 0.3, section=plate, n_modes=300, damping_ratio=0.005)
+    how = {"at": (0.13, 0.1), "speed": 1.0, "n_modes": 300}
+    loose, tight = (
+        fi.plan(modes, fi.Striker.rigid(0.02), fi.Contact.hertz(1e7), tolerance=t, **how) for t in (1e-3, 1e-9)
+    )
+    assert tight.scheme == "collocation" and tight.seconds - cost.START > 10.0 * (loose.seconds - cost.START)

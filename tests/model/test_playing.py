@@ -21,7 +21,7 @@ def measured():
     rng = np.random.default_rng(7)
     frequencies = np.sort(rng.uniform(100.0, 3000.0, 10))
     shapes = rng.normal(0.0, 2.0, (2, 10))
-    return fi.Modes.from_arrays(frequencies, shapes, points=[[0.0], [1.0]], mass=0.3, damping_ratio=0.01)
+    return fi.Modes.from_arrays(frequencies, shapes, points=[[0.0], [1.0]], mass=0.3, damping_ratio=0.01, complete=True)
 
 
 def played(modes, strokes, end):

@@ -93,7 +93,7 @@ def test_effect_is_that_of_a_plate_with_the_air_of_rayleighs_integral():
     row = thin.shape_at(at)
     hits = []
     for factor in (np.ones(8), 1.0 / np.sqrt(1.0 + mass)):
-        modes = fi.Modes.from_arrays(thin.frequencies * factor, row * factor, points=at, mass=thin.mass)
+        modes = fi.Modes.from_arrays(thin.frequencies * factor, row * factor, points=at, mass=thin.mass, complete=True)
         modes = modes.damped(thin.damping_ratio)
         body = thin if factor[0] == 1.0 else modes
         law = fi.Contact.linear(2e4)
@@ -164,3 +164,11 @@ def test_slopes_in_air_are_those_of_the_mixed_shapes():
 
 def test_frequencies_drop_by_a_hundredth_at_the_limit():
     assert pytest.approx(0.01, rel=0.05) == 1.0 - (1.0 + still_air.LIMIT) ** -0.5
+
+
+def test_where_sound_damps_more_than_air_weighs_its_damping_is_named():
+    """A plate so light that all its waves are faster than sound."""
+    section = fi.Plate(replace(SPRUCE, rho=0.45), 3e-3)
+    plate = fi.analytic.rectangle(0.4, 0.3, section=section, n_modes=20, damping_ratio=0.005)
+    told = found(fi.strike(plate, fi.Striker.rigid(1e-5), fi.Contact.linear(1e3), at=(0.13, 0.1), speed=1.0))
+    assert told.number.startswith("damping ratio by the sound radiated") and told.doubtful and told.worst > 0.01

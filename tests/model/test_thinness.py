@@ -3,7 +3,7 @@ import pytest
 import thick_references as thick
 
 import fem_impact as fi
-from fem_impact.model import audit, thinness
+from fem_impact.model import audit, bending, thinness
 
 E, NU, RHO = 210e9, 0.3, 7850.0
 STEEL = fi.Material(E=E, nu=NU, rho=RHO)
@@ -20,7 +20,7 @@ def thick_modes(modes, h, at):
     squared = modes.omega * np.sqrt(12.0 * RHO * (1.0 - NU**2) / E) / h
     turned = 1.0 - RHO * omega**2 / (thick.KAPPA * E / (2.0 * (1.0 + NU)) * squared)
     shape = modes.shape_at(at) / np.sqrt(1.0 + h**2 / 12.0 * squared * turned**2)
-    return fi.Modes.from_arrays(omega / (2.0 * np.pi), shape, points=[at], mass=modes.mass)
+    return fi.Modes.from_arrays(omega / (2.0 * np.pi), shape, points=[at], mass=modes.mass, complete=True)
 
 
 def blow(modes, mass, stiffness, at, residual=False):
@@ -82,7 +82,7 @@ def test_a_beam_of_a_marimba_is_examined_too():
             omega = thick.timoshenko(0.3, E * inertia, RHO * area, RHO * inertia, kGA, ("free", "free"), 12)
             frequencies = np.concatenate([np.zeros(2), omega]) / (2.0 * np.pi)
             shapes = modes.shape_at([0.15])
-            modes = fi.Modes.from_arrays(frequencies, shapes, points=[(0.15,)], mass=modes.mass)
+            modes = fi.Modes.from_arrays(frequencies, shapes, points=[(0.15,)], mass=modes.mass, complete=True)
         exact.append(blow(modes, 0.1, 3e9, 0.15))
     true = abs(exact[1].peak_force / exact[0].peak_force - 1.0)
     assert true > 1e-3
@@ -110,7 +110,9 @@ def test_a_bar_that_strikes_has_its_own_thickness():
 def test_what_is_not_known_is_not_known(modes):
     plate = fi.analytic.rectangle(*SIDES, mass=0.2, first_frequency=100.0, n_modes=60)
     if modes == "measured":
-        plate = fi.Modes.from_arrays(plate.frequencies, plate.shape_at([(0.1, 0.1)]), points=[(0.1, 0.1)], mass=0.2)
+        plate = fi.Modes.from_arrays(
+            plate.frequencies, plate.shape_at([(0.1, 0.1)]), points=[(0.1, 0.1)], mass=0.2, complete=True
+        )
     told = found(fi.strike(plate, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), at=(0.1, 0.1), speed=1.0))
     assert told.state == "not known" and set(told.effect.values()) == {None}
 
@@ -174,3 +176,27 @@ def test_a_stick_that_is_told_slender_or_stout_has_its_shear_and_a_hammer_has_no
 def test_waves_are_a_hundredth_too_fast_at_the_limit():
     """Mindlin's plate to second order in h k: rotation adds 1 / 12, shear 1 / (5 (1 - nu)), each to 1 / omega**2."""
     assert pytest.approx(0.01, rel=0.05) == 0.5 * (1.0 / 12.0 + 0.2 / (1.0 - 0.3)) * thinness.LIMIT**2
+
+
+@pytest.mark.parametrize(("at", "change"), [((0.04, 0.03), 2.9e-3), ((0.0, 0.0), 2.6e-2), ((0.05, 0.05), 0.0)])
+def test_a_block_that_turns_has_its_rotary_inertia(at, change):
+    """The thick theory has it in its rigid motions; nothing else changes the restitution of so small a block."""
+    section, law = fi.Plate(fi.Material(E=210e9, nu=0.3, rho=7850.0), thickness=0.05), fi.Contact.hertz(1e9)
+    thin, thick = (
+        fi.strike(
+            fi.find_modes(fi.assemble(fi.mesh.rectangle(0.1, 0.1, size=0.05), section, theory=theory), n_modes=10),
+            fi.Striker.rigid(0.05), law, at=at, speed=1.0, tolerance=1e-2,
+        )
+        for theory in ("kirchhoff", "mindlin")
+    )  # fmt: skip
+    moved = abs(thick.restitution - thin.restitution)
+    assert moved == pytest.approx(change, rel=0.05, abs=1e-4)
+    assert found(thin).effect["restitution"] == pytest.approx(moved, rel=0.05, abs=1e-5)
+
+
+def test_a_bar_that_turns_has_its_rotary_inertia():
+    """By formula: at the end of a free bar, turning adds 3 / (1 + h**2 / length**2) to the mobility 1 / mass."""
+    bar = fi.Beam.rectangular(fi.Material(E=210e9, nu=0.3, rho=7850.0), width=0.03, height=0.06)
+    modes = fi.analytic.beam(0.2, ends=("free", "free"), section=bar, n_modes=6)
+    rows = bending.bending(bending.known(modes)).heavier(modes.shape_at([0.0]))[0, :2]
+    assert (rows**2).sum() * modes.mass == pytest.approx(1.0 + 3.0 / (1.0 + 0.3**2), rel=1e-9)

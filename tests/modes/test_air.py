@@ -35,7 +35,7 @@ def test_piston_has_the_impedance_of_the_textbook(ka):
     radius, omega = 0.1, ka / 0.1 * C
     modes = fi.Modes(np.ones(1), np.zeros(1), Piston(radius), 1.0)
     spacing = radius / 40.0
-    strength = air._strengths(air._sampled(modes.shapes, spacing), spacing, 2)
+    strength = air._strengths(air._sampled(modes.shapes, spacing)[0], spacing, 2)
     found = air._Air(modes, strength, 2.0 * spacing, RHO / (2.0 * np.pi), C)
     area = np.pi * radius**2
     heavy = RHO * C * area * special.struve(1, 2.0 * ka) / ka / omega

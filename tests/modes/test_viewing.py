@@ -34,5 +34,7 @@ def test_a_plate_is_refined_until_it_is_smooth():
 
 
 def test_shapes_known_at_points_only_are_not_refined():
-    modes = fi.Modes.from_arrays([100.0], [[1.0], [0.5], [0.2]], points=[[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]], mass=1.0)
+    modes = fi.Modes.from_arrays(
+        [100.0], [[1.0], [0.5], [0.2]], points=[[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]], mass=1.0, complete=True
+    )
     assert modes.to_pyvista().n_points == 3

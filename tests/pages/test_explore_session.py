@@ -1,14 +1,17 @@
 """An open page is answered at once, judged when its hand rests, and never sent what it no longer asks for."""
 
 import asyncio
+import gc
 import json
+import logging
+import re
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
 from test_cli import TEXT
 
 import fem_impact as fi
-from fem_impact.pages import explore_map, explore_model, explore_numbers, explore_session
+from fem_impact.pages import explore, explore_map, explore_model, explore_numbers, explore_session
 from fem_impact.scenes.sentences import si
 
 
@@ -23,7 +26,7 @@ class Beside:
     """A worker that computes in this process, at once, and notes what it was asked."""
 
     def __init__(self, explorer):
-        self.explorer, self.asked = explorer, []
+        self.explorer, self.asked, self.ended = explorer, [], 0
 
     def ask(self, function, *arguments):
         self.asked.append((function.__name__, arguments))
@@ -38,8 +41,8 @@ def run(function, *arguments):
         return pool.submit(lambda: asyncio.run(function(*arguments))).result()
 
 
-def follow(explorer, monkeypatch, *messages, until=lambda said: True, rest=0.0):
-    """What a page is sent after some messages."""
+def follow(explorer, monkeypatch, *messages, until=lambda said: True, rest=0.0, apart=False):
+    """What a page is sent after some messages, each of which waits for the answer to the last one if they are apart."""
     monkeypatch.setattr(explore_session, "REST", rest)
     monkeypatch.setattr(explore_map, "FINEST", 49)
     said, workers = [], (Beside(explorer), Beside(explorer))
@@ -50,6 +53,8 @@ def follow(explorer, monkeypatch, *messages, until=lambda said: True, rest=0.0):
         )
         for message in messages:
             session.take(message)
+            while apart and session.asked is not None:
+                await asyncio.sleep(0)
         for _ in range(200):
             if until(said):
                 break
@@ -60,6 +65,9 @@ def follow(explorer, monkeypatch, *messages, until=lambda said: True, rest=0.0):
     session = run(work)
     assert until(said)
     return said, session, workers
+
+
+ANSWERED = {"until": lambda said: any(one["kind"] == "rest" for one in said), "rest": 60.0}
 
 
 def test_force_and_numbers_come_first_then_the_rest_then_the_verdict(explorer, monkeypatch):
@@ -78,8 +86,8 @@ def test_force_and_numbers_come_first_then_the_rest_then_the_verdict(explorer, m
 
 def test_a_hand_that_does_not_rest_is_neither_judged_nor_mapped(explorer, monkeypatch):
     moves = [{"number": i, "turn": {"speed": 1.0 + 0.01 * i}} for i in range(1, 6)]
-    said, session, workers = follow(explorer, monkeypatch, *moves, rest=60.0)
-    assert [one["number"] for one in said if one["kind"] == "blow"] == [1, 2, 3, 4, 5]
+    said, session, workers = follow(explorer, monkeypatch, *moves, **ANSWERED)
+    assert [one["number"] for one in said if one["kind"] == "blow"] == [5]  # what was superseded is not struck
     assert workers[0].asked == workers[1].asked == []
     assert session.settings.speed == pytest.approx(1.05)
 
@@ -126,7 +134,7 @@ async def _back(session):
 
 def test_listener_moves_without_another_blow(explorer, monkeypatch):
     moves = [{"number": 1, "turn": {}}, {"number": 2, "ear": [0.2, 0.1]}, {"number": 3, "turn": {"height": 1.0}}]
-    said, session, _ = follow(explorer, monkeypatch, *moves, rest=60.0)
+    said, session, _ = follow(explorer, monkeypatch, *moves, rest=60.0, apart=True)
     assert session.heard_at == (0.2, 0.1) and session.height == 1.0
     assert ["force" in one for one in said if one["kind"] == "blow"] == [True, False, False]
     assert said[-2]["said"]["height"] == f"{si(1.0, 'm', 3)}, in the air"
@@ -136,7 +144,8 @@ def test_listener_moves_without_another_blow(explorer, monkeypatch):
     "message",
     [
         [], 3, {"turn": []}, {"turn": {"nothing": 1.0}}, {"turn": {"mass": "1"}}, {"turn": {"mass": float("nan")}},
-        {"turn": {"mass": True}}, {"ear": [1.0]}, {"ear": "ab"}, {"view": {"mass": [1.0, 2.0]}}, {"view": 3},
+        {"turn": {"mass": True}}, {"turn": {"mass": 10**400}},
+        {"ear": [1.0]}, {"ear": "ab"}, {"view": {"mass": [1.0, 2.0]}}, {"view": 3},
     ],
 )  # fmt: skip
 def test_nonsense_is_refused(explorer, monkeypatch, message):
@@ -145,5 +154,144 @@ def test_nonsense_is_refused(explorer, monkeypatch, message):
 
 
 def test_values_beyond_a_slider_become_its_end(explorer, monkeypatch):
-    _, session, _ = follow(explorer, monkeypatch, {"number": 1, "turn": {"mass": 1e9, "x": -5.0}}, rest=60.0)
+    _, session, _ = follow(explorer, monkeypatch, {"number": 1, "turn": {"mass": 1e9, "x": -1e-12}}, **ANSWERED)
     assert session.settings.mass == explorer.setup.range("mass")[1] and session.settings.at[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("message", "stays"), [({"turn": {"x": -0.01, "y": 0.1}}, "strike"), ({"ear": [9.0, 0.1]}, "listening")]
+)
+def test_a_click_beside_the_body_moves_nothing_and_says_so(explorer, monkeypatch, message, stays):
+    said, session, _ = follow(explorer, monkeypatch, {"number": 1, **message}, **ANSWERED)
+    assert re.fullmatch(rf"\(.*\)\sm is beside the body: the {stays} point stays\.", said[0]["note"])
+    assert session.settings.at == explorer.setup.start.at == session.heard_at
+
+
+def test_where_the_body_does_not_move_nothing_is_heard(explorer, monkeypatch):
+    corner = {"number": 1, "turn": {"x": 0.0, "y": 0.0}}
+
+    def heard(said):
+        return any(one["kind"] == "sound" and "Computing" not in one["note"] for one in said)
+
+    said, session, _ = follow(explorer, monkeypatch, corner, **ANSWERED)
+    assert session.settings.at == (0.0, 0.0) and said[0]["note"].startswith("The body does not move at (0, 0)")
+    settings, middle = session.settings, explorer.setup.start
+    silent = [(settings, middle.at, 0.0), (settings, middle.at, 1.0), (middle, (0.0, 0.0), 0.0)]
+    for struck, where, height in silent:
+        sound = explorer.listen(struck, where, height, None)
+        assert sound["uri"] == "" and sound["note"].startswith("Nothing is heard: the body does not move at (0, 0)")
+
+
+def test_one_page_that_asks_for_much_does_not_make_another_wait(explorer, monkeypatch):
+    struck, answer = [], explorer.answer
+    monkeypatch.setattr(explorer, "answer", lambda settings: struck.append(settings.mass) or answer(settings))
+
+    async def work():
+        said = []
+        one, other = (
+            explore_session.Session(
+                explorer, Beside(explorer), Beside(explorer), lambda said_, who=who: said.append((who, said_))
+            )
+            for who in ("one", "other")
+        )
+        for i in range(1000):
+            one.take({"number": i, "turn": {"mass": 0.02 + 1e-6 * i}})
+        other.take({"number": 7, "turn": {"mass": 0.05}})
+        while len(struck) < 2:
+            await asyncio.sleep(0)
+        one.close(), other.close()
+        return [(who, message["number"]) for who, message in said if message["kind"] == "rest"]
+
+    assert run(work) == [("one", 999), ("other", 7)]
+    assert struck == [pytest.approx(0.020999), pytest.approx(0.05)]
+
+
+def test_of_several_sounds_the_last_is_played(explorer, monkeypatch):
+    asked = []
+    monkeypatch.setattr(explore_numbers.Explorer, "listen", lambda *about: asked.append(about[-1]) or {"note": "done"})
+    plays = [{"play": "roll"}] * 3 + [{"play": "blow"}]
+    said, _, _ = follow(explorer, monkeypatch, *plays, until=lambda said: said[-1]["note"] == "done", rest=60.0)
+    assert asked == [None] and len(said) == 5
+
+
+class Replaced(Beside):
+    """A worker whose process ends at every question, and is replaced or not."""
+
+    def __init__(self, explorer, good):
+        super().__init__(explorer)
+        self.good = good
+
+    def ask(self, function, *arguments):
+        self.ended += 1
+        answer = super().ask(function, *arguments)
+        if not self.good:
+            answer = Future()
+            answer.set_exception(fi.SimulationError("the process has ended"))
+        return answer
+
+
+@pytest.mark.parametrize(("good", "told"), [(True, "another one has taken its place."), (False, "process has ended.")])
+def test_a_process_that_ended_is_told_in_one_line(explorer, good, told):
+    said = []
+
+    async def work():
+        session = explore_session.Session(explorer, Replaced(explorer, good), Beside(explorer), said.append)
+        await session._guarded(session._judge)
+
+    run(work)
+    notes = [one["text"] for one in said if one["kind"] == "note"]
+    assert len(notes) >= 1 and all(note.endswith(told) and "\n" not in note for note in notes)
+    assert any(one.get("exact") for one in said) == good
+
+
+UPGRADE = "GET /talk HTTP/1.1\r\nHost: {0}\r\nOrigin: http://{0}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+UPGRADE += "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n"
+BAD = {
+    "nested": "[" * 60_000,
+    "large": '{"turn": {"mass": 1%s}}' % ("0" * 400),
+    "larger": '{"turn": {"mass": 1%s}}' % ("0" * 5000),
+    "no JSON": "\0",
+    "a list": "[]",
+}
+
+
+async def talk(host, text):
+    """A connection that has sent a message, as a page would."""
+    reader, writer = await asyncio.open_connection(*host.split(":"))
+    writer.write(UPGRADE.format(host).encode())
+    await reader.readuntil(b"\r\n\r\n")
+    raw = text.encode()
+    size = bytes([0x80 | len(raw)]) if len(raw) < 126 else b"\xfe" + len(raw).to_bytes(2, "big")
+    writer.write(b"\x81" + size + bytes(4) + raw)
+    return reader, writer
+
+
+def test_pages_that_vanish_or_send_nonsense_are_one_line_each(explorer, caplog, monkeypatch):
+    pytest.importorskip("tornado", reason="exploring is an extra: fem-impact[web]")
+    caplog.set_level(logging.INFO)
+    monkeypatch.setattr(explore_session, "REST", 60.0)
+    bad = []
+
+    async def work():
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: bad.append(context))
+        server, address = explore._server(explorer, [Beside(explorer), Beside(explorer)], 0)
+        host = address.split("/")[2]
+        for _ in range(5):
+            _, writer = await talk(host, '{"number": 1, "turn": {"mass": 0.02}}')
+            writer.transport.abort()
+        for text in BAD.values():
+            reader, writer = await talk(host, text)
+            assert (await reader.read(2))[0] == 0x88  # the connection is closed
+            writer.transport.abort()
+        while sum("page" in record.getMessage() for record in caplog.records) < 5 + len(BAD):
+            await asyncio.sleep(0.01)
+        server.stop()
+        await server.close_all_connections()
+
+    run(work)
+    gc.collect()  # errors that nobody asked for are told as they are collected
+    assert bad == []
+    said = [record.getMessage() for record in caplog.records if record.name != "tornado.access"]
+    assert sorted(line.partition(":")[0] for line in said) == ["a page has gone"] * 5 + ["a page is refused"] * len(BAD)
+    assert all(len(line) < 200 and "\n" not in line for line in said)
+    assert not any(record.exc_info for record in caplog.records)

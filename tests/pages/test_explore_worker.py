@@ -2,11 +2,14 @@
 
 import io
 import pickle
+from functools import partial
 
 import pytest
 
 from fem_impact._base.check import SimulationError
 from fem_impact.pages import explore_worker
+
+DEADLY = partial(eval, "__import__('os')._exit(3)")  # the process knows no functions of this file
 
 
 def add(held, *values):
@@ -37,16 +40,25 @@ def test_a_process_of_its_own_computes_and_ends():
     worker = explore_worker.Worker({"a": 1})
     try:
         assert worker.ask(dict.get, "a").result(60) == 1
-        with pytest.raises(ValueError, match="could not convert"):
-            worker.ask(_number, "x").result(60)
-        worker.process.kill()
-        worker.process.wait()
-        with pytest.raises(SimulationError, match="beside the page has ended"):
-            worker.ask(dict.get, "a").result(60)
+        with pytest.raises(ValueError, match="has length 1; 2 is required"):
+            worker.ask(dict.update, "x").result(60)
     finally:
         worker.stop()
     assert worker.process.poll() is not None
+    with pytest.raises(RuntimeError):  # nothing takes its place any more
+        worker.ask(dict.get, "a")
 
 
-def _number(held, text):
-    return float(text)
+def test_a_process_that_is_killed_is_replaced_and_answers():
+    worker = explore_worker.Worker({"a": 1})
+    try:
+        assert (worker.ask(dict.get, "a").result(60), worker.ended) == (1, 0)
+        first = worker.process
+        first.kill()
+        assert (worker.ask(dict.get, "a").result(60), worker.ended) == (1, 1)
+        assert first.poll() is not None and worker.process.poll() is None
+        with pytest.raises(SimulationError, match="has ended, and so has the one in its place"):
+            worker.ask(DEADLY).result(60)
+        assert (worker.ask(dict.get, "a").result(60), worker.ended) == (1, 3)
+    finally:
+        worker.stop()

@@ -1,14 +1,21 @@
 """The page of a fit shows what was found and what the data do not tell."""
 
+import base64
+import io
+from dataclasses import replace
+from itertools import pairwise
+
+import matplotlib.pyplot as plt
 import pytest
 
 import fem_impact as fi
 from fem_impact.pages import fit_page
+from fem_impact.taps.found import Found
 
 
 @pytest.fixture(scope="module")
 def found():
-    body = fi.Modes.from_arrays([900.0], [[2.0]], points=[[0.0]], mass=1.0, damping_ratio=0.02)
+    body = fi.Modes.from_arrays([900.0], [[2.0]], points=[[0.0]], mass=1.0, damping_ratio=0.02, complete=True)
     law = fi.Contact.hertz(5e7)
     hits = [fi.strike(body, fi.Striker.rigid(0.1), law, at=[0.0], speed=v) for v in (0.5, 1.0, 1.5)]
     taps = [fi.measure(hit, rate=25600.0, noise=5e-3, rng=i) for i, hit in enumerate(hits)]
@@ -24,7 +31,8 @@ def test_a_page_with_values_ridges_pictures_and_double_hits(found, tmp_path):
     page = (tmp_path / "fit.html").read_text()
     assert "A &lt;hammer&gt; &amp; a bar" in page
     assert page.count("data:image/png;base64,") == 3
-    assert "do not tell contact.stiffness" in page and "along its ridge" in page
+    assert "do not tell contact.stiffness" in page and "and the taps are explained as well" in page
+    assert "^-" not in made.summary() and 'class="badge good"' not in page
     assert "tip x 10" in page and "http" not in page.replace("http-equiv", "")
 
 
@@ -32,6 +40,29 @@ def test_pictures_alone(found):
     for name, draw in (("pulses", fit_page.pulses), ("profiles", fit_page.profiles), ("spectrum", fit_page.spectrum)):
         figure = draw(found[0])
         assert len(figure.axes) >= {"pulses": 3, "profiles": 4, "spectrum": 1}[name]
+
+
+def test_labels_of_axes_keep_apart_and_pictures_have_no_background(found):
+    figure = fit_page.profiles(found[0])
+    figure.canvas.draw()
+    for axes in figure.axes:
+        boxes = [label.get_window_extent() for label in axes.get_xticklabels(which="both") if label.get_text()]
+        boxes = sorted(box.extents[[0, 2]].tolist() for box in boxes)
+        assert all(one[1] < next[0] for one, next in pairwise(boxes))
+    pixels = plt.imread(io.BytesIO(base64.b64decode(fit_page._uri(figure).partition(",")[2])))
+    assert pixels[0, 0, 3] == 0.0
+
+
+@pytest.mark.parametrize("white, badge", [(0.5, "good"), (1e-4, "bad")])
+def test_a_verdict_counts_what_the_model_lacks(found, white, badge, tmp_path, monkeypatch):
+    monkeypatch.setattr(Found, "unidentifiable", ())
+    monkeypatch.setattr(Found, "whiteness", white)
+    made = replace(found[0])
+    made.__dict__["profiles"] = found[0].profiles
+    fit_page.write(tmp_path / "fit.html", made)
+    page = (tmp_path / "fit.html").read_text()
+    assert page.count('class="badge ') == 1 and f'class="badge {badge}"' in page
+    assert ("the model lacks something" in page) == (badge == "bad")
 
 
 def test_double_hits_are_a_table(found):

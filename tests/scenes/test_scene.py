@@ -282,7 +282,7 @@ BAD = [
     ("at = [0.1395, 0.09]", "", r"\[strike\] at is missing"),
     ("at = [0.1395, 0.09]", "at = [0.5, 0.09]", r"\[strike\] at must lie on the body, got \(0.5, 0.09\) m"),
     ("at = [0.1395, 0.09]", "at = [0.1, nan]", r"\[strike\] at\[1\] must be finite, got nan"),
-    ("at = [0.1395, 0.09]", "at = [0.1]", r"\[strike\] at must have shape"),
+    ("at = [0.1395, 0.09]", "at = [0.1]", r"\[strike\] at must be a point \(x, y\) in m, got \[0.1\]"),
     ("at = [0.1395, 0.09]", 'at = "middle"', r"\[strike\] at must be numbers in m, got 'middle'"),
     ("speed = 2.0", "speed = -2.0", r"\[strike\] speed must .*-2 m/s"),
     ("tolerance = 1e-2", "tolerance = 0", r"\[strike\] tolerance must lie between"),
@@ -325,9 +325,11 @@ def test_bad_scene_is_told_in_one_line_with_file_table_and_key(tmp_path, old, ne
         (b"", r"\[mesh\] is missing"),
         (b"mesh = 3", r"mesh must be a table, written \[mesh\]"),
         (b"a = " + b"[" * 50_000, "not valid TOML"),
+        (b"a" + b".a" * 50_000 + b" = 1", "a key must have at most 16 parts between dots, got 'a.a.*' and more"),
+        (b"[" + b'"."."\\"" . ' * 9 + b"a]", "a key must have at most 16 parts between dots"),
         (b"#" * 2_000_000, "must be smaller than"),
     ],
-    ids=["no text", "nothing", "no table", "nested", "huge"],
+    ids=["no text", "nothing", "no table", "nested", "dotted", "quoted", "huge"],
 )
 def test_file_that_is_no_scene_is_told_so(tmp_path, raw, text):
     (tmp_path / "scene.toml").write_bytes(raw)

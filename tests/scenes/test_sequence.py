@@ -62,7 +62,7 @@ def test_the_prompt_plays_a_scene_and_writes_one_sound_of_all(path, tmp_path, ca
     data = json.loads((tmp_path / "out" / "response.json").read_text())
     said = capsys.readouterr().out
     assert "2 strokes" in said and "stroke 1" in said
-    assert {path.name for path in (tmp_path / "out").iterdir() if path.is_file()} == set(data["files"])
+    assert {path.name for path in (tmp_path / "out").glob("[!.]*") if path.is_file()} == set(data["files"])
     assert [each["when"] for each in data["strokes"]] == [0.0, 0.03]
     assert sum(each["impulse"] for each in data["strokes"]) == pytest.approx(data["sequence"]["impulse"])
     assert data["scene"]["stroke"][1]["striker"] == {"kind": "rigid", "mass": 0.01}

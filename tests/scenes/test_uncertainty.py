@@ -310,7 +310,7 @@ def test_the_prompt_writes_numbers_and_a_picture_and_says_what_to_measure(scene,
     assert cli.main(words) == 0
     text = capsys.readouterr().out
     assert "What should be measured better" in text and "A ball on a plate" in text
-    assert sorted(p.name for p in out.iterdir()) == ["spread.csv", "spread.json", "spread.nc", "spread.png"]
+    assert sorted(p.name for p in out.glob("[!.]*")) == ["spread.csv", "spread.json", "spread.nc", "spread.png"]
     data = json.loads((out / "spread.json").read_text())
     assert data["inputs"]["contact.stiffness"] == "lognormal(100000, 0.2)" and data["correlation"][0][1] == 0.3
     table = xarray.load_dataset(out / "spread.nc", engine="scipy")

@@ -1,9 +1,12 @@
 """Pictures carry the data they are given, with units, and are written without a screen."""
 
+from dataclasses import replace
+
 import matplotlib.image
 import numpy as np
 import pytest
 
+from fem_impact import mesh
 from fem_impact.impact.collision import strike
 from fem_impact.impact.contact import Contact
 from fem_impact.impact.striker import Striker
@@ -97,3 +100,15 @@ def test_mobility_shows_every_peak(modes):
 def test_mobility_of_a_rigid_mass_needs_a_band():
     with pytest.raises(ValueError, match="band must be given"):
         figures.mobility(Modes.rigid(1.0), None)
+
+
+def test_names_between_dollar_signs_are_no_formulas(tmp_path, monkeypatch):
+    name = r"a$\frac{$b"
+    plate = mesh.rectangle(0.3, 0.2, size=0.1)
+    left, right, whole = (plate.edges[each] for each in ("left", "right", "boundary"))
+    named = replace(plate, edges={name: left, "x$": right, "boundary": whole})
+    monkeypatch.setitem(matplotlib.rcParams, "text.usetex", True)  # as a file in the working folder may say
+    monkeypatch.setitem(matplotlib.rcParams, "svg.fonttype", "none")
+    figures.save(tmp_path / "edges.svg", figures.edges(named))
+    text = (tmp_path / "edges.svg").read_text()
+    assert f">{name}<" in text and ">x$<" in text

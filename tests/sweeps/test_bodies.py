@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
+from fem_impact._base import identity
 from fem_impact.model.target import Target
 from fem_impact.sweeps import bodies
 
@@ -111,7 +112,7 @@ def test_points_off_the_body_and_wrong_axes_are_told_before_the_work():
 
 
 @pytest.mark.slow
-def test_kept_vectors_serve_the_same_map_only(tmp_path):
+def test_kept_vectors_serve_the_same_map_only(tmp_path, monkeypatch):
     def found(tolerance=1e-2, mass=0.03, keep=tmp_path / "kept.npz"):
         over = {"mass": [0.01, mass], "at": [AT, (0.1, 0.2)]}
         return bodies.body_of(
@@ -134,3 +135,7 @@ def test_kept_vectors_serve_the_same_map_only(tmp_path):
     assert (tmp_path / "kept.npz").read_bytes() != before
     (tmp_path / "kept.npz").write_bytes(before[:100])
     assert_allclose(found().modes.omega, first.modes.omega, rtol=1e-9)
+    monkeypatch.setattr(identity, "program", lambda: "another version")
+    before = (tmp_path / "kept.npz").read_bytes()
+    found()
+    assert (tmp_path / "kept.npz").read_bytes() != before

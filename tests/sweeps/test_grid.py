@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.impact import collision
-from fem_impact.sweeps import grid, solving
+from fem_impact.sweeps import cells, grid, solving
 
 AT = (0.465, 0.3)
 
@@ -37,6 +37,17 @@ def test_a_map_as_the_design_says_it():
     assert scene["target"]["mass"] == 0.2
     assert len(scene["target"]["frequencies"]) == 80
     assert (table.failure == "").all()
+
+
+@pytest.mark.parametrize("also", [{}, {"loss": [0.0, 0.3]}, {"target_mass": [0.1, 2.0]}, {"at": [AT, (0.7, 0.45)]}])
+def test_a_cell_has_the_same_bits_whatever_is_computed_with_it(also):
+    base = cells.Case(plate(), stick(), fi.Contact.linear(1e5), np.array(AT), 1.0)
+    axes = cells.checked_axes(base, {"mass": np.geomspace(0.01, 0.2, 8), **also})
+    whole = grid.Grid(base, axes, 1e-3, True, 5e3, {})
+    expected, _ = grid.solve(whole, 0, whole.n_cases)
+    starts = range(0, whole.n_cases, 3)
+    parts = [grid.solve(replace(whole, kernels={}), i, min(i + 3, whole.n_cases))[0] for i in starts]
+    assert np.hstack(parts).tobytes() == expected.tobytes()
 
 
 VALUES = {

@@ -38,7 +38,7 @@ def test_the_body_of_a_scene_is_kept(found, tmp_path):
 
 
 def test_an_unknown_structure_needs_a_scene(found):
-    body = fi.Modes.from_arrays([500.0], [[1.0]], points=[[0.0]], mass=1.0)
+    body = fi.Modes.from_arrays([500.0], [[1.0]], points=[[0.0]], mass=1.0, complete=True)
     hit = fi.strike(body, fi.Striker.rigid(0.1), LAW, at=[0.0], speed=1.0)
     taps = [fi.measure(hit, rate=25600.0)]
     made = fi.fit(

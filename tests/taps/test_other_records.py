@@ -126,7 +126,7 @@ def test_a_spike_is_no_tap_of_this_hammer(force, tmp_path):
 @pytest.mark.slow
 def test_five_taps_on_an_unknown_structure_are_predicted_to_their_noise(tmp_path):
     body = fi.Modes.from_arrays(
-        [700.0, 2100.0, 5200.0], [[1.1, 0.9, 0.8]], points=[[0.0]], mass=1.0, damping_ratio=0.03
+        [700.0, 2100.0, 5200.0], [[1.1, 0.9, 0.8]], points=[[0.0]], mass=1.0, damping_ratio=0.03, complete=True
     )
     force = record(struck(body, [0.0]))
     time = np.arange(len(force)) / RATE

@@ -396,3 +396,11 @@ def test_the_axis_of_time_is_in_doubt_where_a_table_has_many_rows(tmp_path, n_ta
     np.savez(tmp_path / "taps.npz", force=force, rate=RATE)
     notes = " ".join(readers.numpy_file(tmp_path / "taps.npz").notes)
     assert ("was taken as time" in notes) == doubt
+
+
+def test_a_wav_beyond_full_scale_says_so(tmp_path):
+    values = np.zeros((2000, 2), np.float32)
+    values[500:520] = [0.9, 3e38]
+    wavfile.write(tmp_path / "t.wav", int(RATE), values)
+    *_, notes, _ = recording(tmp_path / "t.wav")
+    assert notes == "channel 2 reaches 3e+38, but full scale is 1: it has a unit of its own, or is damaged"

@@ -48,6 +48,31 @@ def test_taps_are_found_in_a_long_record_and_double_hits_stay_together(tmp_path)
     assert apart.n_taps == 4
 
 
+@pytest.mark.parametrize("resonance", [None, 8e3])
+def test_a_second_touch_of_a_twentieth_is_told_from_the_ringing_of_a_rig(resonance):
+    plate = fi.analytic.rectangle(1.0, 0.7, mass=2.0, first_frequency=60.0, n_modes=150, damping_ratio=0.01)
+    hit = fi.strike(plate, fi.Striker.rigid(0.1), fi.Contact.hertz(2e8), at=(0.31, 0.27), speed=1.0, tolerance=1e-2)
+    assert hit.n_impacts == 2 and hit.impacts[1].peak_force < 0.05 * hit.peak_force
+    wall = fi.strike(fi.Modes.rigid(1e4), fi.Striker.rigid(0.1), fi.Contact.hertz(2e8), at=None, speed=1.0)
+    rig = {"rate": RATE, "resonance": resonance, "resonance_damping": 0.03, "noise": 1e-3, "rng": 1}
+    assert [int(fi.measure(each, **rig).n_pulses[0]) for each in (hit, wall)] == [2, 1]
+
+
+@pytest.mark.parametrize("noise", [0.0, 5e-3])
+def test_a_second_rise_of_seven_hundredths_is_a_pulse_above_the_noise_of_its_record(noise):
+    first, second = np.zeros((2, 400))
+    first[50:63] = np.sin(np.pi * (np.arange(13) + 0.5) / 13)
+    second[90:110] = 0.07 * np.sin(np.pi * (np.arange(20) + 0.5) / 20)
+    one, two = np.array([first, first + second]) + noise * np.random.default_rng(2).standard_normal((2, 400))
+    taps = fi.Taps.from_arrays(100.0 * np.array([one, two]), rate=RATE)
+    assert taps.n_pulses.tolist() == [1, 2]
+    assert taps.impulse[1] / taps.impulse[0] == pytest.approx(1.108, abs=0.02)  # 7 % for 20 samples instead of 13
+    told = fi.Taps.from_arrays(taps.force, rate=RATE, pulse=10.0)
+    assert told.n_pulses.tolist() == told.pick([0, 1]).n_pulses.tolist() == [1, 1]
+    with pytest.raises(ValueError, match="pulse must be positive"):
+        fi.Taps.from_arrays(taps.force, rate=RATE, pulse=0.0)
+
+
 def test_a_force_that_pulls_is_turned_around(tmp_path):
     np.savez(tmp_path / "t.npz", force=-record([5000], offset=0.0), rate=RATE)
     taps = fi.read_taps(tmp_path / "t.npz")
@@ -98,7 +123,9 @@ def test_parts_of_a_table():
     two = taps.pick([0, 2])
     assert two.labels == ("tap 1", "tap 3") and np.array_equal(two.force[1], taps.force[2])
     cut = taps.between(5e-4, 2e-3)
-    assert cut.time[0] == 0.0 and np.allclose(cut.onset, taps.onset - 5e-4, atol=1 / RATE)
+    assert cut.time[[0, -1]] == pytest.approx([0.0, 1.5e-3], abs=1 / RATE) and np.allclose(
+        cut.onset, taps.onset - 5e-4, atol=1 / RATE
+    )
     assert np.allclose(cut.peak, taps.peak)
 
 

@@ -53,7 +53,7 @@ def test_the_cell_behind_a_rigid_tip_misses_its_share_of_the_force():
 
 
 def test_the_mode_of_a_hammer_shows_behind_its_tip():
-    hammer = fi.Modes.from_arrays([0.0, 3000.0], [[10.0**0.5, 10.0**0.5]], points=[[0.0]], mass=0.1)
+    hammer = fi.Modes.from_arrays([0.0, 3000.0], [[10.0**0.5, 10.0**0.5]], points=[[0.0]], mass=0.1, complete=True)
     law = fi.Touch(fi.Contact.linear(4e6), 0, None, first_at=[0.0])
     hit = fi.collide([hammer], [law], speeds=[1.0], tolerance=1e-6)
     tap = fi.measure(hit, rate=RATE, tip_mass=0.01, duration=0.02)
@@ -65,7 +65,9 @@ def test_the_mode_of_a_hammer_shows_behind_its_tip():
 
 
 def test_a_response_is_the_motion_of_the_target():
-    plate = fi.Modes.from_arrays([400.0], [[1.5], [0.8]], points=[[0.0], [1.0]], mass=0.5, damping_ratio=0.02)
+    plate = fi.Modes.from_arrays(
+        [400.0], [[1.5], [0.8]], points=[[0.0], [1.0]], mass=0.5, damping_ratio=0.02, complete=True
+    )
     hit = fi.strike(plate, fi.Striker.rigid(0.05), fi.Contact.linear(2e5), at=[0.0], speed=1.0, tolerance=1e-6)
     tap = fi.measure(hit, rate=51200.0, at=[[1.0]], duration=0.03)
     late = (tap.time > 0.004) & (tap.time < 0.028)

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import fem_impact as fi
-from fem_impact.taps import transfer
+from fem_impact import cli
+from fem_impact.modes import universal_files
+from fem_impact.taps import readers, transfer
 
 RATE = 12800.0  # [Hz]
 
@@ -12,7 +15,7 @@ RATE = 12800.0  # [Hz]
 @pytest.fixture(scope="module")
 def body():
     return fi.Modes.from_arrays(
-        [180.0, 640.0], [[1.2, 0.9], [0.7, -1.1]], points=[[0.0], [1.0]], mass=1.0, damping_ratio=0.02
+        [180.0, 640.0], [[1.2, 0.9], [0.7, -1.1]], points=[[0.0], [1.0]], mass=1.0, damping_ratio=0.02, complete=True
     )
 
 
@@ -60,7 +63,7 @@ def test_windows(body):
 
 def test_modes_are_paired_by_shape_although_their_order_changed(body):
     other = fi.Modes.from_arrays(
-        [170.0, 200.0, 660.0], [[0.1, 1.2, 0.9], [1.3, 0.7, -1.1]], points=[[0.0], [1.0]], mass=1.0
+        [170.0, 200.0, 660.0], [[0.1, 1.2, 0.9], [1.3, 0.7, -1.1]], points=[[0.0], [1.0]], mass=1.0, complete=True
     )
     pairs = fi.matched(body, other)
     assert [pair.computed for pair in pairs] == [1, 2] and all(pair.mac > 0.999 for pair in pairs)
@@ -87,8 +90,59 @@ def test_universal_files_keep_taps_and_functions(body, tmp_path):
     transfer.write_uff(tmp_path / "h.uff", found)
     back = transfer.read_frf(tmp_path / "h.uff")
     assert np.allclose(back.H.values, found.H.values, rtol=1e-4, atol=1e-6)
-    with pytest.raises(ValueError, match="holds no frequency responses"):
-        transfer.read_frf(tmp_path / "t.uff")
+    with pytest.raises(
+        ValueError, match=r"holds time records \(data set 58, function type 1\), no frequency responses"
+    ):
+        fi.frf(tmp_path / "t.uff")
+
+
+def oscillator(path):
+    """A universal file with the mobility-like response of an oscillator at 99 Hz; the response and its data set."""
+    pyuff = pytest.importorskip("pyuff")
+    frequency = np.arange(1.0, 401.0)
+    made = xr.Dataset(
+        {"H": (("frequency", "channel"), 1.0 / (100.0**2 - frequency**2 + 20j * frequency)[:, None])},
+        {"frequency": frequency, "channel": ["tip"], "units": ("channel", ["m/s/N"])},
+    )
+    transfer.write_uff(path, made)
+    return made, pyuff.UFF(str(path)).read_sets(0)
+
+
+def test_frequency_responses_of_a_universal_file_are_read_or_named(tmp_path):
+    path = tmp_path / "h.uff"
+    made, one = oscillator(path)
+    plain = transfer.arrays(path)
+    assert np.allclose(plain["H"], made.H, rtol=1e-4) and "coherence" not in plain and plain["units"] == ["m/s/N"]
+    with pytest.raises(
+        ValueError, match=r"holds frequency responses \(data set 58, function type 4\), no time records"
+    ):
+        readers.arrays(path)
+    with pytest.raises(ValueError, match="58, of which 58 are time records or frequency responses"):
+        universal_files.arrays(path, "z")
+    feet = {"type": 164, "units_code": 2, "units_description": "foot", "temp_mode": 1, "length": 2.0, "force": 0.5,
+            "temp": 1.0, "temp_offset": 1.0}  # fmt: skip
+    sure = one | {"func_type": 6, "ord_data_type": 4, "data": np.full(400, 0.75)}
+    scaled = transfer.arrays(written(path, feet, one, sure))
+    assert np.allclose(scaled["H"], 0.25 * made.H, rtol=1e-4) and (scaled["coherence"] == 0.75).all()
+    with pytest.raises(ValueError, match="responses at other frequencies for 'tip' than for 'tip'"):
+        transfer.arrays(written(path, one, one | {"x": 2.0 * one["x"], "abscissa_inc": 2.0}))
+    with pytest.raises(ValueError, match="a response 'tip' that is no motion per force"):
+        transfer.arrays(written(path, one | {"ordinate_spec_data_type": 2}))
+
+
+def written(path, *sets):
+    pytest.importorskip("pyuff").UFF(str(path)).write_sets(list(sets), mode="overwrite")
+    return path
+
+
+@pytest.mark.slow
+def test_the_prompt_lists_peaks_of_frequency_responses_in_a_file(tmp_path, capsys):
+    made, _ = oscillator(tmp_path / "h.uff")
+    assert cli.main(["frf", str(tmp_path / "h.uff"), "--out", str(tmp_path / "h.csv")]) == 0
+    assert "99 Hz" in capsys.readouterr().out
+    assert np.loadtxt(tmp_path / "h.csv", delimiter=",", skiprows=1)[:, 1] == pytest.approx(
+        made.H.values[:, 0].real, rel=1e-3
+    )
 
 
 def test_wrong_records_are_refused(body):

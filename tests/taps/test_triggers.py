@@ -22,17 +22,35 @@ def test_a_gap_decides_what_is_one_tap():
 
 def test_pulses_are_counted_once_each():
     pulse = np.sin(np.pi * np.arange(11) / 10)
-    assert triggers.n_pulses(np.pad(pulse, 20)) == 1
-    assert triggers.n_pulses(np.concatenate([pulse, np.zeros(5), 0.3 * pulse])) == 2
-    assert triggers.n_pulses(np.concatenate([pulse, np.zeros(5), 0.07 * pulse])) == 1  # the ringing of a filter
-    assert triggers.n_pulses(np.zeros(30)) == 0
+    assert triggers.pulses(np.pad(pulse, 20)) == [(21, 30)]
+    assert len(triggers.pulses(np.concatenate([pulse, np.zeros(5), 0.3 * pulse]))) == 2
+    assert len(triggers.pulses(np.concatenate([pulse, np.zeros(5), 0.002 * pulse]))) == 2  # above what noise allows
+    assert triggers.pulses(np.zeros(30)) == []
+
+
+@pytest.mark.parametrize(("low", "second", "n"), [(0.04, 0.5, 2), (0.06, 0.5, 1), (0.02, 0.07, 2), (0.04, 0.07, 1)])
+def test_pulses_that_touch_are_apart_below_a_twentieth_of_the_peak_or_half_of_the_smaller(low, second, n):
+    force = np.interp(np.arange(41), [0, 10, 20, 30, 40], [0.0, 1.0, low, second, 0.0])
+    assert len(triggers.pulses(force)) == n
+
+
+def test_ringing_and_bits_are_no_pulses_and_a_push_above_them_is():
+    pulse, k = np.sin(np.pi * np.arange(11) / 10), np.arange(1, 60)
+    ringing = 0.03 * np.exp(-k / 20.0) * np.sin(2.0 * np.pi * k / 7.3)  # from 2.7 % on, pushing first
+    tap = np.concatenate([np.zeros(20), pulse, ringing])
+    assert len(triggers.pulses(tap)) == 1
+    tap[60:71] += 0.1 * pulse
+    assert len(triggers.pulses(tap)) == 2 and len(triggers.pulses(tap, least=0.15)) == 1
+    bits = np.concatenate([np.zeros(20), np.round(512 * pulse) / 512, np.zeros(50)])
+    bits[[50, 60]] = 1.0 / 512.0
+    assert len(triggers.pulses(bits)) == 1
 
 
 def test_noise_is_no_pulse_and_drift_no_rest():
     rng = np.random.default_rng(2)
     pulse = np.pad(np.sin(np.pi * np.arange(11) / 10), (500, 3000))
     noisy = pulse + 0.04 * rng.standard_normal(len(pulse))
-    assert triggers.n_pulses(noisy) > 1  # without knowledge of the noise
+    assert len(triggers.pulses(noisy, least=0.08)) > 1  # without knowledge of the noise
     ((first, end),) = triggers.pulses(noisy, 0.04)
     assert abs(first - 501) <= 2 and abs(end - 510) <= 2
     assert triggers.pulses(np.zeros(30)) == []
@@ -65,7 +83,7 @@ def test_a_second_hit_is_found_in_strong_noise():
     pulse = np.sin(np.pi * np.arange(101) / 100)
     force = np.concatenate([np.zeros(900), pulse, np.zeros(100), 0.53 * pulse, np.zeros(900)])
     noisy = force + 0.1 * np.random.default_rng(4).standard_normal(len(force))  # six deviations are 0.6
-    assert triggers.n_pulses(np.convolve(noisy, np.ones(16) / 16.0, mode="same"), 0.1) == 2
+    assert len(triggers.pulses(np.convolve(noisy, np.ones(16) / 16.0, mode="same"), 0.1)) == 2
 
 
 def cut(force, *, rate=1000.0, **options):
@@ -86,7 +104,8 @@ def test_drift_is_told_from_a_fifth_of_the_trigger_on(share, told):
 def test_a_pulse_of_a_tenth_of_a_second_is_no_drift():
     force = np.zeros(4000)
     force[2010:2100] = 10.0
-    assert cut(force)[0].max() > 9.99
+    for offset in (0.0, 3.0):
+        assert np.ptp(cut(force + offset)[0]) == cut(force + offset)[0].max() == pytest.approx(10.0, rel=1e-3)
 
 
 @pytest.mark.parametrize(("lead", "told"), [(6, True), (10, False)])

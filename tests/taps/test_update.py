@@ -71,6 +71,7 @@ def test_constants_that_only_act_together_are_called_untold():
             np.ones((1, 3)),
             points=[[0.0]],
             mass=1.0,
+            complete=True,
         )
 
     found = fi.update(body, [110.0, 330.0, 770.0], {"E": (0.1, 10.0), "rho": (0.1, 10.0)})
@@ -93,3 +94,19 @@ def test_wrong_arguments_are_refused():
         fi.update(DISK, [100.0], {"striker.mass": (1.0, 2.0)})
     with pytest.raises(ValueError, match="must name numbers in tables of the scene"):
         fi.update(DISK, [100.0], {"supports.boundary": (1.0, 2.0)})
+
+
+@pytest.mark.parametrize("extra", [[], [230.0], [230.0, 700.0]])
+def test_a_peak_that_is_no_mode_stays_unpaired_and_is_told(extra):
+    def body(values):
+        along, across = np.sqrt(values["E"]), np.sqrt(values["G"])
+        table = sorted([*(100.0 * along * i**2 for i in range(1, 5)), *(140.0 * across * i**1.5 for i in range(1, 5))])
+        return fi.Modes.from_arrays(table, np.ones((1, 8)), points=[[0.0]], mass=1.0)
+
+    true = body({"E": 1.3, "G": 0.8}).frequencies[[0, 1, 3, 4, 5, 6]] * (
+        1.0 + 1e-3 * np.random.default_rng(2).standard_normal(6)
+    )
+    found = fi.update(body, np.sort([*true, *extra]), {"E": (0.3, 3.0), "G": (0.3, 3.0)})
+    assert found.unpaired == tuple(extra) and len(found.pairs) == 6
+    assert found.values["E"] == pytest.approx(1.3, rel=5e-3) and found.values["G"] == pytest.approx(0.8, rel=5e-3)
+    assert found.error < 3e-3 and ("left out: 230 Hz" in found.summary()) == bool(extra)

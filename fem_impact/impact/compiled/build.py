@@ -6,6 +6,7 @@ edit in another file that they call into. Here every one carries a stamp of the 
 
 import hashlib
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,13 @@ import numpy as np
 
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"  # else as plain Python, without the import of numba
 if COMPILED:
+    READ_BEFORE = "numba" in sys.modules
     from numba import config, njit
     from numba.core.options import DefaultOptions
 
+    if not READ_BEFORE:  # numba takes from a file in the working folder whose compiled code it runs: not for us
+        config._config_fname = os.devnull
+        config.reload_config()
     COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # a file may say so too
     UNCOUNTED = hasattr(DefaultOptions, "_nrt")  # whether the compiler can leave out the counting of references
 LOOSE = {"reassoc", "contract"}  # sums may be reordered to run in parallel lanes; NaN and infinity keep their meaning

@@ -18,7 +18,7 @@ from .law import special_of
 from .propagation import any_of, commit, restore
 from .record import EXHAUSTED, FAILED, FINISHED, FULL, SETTLED, total_energy
 from .rounding import OVERFLOW
-from .stretched import Stretch, attempt, finish, flown, leave_open, made_room, stretching_energy, unseen
+from .stretched import Stretch, attempt, finish, flown, made_room, stretching_energy, unseen
 
 from .frame import (  # isort: skip
     LEVELS, LOST, NOTHING, TAKEN, begin, course_of, fly, followed, locate, made_run, moving, over, remembered,
@@ -171,8 +171,6 @@ def follow(scene, tables, room, limits, run, steps):
         if not finite(contacts):
             status = FAILED
             break
-        if room is not None:
-            leave_open(contacts, limits.depth)
         record(contacts, course, steps[count[STEPS]], tables.sums[slot], h, blind)
         if tables.ramp and fine == 0 and any_of(contacts.force):
             count[FALLBACKS] += 1

@@ -219,7 +219,8 @@ def record(contacts, course, row, sums, h, blind):
     row[BLIND] = 1.0 if blind else 0.0
     for i in range(y.size):
         first = remember(contacts, i, row)
-        row[first + CLOSED] = 1.0 if f[i] > 0.0 or contacts.pressed[i] else 0.0
+        closed = contacts.pressed[i] or (f[i] > 0.0 and (blind or start[i] >= 0.0))  # else it ends where they touch
+        row[first + CLOSED] = 1.0 if closed else 0.0
         row[first + PUSH] = f[i] - 0.5 * s[i]
         row[first + PUSH + 1] = s[i]
         mean = contacts.free[FREE_MEAN, i]

@@ -20,6 +20,8 @@ from .rounding import REPEATED
 PATIENT = 4  # [-] looks of a flight that make do with the table of a step up to four times shorter than allowed
 GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before; does not change the result
 SLOW_LOOKS = 300  # [-] looks of a flight that lead hardly on before a stepping scheme takes over
+AWAY = 1e14  # [-] over rounding of the approach: bodies that come no nearer than so much of it, 2 %, touch by no error
+LASTING = 200  # [-] looks after which a proof that nothing touches again does without that
 ONSET, NEVER, LATER, SLOW, UNPROVED = range(5)  # how a flight ends, see `find_onset`
 LOOK_LIMIT = 20_000_000  # [-] looks ahead times modes in one free flight: a time limit of some 0.1 s
 
@@ -107,6 +109,7 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
     bounds = np.empty((m, 6))
     before = np.empty((m, 2))
     wait = 0.0
+    away = AWAY * limits.depth
     old_q = q.copy()
     old_p = p.copy()
     for look in range(LOOK_LIMIT // (q.size + 50)):
@@ -124,7 +127,7 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
             r2 = bounds[i, RIGID_ACCELERATION]
             reach = bounds[i, REACH]
             hardest = bounds[i, HARDEST]
-            parted = r1 <= limits.still and r2 <= 0.0 and r0 + reach <= limits.depth
+            parted = r1 <= limits.still and r2 <= 0.0 and r0 + reach <= (limits.depth if look > LASTING else -away)
             if parted and (look == 0 or before[i, 1] <= 0.0):
                 continue
             d, v = approach(shape, offset, i, q, p)
@@ -133,7 +136,7 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
             before[i, 0] = d
             before[i, 1] = v
             if parted:
-                if v > 0.0:  # it turns back later, at most from there
+                if v > 0.0 and r0 + reach > -away:  # it turns back later, at most from there
                     out_miss[0] = max(out_miss[0], r0 + reach)
                 continue
             final = False
@@ -147,6 +150,8 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
             bound = max(bound, quadratic_wait(d, max(0.0, r1 + bounds[i, FASTEST]), max(r2, 0.0)))
             if r2 <= 0.0 and r0 + reach <= 0.0:
                 bound = max(bound, quadratic_wait(r0 + reach, max(0.0, r1), 0.0))
+                if hardest > 0.0:  # it cannot touch, but turns back near enough to be told
+                    bound = min(bound, bounds[i, FASTEST] / hardest)
             if bound < wait:
                 wait = bound
                 first = i

@@ -11,11 +11,15 @@ import numpy as np
 
 from .build import ONE, ZERO, inner, outer
 from .events import hermite_root, letting_go, lowest
-from .law import FELT, at, dent, growth, soaked, spring_with, steepness, stored
-from .layout import APPROACH, CLOSED, HEAD, KIND, LENGTH, LOSS, PUSH, RATE, SPEED, START, WIDTH
+from .law import FELT, POWER, at, dent, growth, soaked, spring_with, steepness, stored
+from .layout import APPROACH, CLOSED, HEAD, KIND, LENGTH, LOSS, PUSH, RATE, REMEMBERED, SPEED, START, WIDTH
+from .rounding import NEAR
 
 FEW, CLOSER = 3, 16  # [-] parts into which the search for a largest force cuts all steps, and what is left, thrice
 HIGH_ENOUGH = 0.95  # [-] of the largest force: only steps with so much are looked at more closely
+# [-] error of the peak force over the misfit in `force_missed`, for a power law and for one with loss, layers or memory
+MISFIT = 1.5, 12.0
+NEAR_PEAK = 0.8, 0.35  # [-] that misfit counts only above this fraction of the peak force, for both
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = range(6)  # why a run ended
 FULL = -1  # it did not: its record is full
 
@@ -164,6 +168,30 @@ def nearest_turn(steps, now, law, n_coefficients, miss):
     return nearest / farthest if farthest > 0.0 else np.inf
 
 
+@outer()
+def force_missed(steps, now, law, n_coefficients, peak):
+    """How far the largest mean forces of steps are from Simpson's rule for the law on the cubic through both ends.
+
+    Over the peak force, and times MISFIT, the error of that.
+    """
+    worst = 0.0
+    for i in range(law.shape[0]):
+        rough = int(law[i, LOSS] > 0.0 or (law.shape[1] == WIDTH and law[i, KIND] != POWER))
+        for row in range(steps.shape[0]):
+            first = HEAD + (PUSH + n_coefficients) * i
+            if steps[row, first + CLOSED] == 0.0:
+                continue
+            begin = force_within(steps, now, law, n_coefficients, row, i, 0.0)
+            middle = force_within(steps, now, law, n_coefficients, row, i, 0.5)
+            final = force_within(steps, now, law, n_coefficients, row, i, 1.0)
+            if max(begin, middle, final) > NEAR_PEAK[rough] * peak:
+                mean = steps[row, first + PUSH]
+                if n_coefficients > 1:
+                    mean += 0.5 * steps[row, first + PUSH + 1]
+                worst = max(worst, MISFIT[rough] * abs(mean - (begin + 4.0 * middle + final) / 6.0))
+    return worst / peak
+
+
 @inner()
 def rate_at(steps, now, law, n_coefficients, i, first, time):
     """Rate of the force of contact i [N/s] at a time that a step from the first on holds; zero where none acts."""
@@ -268,18 +296,47 @@ def peak_in(steps, now, law, n_coefficients, row, i, looks):
     return peak
 
 
-@outer()
-def find_impacts(steps, now, law, n_coefficients, looks, touch):
-    """Every unbroken push, (n_impacts, 5): start, end, peak force, impulse, contact; contact by contact.
+@inner()
+def rate_within(steps, now, law, n_coefficients, row, i, part):
+    """Approach rate of contact i at a fraction of a step, by the cubic through both ends."""
+    d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
+    if part <= 0.0 or part >= 1.0:
+        return v0 if part <= 0.0 else v1
+    h = steps[row, LENGTH]
+    a = 2.0 * (d0 - d1) + h * (v0 + v1)
+    b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
+    return v0 + part * (2.0 * b + 3.0 * a * part) / h
 
-    Bodies that touch and approach no faster than ``touch`` [m/s] before the first push press from the start of that
-    time. The peak is sought with ``looks`` per step in the step with the largest of a few and in those beside it: where
-    it lies at the end of a step, rounding decides which holds the larger look.
+
+@inner()
+def stays(steps, row, first, slack):
+    """Whether two bodies touch at the start of a step, within ``slack`` [m], and stay there."""
+    return abs(steps[row, first]) <= slack and abs(steps[row, first + SPEED]) * steps[row, LENGTH] <= slack
+
+
+@inner()
+def still_pressed(now, law, i, d):
+    """Whether contact i presses at the end of a run, where the approach from its dent is d."""
+    if law.shape[1] == WIDTH and law[i, KIND] == FELT and now[REMEMBERED, i] < 0.0:
+        return False
+    return d > NEAR * abs(now[APPROACH, i])
+
+
+@outer()
+def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
+    """Every unbroken push, (n_impacts, 8), contact by contact.
+
+    Its start, end, peak force, impulse and contact; how fast the bodies approach at its start and part at its end; and
+    since when they have touched at rest, infinity if they met. A rate up to ``still`` [m/s] is rest, an approach up to
+    ``slack`` [m] either way a touch. They approach with 0 where they touched before or press each other as the run
+    begins; where they do as it ends, they part with NaN. The peak is sought with ``looks`` per step in the step with
+    the largest of a few and in those beside it: where it lies at the end of a step, rounding decides which holds the
+    larger look.
     """
     n_steps = steps.shape[0]
     m = law.shape[0]
     width = PUSH + n_coefficients
-    result = np.empty((8, 5))
+    result = np.empty((8, 8))
     count = ZERO
     for i in range(m):
         first = HEAD + width * i
@@ -293,7 +350,18 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
                 result = resized(result, count, 2 * count)
             begin = row
             start = steps[row, START] + lower * steps[row, LENGTH]
+            met = rate_within(steps, now, law, n_coefficients, row, i, lower)
+            since = np.inf
+            if abs(steps[row, first]) <= slack:
+                back = row
+                while back >= 0 and (back == row or stays(steps, back, first, slack)):
+                    if abs(steps[back, first + SPEED]) <= still:
+                        since = steps[back, START]
+                    back -= 1
+            if met <= still or since < np.inf or (row == 0 and steps[row, first] > slack):
+                met = 0.0
             end = start
+            part = 0.0
             impulse = 0.0
             peak = 0.0
             peak_row = row
@@ -306,6 +374,7 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
                         peak = f
                         peak_row = row
                 end = steps[row, START] + upper * steps[row, LENGTH]
+                part = upper
                 row += 1
                 if upper < 1.0 or row == n_steps:
                     break
@@ -314,14 +383,17 @@ def find_impacts(steps, now, law, n_coefficients, looks, touch):
                     break
             for near in range(max(begin, peak_row - 1), min(row - 1, peak_row + 1) + 1):
                 peak = max(peak, peak_in(steps, now, law, n_coefficients, near, i, looks))
-            if steps[begin, first] == 0.0:
-                while begin > 0 and steps[begin - 1, first] == 0.0 and abs(steps[begin - 1, first + SPEED]) <= touch:
-                    begin -= 1
-                    start = steps[begin, START]
+            left = -rate_within(steps, now, law, n_coefficients, row - 1, i, part)
+            low = dent(law, i, memory_of(steps, law, n_coefficients, row - 1, i))
+            if row == n_steps and part >= 1.0 and still_pressed(now, law, i, now[APPROACH, i] - low):
+                left = np.nan
             result[count, 0] = start
             result[count, 1] = end
             result[count, 2] = peak
             result[count, 3] = impulse
             result[count, 4] = i
+            result[count, 5] = met
+            result[count, 6] = left
+            result[count, 7] = since
             count += 1
     return resized(result, count, count)

@@ -21,7 +21,6 @@ import numpy as np
 
 from .build import LOOSE, TRUE, ZERO, inner, outer
 from .bundles import Scene
-from .events import LOCATED
 from .exact import made_tables, predict, solve_step
 from .frame import LEVELS, begin, course_of, made_run, moving, touching
 from .propagation import any_of, commit, lane_table, restore
@@ -313,16 +312,6 @@ def unseen(bodies, contacts, h, level):
         if max(start, end) + ripple > 0.0 and ripple > RIPPLE * (abs(start) + abs(end)):
             return 1
     return 0
-
-
-@inner()
-def leave_open(contacts, depth):
-    """Leave out the force of an open contact that ends a step just at its onset, or the step would count as closed."""
-    for i in range(contacts.end.size):
-        start, end = contacts.now[APPROACH, i], contacts.end[i]
-        if not contacts.pressed[i] and end <= max(depth, LOCATED * (abs(start) + abs(end))):
-            contacts.force[i] = 0.0
-            contacts.slope[i] = 0.0
 
 
 @inner()

@@ -275,6 +275,7 @@
         put($(`${name}-said`), text);
         sliders[name].setAttribute("aria-valuetext", text);
       }
+      if ("note" in got) put($("note"), got.note);
       if ("failed" in got) {
         for (const cell of Object.values(cells)) put(cell, "—");
         put($("verdict"), sentence(got.failed));
@@ -337,6 +338,7 @@
         root.dataset.map = JSON.stringify([got.mass, got.stiffness, got.columns, got.exact]);
       }
     },
+    note(got) { put($("note"), sentence(got.text)); },
     sound(got) {
       put($("heard"), got.note);
       const player = $("player");

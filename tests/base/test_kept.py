@@ -1,0 +1,41 @@
+"""Kept arrays are read as they were written, or not at all."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from fem_impact._base import kept
+
+ARRAYS = {"omega": np.arange(3.0), "notes": np.array(["a", "b"]), "mass": 0.2}
+
+
+@pytest.fixture
+def path(tmp_path):
+    kept.write(tmp_path / "modes.npz", "key", ARRAYS)
+    return tmp_path / "modes.npz"
+
+
+def test_what_was_written_is_read(path):
+    found = kept.read(path, "key")
+    assert set(found) == set(ARRAYS)
+    for name, array in ARRAYS.items():
+        assert_array_equal(found[name], array)
+    assert kept.read(path, "other") is None and kept.read(path.with_name("none"), "key") is None
+
+
+def test_no_file_with_a_flipped_bit_is_read(path):
+    raw = path.read_bytes()
+    for place in range(0, 8 * len(raw), 61):
+        damaged = bytearray(raw)
+        damaged[place // 8] ^= 1 << place % 8
+        path.write_bytes(damaged)
+        assert kept.read(path, "key") is None, place
+
+
+@pytest.mark.parametrize("raw", [b"", b"PK", 40 * b"\0"])
+def test_no_other_file_is_read(path, raw):
+    path.write_bytes(raw)
+    assert kept.read(path, "key") is None
+    path.unlink()
+    path.mkdir()
+    assert kept.read(path, "key") is None

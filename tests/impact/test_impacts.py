@@ -1,0 +1,214 @@
+"""What counts as an impact, when its force begins and ends, and with what speeds the bodies meet and part."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.impact import response
+
+GRAVITY = 9.81
+FLOOR = fi.Modes.rigid(1e9)
+
+
+def chain(masses, exponent, stiffnesses, gaps, speed, **options):
+    touches = [
+        fi.Touch(fi.Contact.power(k, exponent, gap=gap), i, i + 1) for i, (k, gap) in enumerate(zip(stiffnesses, gaps))
+    ]
+    balls = [fi.Modes.rigid(mass) for mass in masses]
+    return fi.collide(balls, touches, speeds=[speed, *[0.0] * (len(masses) - 1)], duration=0.05, **options)
+
+
+def slow_chain(tolerance):
+    """Five bodies, three of them touching, whose forces rise as slowly as the power 33 of time."""
+    masses = 0.982752, 0.171869, 0.212304, 0.530842, 0.661054
+    stiffnesses = 3.47887e11, 7.67257e11, 1.20156e12, 4.89698e11
+    return chain(masses, 2.5, stiffnesses, (0.0, 5.74532e-5, 0.0, 0.0), 0.32811, tolerance=tolerance)
+
+
+def random_chain(seed, tolerance):
+    rng = np.random.default_rng(seed)
+    n, exponent = int(rng.integers(3, 7)), float(rng.choice([1.0, 1.5, 2.5]))
+    stiffnesses = 10.0 ** rng.uniform(0.0, 0.7, n - 1) * {1.0: 1e6, 1.5: 1e8, 2.5: 2e11}[exponent]
+    gaps = np.where(rng.random(n - 1) < 0.6, 0.0, 10.0 ** rng.uniform(-6.0, -3.5, n - 1))
+    masses = np.exp(rng.uniform(np.log(0.1), 0.0, n))
+    return chain(masses.tolist(), exponent, stiffnesses, gaps, rng.uniform(0.2, 1.5), tolerance=tolerance)
+
+
+def assert_same_impacts(found, truth, within):
+    assert found.n_impacts == truth.n_impacts
+    assert_allclose(found.contact_time, truth.contact_time, rtol=within)
+    assert_allclose(found.peak_force, truth.peak_force, rtol=within)
+    assert_allclose(found.impulse, truth.impulse, rtol=within)
+
+
+# --- what is in contact ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-6])
+@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
+def test_bodies_that_touch_are_in_contact_from_when_force_acts_on_them(tolerance):
+    """Those beyond the gap touch from the start, and press each other when the gap is closed at 0.756 ms."""
+    hit = slow_chain(tolerance)
+    assert hit.n_impacts == 7
+    assert_allclose(hit.contact_time, 17.479156e-3, rtol=tolerance)  # collocation at 1e-9 and 1e-10
+    met = next(each for each in hit.impacts if each.contact == 1)
+    starts = [min(each.start for each in hit.impacts if each.contact == c) for c in range(4)]
+    assert starts == [0.0, met.start, met.start, met.start]
+
+
+@pytest.mark.parametrize("n", [3, 6])
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.5])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
+def test_a_ball_that_meets_others_presses_them_all_at_once(n, exponent, tolerance):
+    """Force reaches every one of touching rigid bodies at once, however slowly it rises there."""
+    hit = chain([0.1] * n, exponent, [1e8] * (n - 1), [1e-4, *[0.0] * (n - 2)], 0.5, tolerance=tolerance)
+    first = [min(each.start for each in hit.impacts if each.contact == c) for c in range(n - 1)]
+    assert_allclose(first, 1e-4 / 0.5, rtol=1e-9)
+
+
+def test_how_small_a_force_or_gap_counts_as_none_does_not_matter(monkeypatch):
+    histories = [blow.history for blow in (slow_chain(1e-3), random_chain(13, 1e-3))]
+    wanted = [history.impacts for history in histories]
+    for factor in (0.1, 10.0):
+        monkeypatch.setattr(response, "FAINT", factor * 1e-9)
+        monkeypatch.setattr(response, "TOUCH", factor * 1e-6)
+        assert [replace(history).impacts for history in histories] == wanted
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
+def test_impacts_of_random_chains_do_not_depend_on_the_tolerance(seed):
+    truth = random_chain(seed, 1e-7)  # errs by some 1e-8; collocation refuses 3 of these chains below
+    for tolerance in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
+        assert_same_impacts(random_chain(seed, tolerance), truth, tolerance)
+
+
+# --- speeds of meeting and parting -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("masses", [(0.1, 0.1), (0.02, 0.3)])
+def test_two_masses_and_a_linear_spring(masses):
+    k, speed, gap = 1e6, 0.7, 1e-4
+    hit = chain(masses, 1.0, [k], [gap], speed, tolerance=1e-8)
+    (impact,) = hit.impacts
+    reduced = masses[0] * masses[1] / sum(masses)
+    assert_allclose(impact.start, gap / speed, rtol=1e-9)
+    assert_allclose(impact.duration, np.pi * np.sqrt(reduced / k), rtol=1e-8)
+    assert_allclose([impact.approach_speed, impact.separation_speed], speed, rtol=1e-9)
+    assert_allclose(impact.restitution, 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-8])
+def test_each_impact_of_newtons_cradle_gives_back_the_speed(tolerance):
+    hit = chain([0.1] * 5, 1.5, [1e9] * 4, [0.0, 1e-3, 1e-3, 1e-3], 1.0, tolerance=tolerance)
+    assert [each.contact for each in hit.impacts] == [0, 1, 2, 3]
+    assert_allclose([each.approach_speed for each in hit.impacts], 1.0, rtol=1e-9)
+    assert_allclose([each.restitution for each in hit.impacts], 1.0, rtol=1e-9)
+
+
+def test_bodies_that_touched_before_have_no_restitution_of_an_impact():
+    hit = chain([0.1] * 3, 1.5, [1e9] * 2, [0.0, 0.0], 1.0, tolerance=1e-4)
+    found = {each.contact: each for each in hit.impacts[:2]}
+    assert found[0].restitution > 0.0
+    assert found[1].restitution is None and found[1].approach_speed == 0.0
+    assert found[1].separation_speed > 0.0
+
+
+@pytest.mark.parametrize("restitution", [0.3, 0.8])
+def test_the_restitution_of_each_bounce_is_that_of_the_law(restitution):
+    """Three bounces under gravity; the law gives its restitution at the speed of the first."""
+    law = fi.Contact.restituting(1e9, 1.5, restitution=restitution, speed=1.0)
+    ball = fi.Striker.rigid(0.1)
+    hit = fi.strike(FLOOR, ball, law, at=None, speed=1.0, striker_force=0.1 * GRAVITY, max_impacts=3, tolerance=1e-4)
+    first, second, _ = hit.impacts
+    assert_allclose(first.restitution, restitution, rtol=1e-2)  # the weight counts during the contact, too
+    assert_allclose(second.approach_speed, first.separation_speed, rtol=1e-6)
+    assert second.restitution > first.restitution  # a slower one loses less
+    assert_allclose(hit.restitution, np.prod([each.restitution for each in hit.impacts]), rtol=1e-6)
+
+
+# --- restitution of the blow -----------------------------------------------------------------------------------------
+
+
+def falling(duration, mass=0.5, force=GRAVITY * 0.5, **options):
+    """A hammer on a concrete slab."""
+    slab = fi.Plate(fi.Material(E=30e9, nu=0.2, rho=2400.0), thickness=0.1)
+    modes = fi.analytic.rectangle(2.0, 1.5, section=slab, n_modes=40)
+    rules = {"at": (0.8, 0.6), "speed": 1.0, "tolerance": 1e-2, "duration": duration, "residual": False, **options}
+    return fi.strike(modes, fi.Striker.rigid(mass), fi.Contact.hertz(1e9), striker_force=force, **rules)
+
+
+def test_the_restitution_of_a_falling_hammer_does_not_depend_on_the_duration():
+    found = [falling(duration).restitution for duration in (1e-3, 0.02, 0.05, 0.1)]
+    assert_allclose(found, found[0], rtol=1e-9)
+    assert_allclose(found[0], falling(1e-3, force=0.0).restitution, rtol=1e-3)  # its weight, for half a millisecond
+
+
+@pytest.mark.parametrize("height", [1e-3, 0.05])
+def test_a_body_dropped_from_rest_leaves_as_fast_as_it_came(height):
+    law = fi.Contact.linear(1e6, gap=height)
+    for duration in (1.2, 1.7):  # times that it takes to fall
+        time = duration * np.sqrt(2.0 * height / GRAVITY)
+        hit = fi.strike(
+            FLOOR, fi.Striker.rigid(0.1), law, at=None, speed=0.0, striker_force=0.1 * GRAVITY, duration=time
+        )
+        assert_allclose(hit.restitution, 1.0, rtol=1e-7)
+        assert_allclose(hit.impacts[0].approach_speed, np.sqrt(2.0 * GRAVITY * height), rtol=1e-7)
+
+
+def test_a_held_striker_rebounds_at_its_last_separation():
+    held = fi.Striker.rigid(0.1).held(fi.Hand(stiffness=200.0, force=1.0))
+    rules = {"at": None, "speed": 1.0, "tolerance": 1e-4}
+    short, long = (fi.strike(FLOOR, held, fi.Contact.linear(1e7), duration=t, **rules) for t in (1e-3, 5e-3))
+    assert short.n_impacts == long.n_impacts == 1
+    assert_allclose([short.restitution, long.restitution], 1.0, rtol=1e-7)
+
+
+def test_there_is_no_restitution_while_the_bodies_still_touch():
+    hit = falling(1e-4)
+    assert hit.restitution is None and hit.in_contact
+    assert hit.impacts[-1].restitution is None and hit.impacts[-1].separation_speed is None
+    assert "restitution none, still in contact" in hit.summary()
+    assert "none, still in contact" in hit._repr_html_()
+    told = json.loads(json.dumps(fi.export.plain(fi.export.numbers(hit)), allow_nan=False))
+    assert told["response"]["restitution"] is None and told["response"]["in_contact"] is True
+    assert told["impacts"][-1]["restitution"] is None
+    table = hit.to_xarray()
+    assert np.isnan(table.restitution) and np.isnan(table.impact_restitution[-1]) and table.attrs["in_contact"] == 1
+    with pytest.raises(fi.SimulationError, match="no gradient of restitution: none, still in contact"):
+        hit.gradient("restitution", "striker.mass")
+    assert not falling(1e-3).in_contact
+
+
+def test_gradients_of_the_restitution_of_a_falling_body_are_differences():
+    numbers = {"striker.mass": 0.5, "strike.speed": 1.0, "contact.gap": 2e-3}
+
+    def blow(mass, speed, gap):
+        law = fi.Contact.power(1e6, 1.5, loss=0.2, gap=gap)
+        body = fi.Modes.rigid(3.0)
+        return fi.strike(
+            body, fi.Striker.rigid(mass), law, at=None, speed=speed, striker_force=5.0, duration=0.012, tolerance=1e-8
+        )
+
+    found = blow(*numbers.values()).gradient("restitution", tuple(numbers))
+    for i, (name, value) in enumerate(numbers.items()):
+        low, high = (
+            blow(*(x * (1.0 + side * 1e-3 * (other == name)) for other, x in numbers.items())).restitution
+            for side in (-1.0, 1.0)
+        )
+        assert_allclose(found.slopes[i], (high - low) / (2e-3 * value), rtol=1e-4, atol=1e-7)
+
+
+def test_the_start_of_a_contact_behind_a_gap_moves_with_that_gap():
+    def blow(gap, speed):
+        return chain([0.1, 0.15, 0.12], 1.5, [1e8, 2e8], [gap, 0.0], speed, tolerance=1e-9)
+
+    found = blow(1e-4, 1.0).gradient("contact_time", ("contacts.0.gap", "speeds.0"))
+    gap, speed = ((blow(*more).contact_time - blow(*less).contact_time) for less, more in (
+        ((0.99e-4, 1.0), (1.01e-4, 1.0)), ((1e-4, 0.999), (1e-4, 1.001))))  # fmt: skip
+    assert_allclose(found.slopes, [gap / 2e-6, speed / 2e-3], rtol=1e-4, atol=1e-7)

@@ -1,0 +1,143 @@
+"""Modes from elsewhere: what nobody says of a body is estimated, told, and added once it is stated."""
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+
+STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
+BAR = fi.Beam.rectangular(STEEL, width=0.03, height=0.01)
+POINTS = np.linspace(0.0, 0.4, 41)[:, None]
+BALL, LAW = fi.Striker.rigid(0.05), fi.Contact.linear(1e6)
+
+
+def bar(n_modes, *, rigid=True, **stated):
+    modes = fi.analytic.beam(0.4, ends=("free", "free"), section=BAR, n_modes=n_modes + 2)
+    first = 0 if rigid else 2
+    shapes = modes.shape_at(POINTS)[:, first:]
+    if stated.get("compliance") is True:
+        stated["compliance"] = modes.shapes.compliance(POINTS)
+    return fi.Modes.from_arrays(modes.frequencies[first:], shapes, points=POINTS, mass=modes.mass, **stated)
+
+
+def plate(n_modes, n=9, **stated):
+    modes = fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(STEEL, 2e-3), n_modes=n_modes)
+    x, y = np.meshgrid(np.linspace(0.0, 0.4, n), np.linspace(0.0, 0.3, n), indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel()])
+    return fi.Modes.from_arrays(modes.frequencies, modes.shape_at(points), points=points, mass=modes.mass, **stated)
+
+
+def struck(modes, *, law=LAW, at=(0.1,), tolerance=1e-2, **options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fi.ToleranceWarning)
+        return fi.strike(modes, BALL, law, at=at, speed=1.0, tolerance=tolerance, **options)
+
+
+def test_missing_rigid_motions_are_never_met_in_silence():
+    found = struck(bar(12, rigid=False))
+    truth = struck(bar(12, compliance=True))
+    assert not found.tolerance_met and found.error.truncation >= abs(found.restitution - truth.restitution)
+    assert "not stated of the target: static compliance, whether it moves freely" in found.verdict
+    assert any("no rigid motion is given" in note for note in found.notes)
+
+
+def test_residual_false_says_that_these_modes_are_all():
+    assert "not stated" not in struck(bar(12, rigid=False), residual=False).verdict
+    assert "not stated" not in struck(bar(12, rigid=False, complete=True)).verdict
+
+
+def test_a_free_body_gets_the_rigid_motions_of_its_points():
+    """Exact for a uniform body, as areas and lines are integrated exactly: 4 / mass at the end of a bar."""
+    modes = bar(3, rigid=False, free=True)
+    assert modes.n_rigid == 2
+    assert_allclose((modes.shape_at([0.0])[0, :2] ** 2).sum() * modes.mass, 4.0, rtol=1e-9)
+    x = np.array([(0.0, 0.0), (0.3, 0.0), (0.3, 0.2), (0.0, 0.2), (0.1, 0.05)])
+    square = fi.Modes.from_arrays([100.0], [[1.0], [-1.0], [1.0], [-1.0], [0.3]], points=x, mass=0.5, free=True)
+    assert_allclose((square.shape_at([(0.0, 0.0)])[0, :3] ** 2).sum() * 0.5, 7.0, rtol=1e-9)  # 1 + 3 + 3
+
+
+def test_a_body_whose_modes_carry_its_mass_is_held():
+    assert plate(12).unstated == ("compliance",)
+    assert bar(12, rigid=False).unstated == ("compliance", "free")
+    assert bar(12, rigid=False, free=False).unstated == ("compliance",)
+
+
+@pytest.mark.parametrize("n_modes", [5, 12, 40])
+def test_the_estimate_holds_the_compliance_left_out(n_modes):
+    for modes, whole in (
+        (bar(n_modes), fi.analytic.beam(0.4, ends=("free", "free"), section=BAR, n_modes=n_modes + 2)),
+        (plate(n_modes, 13), fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(STEEL, 2e-3), n_modes=n_modes)),
+    ):
+        points = modes.shapes.grid()[0]
+        points = points[:: max(1, len(points) // 20)]
+        truth = np.array([whole.residual_compliance(point[None])[0, 0] for point in points])
+        guess, doubt = np.transpose(
+            [(s.deflection(p, p)[0, 0] - m, s.compliance_error(p)[0] * s.deflection(p, p)[0, 0])
+             for s, p, m in ((modes.shapes, p[None], modes.modal_compliance(p[None])[0, 0]) for p in points)]
+        )  # fmt: skip
+        assert (np.abs(guess - truth) <= doubt + 1e-9 * truth.max()).mean() >= 0.9
+
+
+def test_two_contacts_on_an_estimated_body_count_what_is_between_them():
+    modes = bar(12)
+    one, both = (modes.shapes.compliance_error(np.array(at)) for at in ([[0.1]], [[0.1], [0.11]]))
+    assert both[0] > one[0]
+    touches = [fi.Touch(LAW, 0, 2, None, [0.1]), fi.Touch(LAW, 1, 2, None, [0.11])]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fi.ToleranceWarning)
+        hit = fi.collide([fi.Modes.rigid(0.05)] * 2 + [modes], touches, speeds=[1.0, 1.0, 0.0], tolerance=1e-2)
+    assert "not stated of body 2: static compliance" in hit.verdict
+
+
+def test_a_map_counts_what_is_not_stated():
+    over = {"mass": [0.02, 0.05]}
+    table = fi.sweep(bar(12, rigid=False), BALL, LAW, at=[0.1], speed=1.0, tolerance=1e-2, over=over)
+    assert not table.tolerance_met.any() and (table.truncation > 0.05).all()
+    table = fi.sweep(bar(12), BALL, LAW, at=[0.1], speed=1.0, tolerance=1e-2, over=over)
+    assert table.tolerance_met.all() and table.truncation.min() > 0.0
+
+
+def test_a_scaled_body_is_as_little_known():
+    modes = bar(12, rigid=False)
+    heavier = modes.scaled(mass=2.0 * modes.mass)
+    assert heavier.unstated == modes.unstated
+    assert_allclose(heavier.shapes.loose(POINTS), 2.0**-0.5 * modes.shapes.loose(POINTS))
+
+
+def test_what_is_stated_as_advised_meets_the_tolerance():
+    found = struck(bar(12, rigid=False))
+    assert re.search(
+        "make the target with free = True or False, as it is; give the compliance of the target", found.verdict
+    )
+    assert struck(bar(12, rigid=False, free=True, compliance=True)).tolerance_met
+    hard = struck(bar(8), law=fi.Contact.linear(1e8))
+    assert "give the compliance of the target" in hard.verdict and "with free" not in hard.verdict
+    assert struck(bar(40, compliance=True), law=fi.Contact.linear(1e8)).tolerance_met
+
+
+def test_what_contradicts_itself_works_as_advised():
+    with pytest.raises(ValueError, match=r"free must be False: .* carries 6\d% of the mass along"):
+        plate(12, free=True)
+    assert plate(12).n_rigid == 0
+    line = [[0.0, 0.0], [0.1, 0.1]]
+    with pytest.raises(ValueError, match="free needs points that span the body"):
+        fi.Modes.from_arrays([9.0], [[1.0], [-1.0]], points=line, mass=1.0, free=True)
+    assert fi.Modes.from_arrays([0.0, 9.0], [[1.0, 1.0], [1.0, -1.0]], points=line, mass=1.0).n_rigid == 1
+    with pytest.raises(ValueError, match="complete must be False"):
+        bar(12, compliance=True, complete=True)
+    assert not bar(12, compliance=True).unstated
+
+
+def test_a_universal_file_loses_the_compliance_and_says_so(tmp_path, read_here):
+    pytest.importorskip("pyuff", reason="the uff extra is not installed")
+    modes = fi.analytic.beam(0.4, ends=("free", "free"), section=BAR, n_modes=14)
+    fi.export.write_uff(tmp_path / "bar.uff", modes)
+    again = fi.Modes.from_uff(tmp_path / "bar.uff", mass=modes.mass)
+    assert "not stated of the target: static compliance" in struck(again).verdict
+    points = again.shapes.grid()[0]
+    known = fi.Modes.from_uff(tmp_path / "bar.uff", mass=modes.mass, compliance=modes.shapes.compliance(points))
+    assert "not stated" not in struck(known).verdict
