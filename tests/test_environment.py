@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import venv
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,6 @@ from scenes import QUICK as SCENE
 import fem_impact
 
 ROOT = str(Path(fem_impact.__file__).parents[1])
-# Hides optional libraries from this interpreter and those it starts.
 WITHOUT = """
 import importlib.machinery
 real = importlib.machinery.PathFinder.find_spec
@@ -36,10 +36,9 @@ HIDDEN = {
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="shells, limits and devices of POSIX")
 
 
-def run(folder, command, path=(), **environment):
+def run(folder, command, python=sys.executable, **environment):
     (folder / "scene.toml").write_text(SCENE)
-    search = os.pathsep.join([*map(str, path), ROOT])
-    whole = {**os.environ, "PYTHONPATH": search, "FEM": f"{sys.executable} -m fem_impact", **environment}
+    whole = {**os.environ, "PYTHONPATH": ROOT, "FEM": f"{python} -m fem_impact", **environment}
     whole = {name: value for name, value in whole.items() if value is not None}
     done = subprocess.run(["bash", "-c", command], cwd=folder, env=whole, capture_output=True, text=True, timeout=600)
     assert "Traceback" not in done.stderr and "Error" not in done.stderr, done.stderr
@@ -124,10 +123,12 @@ EXTRA = [
 
 @pytest.fixture
 def without(tmp_path):
-    """A folder that hides optional libraries from the interpreters that find it on their path."""
-    (tmp_path / "site").mkdir()
-    (tmp_path / "site" / "sitecustomize.py").write_text(WITHOUT.format(hidden=HIDDEN))
-    return [tmp_path / "site"]
+    """A Python of an environment of its own, in which it and those it starts find no optional library."""
+    venv.create(tmp_path / "venv", symlinks=True)
+    site = next((tmp_path / "venv").glob("lib/python*/site-packages"))
+    (site / "all.pth").write_text("\n".join(path for path in sys.path if path.endswith("-packages")))
+    (site / "sitecustomize.py").write_text(WITHOUT.format(hidden=HIDDEN))
+    return tmp_path / "venv" / "bin" / "python"
 
 
 @pytest.mark.slow

@@ -50,10 +50,11 @@ elif kind == "blocks":
     write, left = Store.write, [int(moment)]
 
     def counted(*what):
-        write(*what)
+        kept = write(*what)
         left[0] -= 1
         if left[0] == 0:
             send()
+        return kept
 
     Store.write = counted
 else:

@@ -51,6 +51,7 @@ BLOCK = 24
 ROOM = 0.1
 # [-] pieces across a square that the rim cuts: with one, the added masses of free plates err ten times as much
 FINER = 4
+MOST_SAMPLES = 1e9  # [-] limit of memory: values of all shapes on the grid of points
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +141,11 @@ def in_air(
     size = min(2.0 * np.pi / wave / PER_WAVE, np.sqrt(area) / FEWEST)
     share = 1.0 if baffled else 0.5
     spacing = size / SAMPLES[0]
+    if not modes.n_modes * area / spacing**2 <= MOST_SAMPLES:
+        raise ValueError(
+            f"speed must be higher or modes fewer, got {speed}: {modes.n_modes} modes on a grid for waves of "
+            f"{2.0 * np.pi / wave:.2g} m, the shortest of plate or sound, take more than {MOST_SAMPLES:.0e} numbers"
+        )
     samples, missed = _sampled(modes.shapes, spacing)
     weight = density * sides * share / (2.0 * np.pi)
     found, other = (_Air(modes, _strengths(samples, spacing, n), n * spacing, weight, speed) for n in SAMPLES)

@@ -361,11 +361,11 @@ class Modes:
         values = check.array("shapes", shapes, (len(points), len(omega)), "kg**-0.5")
         mass, connected = check.positive("mass", mass, "kg"), _connected(cells, points)
         damping = damping_ratios(damping_ratio, omega)
-        complete = check.flag("complete", complete)
+        complete, free = check.flag("complete", complete), None if free is None else check.flag("free", free)
         if complete and (compliance is not None or free):
             raise ValueError("complete must be False if compliance is given or free is True; leave it out")
         loose = None
-        if not complete and omega[0] > 0.0 and points.shape[1] and (free is None or check.flag("free", free)):
+        if not complete and omega[0] > 0.0 and points.shape[1] and free is not False:
             loose = _loose(points, connected, values, mass, free)
         if free and loose is not None:
             omega, damping = (np.append(np.zeros(loose.shape[1]), each) for each in (omega, damping))

@@ -69,7 +69,7 @@ def frf(
     700
     """
     if isinstance(records, (str, Path)):
-        return read_frf(records)
+        return read_frf(check.path("records", records))
     taps = joined(records, "records")
     check.one_of("method", method, METHODS)
     if not taps.response.shape[2]:

@@ -9,7 +9,8 @@ from test_cli import TEXT
 
 import fem_impact as fi
 from fem_impact import cli
-from fem_impact.show import canvas, painter, pictures, sampling
+from fem_impact._base import child
+from fem_impact.show import canvas, pictures, sampling
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +98,7 @@ def test_other_endings_are_refused(hit, tmp_path, name):
 
 @pytest.mark.slow
 def test_strike_writes_them_when_asked(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(painter.sys, "executable", "/bin/false")  # the other process fails
+    monkeypatch.setattr(child.sys, "executable", "/bin/false")  # the other process fails
     monkeypatch.setattr(pictures, "can_render", lambda: False)
     monkeypatch.setitem(pictures.animation.__wrapped__.__kwdefaults__, "frames", 3)
     (tmp_path / "small.toml").write_text(TEXT)
