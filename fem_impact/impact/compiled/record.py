@@ -11,14 +11,18 @@ import numpy as np
 
 from .build import ONE, ZERO, inner, outer
 from .events import hermite_root, letting_go, lowest
-from .law import FELT, POWER, at, dent, growth, soaked, spring_with, steepness, stored
+from .law import FELT, LAYERS, PLASTIC, POWER, at, dent, growth, soaked, spring_with, steepness, stored
 from .layout import APPROACH, CLOSED, HEAD, KIND, LENGTH, LOSS, PUSH, RATE, REMEMBERED, SPEED, START, WIDTH
 from .rounding import NEAR
 
 FEW, CLOSER = 3, 16  # [-] parts into which the search for a largest force cuts all steps, and what is left, thrice
+HIGH = 0.9  # [-] of the largest mean force of a step: only steps with so much are searched for the peak
 HIGH_ENOUGH = 0.95  # [-] of the largest force: only steps with so much are looked at more closely
 # [-] error of the peak force over the misfit in `force_missed`, for a power law and for one with loss, layers or memory
-MISFIT = 1.5, 12.0
+MISFIT = 1.5, 5.0
+# [-] nodes and weights of Gauss and Legendre for a step: a spring that sets in like x**1.5 is integrated 13 times as
+# well as by Simpson's rule
+GAUSS = (0.5 - 0.6**0.5 / 2.0, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.5 + 0.6**0.5 / 2.0, 5.0 / 18.0)
 NEAR_PEAK = 0.8, 0.35  # [-] that misfit counts only above this fraction of the peak force, for both
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = range(6)  # why a run ended
 FULL = -1  # it did not: its record is full
@@ -168,27 +172,37 @@ def nearest_turn(steps, now, law, n_coefficients, miss):
     return nearest / farthest if farthest > 0.0 else np.inf
 
 
+@inner()
+def mean_push(steps, n_coefficients, row, first):
+    """Mean force of a contact in a step, whose numbers begin at ``first``."""
+    mean = 0.0
+    for k in range(n_coefficients):
+        mean += steps[row, first + PUSH + k] / (k + 1.0)
+    return mean
+
+
 @outer()
 def force_missed(steps, now, law, n_coefficients, peak):
-    """How far the largest mean forces of steps are from Simpson's rule for the law on the cubic through both ends.
+    """How far the largest mean forces of steps are from those of the law on the cubic through both ends.
 
-    Over the peak force, and times MISFIT, the error of that.
+    Over the peak force, and times MISFIT, the error of that. At a corner of the law a single step may miss, which
+    hardly changes the peak: there two in turn count.
     """
     worst = 0.0
     for i in range(law.shape[0]):
         rough = int(law[i, LOSS] > 0.0 or (law.shape[1] == WIDTH and law[i, KIND] != POWER))
+        corner = law.shape[1] == WIDTH and (law[i, KIND] == LAYERS or law[i, KIND] == PLASTIC)
+        before = 0.0
         for row in range(steps.shape[0]):
             first = HEAD + (PUSH + n_coefficients) * i
-            if steps[row, first + CLOSED] == 0.0:
-                continue
-            begin = force_within(steps, now, law, n_coefficients, row, i, 0.0)
-            middle = force_within(steps, now, law, n_coefficients, row, i, 0.5)
-            final = force_within(steps, now, law, n_coefficients, row, i, 1.0)
-            if max(begin, middle, final) > NEAR_PEAK[rough] * peak:
-                mean = steps[row, first + PUSH]
-                if n_coefficients > 1:
-                    mean += 0.5 * steps[row, first + PUSH + 1]
-                worst = max(worst, MISFIT[rough] * abs(mean - (begin + 4.0 * middle + final) / 6.0))
+            mean = mean_push(steps, n_coefficients, row, first)
+            miss = 0.0
+            if steps[row, first + CLOSED] > 0.0 and mean > NEAR_PEAK[rough] * peak:
+                miss = mean
+                for part, weight in GAUSS:
+                    miss -= weight * force_within(steps, now, law, n_coefficients, row, i, part)
+            worst = max(worst, MISFIT[rough] * (min(abs(miss), before) if corner else abs(miss)))
+            before = abs(miss)
     return worst / peak
 
 
@@ -364,15 +378,12 @@ def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
             part = 0.0
             impulse = 0.0
             peak = 0.0
-            peak_row = row
+            most = 0.0
+            peak_row = begin
             while upper > lower:
-                for k in range(n_coefficients):
-                    impulse += steps[row, LENGTH] * steps[row, first + PUSH + k] / (k + 1.0)
-                for look in range(n_coefficients):
-                    f = force_within(steps, now, law, n_coefficients, row, i, look / n_coefficients)
-                    if f > peak:
-                        peak = f
-                        peak_row = row
+                mean = mean_push(steps, n_coefficients, row, first)
+                impulse += steps[row, LENGTH] * mean
+                most = max(most, mean)
                 end = steps[row, START] + upper * steps[row, LENGTH]
                 part = upper
                 row += 1
@@ -381,6 +392,13 @@ def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
                 lower, upper = pushing(steps, now, law, n_coefficients, row, i)
                 if lower > 0.0:
                     break
+            for near in range(begin, row):
+                if mean_push(steps, n_coefficients, near, first) >= HIGH * most:
+                    for look in range(n_coefficients):
+                        f = force_within(steps, now, law, n_coefficients, near, i, look / n_coefficients)
+                        if f > peak:
+                            peak = f
+                            peak_row = near
             for near in range(max(begin, peak_row - 1), min(row - 1, peak_row + 1) + 1):
                 peak = max(peak, peak_in(steps, now, law, n_coefficients, near, i, looks))
             left = -rate_within(steps, now, law, n_coefficients, row - 1, i, part)
