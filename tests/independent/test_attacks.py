@@ -17,6 +17,9 @@ def check(area, numbers):
     judged = [each for each in verdicts if each.judged]
     assert len(judged) >= 0.7 * len(verdicts)
     assert not bad, attack_blows.table(verdicts)
+    claims = [each.claim / max(each.truth, each.floor) for each in judged if each.met]
+    # of thousands one in twenty claims more than 30 times the truth; complete bodies bound what they leave out
+    assert sum(claim > 30.0 for claim in claims) <= 0.25 * len(claims), attack_blows.table(verdicts)
     loud = sum(each.kind == "loud" for each in judged)
     assert loud <= 0.2 * len(judged), attack_blows.table(verdicts)  # silence is not bought by doubting everything
 
