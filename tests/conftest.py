@@ -13,6 +13,14 @@ from warming import compile_all
 settings.register_profile("same", derandomize=True)  # the same cases in every run
 settings.load_profile("same")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+# What `pytest -m smoke` runs, without their slow cases: quick files of every package, physics in each.
+SMOKE = (
+    "designs/test_goals", "fe/test_beam_elements", "fe/test_membrane", "fe/test_plausible", "impact/test_collision",
+    "impact/test_contact_cases", "impact/test_force_spectrum", "impact/test_threshold", "mesh/test_meshes",
+    "mesh/test_triangulation", "model/test_idealisation", "model/test_target", "modes/test_analytic", "modes/test_ritz",
+    "modes/test_timoshenko", "scenes/test_templates", "show/test_sound", "sweeps/test_cells", "taps/test_found",
+    "taps/test_rig", "taps/test_transfer", "test_end_to_end", "test_figures_of_the_source",
+)  # fmt: skip
 FLAGS = (
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync",
@@ -68,11 +76,14 @@ def pytest_addoption(parser):
 
 @pytest.hookimpl(tryfirst=True)  # before the groups are read
 def pytest_collection_modifyitems(config, items):
-    """What shares a fixture of its file runs on one worker; of slow cases marked `thin(n)` about every n-th is run."""
+    """Marks by file; what shares a fixture of its file runs on one worker; of slow `thin(n)` cases every n-th is run."""
     for item in items:
         shared = any(made[-1].scope == "module" for made in item._fixtureinfo.name2fixturedefs.values())
         if shared and item.get_closest_marker("xdist_group") is None:
             item.add_marker(pytest.mark.xdist_group(item.path.stem))
+        place = item.path.relative_to(config.rootpath / "tests").with_suffix("").as_posix()
+        if place in SMOKE and item.get_closest_marker("slow") is None:
+            item.add_marker(pytest.mark.smoke)
     if config.getoption("--all-cases"):
         return
     kept, left_out = [], []
@@ -90,11 +101,11 @@ def all_cases(request):
 
 
 def pytest_configure(config):
-    """Compile the inner loops once, before workers start, so that no test waits for the compiler."""
+    """Compile the inner loops once, before workers start, so that no test waits for the compiler; smoke needs few."""
     from fem_impact._base import isolated
 
     isolated.PATIENCE = 120.0  # [s] a busy machine must not refuse a file; tests of the limit set their own
-    if not hasattr(config, "workerinput"):
+    if not hasattr(config, "workerinput") and config.option.markexpr != "smoke":
         compile_all()
 
 

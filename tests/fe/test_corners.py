@@ -89,6 +89,7 @@ def test_triangles_at_a_singular_corner_are_narrow_and_not_narrower():
     assert 0.4 < max(angles) < 0.7
 
 
+@pytest.mark.slow
 def test_hinged_edges_in_line_are_told():
     """At 179 degrees the exponent is next to one: no mesh resolves it, and no unit is to blame."""
     angle = np.radians(np.linspace(0.0, 179.0, 13))

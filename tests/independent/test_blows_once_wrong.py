@@ -234,7 +234,10 @@ def run(folder, name, tolerance, source):
     return fi.load_scene(path).strike(tolerance=tolerance)
 
 
-@pytest.mark.parametrize("name", SCENES)
+LONG = "loss on a disk"
+
+
+@pytest.mark.parametrize("name", [pytest.param(x, marks=[pytest.mark.slow] * (x == LONG)) for x in SCENES])
 def test_the_tolerance_of_closed_forms_is_met(tmp_path, name):
     truth = run(tmp_path, name, 1e-6, "analytic")
     for tolerance in (1e-3, 1e-4, 1e-5):

@@ -71,8 +71,8 @@ def test_cells_at_several_points_are_single_blows_there():
     ("name", "values"),
     [
         ("target_mass", [0.05, 0.3]),
-        ("target_frequency", [80.0, 200.0]),
-        ("damping_ratio", [0.0, 0.05]),
+        pytest.param("target_frequency", [80.0, 200.0], marks=pytest.mark.slow),
+        pytest.param("damping_ratio", [0.0, 0.05], marks=pytest.mark.slow),
         ("loss", [0.0, 0.3]),
         ("gap", [0.0, 1e-3]),
     ],
