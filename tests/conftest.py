@@ -76,7 +76,7 @@ def pytest_addoption(parser):
 
 @pytest.hookimpl(tryfirst=True)  # before the groups are read
 def pytest_collection_modifyitems(config, items):
-    """Marks by file; what shares a fixture of its file runs on one worker; of slow `thin(n)` cases every n-th is run."""
+    """Marks by file; what shares a fixture of its file runs on one worker; of slow `thin(n)` every n-th is run."""
     for item in items:
         shared = any(made[-1].scope == "module" for made in item._fixtureinfo.name2fixturedefs.values())
         if shared and item.get_closest_marker("xdist_group") is None:
