@@ -17,7 +17,7 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 SMOKE = (
     "designs/test_goals", "fe/test_beam_elements", "fe/test_membrane", "fe/test_plausible", "impact/test_collision",
     "impact/test_contact_cases", "impact/test_force_spectrum", "impact/test_threshold", "mesh/test_meshes",
-    "mesh/test_triangulation", "model/test_idealisation", "modes/test_analytic", 
+    "mesh/test_triangulation", "model/test_idealisation", "modes/test_analytic",
     "modes/test_timoshenko", "scenes/test_templates", "show/test_sound", "sweeps/test_cells", "taps/test_found",
     "taps/test_rig", "test_end_to_end", "test_figures_of_the_source",
 )  # fmt: skip
