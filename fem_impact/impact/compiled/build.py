@@ -2,21 +2,32 @@
 
 Numba keeps compiled functions on disk and compiles them anew where their own file has changed; it does not notice an
 edit in another file that they call into. Here every one carries a stamp of the whole package.
+
+Work that is over before a compiler would be, such as a plan, runs `uncompiled`: there, kernels that are not on disk are
+run as plain Python, by a second copy of this package in which nothing is compiled.
 """
 
 import hashlib
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from importlib import import_module, util
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+PLAIN = "plain"  # name of the copy in which nothing is compiled
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"  # else as plain Python, without the import of numba
+COMPILED &= not __name__.endswith(f".{PLAIN}.build")
+QUICK: ContextVar[bool] = ContextVar("QUICK", default=False)  # whether to compile nothing
 if COMPILED:
     READ_BEFORE = "numba" in sys.modules
     from numba import config, njit
     from numba.core.options import DefaultOptions
+    from numba.core.registry import CPUDispatcher
 
     if not READ_BEFORE:  # numba takes from a file in the working folder whose compiled code it runs: not for us
         config._config_fname = os.devnull
@@ -37,6 +48,48 @@ def _stamp() -> str:
 STAMP = _stamp()
 
 
+@contextmanager
+def uncompiled() -> Iterator[None]:
+    """Compile nothing meanwhile."""
+    token = QUICK.set(True)
+    try:
+        yield
+    finally:
+        QUICK.reset(token)
+
+
+def limited() -> bool:
+    """Whether a run may be plain Python, and therefore must be short."""
+    return not COMPILED or QUICK.get()
+
+
+def _plain(kernel: Any) -> Any:
+    """A kernel as plain Python, with all that it calls."""
+    package, _, module = kernel.__module__.rpartition(".")
+    copy = f"{package}.{PLAIN}"
+    if copy not in sys.modules:
+        folder = Path(__file__).parent
+        spec = util.spec_from_file_location(copy, folder / "__init__.py", submodule_search_locations=[str(folder)])
+        assert spec is not None
+        sys.modules[copy] = util.module_from_spec(spec)
+    return getattr(import_module(f"{copy}.{module}"), kernel.__name__)
+
+
+if COMPILED:
+
+    class _Uncompiled(Exception):
+        """A kernel would have to be compiled."""
+
+    class _Kernel(CPUDispatcher):
+        """A kernel that runs as plain Python where nothing is to be compiled."""
+
+        def __call__(self, *arguments: Any) -> Any:
+            try:
+                return super().__call__(*arguments)
+            except _Uncompiled:
+                return _plain(self)(*arguments)
+
+
 def outer(allocates: bool = True, **options: Any) -> Any:
     """Compile for use from Python; other threads run meanwhile. ``allocates`` as for `inner`."""
     if not COMPILED:
@@ -47,8 +100,17 @@ def outer(allocates: bool = True, **options: Any) -> Any:
 
     def compiled(function: Any) -> Any:
         kernel = njit(**wrapped, **options)(function)
-        # numba has no public way to say so; test_build.py edits a callee in a fresh process
+        # numba has no public ways to do the following; test_build.py tests all in fresh processes
         kernel._cache._cache_file._source_stamp = STAMP
+        kernel.__class__ = _Kernel
+        compiler, compile_it = kernel._compiler, kernel._compiler.compile
+
+        def compile_unless_quick(*signature: Any) -> Any:
+            if QUICK.get():
+                raise _Uncompiled
+            return compile_it(*signature)
+
+        compiler.compile = compile_unless_quick
         return kernel
 
     return compiled
