@@ -15,6 +15,7 @@ from ..fe.assembly import THEORIES
 from ..fe.section import Beam, Plate
 from ..impact import collision
 from ..impact.assumption import Assumption, unexamined
+from ..impact.compiled import build
 from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
@@ -101,7 +102,8 @@ def foresee(
     stiff = replace(collision.shortened(striker, striker.modes.n_rigid), hand=None)
     bare, wall = replace(contact, loss=0.0, gap=0.0), unyielding(np.zeros(1), 1.0)
     try:
-        hit = collision.strike(wall, stiff, bare, at=np.zeros(1), speed=speed, tolerance=ROUGH)
+        with build.uncompiled():
+            hit = collision.strike(wall, stiff, bare, at=np.zeros(1), speed=speed, tolerance=ROUGH)
     except SimulationError:
         return unexamined(how["quantity"], "the same blow on a wall cannot be computed", "strike")
     hit = replace(hit, striker=striker, contacts=(contact,), quantities=how["quantity"])

@@ -1,7 +1,8 @@
 """What a blow costs: processor time and memory by kind of target, at the speed of this machine.
 
-The seconds below belong to a machine that takes REFERENCE for a short benchmark. The benchmark tells how much slower
-this machine is at sparse, dense and compiled work; its result is kept beside the compiled kernels.
+The seconds below belong to a typical machine, which takes REFERENCE for a short benchmark. `calibrate`, of which
+`fem-impact doctor` is the caller, finds how much slower this machine is at sparse, dense and compiled work, and keeps
+that beside the compiled kernels. A plan reads what is kept there and measures nothing.
 """
 
 import hashlib
@@ -56,7 +57,6 @@ LONGEST = 100.0  # [-] a blow is followed up to so many undisturbed contacts; th
 MANY = 2  # [-] impacts up to which two meshes suffice; each multiplies the error that a mesh makes before it
 PROCESS, ELEMENTS = 2.1e8, 5e7  # [byte] of the process with its libraries, and of those for elements
 PER_UNKNOWN, PER_PAIR = 1e4, 16.0  # [byte] per unknown with its factors; per unknown and solution
-WORTH = 1.0  # [s] a run predicted to take longer is worth the benchmark
 REPEATS = 3  # [-] times that the benchmark runs; the fastest counts
 GRID, WIDTH, SOLUTIONS = 22, 6, 30  # [-] nodes per side, unknowns per node and solutions of the sparse benchmark
 SQUARE, MODES, STEPS = 700, 300, 4000  # [-] size of the product of the benchmark; modes and time steps of its strike
@@ -77,9 +77,8 @@ class Work:
 
     @property
     def seconds(self) -> float:
-        """Processor time [s] on this machine, which is measured if it has not been and much is to be done."""
-        found = self.on(known())
-        return self.on(measured()) if found > WORTH else found
+        """Processor time [s] on this machine if it has been measured, else on a typical one."""
+        return self.on(known() or REFERENCE)
 
     def on(self, machine: "Machine") -> float:
         """Processor time [s] on a machine."""
@@ -191,22 +190,14 @@ def _fastest(work: Callable[[], object]) -> float:
 
 
 @cache
-def known() -> Machine:
-    """This machine as measured before, else that of REFERENCE; the same as long as the process lives."""
-    return read() or REFERENCE
+def known() -> Machine | None:
+    """This machine as measured before, None if it was not; the same as long as the process lives."""
+    return read()
 
 
-@cache
-def measured() -> Machine:
-    """This machine as measured before, else measured now, and kept if that is possible."""
-    found = read()
-    if found is not None or place() is None:  # plain Python takes seconds for the steps of the benchmark
-        return found or REFERENCE
-    found = benchmark()
-    if not found.credible:
-        return REFERENCE
-    keep(found)
-    return found
+def whose() -> str:
+    """The machine that predicted seconds belong to, in words."""
+    return "a typical machine (`fem-impact doctor` measures yours)" if known() is None else "this machine"
 
 
 def calibrate() -> bool:

@@ -17,6 +17,7 @@ from ..fe.section import Plate
 from ..impact import accuracy, assumption, collision, promise
 from ..impact.assumption import Assumption
 from ..impact.collision import BAND_POINTS
+from ..impact.compiled import build
 from ..impact.contact import Contact
 from ..impact.quantities import apart, words
 from ..impact.response import LOOKED_AT, Response
@@ -170,7 +171,7 @@ class Plan:
         """Predicted time and memory, in words."""
         time = f"{self.seconds:.1g} s" if self.seconds < 10.0 else f"{self.seconds:.0f} s"
         memory = float(f"{self.memory / 1e6:.2g}")
-        return f"about {time} and {memory:.0f} MB predicted"
+        return f"about {time} and {memory:.0f} MB predicted for {cost.whose()}"
 
     def data(self) -> dict[str, Any]:
         """All decisions and predictions by name, in SI units."""
@@ -922,7 +923,7 @@ def _foreseen(asked: _Asked) -> tuple[float, int]:
     if seen is None or not np.isfinite(seen.mobility):
         return 1.0, 1
     endless = idealisation.endless(at, seen.mass, seen.mobility, asked.duration)
-    with suppress(check.SimulationError):
+    with suppress(check.SimulationError), build.uncompiled():
         hit = collision.strike(
             endless, collision.shortened(striker, _striker_modes(asked, 1.0)[0]), asked.blow.contact, at=at,
             speed=asked.values["speed"], tolerance=audit.ROUGH, duration=cost.LONGEST * asked.duration,

@@ -1,4 +1,4 @@
-"""Compiled kernels on disk are compiled anew after an edit in another file that they call into."""
+"""Compiled kernels on disk are compiled anew after an edit in another file; a plan compiles nothing."""
 
 import os
 import shutil
@@ -6,9 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import fem_impact
+from fem_impact.impact.compiled import build, law
 
 SCRIPT = """
 import numpy as np
@@ -19,6 +21,37 @@ steps[:, 1] = 1.0  # two steps of a second: down and up again, then up and down 
 steps[:, 3:5] = [[1.0, -3.0], [1.0, 5.0]]
 print(nearest_turn(steps, np.array([[1.0], [0.0], [0.0], [0.0], [-5.0]]), np.array([[1.0, 1.0, 0.0, 0.0]]), 5, -np.inf))
 """
+
+PLAN = """
+import fem_impact as fi
+from fem_impact.impact.compiled import energy, law, record
+
+plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), thickness=3e-3)
+system = fi.assemble(fi.mesh.rectangle(0.465, 0.3), plate, supports={"boundary": "hinged"})
+stick, touch = fi.Striker.stick(mass=0.1, first_frequency=10e3), fi.Contact.hertz(695e3)
+plan = fi.plan(system, stick, touch, at=(0.1395, 0.09), speed=2.0, tolerance=1e-3, damping_ratio=0.005)
+print(plan)
+for kernel in (energy.follow, record.find_impacts, law.stored):
+    assert not kernel.overloads
+"""
+
+
+@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+def test_a_plan_compiles_nothing(tmp_path):
+    """It strikes, to foresee the length of the blow and what may be wrong with the model, as plain Python."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", PLAN], env=environment, capture_output=True, text=True, check=True)
+    assert "predicted for a typical machine" in done.stdout and not list(tmp_path.rglob("*.nb?"))
+
+
+@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+def test_what_is_not_compiled_runs_as_plain_python_and_says_the_same():
+    table, approach = np.array([[1e6, 1.5, 0.1, 0.0]]), np.array([1e-3], np.float32)  # a type nothing is compiled for
+    known = len(law.stored.overloads)
+    with build.uncompiled():
+        found = law.stored(approach, table)
+    assert found == pytest.approx(law.stored(approach.astype(float), table), rel=1e-6)
+    assert len(law.stored.overloads) <= known + 1
 
 
 @pytest.mark.slow

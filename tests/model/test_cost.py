@@ -19,14 +19,12 @@ MUCH = cost.Work(sparse=10.0, dense=1.0, steps=1.0)
 
 @pytest.fixture(autouse=True)
 def place(tmp_path, monkeypatch):
-    """A file of its own for every test; what the process has measured is forgotten before and after."""
+    """A file of its own for every test; what the process has read is forgotten before and after."""
     path = tmp_path / "kernels" / "speed.json"
     monkeypatch.setattr(cost, "place", lambda: path)
-    for remembered in (cost.known, cost.measured):
-        remembered.cache_clear()
+    cost.known.cache_clear()
     yield path
-    for remembered in (cost.known, cost.measured):
-        remembered.cache_clear()
+    cost.known.cache_clear()
 
 
 @pytest.fixture
@@ -107,22 +105,14 @@ def test_a_machine_half_as_fast_takes_twice_as_long():
     assert replace(MUCH, steps=5.0).on(replace(cost.REFERENCE, steps=SLOW.steps)) == pytest.approx(10.0 + 1.0 + 10.0)
 
 
-def test_without_a_file_cheap_work_is_predicted_with_built_in_rates_and_no_benchmark(place, benchmarks):
-    work = cost.Work(sparse=0.5)
-    assert work.seconds == 0.5 and not benchmarks and not place.exists()
+def test_without_a_file_seconds_are_those_of_a_typical_machine_and_nothing_is_measured(place, benchmarks):
+    assert MUCH.seconds == pytest.approx(12.0) and "typical" in cost.whose()
+    assert not benchmarks and not place.exists()
 
 
-def test_much_work_is_worth_one_benchmark_whose_result_is_kept(place, benchmarks):
-    assert MUCH.seconds == MUCH.seconds == pytest.approx(24.0) and len(benchmarks) == 1
-    assert cost.read() == SLOW
-    cost.measured.cache_clear()  # as a new process
-    cost.known.cache_clear()
-    assert MUCH.seconds == pytest.approx(24.0) and len(benchmarks) == 1
-
-
-def test_what_was_kept_of_this_machine_serves_cheap_work_too(place, benchmarks):
-    assert cost.keep(SLOW)
-    assert cost.Work(sparse=0.25).seconds == pytest.approx(0.5) and not benchmarks
+def test_what_doctor_kept_of_this_machine_serves_every_later_process(benchmarks):
+    assert cost.calibrate() and len(benchmarks) == 1
+    assert MUCH.seconds == pytest.approx(24.0) and cost.whose() == "this machine" and len(benchmarks) == 1
 
 
 @pytest.mark.parametrize(
@@ -139,11 +129,11 @@ def test_what_was_kept_of_this_machine_serves_cheap_work_too(place, benchmarks):
     ],
     ids=["empty", "cut", "no text", "list", "null", "short", "no number", "deep"],
 )
-def test_a_damaged_file_is_replaced_without_a_word(place, benchmarks, text):
+def test_a_damaged_file_does_not_count_and_is_replaced(place, benchmarks, text):
     place.parent.mkdir()
     place.write_bytes(text)
     assert cost.read() is None
-    assert MUCH.seconds == pytest.approx(24.0) and cost.read() == SLOW
+    assert cost.calibrate() and cost.read() == SLOW
 
 
 @pytest.mark.parametrize("change", [{"stamp": "other"}, {"dense": 1e9}, {"dense": 0.0}, {"dense": float("nan")}])
@@ -153,9 +143,8 @@ def test_other_kernels_and_impossible_numbers_do_not_count(place, change):
     assert cost.read() is None
 
 
-def test_where_nothing_can_be_kept_the_machine_is_measured_once_a_process(place, benchmarks):
+def test_doctor_says_where_nothing_can_be_kept(place, benchmarks):
     place.parent.write_text("a file where the folder should be")
-    assert MUCH.seconds == MUCH.seconds == pytest.approx(24.0) and len(benchmarks) == 1
     assert not cost.calibrate()
 
 
@@ -167,7 +156,7 @@ def test_without_compiled_kernels_nothing_is_measured_or_kept(monkeypatch, bench
 
 def test_a_disturbed_benchmark_is_not_believed(place, monkeypatch):
     monkeypatch.setattr(cost, "benchmark", lambda: replace(SLOW, steps=0.0))
-    assert pytest.approx(12.0) == MUCH.seconds and not place.exists()
+    assert not cost.calibrate() and not place.exists()
 
 
 def test_the_result_lies_beside_the_kernels(monkeypatch):

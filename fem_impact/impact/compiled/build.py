@@ -2,21 +2,40 @@
 
 Numba keeps compiled functions on disk and compiles them anew where their own file has changed; it does not notice an
 edit in another file that they call into. Here every one carries a stamp of the whole package.
+
+Work that is over before a compiler would be, such as a plan, runs `uncompiled`: there, kernels that are not on disk are
+run as plain Python, by a second copy of this package in which nothing is compiled.
 """
 
+import gc
 import hashlib
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import cached_property
+from importlib import import_module, util
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+PLAIN = "plain"  # name of the copy in which nothing is compiled
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"  # else as plain Python, without the import of numba
+COMPILED &= not __name__.endswith(f".{PLAIN}.build")
+QUICK: ContextVar[bool] = ContextVar("QUICK", default=False)  # whether to compile nothing
 if COMPILED:
     READ_BEFORE = "numba" in sys.modules
     from numba import config, njit
+    from numba._dynfunc import make_function
+    from numba.core import compiler, types
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler_machinery import register_pass
     from numba.core.options import DefaultOptions
+    from numba.core.registry import CPUDispatcher
+    from numba.core.targetconfig import ConfigStack
+    from numba.core.typed_passes import NativeLowering
 
     if not READ_BEFORE:  # numba takes from a file in the working folder whose compiled code it runs: not for us
         config._config_fname = os.devnull
@@ -37,6 +56,125 @@ def _stamp() -> str:
 STAMP = _stamp()
 
 
+@contextmanager
+def uncompiled() -> Iterator[None]:
+    """Compile nothing meanwhile."""
+    token = QUICK.set(True)
+    try:
+        yield
+    finally:
+        QUICK.reset(token)
+
+
+def limited() -> bool:
+    """Whether a run may be plain Python, and therefore must be short."""
+    return not COMPILED or QUICK.get()
+
+
+def _plain(kernel: Any) -> Any:
+    """A kernel as plain Python, with all that it calls."""
+    package, _, module = kernel.__module__.rpartition(".")
+    copy = f"{package}.{PLAIN}"
+    if copy not in sys.modules:
+        folder = Path(__file__).parent
+        spec = util.spec_from_file_location(copy, folder / "__init__.py", submodule_search_locations=[str(folder)])
+        assert spec is not None
+        sys.modules[copy] = util.module_from_spec(spec)
+    return getattr(import_module(f"{copy}.{module}"), kernel.__name__)
+
+
+if COMPILED:
+
+    class _Uncompiled(Exception):
+        """A kernel would have to be compiled."""
+
+    class _Kernel(CPUDispatcher):
+        """A kernel that runs as plain Python where nothing is to be compiled."""
+
+        def __call__(self, *arguments: Any) -> Any:
+            try:
+                return super().__call__(*arguments)
+            except _Uncompiled:
+                return _plain(self)(*arguments)
+
+    class _Flags(compiler.Flags):
+        """Options of a kernel that are compared quickly: numba does so at each operation, a tenth of its time."""
+
+        @cached_property
+        def _known(self) -> tuple[Any, ...]:
+            return tuple(sorted((name, str(value)) for name, value in self._values.items()))
+
+        def __hash__(self) -> int:
+            return hash(self._known)
+
+        def __eq__(self, other: object) -> bool:
+            return self is other or (isinstance(other, _Flags) and self._known == other._known)
+
+    class _Part(JITCodeLibrary):
+        """What is only ever part of kernels becomes machine code with them, not once more by itself."""
+
+        sums = False  # whether sums are reordered, which is decided here, not by what surrounds them in a kernel
+
+        def _optimize_final_module(self) -> None:
+            if self.sums:
+                super()._optimize_final_module()
+
+        def _finalize_final_module(self) -> None:
+            self._finalize_dynamic_globals()
+            self._finalized = True
+
+    @register_pass(mutates_CFG=True, analysis_only=False)
+    class _Lowering(NativeLowering):
+        """The last pass of the compiler, for a part."""
+
+        _name = "lowering_of_a_part"
+
+        def run_pass(self, state: Any) -> bool:
+            state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.library.sums = bool(state.flags.fastmath)
+            state.flags.no_compile = True
+            super().run_pass(state)
+            found = state["cr"]
+            name = found.fndesc.qualname
+            handle = make_function(found.fndesc.lookup_module(), name, "", 0, found.env, (state.library,))
+            state.targetctx.insert_user_function(handle, found.fndesc, [state.library])
+            state["cr"] = found._replace(cfunc=handle)
+            return True
+
+    class _Parts(compiler.CompilerBase):
+        """The passes of the compiler for a part."""
+
+        def define_pipelines(self) -> list[Any]:
+            builder = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)
+            builder.passes = [(_Lowering if step is NativeLowering else step, what) for step, what in builder.passes]
+            builder.finalize()
+            return [builder]
+
+    @contextmanager
+    def _hastened() -> Iterator[None]:
+        """Look up the type of each operation on numbers once, and collect no garbage: a third of the time."""
+        function: Any = types.BaseFunction
+        slow, found = function.get_call_type, {}
+
+        def quick(self: Any, context: Any, arguments: Any, keywords: Any) -> Any:
+            if keywords or not all(isinstance(each, (types.Number, types.Boolean)) for each in arguments):
+                return slow(self, context, arguments, keywords)
+            key = self, tuple(arguments), ConfigStack.top_or_none()
+            if key not in found:
+                found[key] = slow(self, context, arguments, keywords)
+            return found[key]
+
+        collects = gc.isenabled()
+        gc.disable()
+        function.get_call_type = quick
+        try:
+            yield
+        finally:
+            function.get_call_type = slow
+            if collects:
+                gc.enable()
+
+
 def outer(allocates: bool = True, **options: Any) -> Any:
     """Compile for use from Python; other threads run meanwhile. ``allocates`` as for `inner`."""
     if not COMPILED:
@@ -47,8 +185,19 @@ def outer(allocates: bool = True, **options: Any) -> Any:
 
     def compiled(function: Any) -> Any:
         kernel = njit(**wrapped, **options)(function)
-        # numba has no public way to say so; test_build.py edits a callee in a fresh process
+        # numba has no public ways to do the following; test_build.py tests all in fresh processes
         kernel._cache._cache_file._source_stamp = STAMP
+        kernel.__class__ = _Kernel
+        compile_it = kernel._compiler.compile
+
+        def compile_unless_quick(*signature: Any) -> Any:
+            if QUICK.get():
+                raise _Uncompiled
+            with _hastened():
+                return compile_it(*signature)
+
+        kernel._compiler.compile = compile_unless_quick
+        kernel._compiler._customize_flags = _Flags
         return kernel
 
     return compiled
@@ -64,11 +213,18 @@ def inner(allocates: bool = False, arrays: Any = None, part: bool = False, **opt
     if not COMPILED:
         return lambda function: arrays or function
     bare: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    bare["pipeline_class"] = _Parts
     own = "fastmath" in options  # which would get lost with the function itself
     bare |= {"inline": "always" if part and not own else "never", "forceinline": part and own}
     if UNCOUNTED:
         bare["_nrt"] = allocates  # this and forceinline are said in all cases, as callees inherit them
-    return njit(**bare, **options)
+
+    def compiled(function: Any) -> Any:
+        kernel = njit(**bare, **options)(function)
+        kernel._compiler._customize_flags = _Flags
+        return kernel
+
+    return compiled
 
 
 def folder(kernel: Any) -> Path | None:
