@@ -28,8 +28,8 @@ From Python, `fi.load_scene(path)` reads a scene, and `.plan()`, `.strike()` and
 
 `thickness`, `width`, `height` and `diameter` are numbers or
 
-- tables `{ x = [...], y = [...], values = [[...], ...] }` (no `y` on a beam) with one row of values for each x, linear in
-  between and constant beyond; or
+- tables `{ x = [...], y = [...], values = [[...], ...] }` (no `y` on a beam) with one row of values for each x, linear
+  in between and constant beyond; or
 - cases `{ cases = [{ value, centre, radius }, { value, from, to }], otherwise }`, of which the first that holds counts.
 """
 
