@@ -5,8 +5,8 @@
 A rigid hammer of 33 g strikes the hinged plate of 200 g of *Euphonics* 12.1 through a Hertz spring. Draws four plots:
 mesh size and element (largest error of the first sixty frequencies), number of modes with and without the residual
 compliance, step and scheme, and the whole chain from mesh to response. There, every combination of mesh, modes and
-steps is one dot, and a line shows the choices for tolerances from 1e-1 to 1e-8. Prints the README's table, the cost of
-a tolerance over that of the cheapest combination, and the seconds and memory predicted by the plan and measured. With
+steps is one dot, and a line shows the choices for tolerances from 1e-1 to 1e-8. Prints the table of limits.md, what a
+tolerance costs over the cheapest combination, and the seconds and memory predicted by the plan and measured. With
 ``--modes`` also what every tolerance costs if the modes of the plate carry the blow instead of Ritz vectors (minutes at
 1e-7 and 1e-8); with ``--only-chain`` the first three plots are left out. The seconds are those of one processor, which
 other programs on the machine change little. The error is the largest of those in restitution (absolute), impulse,
@@ -175,7 +175,7 @@ def dials(whole: fi.Scene, target: str | None = None) -> list[Dial]:
 
 
 def table(found: list[Dial]) -> str:
-    """The table of the README."""
+    """The table of `limits.md`."""
     lines = [
         "| tolerance | seconds | unknowns | vectors | steps | MB | true error |",
         "|---|---|---|---|---|---|---|",

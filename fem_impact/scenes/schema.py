@@ -41,10 +41,12 @@ class Part:
 
 
 def _plate(material: Material, *, thickness: Any, tension: float = 0.0) -> Plate:
+    """A plate."""
     return Plate(material, varying("thickness", thickness, 2), tension)
 
 
 def _beam(material: Material, *, width: Any = None, height: Any = None, diameter: Any = None) -> Beam:
+    """A beam of rectangular section, or of a round one."""
     width, height = varying("width", width, 1), varying("height", height, 1)
     diameter = varying("diameter", diameter, 1)
     if diameter is not None and width is None and height is None:
@@ -55,6 +57,7 @@ def _beam(material: Material, *, width: Any = None, height: Any = None, diameter
 
 
 def _sphere(*, radius: float, E: float, nu: float, rho: float, yield_strength: float | None = None) -> Striker:
+    """A solid ball, which does not vibrate itself."""
     return Striker.sphere(Material(E=E, nu=nu, rho=rho, yield_strength=yield_strength), radius)
 
 
@@ -62,6 +65,7 @@ def _bar(
     *, E: float, rho: float, length: float, width: Any = None, height: Any = None, diameter: Any = None,
     left: str = "free", right: str = "free", at: float, nu: float = 0.3, theory: str = "euler",
 ) -> Striker:  # fmt: skip
+    """A bar that bends, such as a plectrum or a stick held by one end."""
     section = _beam(Material(E=E, nu=nu, rho=rho), width=width, height=height, diameter=diameter)
     body, held = mesh.line(length), {"left": left, "right": right}
     known = closed_form(body, section, held, check.one_of("theory", theory, THEORIES[1]))
@@ -86,6 +90,7 @@ def _held(maker: Any) -> Callable[..., Striker]:
 
     own = inspect.signature(maker)
     hand = inspect.Parameter("hand", inspect.Parameter.KEYWORD_ONLY, default=None)
+    make.__doc__ = maker.__doc__
     make.__signature__ = own.replace(parameters=[*own.parameters.values(), hand])  # type: ignore[attr-defined]
     return make
 
@@ -118,8 +123,8 @@ def target_values(
         "scale": given,
         "nu": nu,
         "damping_ratio": over_frequency("damping_ratio", damping_ratio),
-        "point_masses": tuple(_weight(i, entry) for i, entry in enumerate(point_masses)),
-        "point_supports": tuple(_post(i, entry) for i, entry in enumerate(point_supports)),
+        "point_masses": tuple(_weight(i, entry) for i, entry in enumerate(_listed("point_masses", point_masses))),
+        "point_supports": tuple(_post(i, entry) for i, entry in enumerate(_listed("point_supports", point_supports))),
         "source": check.one_of("source", source, SOURCES),
         "model": check.one_of("model", model, MODELS),
         "stretching": check.flag("stretching", stretching),
@@ -127,6 +132,12 @@ def target_values(
         "baffle": check.flag("baffle", baffle),
         "theory": None if theory is None else check.one_of("theory", theory, [*THEORIES[2], *THEORIES[1]]),
     }
+
+
+def _listed(name: str, value: Any) -> Sequence[Any]:
+    if not isinstance(value, (list, tuple)):
+        raise ValueError(f"{name} must be a list of tables such as [{{ at = [0.1, 0.2] }}], got {check.shown(value)}")
+    return value
 
 
 def _weight(i: int, entry: Any) -> tuple[Any, float]:

@@ -1,11 +1,13 @@
 """The schema for editors: every scene that is shipped satisfies it, and what a scene may not say violates it."""
 
 import json
+import re
 import tomllib
 from pathlib import Path
 
 import pytest
 
+import fem_impact as fi
 from fem_impact import cli
 from fem_impact.scenes import editor_schema, templates
 from fem_impact.scenes.schema import MAKERS, TABLES
@@ -19,7 +21,8 @@ PLAIN = {"object": dict, "array": list, "string": str, "boolean": bool, "integer
 def faults(value, schema, where="scene"):
     """What violates the few keywords that the schema uses; a keyword it does not know is an error."""
     known = {"$schema", "title", "description", "default", "type", "properties", "required", "additionalProperties",
-             "enum", "const", "oneOf", "anyOf", "items"}  # fmt: skip
+             "enum", "const", "oneOf", "anyOf", "items", "pattern", "minimum", "exclusiveMinimum", "maximum",
+             "minItems", "maxItems", "minProperties"}  # fmt: skip
     assert set(schema) <= known, set(schema) - known
     found = []
     kind = PLAIN.get(schema.get("type", ""), object)
@@ -29,7 +32,17 @@ def faults(value, schema, where="scene"):
         found.append(f"{where} is none of {schema['enum']}")
     if "const" in schema and value != schema["const"]:
         found.append(f"{where} is not {schema['const']}")
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        low, high, above = (schema.get(word) for word in ("minimum", "maximum", "exclusiveMinimum"))
+        found += [f"{where} is below {low}"] if low is not None and value < low else []
+        found += [f"{where} is above {high}"] if high is not None and value > high else []
+        found += [f"{where} is not above {above}"] if above is not None and value <= above else []
+    if "pattern" in schema and not re.search(schema["pattern"], value):
+        found.append(f"{where} is not like {schema['pattern']}")
+    if isinstance(value, list) and not schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", len(value)):
+        found.append(f"{where} has {len(value)} items")
     if isinstance(value, dict):
+        found += [f"{where} is empty"] if len(value) < schema.get("minProperties", 0) else []
         inner = schema.get("properties", {})
         found += [f"{where} lacks {name}" for name in schema.get("required", []) if name not in value]
         for name, item in value.items():
@@ -69,13 +82,34 @@ def test_every_new_scene_satisfies_the_schema(kind):
         ("speed = 1.0", 'speed = "fast"', "scene.strike.speed is no number"),
         ("nu = 0.3", "nu = true", "scene.material.nu is no number"),
         ("rho = 450.0", "", "scene.material lacks rho"),
+        ("rho = 450.0", "rho = -450.0", "scene.material.rho is not above 0"),
+        ("length = 0.4 ", "length = 0.0 ", "scene.mesh.length is not above 0"),
+        ("thickness = 3e-3", "thickness = 0", "scene.section.thickness is not above 0"),
+        ("thickness = 3e-3", "thickness = { x = [0.0, 1.0], valus = [1e-3, 2e-3] }", "scene.section.thickness "),
+        ("mass = 0.02", "mass = 0", "scene.striker.mass is not above 0"),
+        ("stiffness = 1e7", "stiffness = -1e7", "scene.contact.stiffness is not above 0"),
+        ("at = [0.13, 0.1] ", 'at = "middle" ', "scene.strike.at is no "),
+        ("at = [0.13, 0.1] ", "at = [0.13, 0.1, 0.0] ", "scene.strike.at "),
+        ("tolerance = 1e-3", "tolerance = 0", "scene.strike.tolerance is below"),
+        ("tolerance = 1e-3", 'quantity = "restitutoin"', "scene.strike.quantity "),
+        ("tolerance = 1e-3", "max_impacts = 1.5", "scene.strike.max_impacts is no integer"),
+        ("tolerance = 1e-3", "stretching = true", "scene.strike has stretching"),
+        ("damping_ratio = 0.005", "damping_ratio = -0.1", "scene.target.damping_ratio "),
+        ("damping_ratio = 0.005", 'theory = "mindlinn"', "scene.target.theory is none of"),
+        ("damping_ratio = 0.005", "point_masses = [{ at = [0.1, 0.1] }]", "scene.target.point_masses[0] lacks mass"),
+        ("damping_ratio = 0.005", 'baffle = "no"', "scene.target.baffle is no boolean"),
+        ("points = [[0.13, 0.1]]", "listener = [0.1, 0.2]", "scene.observe.listener has 2 items"),
+        ("[observe]", "[map.over]\n'striker.mass' = 0.1\n[observe]", "scene.map.over.striker.mass "),
     ],
 )
-def test_what_a_scene_may_not_say_violates_the_schema(old, new, fault):
+def test_what_a_scene_may_not_say_violates_the_schema_and_is_refused(tmp_path, old, new, fault):
     text = templates.text("plate")
     assert text.count(old) == 1
     found = faults(tomllib.loads(text.replace(old, new)), SCHEMA)
     assert any(said.startswith(tuple(fault.split("|"))) for said in found), found
+    (tmp_path / "scene.toml").write_text(text.replace(old, new))
+    with pytest.raises(ValueError, match=r"scene\.toml"):
+        fi.load_scene(tmp_path / "scene.toml").strike()
 
 
 def test_the_schema_knows_every_table_and_kind():

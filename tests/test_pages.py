@@ -1,0 +1,84 @@
+"""The pages: links and anchors resolve, pages made by scripts are current, what they quote is still said."""
+
+import importlib.util
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from fem_impact.impact import assumption
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "studies").rglob("*.md")])
+FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+SAYS = re.compile(r"\*Says\*((?:\s+(?:or, on a map, |or )?`[^`]+`,?)+)")
+
+
+@cache
+def prose(path):
+    """A page without its blocks of code."""
+    return FENCE.sub("", path.read_text(encoding="utf-8"))
+
+
+@cache
+def anchors(path):
+    """The anchors of a page's headings, as sites make them: lower case, hyphens, repeated ones numbered."""
+    found = []
+    for title in re.findall(r"^#+ (.+)$", prose(path), flags=re.MULTILINE):
+        slug = re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
+        found.append(slug if slug not in found else f"{slug}-{found.count(slug)}")
+    return set(found)
+
+
+def name_of(path):
+    return path.relative_to(ROOT).as_posix()
+
+
+def test_the_pages_are_there():
+    expected = {"README", "CHANGELOG", "CONTRIBUTING", "guide", "scene_keys", "limits", "notes", "theory", "api"}
+    assert expected <= {path.stem for path in PAGES}
+
+
+@pytest.mark.parametrize("path", PAGES, ids=name_of)
+def test_links_lead_to_files_and_headings(path):
+    for link in LINK.findall(re.sub(r"`[^`\n]*`", "", prose(path))):
+        if link.startswith("https://"):
+            continue
+        place, _, anchor = link.partition("#")
+        target = (path.parent / place).resolve() if place else path
+        assert target.exists() and target.is_relative_to(ROOT), f"{name_of(path)}: {link}"
+        assert not anchor or anchor in anchors(target), f"{name_of(path)}: {link}"
+
+
+@pytest.mark.parametrize("path", PAGES, ids=name_of)
+def test_a_page_has_one_title_and_comes_first(path):
+    titles = re.findall(r"^# .+$", prose(path), flags=re.MULTILINE)
+    assert len(titles) == 1 and prose(path).startswith(titles[0])
+
+
+@pytest.mark.parametrize("name", ["README", "studies/README", "studies/guide", "studies/limits", "studies/notes"])
+def test_files_named_in_sentences_exist(name):
+    named = re.findall(r"`((?:studies|tests|meshes)/[\w./]+)`", prose(ROOT / f"{name}.md"))
+    assert all((ROOT / each).exists() for each in named)
+
+
+def test_the_page_of_scene_keys_is_current():
+    spec = importlib.util.spec_from_file_location("scene_keys", ROOT / "studies" / "scene_keys.py")
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    assert script.PAGE.read_text(encoding="utf-8") == script.page(), "run python studies/scene_keys.py"
+
+
+def test_every_assumption_is_explained_under_its_name():
+    assert {name.replace(" ", "-") for name in assumption.ALL} <= anchors(ROOT / "studies" / "notes.md")
+
+
+def test_messages_that_the_page_of_notes_quotes_are_said_so():
+    page = (ROOT / "studies" / "notes.md").read_text(encoding="utf-8")
+    code = " ".join(path.read_text(encoding="utf-8") for path in (ROOT / "fem_impact").rglob("*.py"))
+    code = re.sub(r'"\s*\n\s*f?"', "", code)  # texts that go on in the next line
+    quoted = [" ".join(each.split()) for part in SAYS.findall(page) for each in re.findall(r"`([^`]+)`", part)]
+    assert len(quoted) > 25
+    assert [each for each in quoted if each not in code] == []
