@@ -186,13 +186,13 @@ class Plan:
     def __str__(self) -> str:
         wanted = words(self.quantities)
         kept = "met" if self.meets else "MISSED"
-        first = f"tolerance {self.tolerance:g} of {wanted} will be {kept}: predicted error {self.error:.1e}"
+        model, *doubts = assumption.lines(self.assumptions, self.tolerance)
+        first = f"tolerance {self.tolerance:g} of {wanted} will be {kept}: predicted error {self.error:.1e}; {model}"
         lines = [first, *(f"Note: {note}" for note in self.notes), *(f"  {line}" for line in self.reasons)]
         lines.append("Predicted errors:")
         errors = [*self.errors.items(), ("total", self.error)]
         lines += [f"  {line}" for line in markup.columns([(name, f"{error:.1e}") for name, error in errors])]
-        head, *rest = assumption.lines(self.assumptions, self.tolerance)
-        lines += [f"Model: {head}", *(f"  {line}" for line in rest)]
+        lines += [f"Model: {line}" for line in doubts]
         lines.append(f"Cost: {self.cost}")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")
@@ -893,8 +893,8 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     if impacts > cost.MANY and not fixed:
         meshes.append(vectors.finer(blow.target, meshes[0], stages))
     count = vectors.first_count(blow.target, 0.5 / asked.duration, asked.tolerance)
-    kept = f"the target is described by some {count} Ritz vectors started from the blow, more if their error shows"
-    reason = f"argyris elements of {size:.3g} m, smaller towards the blow, with some {n_dofs} unknowns"
+    kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
+    reason = f"argyris elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"
     if asked.moving:
         reason += "; motion comes from the vectors as long as they tell it, later motion and sound from modes driven "
         reason += "by the force that the blow finds"

@@ -163,8 +163,7 @@ def _of_strokes(scene: Scene, run: Played) -> dict[str, Any]:
         for start, hit, who in zip(found.starts.tolist(), found.hits, found.strikers)
         if who
     ]
-    hardest = max(range(len(found.hits)), key=lambda i: found.hits[i].peak_force)
-    own, which = found.hits[hardest], " and ".join(map(str, found.strikers[hardest]))
+    own, which = found.hits[found.hardest], " and ".join(map(str, found.strikers[found.hardest]))
     laws = dict.fromkeys(contact(stroke.contact) for stroke in found.strokes)
     played = f"It is struck {len(strokes)} times in {si(found.strokes[-1].when - found.strokes[0].when, 's')}."
     energies = {name: found.energies[name] for name in ("target", "dissipated", "taken away")}
@@ -233,10 +232,9 @@ def _assumption(each: Assumption) -> dict[str, Any]:
     changes = [f"{QUANTITY_NAMES.get(name, name)} {_share(size)}" for name, size in each.effect.items() if size]
     changes += [f"not known: {each.why}"] if not each.known else []
     changes += ["beyond this estimate"] if each.beyond else []
-    limit = "" if each.limit is None else f", doubtful above {each.limit:g}"
     return {
         "name": each.name,
-        "number": "" if each.value is None else f"{each.number} {each.value:.2g}{limit}",
+        "number": each.reading,
         "changes": changes or ["nothing"],
         "tone": "doubt" if each.beyond or not each.known else "",
         "remedy": each.remedy if each.doubtful or each.worst > SILENT or not each.known else "",
