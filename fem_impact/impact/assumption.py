@@ -30,7 +30,7 @@ READINGS = {
     "own period of the striker over the contact time": "the striker's own period is {}% of the contact time",
     "mass of the air moved over that of the body": "the air carried along weighs {}% of the body",
     "damping ratio by the sound radiated, beyond that stated": "sound adds a damping ratio of {} to that stated",
-    "damping ratio tried": "a damping ratio of {} was tried",
+    "damping ratio tried": "no damping is stated, and a ratio of {} was tried",
 }
 
 
@@ -116,7 +116,8 @@ class Assumption:
         """A quantity and how much it changes: the first that changes more than that, or the one that changes most."""
         changes = {name: change or 0.0 for name, change in self.effect.items()}
         name = next((each for each in changes if changes[each] > more_than), max(changes, key=lambda each: changes[each]))
-        return f"{QUANTITY_NAMES.get(name, name)} by about {changes[name]:.1g}"
+        size = f"{changes[name]:.1g}" if name == "restitution" else f"{100.0 * float(f'{changes[name]:.1g}'):g} %"
+        return f"{QUANTITY_NAMES.get(name, name)} by about {size}"
 
     @property
     def _measured(self) -> str:
@@ -172,7 +173,7 @@ def head(assumptions: Sequence[Assumption], tolerance: float) -> str:
         worst = max(assumptions, key=lambda each: each.worst)
         because = f"{worst.reading}, which changes" if worst.reading else f"{worst.name!r} changes"
         in_all = f", by about {error:.1g} in all" if error > 1.5 * worst.worst else ""
-        said.append(f"the model is wrong here{in_all}: {because} the {worst.change(0.5 * allowed(tolerance))}: {worst.remedy}")
+        said.append(f"the model is wrong here{in_all}: {because} the {worst.change(allowed(tolerance))}: {worst.remedy}")
     if unsure:
         remedies = {each.why: each.remedy for each in unsure}
         names, cures = ", ".join(each.name for each in unsure), ", ".join(dict.fromkeys(remedies.values()))

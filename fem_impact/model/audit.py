@@ -60,7 +60,7 @@ def examine(hit: Response, simplified: Simplified | None = None) -> tuple[Assump
 
 def required(target: Target, hit: Response) -> tuple[Target, str] | None:
     """The target with the better model that the tolerance of a blow requires, and why; None if it requires none."""
-    if target.model != "auto" or target.mesh is None:
+    if target.mesh is None:
         return None
     for each in hit.assumptions:
         if each.worst <= hit.tolerance:

@@ -23,7 +23,7 @@ from ..impact.response import LOOKED_AT, Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, FieldShapes, Modes, at_rest
 from . import audit, cost, idealisation, mixed, vectors
-from .target import FIRST_LOOK, Elements, Stages, Target, Watch
+from .target import FIRST_LOOK, MODELS, Elements, Stages, Target, Watch
 
 # [-] of the tolerance for left-out modes, as much for the time steps, as neither is cheap; the mesh gets the rest
 SHARE = 0.45
@@ -50,10 +50,10 @@ MANY_MODES = 10_000
 SHORT_WAVES = {
     "argyris": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
 }  # fmt: skip
-PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}  # that a user may set
+PIECES = {"target": "", "model": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}  # that a user may set
 # after modes, striker and contact; a plan is for a body at rest
 ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
-TARGETS = ("rigid", "infinite", "vectors", "mixed", "modal")
+CHOICES = {"target": ("rigid", "infinite", "vectors", "mixed", "modal"), "model": MODELS}
 RINGING = ("modal", "vectors")  # those of a target that rings
 # [-] modes times steps of one run of a plate that is infinite above a frequency: a time limit of ten seconds
 MOST_MIXED = 2e8
@@ -241,8 +241,8 @@ class _Asked:
             **{name: value for name, value in changes.items() if name not in PIECES},
         }
         for name, value in pieces.items():
-            if name == "target":
-                check.one_of("target", value, TARGETS)
+            if name in CHOICES:
+                check.one_of(name, value, CHOICES[name])
             elif PIECES[name]:
                 check.positive(name, value, PIECES[name])
             else:
@@ -374,17 +374,21 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     """Run the plan, and then with the better model of the target that the tolerance requires, if it may be chosen."""
     with _noted(_Asked.checked(plan.blow, plan.changes)):
         run = _carry_out(plan, stages, keep)
+    if plan.changes.get("model", plan.blow.target.model) != "auto":
+        return run
     better = audit.required(plan.blow.target, run.response)
     if better is None:
         return run
     target, why = better
+    before = sum(stages.seconds.values())
     try:
         better_plan = make(replace(plan.blow, target=target), plan.changes, stages)
         progress.foresee(better_plan.seconds)
         again = carry_out(better_plan, stages)
     except (check.SimulationError, ValueError) as error:
         return replace(run, notes=(*run.notes, f"{why}; that was not computed: {error}"))
-    return replace(again, notes=(why, *again.notes))
+    took = sum(stages.seconds.values()) - before
+    return replace(again, notes=(f"{why}; that took {took:.1g} s more", *again.notes))
 
 
 def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:

@@ -37,7 +37,7 @@ def test_an_assumption_that_matters_gets_a_line_with_its_number_its_limit_and_th
     head, line = assumption.lines([make({"restitution": 0.01, "force": 0.03}, 0.3), WELL], 1e-3)
     assert head == "the model holds to 0.03"
     assert line == (
-        "thin target: thickness over wave 0.3; above 0.2 it matters; it changes the peak force by about 0.03; "
+        "thin target: thickness over wave 0.3; above 0.2 it matters; it changes the peak force by about 3 %; "
         "use a thicker theory"
     )
 
