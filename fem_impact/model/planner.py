@@ -747,7 +747,7 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, heavy: bool = Fals
         raise check.SimulationError(f"{blow.name}{NO_MESH}")
     number = _mixed_count(asked, frequency)
     kept = (
-        f"the target keeps its modes up to about {frequency:.3g} Hz, or higher if the echoes left out show; above, it "
+        f"the target keeps its modes up to about {frequency:.3g} Hz, or higher if the echoes left out matter; above, it "
         f"is treated as an infinite plate of mobility {seen.mobility:.3g} m/(N s), from {highest:.3g} Hz on as a spring"
     )
     slow = asked.mass * seen.mobility
@@ -900,8 +900,8 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
     reason = f"argyris elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"
     if asked.moving:
-        reason += "; motion comes from the vectors as long as they tell it, later motion and sound from modes driven "
-        reason += "by the force that the blow finds"
+        reason += "; the vectors give the motion as long as they can, modes driven by the force found give later motion "
+        reason += "and the sound"
     work = cost.by_vectors([blow.target.unknowns(at, each, stages) for each in meshes], count, lasts)
     if asked.moving:
         rings = _ringing_count(asked)
@@ -1061,13 +1061,13 @@ def _plan(
     )
     until = "fixed by dt" if fixed[1] else f"halved until two runs agree to {steps * asked.tolerance:.1e}"
     lasts = asked.values.get("duration")
-    end = "until the final separation" if lasts is None else f"for {lasts:g} s"
+    end = "until the bodies have parted for good" if lasts is None else f"for {lasts:g} s"
     count = asked.duration / dt
     refined = scheme == "collocation" and not fixed[1]  # its first step says little of those it takes in the end
     if asked.blow.target.air:
         work = work + cost.in_air(n_modes)
     work = work + cost.strikes(cost.collocated(steps * asked.tolerance) if refined else count, n_modes + kept)
-    reasons = (*reasons, f"scheme {scheme}, steps of {dt:.3g} s ({count:.0f} per contact), {until}; run {end}")
+    reasons = (*reasons, f"scheme {scheme}, steps of {dt:.3g} s ({count:.0f} per contact), {until}, {end}")
     return Plan(
         asked.blow,
         MappingProxyType(dict(asked.changes)),
