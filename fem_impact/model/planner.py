@@ -371,24 +371,22 @@ def _chosen(asked: _Asked, stages: Stages) -> Plan:
 
 
 def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
-    """Run the plan, and then with the better model of the target that the tolerance requires, if it may be chosen."""
+    """Run the plan, and then with the better models of the target that the tolerance requires, if it may choose."""
     with _noted(_Asked.checked(plan.blow, plan.changes)):
         run = _carry_out(plan, stages, keep)
-    if plan.changes.get("model", plan.blow.target.model) != "auto":
-        return run
-    better = audit.required(plan.blow.target, run.response)
-    if better is None:
-        return run
-    target, why = better
-    before = sum(stages.seconds.values())
-    try:
-        better_plan = make(replace(plan.blow, target=target), plan.changes, stages)
-        progress.foresee(better_plan.seconds)
-        again = carry_out(better_plan, stages)
-    except (check.SimulationError, ValueError) as error:
-        return replace(run, notes=(*run.notes, f"{why}; that was not computed: {error}"))
-    took = sum(stages.seconds.values()) - before
-    return replace(again, notes=(f"{why}; that took {took:.1g} s more", *again.notes))
+    chooses = plan.changes.get("model", plan.blow.target.model) == "auto"
+    told: tuple[str, ...] = ()
+    while chooses and (better := audit.required(plan.blow.target, run.response)) is not None:
+        target, why = better
+        before = sum(stages.seconds.values())
+        try:
+            plan = make(replace(plan.blow, target=target), plan.changes, stages)
+            progress.foresee(plan.seconds)
+            again = _carry_out(plan, stages, None)
+        except (check.SimulationError, ValueError, MemoryError) as error:
+            return replace(run, notes=(*told, *run.notes, f"{why}; that was not computed: {error}"))
+        told, run = (*told, f"{why}; that took {sum(stages.seconds.values()) - before:.1g} s more"), again
+    return replace(run, notes=(*told, *run.notes))
 
 
 def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:
