@@ -382,12 +382,16 @@ def _add_choices(add: Any) -> None:
         metavar="KIND",
         help="treat the struck body as rigid, infinite, by vectors, mixed or modal, whatever the plan chooses",
     )
+    add(
+        "--model", metavar="MODEL",
+        help="auto takes a thick theory, air and stretching where the tolerance needs them; stated as the scene says",
+    )  # fmt: skip
     add("--n-modes", metavar="N", type=int, help="number of modes to keep for the struck body")
     add("--size", metavar="H", type=float, help="element size [m]")
 
 
 def _choices(options: argparse.Namespace) -> dict[str, Any]:
-    names = ("tolerance", "quantity", "target", "n_modes", "size")
+    names = ("tolerance", "quantity", "target", "model", "n_modes", "size")
     return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
 
 

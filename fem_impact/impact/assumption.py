@@ -115,7 +115,8 @@ class Assumption:
     def change(self, more_than: float = math.inf) -> str:
         """A quantity and how much it changes: the first that changes more than that, or the one that changes most."""
         changes = {name: change or 0.0 for name, change in self.effect.items()}
-        name = next((each for each in changes if changes[each] > more_than), max(changes, key=lambda each: changes[each]))
+        most = max(changes, key=lambda each: changes[each])
+        name = next((each for each in changes if changes[each] > more_than), most)
         size = f"{changes[name]:.1g}" if name == "restitution" else f"{100.0 * float(f'{changes[name]:.1g}'):g} %"
         return f"{QUANTITY_NAMES.get(name, name)} by about {size}"
 
@@ -130,7 +131,7 @@ class Assumption:
 
 def unexamined(
     quantities: Iterable[str],
-    why: str = "blows of several bodies are not examined",
+    why: str = "several bodies meet",
     remedy: str = "examine each pair by `fi.strike`",
 ) -> tuple[Assumption, ...]:
     """Every assumption as not known, for a blow that nobody examined."""
@@ -167,13 +168,14 @@ def head(assumptions: Sequence[Assumption], tolerance: float) -> str:
     if not any(each.effect for each in assumptions):
         return _foreseen(assumptions, unsure)
     if len(unsure) == len(assumptions) and len({each.unknown for each in unsure}) == 1:
-        return f"the model is not examined: {unsure[0].unknown}; {unsure[0].remedy}"
+        return f"the model is not examined, as {unsure[0].unknown}: {unsure[0].remedy}"
     error, said = total(assumptions), []
     if error > allowed(tolerance):
         worst = max(assumptions, key=lambda each: each.worst)
         because = f"{worst.reading}, which changes" if worst.reading else f"{worst.name!r} changes"
         in_all = f", by about {error:.1g} in all" if error > 1.5 * worst.worst else ""
-        said.append(f"the model is wrong here{in_all}: {because} the {worst.change(allowed(tolerance))}: {worst.remedy}")
+        change = worst.change(allowed(tolerance))
+        said.append(f"the model is wrong here{in_all}: {because} the {change}: {worst.remedy}")
     if unsure:
         remedies = {each.why: each.remedy for each in unsure}
         names, cures = ", ".join(each.name for each in unsure), ", ".join(dict.fromkeys(remedies.values()))

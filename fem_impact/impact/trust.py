@@ -137,18 +137,17 @@ def _judged(hit: "Response", name: str, band: float | None) -> Judged:
     known = assumption.of_quantity(found, name)
     limit = assumption.allowed(hit.tolerance)
     worst = max(found, key=lambda each: each.effect.get(name) or 0.0)
-    cause, size = error.dominant
-    if not hit.tolerance_met:
-        dominant, remedy = cause if error.resolvable else "the modes left out", promise.remedy(hit)
-    elif known > limit:
-        dominant, remedy = worst.name, worst.remedy
+    cause, size = error.dominant if error.resolvable else ("modes left out", np.inf)
+    dominant = worst.name if (worst.effect.get(name) or 0.0) >= size else cause
+    remedies = [] if hit.tolerance_met else [promise.remedy(hit)]
+    if known > limit:
+        remedies.append(worst.remedy)
     elif unsure:
-        dominant, remedy = unsure[0].name, unsure[0].remedy
-    else:
-        dominant, remedy = worst.name if (worst.effect.get(name) or 0.0) >= size else cause, ""
+        dominant = unsure[0].name if hit.tolerance_met else dominant
+        remedies.append(unsure[0].remedy)
     return Judged(
         name, band, _value(hit, name, band), error.total if error.resolvable else None, None if unsure else known,
-        known, tuple(each.name for each in unsure), dominant, remedy, limit, hit.tolerance,
+        known, tuple(each.name for each in unsure), dominant, "; ".join(remedies), limit, hit.tolerance,
     )  # fmt: skip
 
 

@@ -50,7 +50,8 @@ MANY_MODES = 10_000
 SHORT_WAVES = {
     "argyris": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
 }  # fmt: skip
-PIECES = {"target": "", "model": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}  # that a user may set
+# that a user may set
+PIECES = {"target": "", "model": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}
 # after modes, striker and contact; a plan is for a body at rest
 ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
 CHOICES = {"target": ("rigid", "infinite", "vectors", "mixed", "modal"), "model": MODELS}
@@ -745,8 +746,9 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, heavy: bool = Fals
         raise check.SimulationError(f"{blow.name}{NO_MESH}")
     number = _mixed_count(asked, frequency)
     kept = (
-        f"the target keeps its modes up to about {frequency:.3g} Hz, or higher if the echoes left out matter; above, it "
-        f"is treated as an infinite plate of mobility {seen.mobility:.3g} m/(N s), from {highest:.3g} Hz on as a spring"
+        f"the target keeps its modes up to about {frequency:.3g} Hz, or higher if the echoes left out matter; above, "
+        f"it is treated as an infinite plate of mobility {seen.mobility:.3g} m/(N s), from {highest:.3g} Hz on as a "
+        "spring"
     )
     slow = asked.mass * seen.mobility
     why = f"the contact lasts about {asked.duration:.3g} s on a wall, and the striker slows down within {slow:.3g} s"
@@ -898,7 +900,9 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
     reason = f"argyris elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"
     if asked.moving:
-        reason += "; the vectors give the motion as long as they can, modes driven by the force found give later motion "
+        reason += (
+            "; the vectors give the motion as long as they can, modes driven by the force found give later motion "
+        )
         reason += "and the sound"
     work = cost.by_vectors([blow.target.unknowns(at, each, stages) for each in meshes], count, lasts)
     if asked.moving:
@@ -1177,7 +1181,7 @@ def strike(
         Damping of a system, which has none of its own.
     strict : bool
         Whether a missed tolerance raises SimulationError; otherwise it warns (`ToleranceWarning`).
-    target, size, n_modes, max_frequency, n_striker_modes : optional
+    target, model, size, n_modes, max_frequency, n_striker_modes : optional
         Parts of the model to fix by hand, as in `fi.plan`.
 
     Returns

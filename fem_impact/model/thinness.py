@@ -23,7 +23,8 @@ LIMIT = 0.23  # [-] thickness times wavenumber at which a wave is 1 % too fast f
 # [-] thickness times wavenumber beyond which a force is local to the contact: waves shorter than three thicknesses
 DENT = 2.0
 DOUBT = 0.2  # [-] drop of all frequencies by which a striker of unknown thickness is tried: a choice for a stout one
-SHEARED = 10.0  # [-] what a plate gives by shear over what it gives by bending, at most: it is thinner than half its side
+# [-] what a plate gives by shear over what it gives by bending, at most: it is thinner than half its side
+SHEARED = 10.0
 NEAR = 10  # [-] modes next to a frequency that tell its wavenumber: some of them swing unlike waves, hardly all of ten
 NUMBER = "thickness times wavenumber"
 THICKER = 'take a thick plate, theory = "mindlin", or a softer contact'
@@ -158,7 +159,7 @@ def of_striker(struck: Struck) -> Assumption:
             return Assumption("thin striker", None, LIMIT, {}, quantities, NO_SLENDERNESS, NUMBER, unknown)
         omega[columns] *= 1.0 - DOUBT
         effect = struck.changes(omega=omega)
-        if max(np.inf if x is None else x for x in effect.values()) <= allowed(hit.tolerance):  # known to be at most this
+        if max(np.inf if x is None else x for x in effect.values()) <= allowed(hit.tolerance):  # at most so much
             return Assumption("thin striker", None, None, effect, quantities, NO_SLENDERNESS, NUMBER)
         unknown = "the thickness of the striker, and the blow depends on its bending modes"
         effect = dict.fromkeys(quantities)

@@ -219,7 +219,8 @@ def write_json(path: str | Path, data: dict[str, Any]) -> None:
 
 SCALARS = (
     "n_impacts", "margin", "contact_time", "peak_force", "impulse", "restitution", "speed", "energies", "dissipated",
-    "energy_error", "momentum_error", "tolerance", "tolerance_met", "trusted", "verdict", "finished", "in_contact", "scheme",
+    "energy_error", "momentum_error", "tolerance", "tolerance_met", "trusted", "verdict", "finished", "in_contact",
+    "scheme",
 )  # fmt: skip
 ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "inherited", "sensitivity", "total", "resolvable")
 IMPACT_PARTS = ("start", "end", "peak_force", "impulse", "contact", "restitution")

@@ -47,7 +47,8 @@ def test_a_large_effect_is_beyond_the_estimate():
     assert large.beyond and large.state == "beyond this estimate"
     head, line = assumption.lines([large], 1e-3)
     assert head == (
-        "the model is wrong here: thickness over wave 1, which changes the restitution by about 0.4: use a thicker theory"
+        "the model is wrong here: thickness over wave 1, which changes the restitution by about 0.4: "
+        "use a thicker theory"
     )
     assert "restitution by about 0.4, beyond this estimate" in line
 

@@ -42,7 +42,9 @@ def test_a_blow_that_keeps_every_assumption_says_so_in_one_line():
     soft = fi.Striker.sphere(fi.Material(E=1e6, nu=0.4, rho=1100.0, yield_strength=1e7), 5e-3)
     hit = fi.strike(modes, soft, fi.Contact.between(soft, block), at=(0.12, 0.1), speed=0.01, tolerance=1e-2)
     assert hit.model_verdict == ("the model holds to better than 1e-3",)
-    assert hit.summary().splitlines()[0] == hit.verdict and hit.verdict.endswith("; the model holds to better than 1e-3")
+    assert hit.summary().splitlines()[0] == hit.verdict and hit.verdict.endswith(
+        "; the model holds to better than 1e-3"
+    )
 
 
 def test_the_quantities_asked_for_are_those_that_get_an_effect():
