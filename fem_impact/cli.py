@@ -588,8 +588,8 @@ def _map(options: argparse.Namespace) -> None:
             _say(f"{name.capitalize()}: {table.attrs[name]}")
     if "model_error" in table:
         own, unknown = table.model_error, table.model_error.attrs["not_known"]
-        not_known = f", not counting what is not known ({unknown})" if unknown else ""
-        _say(f"Model: its own error is {float(own.min()):.1g} to {float(own.max()):.1g}{not_known}")
+        not_known = f"; not known: {unknown}" if unknown else ""
+        _say(f"Model: it errs by {float(own.min()):.1g} to {float(own.max()):.1g}{not_known}")
     _print_notes(table.attrs["notes"].splitlines())
     _say(f"Time: {time.perf_counter() - began:.2f} s", f"Files in {folder}{os.sep}: {', '.join(names)}")
 
