@@ -382,12 +382,16 @@ def _add_choices(add: Any) -> None:
         metavar="KIND",
         help="treat the struck body as rigid, infinite, by vectors, mixed or modal, whatever the plan chooses",
     )
+    add(
+        "--model", metavar="MODEL",
+        help="auto takes a thick theory, air and stretching where the tolerance needs them; stated as the scene says",
+    )  # fmt: skip
     add("--n-modes", metavar="N", type=int, help="number of modes to keep for the struck body")
     add("--size", metavar="H", type=float, help="element size [m]")
 
 
 def _choices(options: argparse.Namespace) -> dict[str, Any]:
-    names = ("tolerance", "quantity", "target", "n_modes", "size")
+    names = ("tolerance", "quantity", "target", "model", "n_modes", "size")
     return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
 
 
@@ -584,8 +588,8 @@ def _map(options: argparse.Namespace) -> None:
             _say(f"{name.capitalize()}: {table.attrs[name]}")
     if "model_error" in table:
         own, unknown = table.model_error, table.model_error.attrs["not_known"]
-        not_known = f", not counting what is not known ({unknown})" if unknown else ""
-        _say(f"Model: its own error is {float(own.min()):.1g} to {float(own.max()):.1g}{not_known}")
+        not_known = f"; not known: {unknown}" if unknown else ""
+        _say(f"Model: it errs by {float(own.min()):.1g} to {float(own.max()):.1g}{not_known}")
     _print_notes(table.attrs["notes"].splitlines())
     _say(f"Time: {time.perf_counter() - began:.2f} s", f"Files in {folder}{os.sep}: {', '.join(names)}")
 

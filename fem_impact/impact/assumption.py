@@ -16,6 +16,22 @@ ALL = (
     "thin target", "thin striker", "small deflections", "no yielding", "local contact", "quasi-static contact",
     "still air", "stated damping",
 )  # fmt: skip
+# [-] errors of the model up to this count as right, whatever the tolerance: stiffness, contact law and the speed of a
+# hand are seldom known better, and a blow by hand repeats no better
+ENOUGH = 0.05
+# how each number that decides reads with its value, "{}%" as a percentage up to 100 %
+READINGS = {
+    "thickness times wavenumber": "thickness times wavenumber is {}",
+    "deflection over thickness": "the deflection is {} times the thickness",
+    "contact pressure over that at first yield": "the contact pressure is {} times that at first yield",
+    "contact radius over half the thickness": "the contact radius is {} times half the thickness",
+    "contact radius over the distance to the edge": "the contact radius is {} times the distance to the edge",
+    "contact radius times wavenumber": "contact radius times wavenumber is {}",
+    "own period of the striker over the contact time": "the striker's own period is {}% of the contact time",
+    "mass of the air moved over that of the body": "the air carried along weighs {}% of the body",
+    "damping ratio by the sound radiated, beyond that stated": "sound adds a damping ratio of {} to that stated",
+    "damping ratio tried": "no damping is stated, and a ratio of {} was tried",
+}
 
 
 @dataclass(frozen=True)
@@ -34,6 +50,7 @@ class Assumption:
     remedy: str  # what would make the answer right, or known
     number: str  # what `value` is, with its unit
     unknown: str = ""  # why something is not known; "" if everything is
+    stated: bool = False  # whether what is not known is a matter of the contact law or the mass that the user states
 
     @property
     def known(self) -> bool:
@@ -70,32 +87,51 @@ class Assumption:
         return "estimated" if self.effect else "foreseen"
 
     @property
+    def open(self) -> bool:
+        """Whether something is not known that the user did not state as a fact, so that the answer may be wrong."""
+        return not self.known and not self.stated
+
+    @property
+    def reading(self) -> str:
+        """The number that decides in words; "" if it is not known."""
+        return "" if self.value is None else self._read(self.value)
+
+    def _read(self, value: float) -> str:
+        phrase = READINGS.get(self.number, f"{self.number} {{}}")
+        share = f"{100.0 * value:.2g} % of" if value < 1.0 else f"{value:.2g} times"
+        return phrase.replace("{}% of", share).replace("{}", f"{value:.2g}")
+
+    @property
     def sentence(self) -> str:
         """The assumption in one line."""
-        said = [] if self.value is None else [f"{self.number} {self.value:.2g}{self._limit}"]
-        if self.beyond:
-            said.append(f"changes the {_worst(self.effect)[0]} by some {self.worst:.0%}, beyond this estimate")
-        elif self.worst > 0.0:
-            said.append(f"changes the {_worst(self.effect)[0]} by {self.worst:.1g}")
+        said = [self._measured] if self.value is not None else []
+        if self.worst > 0.0:
+            said.append(f"it changes the {self.change()}" + (", beyond this estimate" if self.beyond else ""))
         if not self.known:
             said.append(f"not known: {self.why}")
         said += [self.remedy] if self.remedy else []
         return f"{self.name}: {'; '.join(said)}"
 
+    def change(self, more_than: float = math.inf) -> str:
+        """A quantity and how much it changes: the first that changes more than that, or the one that changes most."""
+        changes = {name: change or 0.0 for name, change in self.effect.items()}
+        most = max(changes, key=lambda each: changes[each])
+        name = next((each for each in changes if changes[each] > more_than), most)
+        size = f"{changes[name]:.1g}" if name == "restitution" else f"{100.0 * float(f'{changes[name]:.1g}'):g} %"
+        return f"{QUANTITY_NAMES.get(name, name)} by about {size}"
+
     @property
-    def _limit(self) -> str:
-        return "" if self.limit is None else f" ({'above' if self.doubtful else 'of'} {self.limit:g})"
-
-
-def _worst(effect: Mapping[str, float | None]) -> tuple[str, float]:
-    known = {name: change for name, change in effect.items() if change is not None}
-    name = max(known, key=lambda each: known[each])
-    return QUANTITY_NAMES.get(name, name), known[name]
+    def _measured(self) -> str:
+        """The number that decides, and the limit from which on it matters."""
+        if self.limit is None:
+            return self.reading
+        limit = f"{100.0 * self.limit:g} %" if "%" in READINGS.get(self.number, "") else f"{self.limit:g}"
+        return f"{self.reading}; above {limit} it matters"
 
 
 def unexamined(
     quantities: Iterable[str],
-    why: str = "blows of several bodies are not examined",
+    why: str = "several bodies meet",
     remedy: str = "examine each pair by `fi.strike`",
 ) -> tuple[Assumption, ...]:
     """Every assumption as not known, for a blow that nobody examined."""
@@ -104,34 +140,57 @@ def unexamined(
 
 
 def total(assumptions: Sequence[Assumption]) -> float:
-    """Sum of the largest known effects [-]; what is not known is not in it."""
-    return float(sum(each.worst for each in assumptions))
+    """Largest sum over the assumptions of what they do to one quantity [-]; what is not known is not in it."""
+    names = dict.fromkeys(name for each in assumptions for name in each.effect)
+    return max((of_quantity(assumptions, name) for name in names), default=0.0)
+
+
+def of_quantity(assumptions: Sequence[Assumption], name: str) -> float:
+    """Sum of what the assumptions do to a quantity [-]; what is not known is not in it."""
+    return float(sum(each.effect.get(name) or 0.0 for each in assumptions))
+
+
+def allowed(tolerance: float) -> float:
+    """Largest error of the model [-] with which an answer is trusted."""
+    return max(tolerance, ENOUGH)
 
 
 def lines(assumptions: Sequence[Assumption], tolerance: float) -> list[str]:
-    """The examination in words: one line if all is well, and one for each assumption that matters or is not known."""
-    error, worth = total(assumptions), max(SILENT, SHARE * tolerance)
+    """The examination in words: whether the model holds, and a line for each assumption that matters."""
+    worth = max(SILENT, SHARE * tolerance)
     telling = [each for each in assumptions if each.worst > worth or each.doubtful]
-    unknown = [each for each in assumptions if not each.known]
+    return [head(assumptions, tolerance), *(each.sentence for each in sorted(telling, key=lambda each: -each.worst))]
+
+
+def head(assumptions: Sequence[Assumption], tolerance: float) -> str:
+    """Whether the model holds, in one clause: by how much at most, or what is wrong or not known, and what helps."""
+    unsure = [each for each in assumptions if each.open]
     if not any(each.effect for each in assumptions):
-        return _foreseen(assumptions)
-    if error <= worth:
-        head = f"the model's own error is below {_above(error)}"
-    elif any(each.beyond for each in telling):
-        head = f"the model's own error is beyond this estimate: some {error:.0%}"
-    else:
-        head = f"the model's own error is about {error:.1g}"
-    head += f", not counting what is not known ({', '.join(each.name for each in unknown)})" if unknown else ""
-    return [head, *(each.sentence for each in sorted(telling, key=lambda each: -each.worst))]
+        return _foreseen(assumptions, unsure)
+    if len(unsure) == len(assumptions) and len({each.unknown for each in unsure}) == 1:
+        return f"the model is not examined, as {unsure[0].unknown}: {unsure[0].remedy}"
+    error, said = total(assumptions), []
+    if error > allowed(tolerance):
+        worst = max(assumptions, key=lambda each: each.worst)
+        because = f"{worst.reading}, which changes" if worst.reading else f"{worst.name!r} changes"
+        in_all = f", by about {error:.1g} in all" if error > 1.5 * worst.worst else ""
+        change = worst.change(allowed(tolerance))
+        said.append(f"the model is wrong here{in_all}: {because} the {change}: {worst.remedy}")
+    if unsure:
+        remedies = {each.why: each.remedy for each in unsure}
+        names, cures = ", ".join(each.name for each in unsure), ", ".join(dict.fromkeys(remedies.values()))
+        said.append(f"it is not known whether the model holds: {names} ({', '.join(remedies)}): {cures}")
+    if said:
+        return "; ".join(said)
+    holds = f"to better than {_above(error)}" if error <= max(SILENT, SHARE * tolerance) else f"to {error:.1g}"
+    taken = ", with the contact as stated" if any(not each.known for each in assumptions) else ""
+    return f"the model holds {holds}{taken}"
 
 
-def _foreseen(assumptions: Sequence[Assumption]) -> list[str]:
-    doubtful = [each for each in assumptions if each.doubtful]
-    unknown = [each.name for each in assumptions if not each.known]
-    names = ", ".join(each.name for each in doubtful)
-    head = f"doubtful: {names}" if doubtful else "no assumption of the model itself is foreseen to fail"
-    head += f"; not known before the blow: {', '.join(unknown)}" if unknown else ""
-    return [head, *(each.sentence for each in doubtful)]
+def _foreseen(assumptions: Sequence[Assumption], unsure: Sequence[Assumption]) -> str:
+    doubtful = ", ".join(each.name for each in assumptions if each.doubtful)
+    first = f"the model is doubtful here: {doubtful}" if doubtful else "nothing is foreseen to fail in the model"
+    return first + (f"; not known before the blow: {', '.join(each.name for each in unsure)}" if unsure else "")
 
 
 def _above(error: float) -> str:
@@ -141,4 +200,7 @@ def _above(error: float) -> str:
 
 def table(assumptions: Sequence[Assumption]) -> list[dict[str, Any]]:
     """The assumptions as plain data, with their states."""
-    return [asdict(replace(each, effect=dict(each.effect))) | {"state": each.state} for each in assumptions]
+    return [
+        asdict(replace(each, effect=dict(each.effect))) | {"state": each.state, "sentence": each.sentence}
+        for each in assumptions
+    ]

@@ -40,5 +40,10 @@ def dataset(hit: "Response") -> Any:
     data |= {f"energy_{name}": ((), value, {"units": "J"}) for name, value in hit.energies.items()}
     places = {"time": ("time", hit.time, {"units": "s"})}
     told = {"tolerance": hit.tolerance, "tolerance_met": int(hit.tolerance_met), "verdict": hit.verdict}
-    ended = {"outcome": hit.outcome, "in_contact": int(hit.in_contact), "notes": "\n".join(hit.notes)}
+    ended = {
+        "trusted": int(hit.trusted),
+        "outcome": hit.outcome,
+        "in_contact": int(hit.in_contact),
+        "notes": "\n".join(hit.notes),
+    }
     return xarray.Dataset(data, places, told | ended)

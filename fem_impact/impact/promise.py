@@ -31,11 +31,9 @@ MOST_ADVISED = 20_000
 UNSTATED = {"compliance": "static compliance", "free": "whether it moves freely"}  # see `Modes.unstated`
 
 
-def verdict(hit: "Response") -> str:
-    """One sentence: whether the tolerance is met and, if not, why and what would meet it."""
-    error, what = hit.error, words(hit.quantities)
-    for name, modes in _unstated(hit):
-        what += f" (not stated of {name}: {', '.join(UNSTATED[each] for each in modes.unstated)})"
+def sentence(hit: "Response") -> str:
+    """One sentence on the computation: whether the tolerance is met and, if not, why and what would meet it."""
+    error, what = hit.error, words(hit.quantities) + _missing(hit)
     if hit.tolerance_met:
         return f"tolerance {hit.tolerance:g} met: estimated error {error.total:.1e} of {what}"
     if not error.resolvable:
@@ -44,6 +42,19 @@ def verdict(hit: "Response") -> str:
         cause, size = error.dominant
         why = f"estimated error {error.total:.1e} of {what}, mostly from {cause} ({size:.1e})"
     return f"tolerance {hit.tolerance:g} MISSED: {why}; {remedy(hit)}"
+
+
+def met(hit: "Response") -> str:
+    """The same in short, of a tolerance that is met."""
+    return f"tolerance {hit.tolerance:g} met{_missing(hit)}"
+
+
+def _missing(hit: "Response") -> str:
+    """What is not stated of the bodies, in brackets."""
+    return "".join(
+        f" (not stated of {name}: {', '.join(UNSTATED[each] for each in modes.unstated)})"
+        for name, modes in _unstated(hit)
+    )
 
 
 def remedy(hit: "Response") -> str:
@@ -74,9 +85,10 @@ def remedy(hit: "Response") -> str:
 def kept(hit: Any, strict: bool = False) -> Any:
     """A response or a sequence; if it missed its tolerance, warn, or raise SimulationError if ``strict``."""
     if not hit.tolerance_met:
+        said = hit.promise
         if strict:
-            raise SimulationError(hit.verdict)
-        warnings.warn(hit.verdict, ToleranceWarning, stacklevel=_callers_level())
+            raise SimulationError(said)
+        warnings.warn(said, ToleranceWarning, stacklevel=_callers_level())
     return hit
 
 

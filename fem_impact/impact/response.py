@@ -14,7 +14,7 @@ from .._base.rounding import ROUNDING, SAME
 from ..fe import plausible
 from ..modes.modal import Modes, SampledShapes, at_rest
 from ..modes.stretching import stretch
-from . import assumption, datasets, force_spectrum, gradient, promise
+from . import assumption, datasets, force_spectrum, gradient, promise, trust
 from .assumption import Assumption
 from .compiled import law, layout, propagation, record
 from .compiled.bundles import Scene
@@ -479,9 +479,38 @@ class Response(Totals):
         return self.error.total <= self.tolerance
 
     @property
+    def promise(self) -> str:
+        """One sentence on the computation: whether the tolerance is met and, if not, why and what would meet it."""
+        return promise.sentence(self)
+
+    @cached_property
+    def trust(self) -> trust.Trust:
+        """How far to trust each quantity asked for: errors of computation and model, what dominates, what to do.
+
+        Examples
+        --------
+        >>> alloy = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), thickness=1e-3)
+        >>> sheet = fi.analytic.rectangle(0.6, 0.4, section=alloy, n_modes=200, damping_ratio=0.01)
+        >>> hit = fi.strike(sheet, fi.Striker.rigid(0.05), fi.Contact.hertz(1e6), at=(0.2, 0.15), speed=0.5)
+        >>> hit.tolerance_met, hit.trusted, hit.trust["restitution"].dominant
+        (True, False, 'small deflections')
+        """
+        return trust.examine(self)
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the answer holds, and not only its computation.
+
+        The tolerance is met, and the error of the model is known and at most 0.05, or the tolerance if that is larger,
+        in every quantity asked for: what it stands on, such as contact law and speed, is seldom known better. A contact
+        law given by its numbers is taken as stated, as material and damping are.
+        """
+        return self.trust.trusted
+
+    @property
     def verdict(self) -> str:
-        """One sentence: whether the tolerance is met and, if not, why and what would meet it."""
-        return promise.verdict(self)
+        """The answer in one line: how well it is computed, whether the model holds, and what would help."""
+        return trust.verdict(self)
 
     @cached_property
     def assumptions(self) -> tuple[Assumption, ...]:
@@ -499,12 +528,12 @@ class Response(Totals):
 
     @property
     def model_error(self) -> float:
-        """Sum of what the known assumptions do at most to a quantity asked for [-]; see `assumptions`."""
+        """Largest error of a quantity asked for by the assumptions [-]; what is not known is not in it, see `trust`."""
         return assumption.total(self.assumptions)
 
     @property
     def model_verdict(self) -> tuple[str, ...]:
-        """Whether the model itself is right: one line if all is well, more for each assumption that matters."""
+        """Whether the model itself is right, as in `verdict`, and a line for each assumption that matters."""
         return tuple(assumption.lines(self.assumptions, self.tolerance))
 
     @property
@@ -1011,7 +1040,7 @@ class Response(Totals):
     def _repr_html_(self) -> str:
         """For notebooks: the force curve and a table of results."""
         rows = [
-            ("impacts", f"{self.n_impacts}, {self.outcome}"),
+            ("impacts", f"{self.n_impacts}; {self.outcome}"),
             ("peak force", f"{self.peak_force:.5g} N"),
             ("contact time", f"{self.contact_time:.5g} s"),
             ("impulse", f"{self.impulse:.5g} N s"),
@@ -1033,7 +1062,7 @@ class Response(Totals):
     def summary(self) -> str:
         """The blow in a few readable lines."""
         several = self.history.n_contacts > 1
-        lines = [self.verdict, f"{self.n_impacts} impact{'s' if self.n_impacts != 1 else ''}, {self.outcome}"]
+        lines = [self.verdict, f"{self.n_impacts} impact{'s' if self.n_impacts != 1 else ''}; {self.outcome}"]
         lines += [
             f"  {impact.start * 1e3:9.4f} to {impact.end * 1e3:9.4f} ms: peak {impact.peak_force:.5g} N, "
             f"impulse {impact.impulse:.5g} N s" + (f", contact {impact.contact}" if several else "")
@@ -1071,7 +1100,7 @@ class Response(Totals):
                 "trust the number of impacts and averages, not single values"
             )
         if self.audit is not None:
-            lines += [f"Model: {self.model_verdict[0]}", *(f"  {line}" for line in self.model_verdict[1:])]
+            lines += [f"Model: {line}" for line in self.model_verdict[1:]]
         lines[1:1] = [f"Note: {note}" for note in self.notes]  # a slip of a unit makes all that follows wrong
         return "\n".join(lines)
 
@@ -1086,9 +1115,9 @@ class Response(Totals):
     def outcome(self) -> str:
         """How the run ended, in words."""
         words = {
-            record.FINISHED: "then final separation (proved)",
+            record.FINISHED: "proven not to touch again",
             record.HORIZON: "stopped at the given duration",
             record.IMPACTS: "stopped after max_impacts",
-            record.SETTLED: "then everything came to rest",
+            record.SETTLED: "everything came to rest",
         }
         return words[self.history.status]

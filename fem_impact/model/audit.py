@@ -61,19 +61,19 @@ def examine(hit: Response, simplified: Simplified | None = None) -> tuple[Assump
 
 def required(target: Target, hit: Response) -> tuple[Target, str] | None:
     """The target with the better model that the tolerance of a blow requires, and why; None if it requires none."""
-    if target.model != "auto" or target.mesh is None:
+    if target.mesh is None:
         return None
     for each in hit.assumptions:
         if each.worst <= hit.tolerance:
             continue
-        because = f"because {each.name!r} would change the blow by {each.worst:.1g}"
+        because = f"which changes the {each.change()} ({each.reading})"
         if each.name == "thin target" and target.section is not None and not target.thick:
             theory = THEORIES[target.mesh.dimension][1]
-            return replace(target, theory=theory), f"the target has shear and rotary inertia ({theory}), {because}"
+            return replace(target, theory=theory), f"the target now has shear and rotary inertia ({theory}), {because}"
         if each.name == "still air" and target.mesh.dimension == 2 and target.air is None:
-            return replace(target, air=BOTH), f"the target moves air on both sides, {because}"
+            return replace(target, air=BOTH), f"the target now moves the air on both sides, {because}"
         if each.name == "small deflections" and target.can_stretch and not target.stretching:
-            return replace(target, stretching=True), f"the target stiffens as it stretches, {because}"
+            return replace(target, stretching=True), f"the target now stiffens as it stretches, {because}"
     return None
 
 

@@ -55,7 +55,7 @@ A_GONG = "this is a gong: large deflections are not modelled"
 
 def of_target(struck: Struck) -> Assumption:
     """The struck body."""
-    body, quantities = struck.target, struck.quantities
+    body, quantities, hit = struck.target, struck.quantities, struck.hit
 
     def told(value: float | None, effect: dict, unknown: str = "") -> Assumption:
         remedy, limit = REMEDY, LIMIT
@@ -68,11 +68,13 @@ def of_target(struck: Struck) -> Assumption:
 
     if struck.bodies[1].dimension == 0:
         return told(0.0, dict.fromkeys(quantities, 0.0))
+    if struck.ideal == "rigid" and not struck.foreseen and (body is None or body.thickness is None):
+        return told(None, dict.fromkeys(quantities, hit.error.idealisation))  # if it stretched as much as it bends
     if body is None or body.section is None or body.thickness is None:
         return told(None, dict.fromkeys(quantities), "the thickness of the body")
     if struck.ideal:
         return told(*_simplified(struck, body))
-    hit, integrals = struck.hit, struck.bending
+    integrals = struck.bending
     assert integrals is not None
     if struck.foreseen:
         return told(_ahead(struck, body, integrals), {})

@@ -65,7 +65,8 @@ def yielding(struck: Struck) -> Assumption:
     if round_body is None or len(missing) == 2:
         why = "radius and material of the contact" if round_body is None else "yield strengths"
         remedy = SPHERE if round_body is None else "state yield_strength of both materials"
-        return Assumption("no yielding", None, 1.0, dict.fromkeys(quantities), quantities, remedy, number, why)
+        unknown = dict.fromkeys(quantities)
+        return Assumption("no yielding", None, 1.0, unknown, quantities, remedy, number, why, round_body is None)
     R, E = round_body
     weakest = min(strength for strength in strengths.values() if strength is not None)
     value = (6.0 * hit.peak_force * E**2 / (np.pi**3 * R**2)) ** (1.0 / 3.0) / (YIELDS * weakest)
@@ -116,7 +117,8 @@ def small(struck: Struck) -> Assumption:
     if round_body is None or body is None or body.section is None or body.thickness is None:
         why = "radius of the contact" if round_body is None else "thickness of the body"
         remedy = SPHERE if round_body is None else "give material and section of the body"
-        return Assumption("local contact", None, SMALL, dict.fromkeys(quantities), quantities, remedy, number, why)
+        unknown = dict.fromkeys(quantities)
+        return Assumption("local contact", None, SMALL, unknown, quantities, remedy, number, why, round_body is None)
     a = contact_radius(hit.contact, round_body[0], hit.peak_force)
     material, h = body.section.material, body.thickness
     E, nu = (material.E if material.E_across is None else material.E_across), material.nu
@@ -156,9 +158,8 @@ def slow(struck: Struck) -> Assumption:
         return Assumption("quasi-static contact", value, SLOW, dict.fromkeys(quantities, 0.0), quantities, "", number)
     if striker is None or striker.radius is None or striker.material is None:
         why, remedy = "size and material of the striker", "give it as a sphere or a bar"
-        return Assumption(
-            "quasi-static contact", None, SLOW, dict.fromkeys(quantities), quantities, remedy, number, why
-        )
+        unknown, stated = dict.fromkeys(quantities), _hertz(struck) is None
+        return Assumption("quasi-static contact", None, SLOW, unknown, quantities, remedy, number, why, stated)
     E, nu, rho = striker.material.E, striker.material.nu, striker.material.rho
     own = LAMB * np.sqrt(E / (2.0 * (1.0 + nu) * rho)) / striker.radius
     shape = (LIVELY / striker.mass) ** 0.5

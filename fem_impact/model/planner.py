@@ -24,7 +24,7 @@ from ..impact.response import LOOKED_AT, Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, FieldShapes, Modes, at_rest
 from . import audit, cost, idealisation, mixed, vectors
-from .target import FIRST_LOOK, Elements, Stages, Target, Watch
+from .target import FIRST_LOOK, MODELS, Elements, Stages, Target, Watch
 
 # [-] of the tolerance for left-out modes, as much for the time steps, as neither is cheap; the mesh gets the rest
 SHARE = 0.45
@@ -51,10 +51,11 @@ MANY_MODES = 10_000
 SHORT_WAVES = {
     "argyris": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
 }  # fmt: skip
-PIECES = {"target": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}  # that a user may set
+# that a user may set
+PIECES = {"target": "", "model": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}
 # after modes, striker and contact; a plan is for a body at rest
 ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
-TARGETS = ("rigid", "infinite", "vectors", "mixed", "modal")
+CHOICES = {"target": ("rigid", "infinite", "vectors", "mixed", "modal"), "model": MODELS}
 RINGING = ("modal", "vectors")  # those of a target that rings
 # [-] modes times steps of one run of a plate that is infinite above a frequency: a time limit of ten seconds
 MOST_MIXED = 2e8
@@ -187,13 +188,13 @@ class Plan:
     def __str__(self) -> str:
         wanted = words(self.quantities)
         kept = "met" if self.meets else "MISSED"
-        first = f"tolerance {self.tolerance:g} of {wanted} will be {kept}: predicted error {self.error:.1e}"
+        model, *doubts = assumption.lines(self.assumptions, self.tolerance)
+        first = f"tolerance {self.tolerance:g} of {wanted} will be {kept}: predicted error {self.error:.1e}; {model}"
         lines = [first, *(f"Note: {note}" for note in self.notes), *(f"  {line}" for line in self.reasons)]
         lines.append("Predicted errors:")
         errors = [*self.errors.items(), ("total", self.error)]
         lines += [f"  {line}" for line in markup.columns([(name, f"{error:.1e}") for name, error in errors])]
-        head, *rest = assumption.lines(self.assumptions, self.tolerance)
-        lines += [f"Model: {head}", *(f"  {line}" for line in rest)]
+        lines += [f"Model: {line}" for line in doubts]
         lines.append(f"Cost: {self.cost}")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")
@@ -242,8 +243,8 @@ class _Asked:
             **{name: value for name, value in changes.items() if name not in PIECES},
         }
         for name, value in pieces.items():
-            if name == "target":
-                check.one_of("target", value, TARGETS)
+            if name in CHOICES:
+                check.one_of(name, value, CHOICES[name])
             elif PIECES[name]:
                 check.positive(name, value, PIECES[name])
             else:
@@ -372,20 +373,22 @@ def _chosen(asked: _Asked, stages: Stages) -> Plan:
 
 
 def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
-    """Run the plan, and then with the better model of the target that the tolerance requires, if it may be chosen."""
+    """Run the plan, and then with the better models of the target that the tolerance requires, if it may choose."""
     with _noted(_Asked.checked(plan.blow, plan.changes)):
         run = _carry_out(plan, stages, keep)
-    better = audit.required(plan.blow.target, run.response)
-    if better is None:
-        return run
-    target, why = better
-    try:
-        better_plan = make(replace(plan.blow, target=target), plan.changes, stages)
-        progress.foresee(better_plan.seconds)
-        again = carry_out(better_plan, stages)
-    except (check.SimulationError, ValueError) as error:
-        return replace(run, notes=(*run.notes, f"{why}; that was not computed: {error}"))
-    return replace(again, notes=(why, *again.notes))
+    chooses = plan.changes.get("model", plan.blow.target.model) == "auto"
+    told: tuple[str, ...] = ()
+    while chooses and (better := audit.required(plan.blow.target, run.response)) is not None:
+        target, why = better
+        before = sum(stages.seconds.values())
+        try:
+            plan = make(replace(plan.blow, target=target), plan.changes, stages)
+            progress.foresee(plan.seconds)
+            again = _carry_out(plan, stages, None)
+        except (check.SimulationError, ValueError, MemoryError) as error:
+            return replace(run, notes=(*told, *run.notes, f"{why}; that was not computed: {error}"))
+        told, run = (*told, f"{why}; that took {sum(stages.seconds.values()) - before:.1g} s more"), again
+    return replace(run, notes=(*told, *run.notes))
 
 
 def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:
@@ -744,8 +747,9 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, heavy: bool = Fals
         raise check.SimulationError(f"{blow.name}{NO_MESH}")
     number = _mixed_count(asked, frequency)
     kept = (
-        f"the target keeps its modes up to about {frequency:.3g} Hz, or higher if the echoes left out show; above, it "
-        f"is treated as an infinite plate of mobility {seen.mobility:.3g} m/(N s), from {highest:.3g} Hz on as a spring"
+        f"the target keeps its modes up to about {frequency:.3g} Hz, or higher if the echoes left out matter; above, "
+        f"it is treated as an infinite plate of mobility {seen.mobility:.3g} m/(N s), from {highest:.3g} Hz on as a "
+        "spring"
     )
     slow = asked.mass * seen.mobility
     why = f"the contact lasts about {asked.duration:.3g} s on a wall, and the striker slows down within {slow:.3g} s"
@@ -894,11 +898,13 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     if impacts > cost.MANY and not fixed:
         meshes.append(vectors.finer(blow.target, meshes[0], stages))
     count = vectors.first_count(blow.target, 0.5 / asked.duration, asked.tolerance)
-    kept = f"the target is described by some {count} Ritz vectors started from the blow, more if their error shows"
-    reason = f"argyris elements of {size:.3g} m, smaller towards the blow, with some {n_dofs} unknowns"
+    kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
+    reason = f"argyris elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"
     if asked.moving:
-        reason += "; motion comes from the vectors as long as they tell it, later motion and sound from modes driven "
-        reason += "by the force that the blow finds"
+        reason += (
+            "; the vectors give the motion as long as they can, modes driven by the force found give later motion "
+        )
+        reason += "and the sound"
     work = cost.by_vectors([blow.target.unknowns(at, each, stages) for each in meshes], count, lasts)
     if asked.moving:
         rings = _ringing_count(asked)
@@ -1058,13 +1064,13 @@ def _plan(
     )
     until = "fixed by dt" if fixed[1] else f"halved until two runs agree to {steps * asked.tolerance:.1e}"
     lasts = asked.values.get("duration")
-    end = "until the final separation" if lasts is None else f"for {lasts:g} s"
+    end = "until the bodies have parted for good" if lasts is None else f"for {lasts:g} s"
     count = asked.duration / dt
     refined = scheme == "collocation" and not fixed[1]  # its first step says little of those it takes in the end
     if asked.blow.target.air:
         work = work + cost.in_air(n_modes)
     work = work + cost.strikes(cost.collocated(steps * asked.tolerance) if refined else count, n_modes + kept)
-    reasons = (*reasons, f"scheme {scheme}, steps of {dt:.3g} s ({count:.0f} per contact), {until}; run {end}")
+    reasons = (*reasons, f"scheme {scheme}, steps of {dt:.3g} s ({count:.0f} per contact), {until}, {end}")
     return Plan(
         asked.blow,
         MappingProxyType(dict(asked.changes)),
@@ -1176,7 +1182,7 @@ def strike(
         Damping of a system, which has none of its own.
     strict : bool
         Whether a missed tolerance raises SimulationError; otherwise it warns (`ToleranceWarning`).
-    target, size, n_modes, max_frequency, n_striker_modes : optional
+    target, model, size, n_modes, max_frequency, n_striker_modes : optional
         Parts of the model to fix by hand, as in `fi.plan`.
 
     Returns

@@ -161,7 +161,7 @@ class Strokes(Totals):
         return self.error <= self.tolerance
 
     @property
-    def verdict(self) -> str:
+    def promise(self) -> str:
         """One sentence: whether the tolerance is met and, if not, by which blow and what would meet it."""
         worst = max(range(len(self.hits)), key=lambda i: self.hits[i].error.total)
         hit = self.hits[worst]
@@ -170,7 +170,23 @@ class Strokes(Totals):
                 f"tolerance {self.tolerance:g} met by all: estimated error {self.error:.1e} of {words(hit.quantities)}"
             )
         strokes = " and ".join(str(i) for i in self.strikers[worst])
-        return f"stroke {strokes} at {self.starts[worst]:.4g} s: {promise.verdict(hit)}"
+        return f"stroke {strokes} at {self.starts[worst]:.4g} s: {hit.promise}"
+
+    @property
+    def hardest(self) -> int:
+        """Index of the blow with the largest force, in which the model errs most."""
+        return max(range(len(self.hits)), key=lambda i: self.hits[i].peak_force)
+
+    @property
+    def trusted(self) -> bool:
+        """Whether every blow meets its tolerance and the hardest one is trusted, see `Response.trusted`."""
+        return self.tolerance_met and self.hits[self.hardest].trusted
+
+    @property
+    def verdict(self) -> str:
+        """The sentence of `promise`, and whether the model holds in the hardest blow."""
+        which = " and ".join(map(str, self.strikers[self.hardest]))
+        return f"{self.promise}; in the hardest, stroke {which}, {self.hits[self.hardest].model_verdict[0]}"
 
     @property
     def energies(self) -> dict[str, float]:

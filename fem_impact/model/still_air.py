@@ -31,7 +31,7 @@ ROUNDED = 0.1
 RIM = 0.5  # [-] of perimeter / (k area): the air that a finite plate moves beside its waves; with SWELL within 11 %
 SWELL = 0.6  # [-] of (int w)**2 / (area int w**2): what its volume adds (`fi.in_air`, five rectangles and two disks)
 NUMBER = "mass of the air moved over that of the body"
-RADIATED = "damping ratio by the sound radiated, beyond that stated,"
+RADIATED = "damping ratio by the sound radiated, beyond that stated"
 IN_AIR = 'take the modes in air: air = "both sides" under [target], or `fi.in_air`'
 
 

@@ -13,7 +13,7 @@ Mindlin (1951), J. Appl. Mech. 18, 31-38; Wang (1994), J. Vib. Acoust. 116, 536-
 import numpy as np
 
 from ..fe.section import SHEAR, Beam, Plate
-from ..impact.assumption import Assumption
+from ..impact.assumption import Assumption, allowed
 from ..impact.compiled import layout
 from .bending import Bending, Known
 from .deflection import OTHER
@@ -23,6 +23,8 @@ LIMIT = 0.23  # [-] thickness times wavenumber at which a wave is 1 % too fast f
 # [-] thickness times wavenumber beyond which a force is local to the contact: waves shorter than three thicknesses
 DENT = 2.0
 DOUBT = 0.2  # [-] drop of all frequencies by which a striker of unknown thickness is tried: a choice for a stout one
+# [-] what a plate gives by shear over what it gives by bending, at most: it is thinner than half its side
+SHEARED = 10.0
 NEAR = 10  # [-] modes next to a frequency that tell its wavenumber: some of them swing unlike waves, hardly all of ten
 NUMBER = "thickness times wavenumber"
 THICKER = 'take a thick plate, theory = "mindlin", or a softer contact'
@@ -48,6 +50,9 @@ def of_target(struck: Struck) -> Assumption:
 
     if struck.bodies[1].dimension == 0 or struck.bodies[1].thick:
         return Assumption("thin target", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
+    if struck.ideal == "rigid" and not struck.foreseen and (body is None or body.thickness is None):
+        given = min(1.0, SHEARED * struck.hit.error.idealisation)  # at most
+        return Assumption("thin target", None, LIMIT, dict.fromkeys(quantities, given), quantities, NO_SECTION, NUMBER)
     if body is None or body.thickness is None:
         return told(None, dict.fromkeys(quantities), "the thickness of the body")
     if struck.foreseen:
@@ -154,8 +159,8 @@ def of_striker(struck: Struck) -> Assumption:
             return Assumption("thin striker", None, LIMIT, {}, quantities, NO_SLENDERNESS, NUMBER, unknown)
         omega[columns] *= 1.0 - DOUBT
         effect = struck.changes(omega=omega)
-        if max(np.inf if x is None else x for x in effect.values()) <= hit.tolerance:
-            return Assumption("thin striker", None, None, effect, quantities, "", NUMBER)
+        if max(np.inf if x is None else x for x in effect.values()) <= allowed(hit.tolerance):  # at most so much
+            return Assumption("thin striker", None, None, effect, quantities, NO_SLENDERNESS, NUMBER)
         unknown = "the thickness of the striker, and the blow depends on its bending modes"
         effect = dict.fromkeys(quantities)
         return Assumption("thin striker", None, LIMIT, effect, quantities, NO_SLENDERNESS, NUMBER, unknown)

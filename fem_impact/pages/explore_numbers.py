@@ -98,10 +98,10 @@ class Explorer:
             hit = blow(case)
         except SimulationError as error:
             return {"failed": str(error)}
-        own, model = power(hit.model_error), hit.model_verdict
         return {
-            **_force(hit), **_spectrum(hit), "cells": [*_told(hit, True), ("model's error", own)],
-            "what": _described(case.modes), "verdict": hit.verdict, "missed": not hit.tolerance_met, "model": model,
+            **_force(hit), **_spectrum(hit), "cells": [*_told(hit, True), ("model's error", power(hit.model_error))],
+            "what": _described(case.modes), "verdict": hit.verdict, "missed": not hit.tolerance_met,
+            "trusted": hit.trusted, "model": hit.model_verdict[1:],
         }  # fmt: skip
 
     def picture(self, settings: Settings, window: Window) -> Picture:

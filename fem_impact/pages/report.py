@@ -112,7 +112,7 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
         observed=bool(scene.watched),
         tiles=_tiles(response),
         response=response,
-        verdict=tidy(response.verdict),
+        verdict=_sentence(tidy(response.verdict)),
         sounds=_sounds(scene, response),
         files=_downloads(scene, run),
         versions=export.versions(),
@@ -137,7 +137,8 @@ def _of_blow(scene: Scene, run: Run) -> dict[str, Any]:
         "strokes": (), "outcome": response.outcome, "error": response.error.total,
         "energy_error": response.energy_error,
         "budget": _budget(response),
-        "model": tidy(response.model_verdict[0]).capitalize(),
+        "model": _sentence(tidy(response.model_verdict[0])),
+        "trust": tuple(response.trust),
         "assumptions": [_assumption(each) for each in response.assumptions],
         "modelled": _modelled(run, len(response.history.steps), response.scheme),
         "reasons": map(tidy, run.plan.reasons),
@@ -163,8 +164,7 @@ def _of_strokes(scene: Scene, run: Played) -> dict[str, Any]:
         for start, hit, who in zip(found.starts.tolist(), found.hits, found.strikers)
         if who
     ]
-    hardest = max(range(len(found.hits)), key=lambda i: found.hits[i].peak_force)
-    own, which = found.hits[hardest], " and ".join(map(str, found.strikers[hardest]))
+    own, which = found.hits[found.hardest], " and ".join(map(str, found.strikers[found.hardest]))
     laws = dict.fromkeys(contact(stroke.contact) for stroke in found.strokes)
     played = f"It is struck {len(strokes)} times in {si(found.strokes[-1].when - found.strokes[0].when, 's')}."
     energies = {name: found.energies[name] for name in ("target", "dissipated", "taken away")}
@@ -174,6 +174,7 @@ def _of_strokes(scene: Scene, run: Played) -> dict[str, Any]:
         "energy_error": max(hit.energy_error for hit in found.hits),
         "budget": budget[:LISTED],
         "model": f"The hardest, stroke {which}: {tidy(own.model_verdict[0])}",
+        "trust": tuple(own.trust),
         "assumptions": [_assumption(each) for each in own.assumptions],
         "modelled": _modelled(run, sum(len(hit.history.steps) for hit in found.hits), found.hits[0].scheme),
         "reasons": [tidy(line) for line in run.plan.reasons],
@@ -233,14 +234,17 @@ def _assumption(each: Assumption) -> dict[str, Any]:
     changes = [f"{QUANTITY_NAMES.get(name, name)} {_share(size)}" for name, size in each.effect.items() if size]
     changes += [f"not known: {each.why}"] if not each.known else []
     changes += ["beyond this estimate"] if each.beyond else []
-    limit = "" if each.limit is None else f", doubtful above {each.limit:g}"
     return {
         "name": each.name,
-        "number": "" if each.value is None else f"{each.number} {each.value:.2g}{limit}",
+        "number": each.reading,
         "changes": changes or ["nothing"],
         "tone": "doubt" if each.beyond or not each.known else "",
         "remedy": each.remedy if each.doubtful or each.worst > SILENT or not each.known else "",
     }
+
+
+def _sentence(clause: str) -> str:
+    return clause[:1].upper() + clause[1:]
 
 
 def _share(size: float) -> str:

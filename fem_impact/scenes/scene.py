@@ -160,7 +160,8 @@ class Scene:
             Called with the name of each stage; returns a context manager that is open during the stage.
         **changes
             Arguments of `strike` that replace those of the scene, such as ``tolerance`` and ``quantity``; and parts of
-            the plan to fix by hand: ``target`` ("rigid", "infinite", "vectors", "mixed" or "modal"), ``size`` [m] of
+            the plan to fix by hand: ``target`` ("rigid", "infinite", "vectors", "mixed" or "modal"), ``model``
+            ("stated", or "auto": a thick theory, air and stretching where the tolerance needs them), ``size`` [m] of
             elements, ``n_modes`` or ``max_frequency`` [Hz] of the target, ``n_striker_modes``.
 
         Returns
@@ -461,7 +462,7 @@ def load_scene(path: str | Path) -> Scene:
     --------
     >>> hit = fi.load_scene("studies/scenes/drumstick.toml").strike(tolerance=1e-2)
     >>> hit.n_impacts, round(hit.restitution, 2)
-    (1, 0.41)
+    (1, 0.54)
     """
     path = check.path("path", path)
     return scene_of(read_tables(path), path, folder=path.parent)
@@ -511,7 +512,8 @@ def plan(
     **changes
         Arguments of `strike`, such as ``at``, ``speed``, ``tolerance`` and ``quantity``, which replace those of a
         scene; and parts of the plan to fix by hand: ``target`` ("rigid", "infinite", "vectors", "mixed" or "modal"),
-        ``size`` [m] of the elements, ``n_modes`` or ``max_frequency`` [Hz] of the target, ``n_striker_modes``.
+        ``model`` ("stated", or "auto": a thick theory, air and stretching where the tolerance needs them), ``size`` [m]
+        of the elements, ``n_modes`` or ``max_frequency`` [Hz] of the target, ``n_striker_modes``.
 
     Returns
     -------

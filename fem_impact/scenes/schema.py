@@ -64,13 +64,14 @@ def _sphere(*, radius: float, E: float, nu: float, rho: float, yield_strength: f
 def _bar(
     *, E: float, rho: float, length: float, width: Any = None, height: Any = None, diameter: Any = None,
     left: str = "free", right: str = "free", at: float, nu: float = 0.3, theory: str = "euler",
+    damping_ratio: float = 0.0,
 ) -> Striker:  # fmt: skip
     """A bar that bends, such as a plectrum or a stick held by one end."""
     section = _beam(Material(E=E, nu=nu, rho=rho), width=width, height=height, diameter=diameter)
     body, held = mesh.line(length), {"left": left, "right": right}
     known = closed_form(body, section, held, check.one_of("theory", theory, THEORIES[1]))
     find = known or partial(find_modes, assemble(body, section, held, theory=theory))
-    return replace(Striker.flexible(find(n_modes=STICK_MODES), at=at), fixed=False)
+    return replace(Striker.flexible(find(n_modes=STICK_MODES, damping_ratio=damping_ratio), at=at), fixed=False)
 
 
 def _held(maker: Any) -> Callable[..., Striker]:

@@ -135,10 +135,8 @@ def _single_or_multiple(response: Response, law: Contact) -> str:
     if limit is None:
         return said + "Here not even the softest contact rebounds: the body is no heavier than the striker."
     if math.isinf(limit):
-        return said + "By the kinetic-energy criterion the striker rebounds however hard the contact."
-    side = "below" if resonance < limit else "above"
-    times = f"{resonance / limit:.2g}" if resonance > 0.01 * limit else power(resonance / limit)
-    return said + (
-        f"By the kinetic-energy criterion the body stops the striker above {si(limit, 'Hz', 3)}; this blow is {side} "
-        f"that, at {times} times the threshold."
-    )
+        return said + "A single hit is likely, however hard the contact."
+    found = si(resonance, "Hz", 3)
+    if resonance < limit:
+        return said + f"A single hit is likely: {found} is below the limit of {si(limit, 'Hz', 3)}."
+    return said + f"Several hits are likely: {found} is above the limit of {si(limit, 'Hz', 3)}."

@@ -20,7 +20,8 @@ OF_SEQUENCE = ("tolerance", "quantity", "residual", "duration")  # keys of [stri
 OF_BODY = ("n_modes", "max_frequency", "size")  # how the body is described, as in `fi.plan`
 TAKEN = (*OF_SEQUENCE, *OF_BODY)
 SCALARS = (
-    "n_impacts", "contact_time", "peak_force", "impulse", "energies", "tolerance", "tolerance_met", "error", "verdict",
+    "n_impacts", "contact_time", "peak_force", "impulse", "energies", "tolerance", "tolerance_met", "error",
+    "trusted", "verdict",
 )  # fmt: skip
 
 
@@ -97,8 +98,8 @@ class SequencePlan:
             *(f"  {line}" for line in (*table, *more, *reasons)),
         ]
         if body.assumptions:
-            head, *rest = assumption.lines(body.assumptions, self.tolerance)
-            lines += [f"Model of stroke {self.needed}: {head}", *(f"  {line}" for line in rest)]
+            said = assumption.lines(body.assumptions, self.tolerance)
+            lines += [f"Model of stroke {self.needed}: {line}" for line in said]
         return "\n".join([*lines, f"Cost: {body.cost}", *(f"Note: {note}" for note in body.notes)])
 
 

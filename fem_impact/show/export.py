@@ -219,7 +219,8 @@ def write_json(path: str | Path, data: dict[str, Any]) -> None:
 
 SCALARS = (
     "n_impacts", "margin", "contact_time", "peak_force", "impulse", "restitution", "speed", "energies", "dissipated",
-    "energy_error", "momentum_error", "tolerance", "tolerance_met", "verdict", "finished", "in_contact", "scheme",
+    "energy_error", "momentum_error", "tolerance", "tolerance_met", "trusted", "verdict", "finished", "in_contact",
+    "scheme",
 )  # fmt: skip
 ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "inherited", "sensitivity", "total", "resolvable")
 IMPACT_PARTS = ("start", "end", "peak_force", "impulse", "contact", "restitution")
@@ -240,6 +241,7 @@ def numbers(response: Response) -> dict[str, Any]:
         "error": {name: getattr(response.error, name) for name in ERROR_PARTS},
         "model_error": response.model_error,
         "assumptions": table(response.assumptions),
+        "trust": response.trust.table(),
         "n_modes": response.target.n_modes,
         "max_frequency": response.target.frequencies[-1],
     }

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -17,24 +18,27 @@ UNKNOWN = make(dict.fromkeys(USUAL), None, unknown="the thickness", name="still 
 
 
 def test_if_all_is_well_there_is_one_line():
-    assert assumption.lines([WELL, WELL], 1e-4) == ["the model's own error is below 1e-4"]
+    assert assumption.lines([WELL, WELL], 1e-4) == ["the model holds to better than 1e-4"]
 
 
 def test_the_line_never_claims_less_than_the_sum():
     many = [make({"restitution": 8e-5, "force": 0.0})] * 3
-    assert assumption.lines(many, 1e-2) == ["the model's own error is below 1e-3"]  # 2.4e-4
+    assert assumption.lines(many, 1e-2) == ["the model holds to better than 1e-3"]  # 2.4e-4
 
 
 def test_what_is_not_known_is_said_even_if_the_rest_is_well():
     (line,) = assumption.lines([WELL, UNKNOWN], 1e-4)
-    assert line == "the model's own error is below 1e-4, not counting what is not known (still air)"
+    assert line == "it is not known whether the model holds: still air (the thickness): use a thicker theory"
+    (line,) = assumption.lines([WELL, replace(UNKNOWN, stated=True)], 1e-4)
+    assert line == "the model holds to better than 1e-4, with the contact as stated"
 
 
 def test_an_assumption_that_matters_gets_a_line_with_its_number_its_limit_and_the_remedy():
     head, line = assumption.lines([make({"restitution": 0.01, "force": 0.03}, 0.3), WELL], 1e-3)
-    assert head == "the model's own error is about 0.03"
+    assert head == "the model holds to 0.03"
     assert line == (
-        "thin target: thickness over wave 0.3 (above 0.2); changes the peak force by 0.03; use a thicker theory"
+        "thin target: thickness over wave 0.3; above 0.2 it matters; it changes the peak force by about 3 %; "
+        "use a thicker theory"
     )
 
 
@@ -42,7 +46,11 @@ def test_a_large_effect_is_beyond_the_estimate():
     large = make({"restitution": 0.4, "force": 0.03}, 1.0)
     assert large.beyond and large.state == "beyond this estimate"
     head, line = assumption.lines([large], 1e-3)
-    assert "beyond this estimate" in head and "restitution by some 40%, beyond this estimate" in line
+    assert head == (
+        "the model is wrong here: thickness over wave 1, which changes the restitution by about 0.4: "
+        "use a thicker theory"
+    )
+    assert "restitution by about 0.4, beyond this estimate" in line
 
 
 def test_a_number_beyond_its_limit_is_said_even_if_it_changes_little():
@@ -52,9 +60,10 @@ def test_a_number_beyond_its_limit_is_said_even_if_it_changes_little():
 def test_before_the_blow_only_numbers_are_known():
     foreseen = [make({}, 0.5), make({}, 0.1, name="still air")]
     head, line = assumption.lines(foreseen, 1e-4)
-    assert head == "doubtful: thin target" and line.startswith("thin target: thickness over wave 0.5 (above 0.2)")
+    assert head == "the model is doubtful here: thin target"
+    assert line.startswith("thin target: thickness over wave 0.5; above 0.2 it matters")
     assert foreseen[0].state == "foreseen"
-    assert assumption.lines(foreseen[1:], 1e-4) == ["no assumption of the model itself is foreseen to fail"]
+    assert assumption.lines(foreseen[1:], 1e-4) == ["nothing is foreseen to fail in the model"]
 
 
 @pytest.mark.parametrize(
@@ -65,8 +74,23 @@ def test_states(each, state):
     assert each.state == state
 
 
-def test_total_adds_the_worst_of_each():
-    assert assumption.total([WELL, make({"restitution": 0.01, "force": 0.002}), UNKNOWN]) == pytest.approx(0.010003)
+def test_total_adds_what_is_done_to_each_quantity_and_takes_the_largest():
+    found = [WELL, make({"restitution": 0.01, "force": 0.002}), make({"restitution": 0.0, "force": 0.005}), UNKNOWN]
+    assert assumption.total(found) == pytest.approx(0.010001)
+    assert assumption.of_quantity(found, "force") == pytest.approx(0.007003)
+
+
+@pytest.mark.parametrize(
+    "number, value, words",
+    [
+        ("mass of the air moved over that of the body", 0.19, "the air carried along weighs 19 % of the body"),
+        ("mass of the air moved over that of the body", 9.1, "the air carried along weighs 9.1 times the body"),
+        ("deflection over thickness", 1.24, "the deflection is 1.2 times the thickness"),
+    ],
+)
+def test_numbers_read_as_one_says_them(number, value, words):
+    assert replace(WELL, number=number, value=value).reading == words
+    assert set(assumption.READINGS) >= {number}
 
 
 def test_a_table_is_plain_data():

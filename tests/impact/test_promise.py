@@ -35,10 +35,10 @@ def test_the_modes_advised_meet_the_tolerance(n_modes, law, tolerance):
     hit = quiet(plate(n_modes), HAMMER, law, at=AT, speed=1.0, tolerance=tolerance)
     assert hit.tolerance_met == (hit.error.total <= tolerance)
     if hit.tolerance_met:
-        assert hit.verdict.startswith(f"tolerance {tolerance:g} met: estimated error") and "restitution" in hit.verdict
+        assert hit.promise.startswith(f"tolerance {tolerance:g} met: estimated error") and "restitution" in hit.promise
         return
-    assert hit.verdict.startswith(f"tolerance {tolerance:g} MISSED: ")
-    needed = int(re.search(rf"keep (\d+) modes of the target instead of {n_modes}", hit.verdict)[1])
+    assert hit.promise.startswith(f"tolerance {tolerance:g} MISSED: ")
+    needed = int(re.search(rf"keep (\d+) modes of the target instead of {n_modes}", hit.promise)[1])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert fi.strike(plate(needed), HAMMER, law, at=AT, speed=1.0, tolerance=tolerance).tolerance_met
@@ -48,8 +48,10 @@ def test_a_miss_warns_and_strict_raises():
     with pytest.warns(fi.ToleranceWarning, match="tolerance 1e-06 MISSED: .*; keep .* modes") as found:
         hit = fi.strike(plate(10), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-6)
     assert found[0].filename == __file__  # the warning names the user's line
-    assert hit.summary().splitlines()[0] == hit.verdict == str(found[0].message)
-    assert hit.verdict.split(";")[0] in hit._repr_html_() and not hit.tolerance_met
+    assert hit.promise == str(found[0].message) and not hit.tolerance_met and not hit.trusted
+    first = hit.summary().splitlines()[0]
+    assert first == hit.verdict and first.startswith(f"restitution {hit.restitution:.3f}: {hit.promise}")
+    assert hit.promise.split(";")[0] in hit._repr_html_()
     assert fi.export.numbers(hit)["response"]["tolerance_met"] is False
     with pytest.raises(fi.SimulationError, match="MISSED"):
         fi.strike(plate(10), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-6, strict=True)
@@ -100,14 +102,14 @@ def test_a_step_of_ones_own_is_blamed():
         fi.strike(plate(300), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-6, dt=5e-5)
     for better in ({}, {"dt": 2e-6}):
         hit = fi.strike(plate(300), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-6, **better)
-        assert hit.error.step <= 0.4 * hit.tolerance and "leave dt" not in hit.verdict
+        assert hit.error.step <= 0.4 * hit.tolerance and "leave dt" not in hit.promise
 
 
 def test_errors_that_miss_only_together_propose_a_tolerance_that_is_met():
     hit = fi.strike(plate(300), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-3)
     part = 0.39 * hit.tolerance
     missed = replace(hit, error=replace(hit.error, step=part, truncation=part, mesh=part))
-    met = float(re.search(r"; take a tolerance of (\S+)$", missed.verdict)[1])
+    met = float(re.search(r"; take a tolerance of (\S+)$", missed.promise)[1])
     assert not missed.tolerance_met and replace(missed, tolerance=met).tolerance_met
 
 
@@ -117,7 +119,7 @@ def test_impacts_that_cannot_be_told_leave_the_first_one():
     blow = {"at": AT, "speed": 1.0, "tolerance": 1e-2}
     hit = fi.strike(system, HAMMER, SOFT, **blow)
     unsure = replace(hit, error=replace(hit.error, truncation=1.0))
-    assert unsure.verdict.endswith(
+    assert unsure.promise.endswith(
         "; how often the bodies touch cannot be told: give max_impacts = 1 for the first impact alone"
     )
     assert fi.strike(system, HAMMER, SOFT, max_impacts=1, strict=True, **blow).tolerance_met
@@ -134,7 +136,7 @@ def test_an_infinite_plate_that_echoes_is_told_to_be_modal():
 @pytest.mark.parametrize("stiffness, tolerance", [(1e11, 1e-3), (1e10, 1e-6), (1e12, 1e-6)])
 def test_a_contact_that_needs_too_many_modes_gets_what_needs_fewer(stiffness, tolerance):
     blow, law = {"at": AT, "speed": 1.0}, fi.Contact.hertz(stiffness)
-    words = quiet(plate(40), HAMMER, law, tolerance=tolerance, **blow).verdict
+    words = quiet(plate(40), HAMMER, law, tolerance=tolerance, **blow).promise
     assert re.search(r"would have to keep some \S+ modes; ", words)
     loose, soft = (re.search(p, words) for p in (r"take a tolerance of (\S+)(?:,|$)", r"contacts by (\S+)$"))
     assert loose or soft
@@ -143,7 +145,7 @@ def test_a_contact_that_needs_too_many_modes_gets_what_needs_fewer(stiffness, to
         other = fi.Contact.hertz(stiffness / softer)
         hit = quiet(plate(40), HAMMER, other, tolerance=allowed, **blow)
         if not hit.tolerance_met:
-            number = int(re.search(r"keep (\d+) modes", hit.verdict)[1])
+            number = int(re.search(r"keep (\d+) modes", hit.promise)[1])
             hit = fi.strike(plate(number), HAMMER, other, tolerance=allowed, strict=True, **blow)
         assert hit.tolerance_met
 
@@ -154,7 +156,7 @@ def test_a_coarse_mesh_is_blamed_and_the_advice_works():
     coarse, soft = fi.find_modes(system, n_modes=30), fi.Contact.linear(2e4)
     hit = quiet(coarse, HAMMER, soft, at=AT, speed=1.0, tolerance=1e-3)
     assert hit.error.dominant[0] == "the finite elements"
-    limit = float(re.search(r"find the modes of the target with tolerance = ([\d.e-]+)", hit.verdict)[1])
+    limit = float(re.search(r"find the modes of the target with tolerance = ([\d.e-]+)", hit.promise)[1])
     free = fi.assemble(fi.mesh.rectangle(*SIZE), PLATE, {"boundary": "clamped"})
     fine = fi.find_modes(free, n_modes=30, tolerance=limit)
     assert fi.strike(fine, HAMMER, soft, at=AT, speed=1.0, tolerance=1e-3, strict=True).tolerance_met
@@ -190,5 +192,5 @@ def test_the_prompt_writes_everything_and_exits_with_3(tmp_path, capsys):
 
 def test_what_is_met_is_said_with_what_it_is_an_error_of():
     hit = fi.strike(plate(400), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-3, quantity={"spectrum": 2e3})
-    assert "estimated error" in hit.verdict and hit.verdict.endswith("of spectrum to 2000 Hz")
+    assert "estimated error" in hit.promise and hit.promise.endswith("of spectrum to 2000 Hz")
     assert np.isfinite(hit.error.total)

@@ -68,7 +68,7 @@ def test_velocity_is_the_rate_of_displacement():
 
 def test_summary_speaks_of_what_counts(half_sine):
     text = half_sine.summary()
-    for word in ("1 impact", "final separation (proved)", "peak 100", "restitution", "estimated error", "energy"):
+    for word in ("1 impact", "proven not to touch again", "peak 100", "restitution", "estimated error", "energy"):
         assert word in text
 
 

@@ -26,7 +26,8 @@ def test_judged_blow_is_sent_whole(explorer):
     told, hit = explorer.judge(explorer.setup.start), explore_model.blow(explorer.setup.case(explorer.setup.start))
     cells = dict(told["cells"])
     assert cells["impacts"] == str(hit.n_impacts) and cells["restitution"] == f"{hit.restitution:.3f}"
-    assert told["verdict"] == hit.verdict and told["model"] == hit.model_verdict and not told["missed"]
+    assert told["verdict"] == hit.verdict and told["model"] == hit.model_verdict[1:] and not told["missed"]
+    assert told["trusted"] == hit.trusted
     force = unpacked(told["force"])
     assert force.max() == pytest.approx(hit.force.max(), rel=1e-6)  # 32-bit floats
     assert len(force) == len(unpacked(told["time"])) and unpacked(told["time"])[-1] >= hit.impacts[-1].end

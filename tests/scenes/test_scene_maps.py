@@ -148,11 +148,11 @@ def test_another_body_for_each_value_needs_a_count(scene):
 
 
 def test_pictures_name_points_and_whole_numbers(scene):
-    table = maps.map_scene(scene, over={"striker.mass": [0.01, 0.02], "strike.at": [[0.4, 0.3], [0.45, 0.31]]})
+    table = maps.map_scene(scene, over={"striker.mass": [0.01, 0.02], "strike.at": [[0.08, 0.05], [0.09, 0.06]]})
     figure = maps.draw(table.assign(n_impacts=0 * table.n_impacts + 1), "n_impacts")
     figure.canvas.draw()
     axes, bar = figure.axes
-    assert [text.get_text() for text in axes.get_xticklabels() if text.get_text()] == ["(0.4, 0.3)", "(0.45, 0.31)"]
+    assert [text.get_text() for text in axes.get_xticklabels() if text.get_text()] == ["(0.08, 0.05)", "(0.09, 0.06)"]
     assert bar.get_yticks().tolist() == [1.0]
 
 

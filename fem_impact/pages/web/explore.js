@@ -290,10 +290,10 @@
         put($("what"), got.what);
         const error = cells["estimated error"], own = cells["model's error"];
         error.className = got.exact ? (got.missed ? "missed" : "") : "later";
-        own.className = got.exact ? "" : "later";
+        own.className = got.exact ? (got.trusted || got.missed ? "" : "missed") : "later";
         if (!got.exact) put(own, "refining …");
-        put($("verdict"), got.exact ? `${sentence(got.verdict)}.` : "In coarse steps; whether tolerance and model hold is told when the hand rests.");
-        $("verdict").className = got.missed ? "missed" : "";
+        put($("verdict"), got.exact ? `${sentence(got.verdict)}.` : "Preview. Errors are checked when you stop.");
+        $("verdict").className = got.exact && !got.trusted ? "missed" : "";
         $("model").replaceChildren(...(got.model ?? []).map((text) => Object.assign(document.createElement("li"), { textContent: sentence(text) })));
       }
       force.draw();

@@ -1,0 +1,161 @@
+"""How far to trust an answer: of each quantity asked for, the error of the computation and that of the model."""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._base import markup
+from . import assumption, promise
+from .quantities import rebound, words
+
+if TYPE_CHECKING:
+    from .response import Response
+
+BAND_POINTS = 256  # [-] frequencies of a band at which the largest value of a spectrum is looked for
+FEWEST, MOST = 2, 6  # [-] digits shown: as many as the error of the computation lets stand
+UNITS = {"impulse": "N s", "contact_time": "s", "force": "N", "spectrum": "N s"}
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One quantity, and how far to trust it.
+
+    Errors are absolute for the restitution and relative for the others.
+    """
+
+    quantity: str  # as asked for: "restitution", "impulse", "contact_time", "force", "n_impacts", "spectrum", "sound"
+    band: float | None  # [Hz] of "spectrum" and "sound"
+    value: float | None  # in SI units; of a spectrum the largest; None for sound, and for a restitution that is none
+    computation: float | None  # [-] estimated error; None if the modes left out govern the contact
+    model: float | None  # [-] sum of what the assumptions do to it; None if something is not known that may matter
+    known: float  # [-] the same, without what is not known
+    unknown: tuple[str, ...]  # assumptions whose effect is not known and may matter
+    dominant: str  # what the answer suffers from most: a part of the computation, or an assumption
+    remedy: str  # what to do about it; "" if it is trusted
+    allowed: float  # [-] error of the model with which it is trusted
+    tolerance: float  # [-] of the computation
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the computation meets its tolerance, and the model's error is known and at most `allowed`."""
+        computed = self.computation is not None and self.computation <= self.tolerance
+        return computed and self.model is not None and self.model <= self.allowed
+
+    @property
+    def name(self) -> str:
+        """The quantity in words."""
+        return words({self.quantity: self.band})
+
+    @property
+    def shown(self) -> str:
+        """The value with its unit, in as many digits as the error of the computation lets stand."""
+        if self.value is None:
+            return "-"
+        if self.quantity == "n_impacts":
+            return f"{self.value:.0f}"
+        return f"{self.value:.{_digits(self.computation)}g} {UNITS.get(self.quantity, '')}".strip()
+
+
+@dataclass(frozen=True)
+class Trust:
+    """How far to trust each quantity asked for; `print` it, or take one by its name."""
+
+    judged: tuple[Judged, ...]
+
+    def __iter__(self) -> Iterator[Judged]:
+        return iter(self.judged)
+
+    def __getitem__(self, quantity: str) -> Judged:
+        found = {each.quantity: each for each in self.judged}
+        if quantity not in found:
+            raise ValueError(f"quantity must be one of those asked for, {', '.join(found)}, got {quantity!r}")
+        return found[quantity]
+
+    @property
+    def trusted(self) -> bool:
+        """Whether each quantity is."""
+        return all(each.trusted for each in self.judged)
+
+    def table(self) -> list[dict[str, Any]]:
+        """All quantities as plain data."""
+        return [asdict(each) | {"trusted": each.trusted} for each in self.judged]
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        return [
+            (
+                each.name,
+                each.shown,
+                "not known" if each.computation is None else f"{each.computation:.1g}",
+                f"{each.known:.1g}" if each.model is not None else f"{each.known:.1g} and what is not known",
+                "yes" if each.trusted else "no",
+                each.dominant,
+            )
+            for each in self.judged
+        ]
+
+    def __str__(self) -> str:
+        head = "quantity", "value", "computation errs by", "model errs by", "trusted", "mostly by"
+        remedies = dict.fromkeys(each.remedy for each in self.judged if each.remedy)
+        return "\n".join([*markup.columns(self._rows(), head), *(f"To do: {remedy}" for remedy in remedies)])
+
+
+def examine(hit: "Response") -> Trust:
+    """How far to trust each quantity that a blow was asked for."""
+    return Trust(tuple(_judged(hit, name, band) for name, band in hit.quantities.items()))
+
+
+def verdict(hit: "Response") -> str:
+    """The answer in one line: what was asked for first, how well it is computed, and whether the model holds."""
+    first = hit.trust.judged[0]
+    if first.quantity == "restitution":
+        value = rebound(hit, max(FEWEST, _digits(first.computation) - 1))
+    else:
+        value = first.shown if first.value is not None else ""
+    return f"{first.name} {value}".strip() + promised(hit)
+
+
+def promised(hit: "Response") -> str:
+    """What follows the answer in its line: how well it is computed, and whether the model holds."""
+    clause = assumption.head(hit.assumptions, hit.tolerance)
+    holds = all(each.model is not None and each.model <= each.allowed for each in hit.trust)
+    if hit.tolerance_met:
+        computed = f", computed to {hit.error.total:.1g} ({promise.met(hit)})"
+        return f"{computed}{'; ' if holds else ', but '}{clause}"
+    return f": {promise.sentence(hit)}" + ("" if holds else f"; besides, {clause}")
+
+
+def _digits(error: float | None) -> int:
+    """Digits of a number with a relative error."""
+    return FEWEST if error is None else int(np.clip(np.ceil(-np.log10(max(error, 1e-9))) + 1, FEWEST, MOST))
+
+
+def _judged(hit: "Response", name: str, band: float | None) -> Judged:
+    found, error = hit.assumptions, hit.error
+    unsure = [each for each in found if each.open and each.effect.get(name) is None]
+    known = assumption.of_quantity(found, name)
+    limit = assumption.allowed(hit.tolerance)
+    worst = max(found, key=lambda each: each.effect.get(name) or 0.0)
+    cause, size = error.dominant if error.resolvable else ("modes left out", np.inf)
+    dominant = worst.name if (worst.effect.get(name) or 0.0) >= size else cause
+    remedies = [] if hit.tolerance_met else [promise.remedy(hit)]
+    if known > limit:
+        remedies.append(worst.remedy)
+    elif unsure:
+        dominant = unsure[0].name if hit.tolerance_met else dominant
+        remedies.append(unsure[0].remedy)
+    return Judged(
+        name, band, _value(hit, name, band), error.total if error.resolvable else None, None if unsure else known,
+        known, tuple(each.name for each in unsure), dominant, "; ".join(remedies), limit, hit.tolerance,
+    )  # fmt: skip
+
+
+def _value(hit: "Response", name: str, band: float | None) -> float | None:
+    if name == "sound":
+        return None
+    if name == "spectrum":
+        assert band is not None
+        return float(np.abs(hit.spectrum(np.linspace(0.0, band, BAND_POINTS))).max())
+    found = getattr(hit, {"force": "peak_force"}.get(name, name))
+    return None if found is None else float(found)

@@ -1,0 +1,34 @@
+"""Shipped scenes have answers to trust, but for one that shows what is said of the others, and its cure."""
+
+from pathlib import Path
+
+import pytest
+
+import fem_impact as fi
+
+FOLDER = Path(__file__).parents[2] / "studies" / "scenes"
+NAMES = sorted(path.name for path in FOLDER.glob("*.toml"))
+SHOWN = "drumstick_firm.toml"
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != SHOWN])
+def test_a_shipped_scene_has_an_answer_to_trust(name):
+    hit = fi.load_scene(FOLDER / name).strike()
+    assert hit.trusted, hit.verdict
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("stretched")
+def test_the_scene_that_is_not_trusted_names_its_cure(tmp_path):
+    text = (FOLDER / SHOWN).read_text(encoding="utf-8")
+    wrong = fi.load_scene(FOLDER / SHOWN).strike()
+    assert (
+        not wrong.trusted and "but the model is wrong here: the deflection is 1.3 times the thickness" in wrong.verdict
+    )
+    assert f"{wrong.restitution:.2f} to 0.64" in " ".join(text.replace("\n# ", " ").split())
+    (tmp_path / SHOWN).write_text(text.replace("\n# stretching", "\nstretching").replace("\n# air", "\nair"))
+    cured = fi.load_scene(tmp_path / SHOWN).strike()
+    assert cured.trusted and round(cured.restitution, 2) == 0.64
+    chosen = fi.load_scene(FOLDER / SHOWN).run(model="auto")
+    assert chosen.response.restitution == pytest.approx(cured.restitution, abs=1e-9)
+    assert sum("that took" in note for note in chosen.notes) == 2
