@@ -30,7 +30,7 @@ FILES = (".nc", ".zarr", ".csv", ".png", ".pdf", ".svg")  # a folder name must n
 MOST_ROWS = 10**6  # [-] a larger map gets no CSV file: spreadsheets end there, and it would have a hundred megabytes
 PICTURED = {  # layers drawn for a map with two axes: name in the picture
     "n_impacts": "number of impacts",
-    "contact_time": "time in contact",
+    "contact_time": "contact time",
     "restitution": "restitution",
     "peak_force": "peak force",
     "centroid": "spectral centroid",

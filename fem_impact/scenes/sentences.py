@@ -126,19 +126,15 @@ def contact(law: Contact) -> str:
 
 
 def _single_or_multiple(response: Response, law: Contact) -> str:
-    """What the kinetic-energy criterion predicts for the blow."""
+    """What the kinetic-energy criterion predicts for the blow, from its contact resonance on a rigid wall."""
     assert response.striker is not None
     mass = response.striker.felt_mass
     resonance = accuracy.contact_resonance(law, mass, response.speed)
     limit = threshold.threshold_frequency(response.target, response.at, mass)
-    said = f"On a rigid wall the contact would resonate at {si(resonance, 'Hz', 3)}. "
+    wall = f"contact resonance, {si(resonance, 'Hz', 3)}"
     if limit is None:
-        return said + "Here not even the softest contact rebounds: the body is no heavier than the striker."
+        return f"No rebound expected, whatever the {wall}: the body is no heavier than the striker."
     if math.isinf(limit):
-        return said + "By the kinetic-energy criterion the striker rebounds however hard the contact."
-    side = "below" if resonance < limit else "above"
-    times = f"{resonance / limit:.2g}" if resonance > 0.01 * limit else power(resonance / limit)
-    return said + (
-        f"By the kinetic-energy criterion the body stops the striker above {si(limit, 'Hz', 3)}; this blow is {side} "
-        f"that, at {times} times the threshold."
-    )
+        return f"Single hit expected, whatever the {wall}: the striker always rebounds."
+    number, side = ("Single hit", "below") if resonance < limit else ("Several hits", "above")
+    return f"{number} expected: the {wall}, is {side} the limit of {si(limit, 'Hz', 3)} (kinetic-energy criterion)."

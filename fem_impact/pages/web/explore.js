@@ -292,7 +292,7 @@
         error.className = got.exact ? (got.missed ? "missed" : "") : "later";
         own.className = got.exact ? "" : "later";
         if (!got.exact) put(own, "refining …");
-        put($("verdict"), got.exact ? `${sentence(got.verdict)}.` : "In coarse steps; whether tolerance and model hold is told when the hand rests.");
+        put($("verdict"), got.exact ? `${sentence(got.verdict)}.` : "Preview. Errors are checked when you stop.");
         $("verdict").className = got.missed ? "missed" : "";
         $("model").replaceChildren(...(got.model ?? []).map((text) => Object.assign(document.createElement("li"), { textContent: sentence(text) })));
       }
