@@ -81,11 +81,11 @@ def test_commands_shown_name_scenes_that_exist_and_load():
     "line", [line for block in blocks("sh") for line in block.splitlines() if "fem-impact" in line]
 )
 def test_shown_commands_are_ones_the_parser_takes(line):
-    from fem_impact import cli
+    from fem_impact import arguments
 
     words = shlex.split(line)
     start = next(i for i, word in enumerate(words) if word.endswith("fem-impact"))
-    options = cli._parser().parse_args(words[start + 1 :])  # exits with status 2 where an option does not exist
+    options = arguments.parser().parse_args(words[start + 1 :])  # exits with status 2 where an option does not exist
     assert "scene" not in options or options.scene.suffix in (".toml", ".lvm", ".msh")
 
 

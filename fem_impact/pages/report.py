@@ -347,12 +347,18 @@ def audio(samples: np.ndarray, rate: int) -> str:
     return _uri("audio/wav", file.getvalue())
 
 
+@check.typed
+def numbers(scene: Scene, run: Run | Played) -> dict[str, Any]:
+    """Everything that was found, as plain data: what the page offers as response.json; arguments as of `write`."""
+    tables = scene.data(tolerance=run.response.tolerance)
+    return export.run_data(run, tables) if isinstance(run, Run) else sequence.numbers(run.response, tables, run.seconds)
+
+
 def _downloads(scene: Scene, run: Run | Played) -> list[dict[str, str]]:
     response, modes = run.response, run.response.target
     frequencies = _frequencies(response)
     spectrum = response.spectrum(frequencies)
-    tables = scene.data(tolerance=response.tolerance)
-    data = export.run_data(run, tables) if isinstance(run, Run) else sequence.numbers(run.response, tables, run.seconds)
+    data = numbers(scene, run)
     columns = {
         "force.csv": {"time [s]": response.time, "force [N]": response.force},
         "spectrum.csv": {
