@@ -6,27 +6,16 @@ import re
 import sys
 import textwrap
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
 import fem_impact as fi
 
 from . import answers, commands
+from .display import complain
 from .show import FORMATS
 
 BAD_INPUT = 2  # exit status, as Unix tools use it
-
-
-def complain(error: object, status: int) -> int:
-    with suppress(OSError):  # if stderr is closed, the exit status must suffice
-        print(f"fem-impact: {_printable(str(error))}", file=sys.stderr, flush=True)
-    return status
-
-
-def _printable(text: str) -> str:
-    """The text on one line, with control characters escaped."""
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
 
 
 def _place(text: str) -> Path:
@@ -291,7 +280,7 @@ def _add_choices(add: Any) -> None:
 
 class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        print(f"fem-impact {fi.__version__}")
+        sys.stdout.write(f"fem-impact {fi.__version__}\n")
         parser.exit()
 
 

@@ -22,9 +22,9 @@ import fem_impact as fi
 
 from . import answers
 from ._base.files import undo_all
-from .arguments import BAD_INPUT, complain, parser
+from .arguments import BAD_INPUT, parser
 from .commands import Answer
-from .display import wrapped
+from .display import complain, wrapped
 
 FAILED, MISSED, INTERRUPTED = 1, 3, 130  # exit statuses, as Unix tools use them; 130 is 128 + SIGINT
 
@@ -44,7 +44,9 @@ def main(arguments: list[str] | None = None) -> int:
         with _interruptible(options), warnings.catch_warnings():
             if options.quiet:
                 warnings.simplefilter("ignore")
-            found = options.run(options)
+            found: Answer | None = options.run(options)
+            if found is None:  # it has shown its answer already
+                return 0
             _print(options, found)
     except ValueError as error:
         return complain(error, BAD_INPUT)

@@ -7,7 +7,7 @@ import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from rich import progress as bars
 from rich.console import Console
@@ -38,6 +38,18 @@ def wrapped(text: str) -> str:
 def tell(text: str) -> None:
     """Print one sentence to stderr."""
     print(wrapped(f"fem-impact: {text}"), file=sys.stderr, flush=True)
+
+
+def complain(error: object, status: int) -> int:
+    """Print an error on one line of stderr; return the exit status."""
+    with suppress(OSError):  # if stderr is closed, the exit status must suffice
+        print(f"fem-impact: {_printable(str(error))}", file=sys.stderr, flush=True)
+    return status
+
+
+def _printable(text: str) -> str:
+    """The text on one line, with control characters escaped."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
 
 
 class Count:

@@ -7,9 +7,11 @@ import shlex
 from pathlib import Path
 
 import pytest
-from scenes import QUICK, SMALL
+from scenes import BAR, QUICK, SMALL
 from test_cli import TEXT
+from test_studies import study
 
+import fem_impact as fi
 from fem_impact import answers, arguments, cli
 
 ROOT = Path(__file__).parents[1]
@@ -147,3 +149,42 @@ def test_a_quiet_command_still_says_its_errors(folder, capsys):
 def test_out_is_a_folder_or_by_its_ending_the_file(folder, capsys, out):
     assert cli.main(["mesh", "small.toml", "--out", out, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["files"] == ["mine.svg" if "mine" in out else "mesh.png"]
+
+
+def test_the_page_of_commands_is_current():
+    page = study("commands")
+    assert page.PAGE.read_text(encoding="utf-8") == page.page(), "run python studies/commands.py"
+
+
+def test_explore_tells_its_address_as_json(folder, capsys, monkeypatch):
+    monkeypatch.setattr(cli.fi.explore, "serve", lambda *_, ready, **__: ready("http://127.0.0.1:8000/"))
+    assert cli.main(["explore", "small.toml", "--no-open", "--json"]) == 0
+    found, schema = json.loads(capsys.readouterr().out), answers.schema("explore")
+    assert found["address"] == "http://127.0.0.1:8000/" and set(schema["required"]) <= set(found)
+
+
+def test_modes_counts_those_that_bend_and_tells_the_rigid_ones_in_a_line(tmp_path, capsys):
+    (tmp_path / "bar.toml").write_text(BAR)  # free at both ends
+    words = ["modes", str(tmp_path / "bar.toml"), "--n-modes", "4"]
+    assert cli.main(words) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "Modes 1 to 2 are rigid motions: nothing holds the body there" in lines
+    assert [line.split()[0] for line in lines[-4:]] == ["3", "4", "5", "6"] and " 0 Hz" not in "".join(lines)
+    assert cli.main([*words, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["n_rigid"] == 2 and len(found["frequencies"]) == 6 and found["frequencies"][2] > 0.0
+
+
+def test_hammer_says_that_its_tips_are_linear_and_what_the_contact_amounts_to(folder, capsys):
+    words = ["hammer", "small.toml", "--bandwidth", "300", "--masses", "0.01", "--json"]
+    assert cli.main(words) == 0
+    (note,) = json.loads(capsys.readouterr().out)["notes"]
+    assert "tips are linear springs [N/m]; the scene's contact is of another kind (hertz)" in note
+    alike = float(note.split("a tip of ")[1].split()[0])
+    law, mass, speed = fi.Contact.hertz(695e3), 0.03, 2.0  # as long on a rigid wall
+    times = [fi.strike(fi.Modes.rigid(1e6), fi.Striker.rigid(mass), each, at=None, speed=speed).contact_time
+             for each in (law, fi.Contact.linear(alike))]  # fmt: skip
+    assert times[0] == pytest.approx(times[1], rel=1e-2)  # three digits are printed
+    (folder / "small.toml").write_text(TEXT.replace('"hertz"', '"linear"'))
+    assert cli.main(words) == 0
+    assert json.loads(capsys.readouterr().out)["notes"] == []

@@ -4,6 +4,7 @@ import json
 import pickle
 import shutil
 import zipfile
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -98,7 +99,7 @@ def test_any_flipped_bit_is_refused_in_one_sentence(written, name):
         bad = bytearray(raw)
         bad[place] ^= 1
         (folder / name).write_bytes(bytes(bad))
-        with pytest.raises(ValueError, match="damaged, or not of the response.json beside it") as said:
+        with pytest.raises(ValueError, match=r"damaged, or not of the response\.json beside it") as said:
             fi.load_response(folder)
         assert "\n" not in str(said.value)
     (folder / name).write_bytes(raw[: len(raw) // 2])
@@ -123,7 +124,7 @@ def test_what_is_missing_is_named(written, tmp_path):
 class Bomb:
     """Runs when it is unpickled."""
 
-    ran = []
+    ran: ClassVar[list] = []
 
     def __reduce__(self):
         return Bomb.ran.append, (1,)
@@ -159,7 +160,7 @@ def test_nothing_planted_runs_and_arrays_that_do_not_fit_are_refused(written, tm
         shutil.copytree(tmp_path / "good", folder)
         repacked(folder, **plan)
         Bomb.ran.clear()  # pickling does not run it, but be sure
-        with pytest.raises(ValueError, match="damaged, or not of the response.json beside it"):
+        with pytest.raises(ValueError, match=r"damaged, or not of the response\.json beside it"):
             fi.load_response(folder)
         assert Bomb.ran == []
     with zipfile.ZipFile(folder / results.SAVED, "w") as file:
