@@ -80,8 +80,9 @@ def _print(options: argparse.Namespace, found: Answer) -> None:
     if found.said is None:
         _print_json(found.data)
     elif options.json:
-        ours = {"command": options.command, "format": answers.FORMAT, "notes": [], **found.data}
-        _print_json({"versions": fi.export.versions(), **ours})
+        ours = {"command": options.command, "format": answers.FORMAT, **found.data}
+        rest = {"notes": [], "versions": fi.export.versions()}
+        _print_json(ours | {name: value for name, value in rest.items() if name not in ours})
     else:
         for part in found.said:
             print(wrapped(part) if isinstance(part, str) else "\n".join(part))

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import fem_impact as fi
 
 from . import answers
-from .display import Display, tell
+from .display import Display, tell, width
 from .show import FORMATS
 
 MOTION_TIMES = 100  # [-] instants in motion.pvd: four seconds at 25 per second
@@ -206,8 +206,6 @@ def heard(sounds: Sequence[dict[str, Any]]) -> list[str]:
         level = each["stated"] if "bound" in each else f"peak {each['stated']}"
         if each["level"] is None or each["level"] == -math.inf:
             level = "silence"
-        elif "at" in each:
-            level = f"peak {each['reference'] * 10.0 ** (each['level'] / 20.0):.3g} {each['unit']}"
         other = f"{each['file'].replace('_high', '_low')} and " if "bound" in each else ""
         lines.append(
             f"{where}: {level}; full scale of {other}{each['file']} is {each['full_scale']:.4g} {each['unit']}"
@@ -327,8 +325,8 @@ def hammer(options: argparse.Namespace) -> Answer:
     ]
     said: list[str | Sequence[str]] = [
         _title(scene),
-        f"Linear tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:",
         *_noted(notes),
+        f"Linear tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:",
         _table(rows, ("mass", "softest tip", "hardest tip", "its reach")),
     ]
     for hammer in hammers:
@@ -552,9 +550,15 @@ def _noted(notes: Sequence[str]) -> list[str]:
 
 
 def _table(rows: Sequence[Sequence[Any]], head: Sequence[str] = ()) -> list[str]:
+    """A table; on a terminal too narrow for it, each row as a list."""
     from ._base import markup  # imports numpy, which --help and --version do not need
 
-    return markup.columns(rows, head)
+    lines = markup.columns(rows, head)
+    if max(map(len, lines), default=0) <= width():
+        return lines
+    if not head:
+        return [f"{name}: {value}" for name, value in rows]
+    return [line for first, *rest in rows for line in (str(first), *(f"  {h}: {x}" for h, x in zip(head[1:], rest)))]
 
 
 def _choices(options: argparse.Namespace) -> dict[str, Any]:

@@ -27,10 +27,14 @@ LEAST = 0.02  # [-] share of a count that must be done before the rest is estima
 WIDEST = 88  # [-] columns: printed text is never wider, and narrower on a narrow terminal
 
 
+def width() -> int:
+    """Columns that printed text may take."""
+    return max(20, min(WIDEST, shutil.get_terminal_size().columns))
+
+
 def wrapped(text: str) -> str:
     """Text wrapped to the width of the terminal, with continued lines indented."""
-    width = max(20, min(WIDEST, shutil.get_terminal_size().columns))
-    filled = textwrap.TextWrapper(width, subsequent_indent="    ", break_on_hyphens=False)  # keeps paths whole
+    filled = textwrap.TextWrapper(width(), subsequent_indent="    ", break_on_hyphens=False)  # keeps paths whole
     lines = (filled.wrap(line) or [""] for line in text.splitlines())
     return "\n".join(line for wrapped in lines for line in wrapped)
 

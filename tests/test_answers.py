@@ -188,3 +188,11 @@ def test_hammer_says_that_its_tips_are_linear_and_what_the_contact_amounts_to(fo
     (folder / "small.toml").write_text(TEXT.replace('"hertz"', '"linear"'))
     assert cli.main(words) == 0
     assert json.loads(capsys.readouterr().out)["notes"] == []
+
+
+def test_a_table_too_wide_for_the_terminal_becomes_lists(folder, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    assert cli.main(["mesh", "small.toml"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 40 and "left" in lines
+    assert any(line.startswith("  length: 0.3 m") for line in lines)

@@ -233,6 +233,6 @@ def _sounding(heard: sound.Sound) -> tuple[str, str]:
     """The sound as a data URI, raised if it is quiet, and its level in words."""
     level = heard.peak_level
     raised = max(0.0, report.QUIET - level) if math.isfinite(level) else 0.0
-    note = f"Full scale is {heard.full_scale:g} {heard.unit}; peak {level:.1f} dB"
+    note = f"Peak {heard.said}; full scale {heard.full_scale:g} {heard.unit}"
     note += f", raised here by {raised:.1f} dB." if raised else "."
     return report.audio(heard.samples * 10.0 ** (raised / 20.0), heard.rate), note.replace("-", "−")

@@ -323,7 +323,7 @@ def _sounds(scene: Scene, response: Response | Strokes) -> list[Player]:
     players = []
     for name, samples in heard:
         level = samples.peak_level
-        stated = f"peak {samples.said}; full scale is {samples.full_scale:g} {samples.unit} in every report"
+        stated = f"peak {samples.said}; full scale {samples.full_scale:g} {samples.unit}, as in every report"
         players.append(Player(name, stated, audio(samples.samples, samples.rate)))
         if -math.inf < level < QUIET:
             raised = samples.samples * 10.0 ** (-level / 20.0)

@@ -202,7 +202,9 @@ def describe(folder: Path) -> tuple[dict[str, Any], list[str]]:
             data["holds"].append(command)
             data["summary"] += [f"{command}: {lines[0]}", *(f"  {line}" for line in lines[1:])]
     if not data["holds"]:
-        raise fault(folder, "no results of fem-impact are in it; give the folder that --out named")
+        inner = next((name for name in names if set(READERS) & set(_names(folder / name))), None)
+        hint = "the folder that --out named" if inner is None else f"one in it, such as {folder / inner}"
+        raise fault(folder, f"no results of fem-impact are in it; give {hint}")
     return data, data["summary"]
 
 

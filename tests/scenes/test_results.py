@@ -193,6 +193,12 @@ def test_show_tells_what_a_folder_holds(written, capsys, tmp_path):
     assert both["response"]["restitution"] == hit.restitution
 
 
+def test_show_of_the_folder_above_names_one_that_holds_results(written, capsys):
+    folder = written(SMALL)
+    assert cli.main(["show", str(folder.parent)]) == 2
+    assert f"no results of fem-impact are in it; give one in it, such as {folder}" in capsys.readouterr().err
+
+
 def test_show_tells_how_far_a_store_is(capsys, tmp_path):
     pytest.importorskip("zarr", reason="stores are an extra: fem-impact[cluster]")
     (tmp_path / "map.toml").write_text(QUICK)
