@@ -39,11 +39,13 @@ def save(folder: Path, response: Response, points: Any) -> str:
     last = len(response.bodies) - 1
     places: dict[int, Any] = {last: points} if response.bodies[last].dimension else {}
     bodies = tuple(_sampled(response, i, places.get(i, ())) for i in range(last + 1))
-    rung = response.target
+    rung, striker = response.target, response.striker
+    if striker is not None:  # by itself; among the bodies a hand may hold it
+        striker = replace(striker, modes=_at_points(striker.modes, striker.at[None], ()))
     whole = replace(
         response, bodies=bodies, rings=None, vectors=None,
         ringing=None if rung is response.bodies[last] else _at_points(rung, response.ends[last].points, points),
-        striker=None if response.striker is None else replace(response.striker, modes=bodies[0]),
+        striker=striker,
     )  # fmt: skip
     arrays: dict[str, np.ndarray] = {}
     told = {"response": _packed(whole, arrays), "assumptions": _packed(response.assumptions, arrays)}
@@ -138,8 +140,13 @@ def load_response(folder: str | Path) -> Response:
 
     Examples
     --------
-    >>> hit = fi.load_response("out/drumstick")  # doctest: +SKIP
-    >>> hit.restitution, hit.force.max()  # doctest: +SKIP
+    >>> from fem_impact import cli  # at a prompt: fem-impact strike studies/scenes/disk.toml --out out
+    >>> status = cli.main(["strike", "studies/scenes/disk.toml", "--out", "out"])  # doctest: +ELLIPSIS
+    Steel ball on a clamped steel disk
+    ...
+    >>> hit = fi.load_response("out")
+    >>> round(hit.restitution, 3), hit.n_impacts
+    (0.935, 1)
     """
     folder = check.path("folder", folder)
     folder = folder.parent if folder.suffix == ".json" else folder
