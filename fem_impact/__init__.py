@@ -24,6 +24,7 @@ _NAMES = {
     "model.planner": "Plan strike",
     "model.playing": "strokes",
     "scenes.scene": "Scene load_scene plan",
+    "scenes.results": "load_response",
     "scenes.uncertainty": "spread",
     "sweeps.grid": "sweep",
     "sweeps.borders": "read_borders",
@@ -78,6 +79,7 @@ if TYPE_CHECKING:  # the same names for type checkers; test_typing.py compares
     from .modes.ritz import ritz_modes as ritz_modes
     from .pages import explore as explore
     from .pages import report as report
+    from .scenes.results import load_response as load_response
     from .scenes.scene import Scene as Scene
     from .scenes.scene import load_scene as load_scene
     from .scenes.scene import plan as plan

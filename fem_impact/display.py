@@ -1,10 +1,13 @@
 """Shows on a terminal which stage is running, how far it is and how long it still takes."""
 
 import os
+import shutil
+import sys
+import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from rich import progress as bars
 from rich.console import Console
@@ -19,6 +22,38 @@ SOON = 2.0  # [s] time left is not said before a stage has taken this long: the 
 LONG = 10.0  # [s] time left that is announced even if nobody sees the line
 LONGER = 2.0  # [-] over the time announced last, from which on a longer one is announced, too
 LEAST = 0.02  # [-] share of a count that must be done before the rest is estimated from it
+
+
+WIDEST = 88  # [-] columns: printed text is never wider, and narrower on a narrow terminal
+
+
+def width() -> int:
+    """Columns that printed text may take."""
+    return max(20, min(WIDEST, shutil.get_terminal_size().columns))
+
+
+def wrapped(text: str) -> str:
+    """Text wrapped to the width of the terminal, with continued lines indented."""
+    filled = textwrap.TextWrapper(width(), subsequent_indent="    ", break_on_hyphens=False)  # keeps paths whole
+    lines = (filled.wrap(line) or [""] for line in text.splitlines())
+    return "\n".join(line for wrapped in lines for line in wrapped)
+
+
+def tell(text: str) -> None:
+    """Print one sentence to stderr."""
+    print(wrapped(f"fem-impact: {text}"), file=sys.stderr, flush=True)
+
+
+def complain(error: object, status: int) -> int:
+    """Print an error on one line of stderr; return the exit status."""
+    with suppress(OSError):  # if stderr is closed, the exit status must suffice
+        print(f"fem-impact: {_printable(str(error))}", file=sys.stderr, flush=True)
+    return status
+
+
+def _printable(text: str) -> str:
+    """The text on one line, with control characters escaped."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
 
 
 class Count:
@@ -59,8 +94,9 @@ class Display:
     time that it turns out to take twice as long as was told.
     """
 
-    def __init__(self, tell: Callable[[str], object] | None = None) -> None:
+    def __init__(self, tell: Callable[[str], object] | None = None, shown: bool = True) -> None:
         self.console: Console = Console(stderr=True)
+        self.shown = shown
         self.tell = tell
         self.task: bars.TaskID
         self.running: list[tuple[str, float]] = []  # name and start [s] of each stage, the innermost last
@@ -130,7 +166,7 @@ class Display:
             if len(self.running) == 1:
                 self._arm()
             with heard(self.report, self.foresee):
-                if self.bar is None and self.console.is_terminal:
+                if self.bar is None and self.shown and self.console.is_terminal:
                     with undoable(_show_cursor), self._opened():
                         yield
                 else:

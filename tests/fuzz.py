@@ -368,8 +368,8 @@ def solved(grid: grid.Grid, start: int, stop: int) -> tuple[np.ndarray, Texts]:
 
 COMMANDS = """strike SCENE --out OUT --tolerance 1e-2 --json
 strike SCENE --tolerance=0.1
-modes SCENE --count 5 --vtk OUT/modes.pvd
-modes SCENE --json --count=3
+modes SCENE --n-modes 5 --vtk OUT/modes.pvd
+modes SCENE --json --n-modes=3
 hammer SCENE --bandwidth 800 --drop 10 --masses 0.1 0.2 --out OUT/hammers.png
 map SCENE --out OUT --format nc --workers 1 --store STORE
 report SCENE --out OUT/page.html

@@ -33,6 +33,7 @@ from fuzz import PACKAGE, Hang, limited
 from scenes import QUICK
 
 import fem_impact as fi
+from fem_impact.scenes import results
 from fem_impact.mesh.loops import Outline, circle
 
 PATIENCE = 30.0  # [s] per call: thrice what is promised, as other work may run beside
@@ -123,6 +124,9 @@ def things() -> dict[str, Any]:
         modes, striker, law, at=(0.1, 0.1), speed=1.0, over={"mass": [0.02, 0.03], "speed": [1.0, 2.0]},
         tolerance=1e-2, borders=True,
     )  # fmt: skip
+    run = scene.run()
+    fi.export.write_json(folder / "response.json", fi.export.run_data(run, scene.data()))
+    results.save(folder, run.response, scene.points)
     return {
         "map": few, "taps": taps, "file of taps": folder / "taps.npz", "bar": bar,
         "metal": metal, "plate": plate, "beam": beam, "square": square, "modes": modes, "striker": striker, "law": law,
@@ -297,6 +301,7 @@ def table() -> dict[str, dict[str, Any]]:
                       "tolerance": 0.1},
         "Scene.strike": {"self": t["scene"], "tolerance": 1e-1, "speed": 1.0, "at": at},
         "load_scene": {"path": t["path"]},
+        "load_response": {"folder": t["folder"]},
         "plan": {"scene": t["scene"], "tolerance": 1e-1},
         "plan system": {"scene": t["system"], **told, "target": "modal", "n_striker_modes": 1, "watch": None},
         "plan modes": {"scene": t["modes"], **told, "n_modes": 10},
@@ -418,6 +423,7 @@ def table() -> dict[str, dict[str, Any]]:
             "start": None, "points": None,
         },
         "report.read": {"path": t["path"]},
+        "report.numbers": {"scene": t["scene"], "run": t["run"]},
         "report.write": {"path": folder / "report.html", "scene": t["scene"], "run": t["run"]},
         "pictures.mode_shapes": {"path": folder / "modes.png", "modes": t["modes"], "count": 2, "columns": 2},
         "pictures.wave": {"path": folder / "wave.png", **hit, "time": 1e-3},

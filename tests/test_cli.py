@@ -16,7 +16,7 @@ from scenes import SMALL
 from scipy.io import wavfile
 
 import fem_impact as fi
-from fem_impact import cli
+from fem_impact import answers, arguments, cli
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
 TEXT = 'title = "A small test"' + SMALL
@@ -32,7 +32,7 @@ def scene(tmp_path):
 def test_strike_writes_every_file_and_prints_a_summary(scene, tmp_path, capsys):
     assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out")]) == 0
     written = sorted(path.name for path in (tmp_path / "out").glob("[!.]*"))
-    assert written == ["force.csv", "force.png", "modes", "modes.pvd", "response.json", "strike.wav"]
+    assert written == ["force.csv", "force.png", "modes", "modes.pvd", "response.json", "response.npz", "strike.wav"]
     printed = capsys.readouterr().out
     data = json.loads((tmp_path / "out" / "response.json").read_text())
     for word in ("A small test", "Time: mesh", "strike", "files", "total", "response.json", str(tmp_path / "out")):
@@ -45,7 +45,7 @@ def test_strike_writes_every_file_and_prints_a_summary(scene, tmp_path, capsys):
     rigid = ["strike", str(scene), "--out", str(tmp_path / "out"), "--target", "rigid"]
     assert cli.main(rigid) in (0, 3)  # no modes, no sound
     written = sorted(path.name for path in (tmp_path / "out").glob("[!.]*"))
-    assert written == ["force.csv", "force.png", "response.json"]
+    assert written == ["force.csv", "force.png", "response.json", "response.npz"]
 
 
 def test_a_strike_writes_nothing_where_one_file_cannot_be_written(scene, tmp_path, capsys):
@@ -117,7 +117,9 @@ def test_listener_of_the_command_is_the_one_of_the_scene(scene, tmp_path, capsys
 
 def test_json_is_printed_as_it_is_written(scene, tmp_path, capsys):
     assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out"), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == json.loads((tmp_path / "out" / "response.json").read_text())
+    printed = json.loads(capsys.readouterr().out)
+    ours = {"command": "strike", "format": answers.FORMAT, "folder": str(tmp_path / "out")}
+    assert printed == json.loads((tmp_path / "out" / "response.json").read_text()) | ours
 
 
 def test_tolerance_of_the_command_replaces_that_of_the_scene(scene, tmp_path, capsys):
@@ -177,7 +179,7 @@ def test_missing_scene_is_a_sentence_with_the_nearest_name(scene, tmp_path, caps
         (["strike", "SCENE", "--tolerence", "1"], "did you mean --tolerance?"),
         (["modes", "SCENE", "--vkt", "x.vtu"], "did you mean --vtk?"),
         (["hammer", "SCENE"], "required: --bandwidth; see fem-impact hammer --help"),
-        (["modes", "SCENE", "--count", "x"], "invalid int value: 'x'; see fem-impact modes --help"),
+        (["modes", "SCENE", "--n-modes", "x"], "invalid int value: 'x'; see fem-impact modes --help"),
         (["map", "SCENE", "--format", "zar"], "did you mean zarr?"),
         (["play", "SCENE", "--silent", "a.wav"], "unrecognized arguments: a.wav; see fem-impact play --help"),
         ([], "required: COMMAND; see fem-impact --help"),
@@ -201,8 +203,8 @@ def test_scene_may_not_be_a_pipe_that_never_ends(tmp_path, capsys):
 
 
 def test_a_billion_modes_are_refused(scene, capsys):
-    assert cli.main(["modes", str(scene), "--count", "1000000000"]) == 2
-    assert "count must be at most 50000 modes for this scene, got 1000000000" in capsys.readouterr().err
+    assert cli.main(["modes", str(scene), "--n-modes", "1000000000"]) == 2
+    assert "n_modes must be at most 50000 for this scene, got 1000000000" in capsys.readouterr().err
 
 
 def test_place_that_cannot_be_written_to_is_a_sentence(scene, tmp_path, capsys):
@@ -232,7 +234,7 @@ def test_interrupted_run_leaves_nothing(scene, tmp_path, capsys, monkeypatch):
 
 
 def test_modes_are_listed_and_written(scene, tmp_path, capsys):
-    assert cli.main(["modes", str(scene), "--count", "5", "--vtk", str(tmp_path / "m.pvd")]) == 0
+    assert cli.main(["modes", str(scene), "--n-modes", "5", "--vtk", str(tmp_path / "m.pvd")]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "A small test" and sum("Hz" in line for line in lines) == 5
     assert lines[2].split() == ["1", "100", "Hz", "0.01"]
@@ -240,15 +242,15 @@ def test_modes_are_listed_and_written(scene, tmp_path, capsys):
 
 
 def test_modes_as_json(scene, capsys):
-    assert cli.main(["modes", str(scene), "--count", "3", "--json"]) == 0
+    assert cli.main(["modes", str(scene), "--n-modes", "3", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["frequencies"][0] == pytest.approx(100.0) and len(data["frequencies"]) == 3
 
 
 @pytest.mark.parametrize("count", ["0", "-3"])
 def test_count_of_modes_must_be_positive(scene, capsys, count):
-    assert cli.main(["modes", str(scene), "--count", count]) == 2
-    assert "count must be at least 1" in capsys.readouterr().err
+    assert cli.main(["modes", str(scene), "--n-modes", count]) == 2
+    assert "n_modes must be at least 1" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("columns", [20, 40, 200])
@@ -274,7 +276,7 @@ def test_help_and_version_load_nothing_heavy():
 
 
 def test_closed_pipe_is_no_error(scene, tmp_path):
-    command = f"{sys.executable} -m fem_impact.cli modes {scene} --count 20 | head -n 1"
+    command = f"{sys.executable} -m fem_impact.cli modes {scene} --n-modes 20 | head -n 1"
     environment = {**os.environ, "PYTHONPATH": str(Path(cli.__file__).parents[1])}
     run = subprocess.run(["bash", "-c", command], capture_output=True, text=True, env=environment)
     assert run.stdout == "A small test\n" and run.stderr == ""
@@ -291,7 +293,7 @@ def test_default_scene_runs_end_to_end(tmp_path, capsys):
 
 def test_completion_offers_verbs_options_and_files(tmp_path):
     pytest.importorskip("shtab", reason="the extra completion is not installed")
-    script = cli._completion(cli._parser(), "bash")
+    script = arguments.completion(arguments.parser(), "bash")
     (tmp_path / "plate.toml").touch()
 
     def offered(*words):
@@ -302,12 +304,12 @@ def test_completion_offers_verbs_options_and_files(tmp_path):
 
     assert offered("fem-impact", "st") == ["strike"]
     assert offered("fem-impact", "strike", "--to") == ["--tolerance"]
-    assert offered("fem-impact", "modes", "a.toml", "--") == ["--count", "--help", "--json", "--vtk"]
+    assert offered("fem-impact", "modes", "a.toml", "--") == ["--help", "--json", "--n-modes", "--quiet", "--vtk"]
     assert offered("fem-impact", "modes", "pl") == offered("fem-impact", "map", "x", "--out", "pl") == ["plate.toml"]
 
 
 def test_shapes_that_cannot_be_written_are_told_before_the_work(scene, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(fi.Scene, "modes", lambda *_: pytest.fail("the work must not begin"))
+    monkeypatch.setattr(fi.Scene, "modes", lambda *_, **__: pytest.fail("the work must not begin"))
     assert cli.main(["modes", str(scene), "--vtk", str(tmp_path / "m.stl")]) == 2
     assert "path ending must be one of .vtu, .pvd" in capsys.readouterr().err
     assert cli.main(["modes", str(scene), "--vtk", str(scene / "m.pvd")]) == 1
@@ -324,7 +326,9 @@ def test_full_disk_is_a_sentence(scene, tmp_path, capsys, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
-WORDS = st.sampled_from(["strike", "modes", "--out", "--count", "--vtk", "--json", "--tolerance", "3", "-1", "nan", ""])
+WORDS = st.sampled_from(
+    ["strike", "modes", "--out", "--n-modes", "--vtk", "--json", "--tolerance", "3", "-1", "nan", ""]
+)
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -177,3 +177,11 @@ def test_modes_hammers_and_maps_report_their_counts(tmp_path):
     assert counted["vectors"][0][1] < counted["vectors"][-1][1]
     assert [done for _, done, _ in counted["modes"]] == sorted({done for _, done, _ in counted["modes"]})
     assert [done for _, done, _ in counted["hammers"]] == [0, 1, 2]
+
+
+def test_a_quiet_display_shows_nothing_even_on_a_terminal():
+    shown = Display(shown=False)
+    shown.console = Console(file=io.StringIO(), force_terminal=True, width=80, legacy_windows=False)
+    with shown("modes"):
+        report("modes", 1, 2)
+    assert shown.console.file.getvalue() == ""

@@ -42,7 +42,7 @@ def test_package_loads_without_any_extra():
     "words",
     [
         ["strike", "SCENE", "--out", "OUT"],
-        ["modes", "SCENE", "--count", "2"],
+        ["modes", "SCENE", "--n-modes", "2"],
         ["plan", "SCENE"],
         ["map", "SCENE", "--out", "OUT"],
         ["hammer", "SCENE", "--bandwidth", "500", "--masses", "0.01"],

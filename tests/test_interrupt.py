@@ -19,7 +19,10 @@ ENDS = {signal.SIGINT: (130, -2), signal.SIGTERM: (143, -15)}  # ours, and Pytho
 OVER = 'over = { "striker.mass" = { from = 0.01, to = 0.1, count = 8 }, "contact.exponent" = [0.9, 1.0] }'
 SCENE = QUICK.replace('over = { "striker.mass" = [0.03, 0.05] }', OVER)
 COMMANDS = {  # words, and what is there when they are done
-    "strike": ("strike scene.toml --out out", ["force.csv", "force.png", "modes", "modes.pvd", "response.json"]),
+    "strike": (
+        "strike scene.toml --out out",
+        ["force.csv", "force.png", "modes", "modes.pvd", "response.json", "response.npz"],
+    ),
     "modes": ("modes scene.toml --vtk out/m.pvd", ["m", "m.pvd"]),
     "map": ("map scene.toml --out out --store store", ["map.csv", "map.nc"]),
     "hammer": ("hammer scene.toml --bandwidth 300 --masses 0.01 0.03 --out out/h.png", ["h.png"]),

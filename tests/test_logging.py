@@ -8,7 +8,7 @@ import fem_impact as fi
 from fem_impact.scenes import templates
 
 HOME = Path(__file__).parents[1] / "fem_impact"
-SPEAKERS = {"cli.py", "canvas.py"}  # the prompt, and a process whose output its parent reads
+SPEAKERS = {"canvas.py", "cli.py", "display.py"}  # the prompt, and a process whose output its parent reads
 
 
 def test_stages_and_maps_are_logged_under_the_name_of_the_package(caplog, capsys, tmp_path):

@@ -74,8 +74,8 @@ def test_every_command_says_the_notes(scene, tmp_path, capsys):
 
     assert ASSUMED in said("strike", "--out", str(tmp_path / "hit"))
     assert ASSUMED in json.loads((tmp_path / "hit" / "response.json").read_text())["notes"][0]
-    assert ASSUMED in said("modes", "--count", "3")
-    assert ASSUMED in json.loads(said("modes", "--count", "3", "--json"))["notes"][0]
+    assert ASSUMED in said("modes", "--n-modes", "3")
+    assert ASSUMED in json.loads(said("modes", "--n-modes", "3", "--json"))["notes"][0]
     assert ASSUMED in said("plan")
     assert ASSUMED in json.loads(said("plan", "--json"))["notes"][0]
     assert ASSUMED in said("hammer", "--bandwidth", "300", "--masses", "0.01")

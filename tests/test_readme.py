@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import fem_impact as fi
-from fem_impact import cli
+from fem_impact import arguments
 
 ROOT = Path(__file__).parents[1]
 README, GUIDE = ((ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "studies/guide.md"))
@@ -114,7 +114,7 @@ def test_commands_shown_name_scenes_that_exist_and_load():
 
 @pytest.mark.parametrize("line", sorted(set(OURS)))
 def test_shown_commands_are_ones_the_parser_takes(line):
-    options = cli._parser().parse_args(words_of(line))  # exits with status 2 where an option does not exist
+    options = arguments.parser().parse_args(words_of(line))  # exits with status 2 where an option does not exist
     assert "scene" not in options or options.scene.suffix in (".toml", ".lvm", ".msh")
 
 

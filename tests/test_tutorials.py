@@ -28,11 +28,25 @@ def test_from_the_outline_to_the_sound(tmp_path, capsys, monkeypatch):
 
 def test_hammer_test_warns_of_double_hits(tmp_path, capsys):
     tutorial = import_module("tutorial_hammer_test")
-    verdicts = {(one.place, one.tip): one for one in tutorial.judge(tutorial.structure(3e3))}
+    modes = tutorial.structure(3e3)
+    verdicts = {(one.place, one.tip): one for one in tutorial.judge(tutorial.plate(), modes)}
     assert verdicts["middle", "nylon"].good
     assert verdicts["middle", "rubber"].reach < tutorial.BANDWIDTH and verdicts["middle", "rubber"].n_impacts == 1
     assert verdicts["middle", "steel"].n_impacts > 1 and verdicts["corner", "nylon"].n_impacts > 1
     assert verdicts["middle", "steel"].ratio > 1.0  # beyond the threshold, as the criterion foretells
+
+
+def test_hammer_test_gives_no_number_of_a_blow_that_missed(tmp_path, capsys, monkeypatch):
+    tutorial = import_module("tutorial_hammer_test")
+    monkeypatch.setattr(tutorial, "plate", lambda: tutorial.fi.analytic.rectangle(0.6, 0.4, mass=2.6,
+                        first_frequency=60.0, n_modes=20))  # fmt: skip
+    monkeypatch.setattr(tutorial, "structure", lambda *_: tutorial.plate())
+    monkeypatch.setattr(tutorial.hammers, "choose", lambda *_, **__: [])
+    verdicts = tutorial.main(tmp_path)
+    steel = [line for line in capsys.readouterr().out.splitlines() if " steel " in line]
+    assert len(steel) == 2 and all("?" in line and "not resolved" in line for line in steel)
+    assert not any(one.good for one in verdicts if not one.trusted)
+    assert len(tutorial.draw(tutorial.plate()).axes[0].get_lines()) < len(tutorial.TIPS) + 1  # with the wanted level
 
 
 @pytest.mark.slow

@@ -41,8 +41,8 @@ def source_of(options: argparse.Namespace, player: Player) -> Iterator[tuple[Sou
     hands = Hands()
     with ExitStack() as open_now:
         open_now.enter_context(_ended_by_hand(hands))
-        if options.port is not None:
-            name = open_now.enter_context(port(options.port, hands, len(player.points), player.fastest))
+        if options.midi_port is not None:
+            name = open_now.enter_context(port(options.midi_port, hands, len(player.points), player.fastest))
             yield hands, f"MIDI port {name}; Ctrl-C ends"
         else:
             open_now.enter_context(keys(hands, len(player.points), player.fastest))

@@ -21,7 +21,6 @@ from ..scenes.scene import Scene
 from ..scenes.schema import PATHS
 from ..sweeps import bodies, grid
 
-TOLERANCE = 1e-3  # [-] of the blows shown: errors smaller than the plots can show
 QUICK_STEPS, QUICK_IMPACTS = 16.0, 6  # [-] of the first answer to a slider: steps in a contact, and most contacts
 MAP_TOLERANCE = 1e-2  # [-] of the blows on the map, which only counts impacts
 FIRST_LOOK = 30  # [-] modes found first, to estimate the number needed
@@ -80,11 +79,16 @@ class Setup:
         if setup.told:
             return setup
         hard = replace(setup.start, stiffness=SPANS["stiffness"] ** 0.5, mass=setup.start.mass / SPANS["mass"] ** 0.5)
-        needed = bodies.number_of_modes(first, bodies.needed_frequency(setup.case(hard), TOLERANCE))
+        needed = bodies.number_of_modes(first, bodies.needed_frequency(setup.case(hard), setup.tolerance))
         if needed <= first.n_modes:
             return setup
         more = planner.struck(plan.but(n_modes=min(needed, MOST_MODES)), Stages())
         return replace(setup, base=replace(case, modes=more))
+
+    @property
+    def tolerance(self) -> float:
+        """Largest error [-] accepted by the scene."""
+        return float(self.scene.blow.values.get("tolerance", collision.TOLERANCE))
 
     @cached_property
     def start(self) -> Settings:
@@ -222,9 +226,9 @@ class Setup:
             return None
 
 
-def blow(case: grid.Case) -> Response:
+def blow(case: grid.Case, tolerance: float = collision.TOLERANCE) -> Response:
     """The blow of a case; raises SimulationError if the integration fails."""
-    hit = collision.strike(case.modes, case.striker, case.contact, at=case.at, speed=case.speed, tolerance=TOLERANCE)
+    hit = collision.strike(case.modes, case.striker, case.contact, at=case.at, speed=case.speed, tolerance=tolerance)
     return audited(hit)
 
 

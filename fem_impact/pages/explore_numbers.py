@@ -95,7 +95,7 @@ class Explorer:
         view = self.look(settings.at)
         case = self.setup.case(settings, seen=view.seen)
         try:
-            hit = blow(case)
+            hit = blow(case, self.setup.tolerance)
         except SimulationError as error:
             return {"failed": str(error)}
         return {
@@ -132,7 +132,7 @@ class Explorer:
             if self.setup.at_rest(point):
                 return {"uri": "", "note": f"Nothing is heard: the body does not move at {place(point)}."}
         try:
-            rung = blow(case) if rate is None else rolled(case, rate)
+            rung = blow(case, self.setup.tolerance) if rate is None else rolled(case, rate)
             if height > 0.0:
                 heard = sound.radiate(rung, (*where, height), duration=PLAYED)
             else:
@@ -209,7 +209,7 @@ def _told(hit: Response, exact: bool) -> list[tuple[str, str]]:
     return [
         ("impacts", str(hit.n_impacts)),
         ("peak force", si(hit.peak_force, "N", 3)),
-        ("time in contact", si(hit.contact_time, "s", 3)),
+        ("contact time", si(hit.contact_time, "s", 3)),
         ("restitution", rebound(hit, 3).replace("-", "−")),
         ("estimated error", error),
     ]
@@ -233,6 +233,6 @@ def _sounding(heard: sound.Sound) -> tuple[str, str]:
     """The sound as a data URI, raised if it is quiet, and its level in words."""
     level = heard.peak_level
     raised = max(0.0, report.QUIET - level) if math.isfinite(level) else 0.0
-    note = f"Full scale is {heard.full_scale:g} {heard.unit}; peak {level:.1f} dB"
+    note = f"Peak {heard.said}; full scale {heard.full_scale:g} {heard.unit}"
     note += f", raised here by {raised:.1f} dB." if raised else "."
     return report.audio(heard.samples * 10.0 ** (raised / 20.0), heard.rate), note.replace("-", "−")

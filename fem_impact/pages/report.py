@@ -23,6 +23,7 @@ from ..impact.quantities import rebound
 from ..impact.response import Response
 from ..mesh.mesh_files import boundary
 from ..model.playing import Strokes
+from ..modes.modal import Modes
 from ..scenes import hearing, sequence
 from ..scenes.scene import Run, Scene, load_scene, scene_of
 from ..scenes.schema import PATHS, fault, read_bytes
@@ -44,6 +45,10 @@ MOST_PLAYED = 12.0  # [s] the same for a sequence
 LISTED = 40  # [-] blows of a sequence whose errors are listed
 BOUND = {"low": "estimate from below", "high": "estimate from above"}
 MOST_POINTS = 4  # [-] largest number of observation points with a sound player
+OPTIONS = {  # of `fem-impact strike`, by the argument of `Scene.run` that they stand for
+    "tolerance": "--tolerance", "quantity": "--quantity", "target": "--target", "n_modes": "--n-modes",
+    "size": "--size",
+}  # fmt: skip
 WEB = Path(__file__).parent / "web"
 
 
@@ -116,7 +121,8 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
         sounds=_sounds(scene, response),
         files=_downloads(scene, run),
         versions=export.versions(),
-        command=_command(scene, response),
+        modes_end=si(float(response.target.frequencies[-1]), "Hz"),
+        command=_command(scene, run),
         force_picture=_force_picture(response),
         data=_script_text(_plots(response)),
         plotly=plotly.get_plotlyjs(),
@@ -191,14 +197,22 @@ def template(name: str) -> Any:
     ).get_template(name)
 
 
-def _command(scene: Scene, response: Response | Strokes) -> str:
-    """The command that reproduces the blow; for a result, the report command."""
-    path = shlex.quote(str(scene.path))
+def _command(scene: Scene, run: Run | Played) -> str:
+    """What reproduces the blow: a command, or a line of Python if no option of a command says what was changed."""
+    path, response = str(scene.path), run.response
+    quoted = shlex.quote(f"./{path}" if path.startswith("-") else path)
     if scene.path.suffix.lower() == ".json":
-        return f"fem-impact report {path}"
-    path = shlex.quote(str(scene.path.resolve()))
-    modal = " --target modal" if isinstance(response, Response) else ""
-    return f"fem-impact strike {path}{modal} --tolerance {response.tolerance:g}"
+        return f"fem-impact report {quoted} --tolerance {response.tolerance:g}"
+    changes = dict(run.plan.changes) if isinstance(run, Run) else {}
+    changes |= {"target": run.plan.target} if isinstance(run, Run) else {}
+    changes |= {"tolerance": response.tolerance}
+    if not set(changes) <= set(OPTIONS):
+        given = ", ".join(f"{name}={value!r}" for name, value in changes.items())
+        return f"fi.load_scene({path!r}).strike({given})"
+    asked = changes.get("quantity", [])
+    words = [(OPTIONS["quantity"], each) for each in ([asked] if isinstance(asked, str) else asked)]
+    words += [(OPTIONS[name], f"{value}") for name, value in changes.items() if name != "quantity"]
+    return " ".join(["fem-impact strike", quoted, *(f"{option} {shlex.quote(str(value))}" for option, value in words)])
 
 
 def _tiles(response: Response | Strokes) -> list[tuple[str, str]]:
@@ -210,7 +224,7 @@ def _tiles(response: Response | Strokes) -> list[tuple[str, str]]:
     return [
         ("impacts", str(response.n_impacts)),
         ("peak force", si(response.peak_force, "N")),
-        ("time in contact", si(response.contact_time, "s")),
+        ("contact time", si(response.contact_time, "s")),
         ("impulse", si(response.impulse, "N s")),
         own,
         ("estimated error" if response.tolerance_met else "estimated error, above tolerance", total),
@@ -313,7 +327,7 @@ def _sounds(scene: Scene, response: Response | Strokes) -> list[Player]:
     players = []
     for name, samples in heard:
         level = samples.peak_level
-        stated = f"peak {samples.said}; full scale is {samples.full_scale:g} {samples.unit} in every report"
+        stated = f"peak {samples.said}; full scale {samples.full_scale:g} {samples.unit}, as in every report"
         players.append(Player(name, stated, audio(samples.samples, samples.rate)))
         if -math.inf < level < QUIET:
             raised = samples.samples * 10.0 ** (-level / 20.0)
@@ -337,12 +351,18 @@ def audio(samples: np.ndarray, rate: int) -> str:
     return _uri("audio/wav", file.getvalue())
 
 
+@check.typed
+def numbers(scene: Scene, run: Run | Played) -> dict[str, Any]:
+    """Everything that was found, as plain data: what the page offers as response.json; arguments as of `write`."""
+    tables = scene.data(tolerance=run.response.tolerance)
+    return export.run_data(run, tables) if isinstance(run, Run) else sequence.numbers(run.response, tables, run.seconds)
+
+
 def _downloads(scene: Scene, run: Run | Played) -> list[dict[str, str]]:
     response, modes = run.response, run.response.target
     frequencies = _frequencies(response)
     spectrum = response.spectrum(frequencies)
-    tables = scene.data(tolerance=response.tolerance)
-    data = export.run_data(run, tables) if isinstance(run, Run) else sequence.numbers(run.response, tables, run.seconds)
+    data = numbers(scene, run)
     columns = {
         "force.csv": {"time [s]": response.time, "force [N]": response.force},
         "spectrum.csv": {
@@ -372,6 +392,7 @@ def _plots(response: Response | Strokes) -> dict[str, Any]:
     modes, end = response.target, _end(response)
     shown = response.time <= end
     frequencies = _frequencies(response)
+    known = _known(modes, frequencies)
     moving = (modes.omega > 0.0) & (modes.frequencies < 2.0 * frequencies[-1])
     own: dict[str, Any] = {}
     if isinstance(response, Response):
@@ -390,10 +411,10 @@ def _plots(response: Response | Strokes) -> dict[str, Any]:
         "force": {"x": _short(response.time[shown]), "y": _short(response.force[shown])},
         "impacts": [[impact.start, impact.end] for impact in response.impacts],
         "spectrum": {"x": _short(frequencies), "y": _short(np.abs(response.spectrum(frequencies)))},
-        "natural": _short(modes.frequencies[(modes.omega > 0.0) & (modes.frequencies < frequencies[-1])]),
+        "natural": _short(modes.frequencies[(modes.omega > 0.0) & (modes.frequencies <= frequencies[-1])]),
         "mobility": {
-            "x": _short(frequencies),
-            "y": _short(np.abs(spectra.mobility(modes, response.at, response.at, frequencies))),
+            "x": _short(known),
+            "y": _short(np.abs(spectra.mobility(modes, response.at, response.at, known))),
         },
         "modal": {
             "x": _short(modes.frequencies[moving]),
@@ -406,6 +427,12 @@ def _plots(response: Response | Strokes) -> dict[str, Any]:
 def _frequencies(response: Response | Strokes) -> np.ndarray:
     shortest = min((impact.duration for impact in response.impacts), default=1.0)
     return np.geomspace(SPECTRUM_BAND[0], max(SPECTRUM_BAND[1], LOBES / shortest), SPECTRUM_POINTS)
+
+
+def _known(modes: Modes, frequencies: np.ndarray) -> np.ndarray:
+    """Frequencies [Hz] for the mobility: as far as the modes reach, beyond which there are no resonances in it."""
+    last = min(float(modes.frequencies[-1]) or np.inf, float(frequencies[-1]))
+    return np.geomspace(min(float(frequencies[0]), 0.5 * last), last, SPECTRUM_POINTS)
 
 
 def _view(response: Response | Strokes, end: float) -> dict[str, Any]:

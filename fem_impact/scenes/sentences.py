@@ -126,17 +126,15 @@ def contact(law: Contact) -> str:
 
 
 def _single_or_multiple(response: Response, law: Contact) -> str:
-    """What the kinetic-energy criterion predicts for the blow."""
+    """What the kinetic-energy criterion predicts for the blow, from its contact resonance on a rigid wall."""
     assert response.striker is not None
     mass = response.striker.felt_mass
     resonance = accuracy.contact_resonance(law, mass, response.speed)
     limit = threshold.threshold_frequency(response.target, response.at, mass)
-    said = f"On a rigid wall the contact would resonate at {si(resonance, 'Hz', 3)}. "
+    wall = f"contact resonance, {si(resonance, 'Hz', 3)}"
     if limit is None:
-        return said + "Here not even the softest contact rebounds: the body is no heavier than the striker."
+        return f"No rebound expected, whatever the {wall}: the body is no heavier than the striker."
     if math.isinf(limit):
-        return said + "A single hit is likely, however hard the contact."
-    found = si(resonance, "Hz", 3)
-    if resonance < limit:
-        return said + f"A single hit is likely: {found} is below the limit of {si(limit, 'Hz', 3)}."
-    return said + f"Several hits are likely: {found} is above the limit of {si(limit, 'Hz', 3)}."
+        return f"Single hit expected, whatever the {wall}: the striker always rebounds."
+    number, side = ("Single hit", "below") if resonance < limit else ("Several hits", "above")
+    return f"{number} expected: the {wall}, is {side} the limit of {si(limit, 'Hz', 3)} (kinetic-energy criterion)."

@@ -65,7 +65,7 @@ TAILS = (0.001, 0.999)  # [-] levels between which a histogram is drawn
 LONGEST = 26  # [-] characters of an input's name that fit beside its bar
 NAMES = {  # quantity of a blow: its name in a picture
     "n_impacts": "number of impacts",
-    "contact_time": "time in contact",
+    "contact_time": "contact time",
     "restitution": "restitution",
     "impulse": "impulse",
     "peak_force": "peak force",

@@ -102,7 +102,9 @@ class Sound:
 
     @property
     def said(self) -> str:
-        """The level in words, with its reference."""
+        """The level in words: of a pressure with its reference, of a motion its peak."""
+        if self.unit == "m/s":
+            return f"{self.full_scale * float(np.abs(self.samples).max(initial=0.0)):.3g} m/s"
         return f"{self.level:.1f} dB re {REFERENCE[self.unit][1]}".replace("-", "−")
 
 

@@ -34,6 +34,15 @@ OTHERS = {  # what is told of a store whose digests are others
 }
 
 
+def finished(path: Path) -> tuple[int, int]:
+    """How many blocks of a store are finished, and of how many; ValueError if it is none."""
+    with _needed("a store"):
+        import zarr
+    with _intact(path):
+        done = np.asarray(zarr.open_group(str(path), mode="r")["done"])
+    return int(np.count_nonzero(done)), done.size
+
+
 def block_size(n_cases: int) -> int:
     """Number of cells in a block."""
     return max(1, min(LARGEST_BLOCK, math.ceil(n_cases / BLOCKS)))

@@ -55,18 +55,20 @@ def frf(options: Any) -> tuple[xr.Dataset, tuple[str, ...]]:
     return found, taps.notes
 
 
-def peaks(found: xr.Dataset) -> tuple[list[tuple[str, ...]], tuple[str, ...]]:
-    """Rows and heading of a table of the largest peaks of each response."""
-    rows: list[tuple[str, ...]] = []
+def peaks(found: xr.Dataset) -> list[dict[str, Any]]:
+    """The largest peaks of each response: frequency [Hz], magnitude with its unit, and coherence if it is known."""
+    rows = []
     for k, name in enumerate(found["channel"].values):
         size = np.abs(found["H"].values[1:, k])
         places = find_peaks(np.log(np.maximum(size, 1e-300)), prominence=STEEP)[0]
         largest = np.sort(places[np.argsort(-size[places])][:MOST_PEAKS])
         for i in largest:
-            coherence = f"{float(found['coherence'].values[1 + i, k]):.3f}" if "coherence" in found else ""
-            frequency = f"{float(found['frequency'].values[1 + i]):.5g} Hz"
-            rows.append((str(name), frequency, f"{size[i]:.4g} {found['units'].values[k]}", coherence))
-    return rows, ("response", "peak at", "magnitude", "coherence")
+            coherence = float(found["coherence"].values[1 + i, k]) if "coherence" in found else None
+            rows.append({
+                "response": str(name), "frequency": float(found["frequency"].values[1 + i]),
+                "magnitude": float(size[i]), "unit": str(found["units"].values[k]), "coherence": coherence,
+            })  # fmt: skip
+    return rows
 
 
 def write_frf(path: Path, found: xr.Dataset) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import fem_impact as fi
-from fem_impact import cli
+from fem_impact import cli, commands
 from fem_impact._base import child
 from fem_impact.pages import explore_worker
 from fem_impact.show import pictures
@@ -70,7 +70,7 @@ def ask_beside_the_page(monkeypatch):
 def run_again_compiled(monkeypatch):
     began = []
     monkeypatch.setattr(cli, "_prepare", lambda *_, **__: True)
-    monkeypatch.setattr(cli, "_modes", lambda _: (_ for _ in ()).throw(fi.SimulationError("none")))
+    monkeypatch.setattr(commands, "modes", lambda _: (_ for _ in ()).throw(fi.SimulationError("none")))
     monkeypatch.setattr(os, "execve", lambda *them: began.append(them))
     assert cli.main(["modes", "none.toml"]) == cli.FAILED
     ((program, words, environment),) = began

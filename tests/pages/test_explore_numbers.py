@@ -23,7 +23,9 @@ def unpacked(text):
 
 
 def test_judged_blow_is_sent_whole(explorer):
-    told, hit = explorer.judge(explorer.setup.start), explore_model.blow(explorer.setup.case(explorer.setup.start))
+    setup = explorer.setup
+    told, hit = explorer.judge(setup.start), explore_model.blow(setup.case(setup.start), setup.tolerance)
+    assert hit.tolerance == setup.scene.blow.values["tolerance"] == 1e-2  # the scene's own
     cells = dict(told["cells"])
     assert cells["impacts"] == str(hit.n_impacts) and cells["restitution"] == f"{hit.restitution:.3f}"
     assert told["verdict"] == hit.verdict and told["model"] == hit.model_verdict[1:] and not told["missed"]

@@ -1,8 +1,10 @@
 """The page about a blow: everything on it, nothing from elsewhere, usable by anyone."""
 
 import base64
+import html
 import json
 import re
+import shlex
 import sys
 
 import numpy as np
@@ -94,6 +96,38 @@ def test_result_of_a_strike_gives_the_same_blow(page, tmp_path):
     for name in (tmp_path / "out", tmp_path / "out" / "response.json"):
         again = report.read(name)
         assert again.strike().impulse == report.read(scene).strike().impulse
+
+
+@pytest.mark.parametrize(("kind", "target"), [("analytic", "modal"), ("fe", "vectors")])
+def test_the_command_on_the_page_gives_the_same_numbers(tmp_path, monkeypatch, capsys, kind, target):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my plate.toml").write_text(TEXT.replace('"analytic"', f'"{kind}"'))
+    assert cli.main(["report", "my plate.toml", "--out", "r.html", "--tolerance", "0.02"]) == 0
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    told = html.unescape(re.search(r"<code>(fem-impact .*?)</code>", page)[1])
+    words = shlex.split(told)
+    assert words[:3] == ["fem-impact", "strike", "my plate.toml"] and f"--target {target}" in told
+    assert cli.main([*words[1:], "--out", "again"]) == 0
+    again = json.loads((tmp_path / "again" / "response.json").read_text())
+    shown = json.loads(download(page, "response.json"))
+    assert again["response"] == shown["response"] and again["impacts"] == shown["impacts"]
+
+
+def test_a_change_that_no_option_names_is_reproduced_from_python(tmp_path):
+    (tmp_path / "scene.toml").write_text(SMALL)
+    scene = fi.load_scene(tmp_path / "scene.toml")
+    run = scene.run(motion=True, speed=1.0)
+    told = report._command(scene, run)
+    assert told.startswith("fi.load_scene(") and eval(told, {"fi": fi}).impulse == run.response.impulse
+
+
+def test_the_mobility_ends_where_the_modes_end_and_the_page_says_where(page):
+    text = page.read_text(encoding="utf-8")
+    data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)[1])
+    last = np.loadtxt(download(text, "modes.csv").splitlines(), delimiter=",", skiprows=1)[-1, 0]
+    assert last < data["spectrum"]["x"][-1]  # the spectrum goes on
+    assert data["mobility"]["x"][-1] == pytest.approx(last, rel=1e-5) == data["natural"][-1]
+    assert f"modes of the struck body end at {sentences.si(last, 'Hz')}" in text
 
 
 @pytest.mark.slow

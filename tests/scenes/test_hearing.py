@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scenes import BAR, SMALL
 from scipy.io import wavfile
 
-from fem_impact import cli
+from fem_impact import commands
 from fem_impact.scenes import hearing, scene
 from fem_impact.show import sound
 
@@ -68,11 +68,10 @@ def test_in_free_air_a_listener_gets_both_bounds_and_never_one_number(tmp_path, 
         assert each["stated"] == f"bounded: between {levels} dB re 20 µPa" and each["listener"] == place
     assert [each.get("bound") for each in found] == [None, *["low", "high"] * 3]
     assert found[3]["full_scale"] == found[4]["full_scale"]
-    cli._say_sounds(found)
-    lines = capsys.readouterr().out.replace("\n    ", " ").splitlines()
+    lines = commands.heard(found)
     assert (
         len(lines) == 4
-        and f"Listener: {found[4]['stated']}; 1.0 in radiated_2_low.wav and radiated_2_high.wav" in lines[2]
+        and f"Listener: {found[4]['stated']}; full scale of radiated_2_low.wav and radiated_2_high.wav" in lines[2]
     )
 
 

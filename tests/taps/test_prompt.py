@@ -71,4 +71,4 @@ def test_peaks_of_five_times_their_surroundings_are_listed_and_lower_ones_are_no
          "coherence": (("frequency", "channel"), np.ones((400, 1))), "units": ("channel", ["m/s^2/N"])},
         {"frequency": frequency, "channel": ["a"]},
     )  # fmt: skip
-    assert [row[1] for row in prompt.peaks(found)[0]] == ["100 Hz"]
+    assert [each["frequency"] for each in prompt.peaks(found)] == [100.0]

@@ -1,0 +1,176 @@
+"""What every command prints with --json, how it ends, and examples of it: the tables that help, pages and tests use."""
+
+from typing import Any
+
+FORMAT = 1  # number of the format of all answers; it grows when a key changes its meaning, not when one is added
+STATUSES = {
+    0: "done", 1: "the run failed", 2: "bad input", 3: "done, but the tolerance is missed", 130: "interrupted",
+}  # fmt: skip
+MISSES = ("strike", "report")  # commands that end with 3 where the tolerance is missed
+
+Keys = dict[str, tuple[str, str]]  # key: JSON type (with "?" if it may be left out), and meaning
+ALL: Keys = {
+    "command": ("string", "name of the command"),
+    "format": ("integer", f"number of this format, {FORMAT}; it grows when a key changes its meaning"),
+    "notes": ("array", "what was assumed, and numbers that are probably a slip of a unit, as sentences"),
+    "folder": ("string|null", "where the files are; null if none was written"),
+    "files": ("array", "names of the files in that folder"),
+    "versions": ("object", "versions of Python and of the packages that compute the numbers"),
+}
+
+
+def _alike(meaning: str, names: str) -> Keys:
+    """Keys that are explained together."""
+    return dict.fromkeys(names.split(), ("any?", meaning))
+
+
+SCENE: Keys = {"scene": ("object", "tables of the scene as it was struck, as in its TOML file")}
+SECONDS: Keys = {"seconds": ("object", "wall time [s] of each stage")}
+BLOW: Keys = {
+    "response": (
+        "object?",
+        "numbers of the blow in SI units: n_impacts, restitution, peak_force, error ..., assumptions",
+    ),
+    "sequence": ("object?", "of a scene with strokes, in place of response: the numbers of all strokes together"),
+    "impacts": ("array", "of each impact start [s], end [s], peak_force [N], impulse [N s], contact and restitution"),
+    "strokes": ("array?", "of each stroke when [s], at [m], speed [m/s], n_impacts and impulse [N s]"),
+    "plan": ("object?", "what was modelled, why, and the errors and the cost predicted"),
+}
+KEYS: dict[str, Keys] = {
+    "strike": BLOW | SCENE | SECONDS | {
+        "sounds": ("array?", "of each sound file, place, full_scale, unit, levels [dB] and their reference"),
+        "sound": ("object?", "the first of the sounds at a point"),
+        "radiated": ("object?", "the first of the sounds at a listener"),
+        "verified": ("object?", "with --verify: differences [-] from a finer run"),
+    },
+    "plan": {
+        "tolerance": ("number", "largest error accepted [-]"),
+        "seconds": ("number", "predicted time [s]"),
+        "memory": ("number", "predicted memory [byte]"),
+        "target": ("string?", "how the struck body is treated"),
+        "errors": ("object?", "predicted errors [-] by cause"),
+        "reasons": ("array?", "why, as sentences"),
+        "assumptions": ("array?", "what the model assumes, and what each assumption changes"),
+        "strokes": ("array?", "of a scene with strokes: each, with the number of its plan"),
+        "plans": ("array?", "of a scene with strokes: their plans"),
+    } | _alike(
+        "as the argument of this name of `fi.strike`, `fi.find_modes` or `fi.assemble`",
+        "quantities element size n_dofs n_modes max_frequency n_striker_modes scheme dt duration mass mobility meets "
+        "needed",
+    ),
+    "modes": {
+        "frequencies": ("array", "natural frequencies [Hz], rigid motions (0 Hz) first"),
+        "damping_ratios": ("array", "damping ratio [-] of each mode"),
+        "n_rigid": ("integer", "number of rigid motions"),
+        "mass": ("number", "mass of the body [kg]"),
+    },
+    "map": SECONDS | {
+        "n_blows": ("integer", "number of blows"),
+        "axes": ("object", "number of values along each axis"),
+        "n_single": ("integer", "blows with one impact"),
+        "n_failed": ("integer", "blows without an answer"),
+        "cells": ("string?", "how many cells were computed, in words"),
+        "borders": ("string?", "how many borders between numbers of impacts were found, in words"),
+        "model_error": ("object?", "least and largest error of the model itself [-], and what of it is not known"),
+    },
+    "spread": SECONDS | _alike(
+        "see `Spread.data` of `fi.spread`",
+        "title inputs blows independent failed seed tolerance correlation confidence double_hit chaotic quantities "
+        "checks rescaled why_no_sobol",
+    ),
+    "hammer": {
+        "bandwidth": ("number?", "bandwidth to reach [Hz]"),
+        "drop": ("number?", "how far the spectrum may fall within it [dB]"),
+        "hammers": ("array?", "of each its mass [kg], reach [Hz], and tips [N/m] that hit once, or that also reach it"),
+        "table": ("object?", "with --rove: columns with a row for every point and tip"),
+        "verdicts": ("array?", "with --rove: of every point whether a tip works, or why none does"),
+        "resolution": ("number?", "with --rove: frequency resolution [Hz]"),
+    },
+    "report": BLOW | SCENE | SECONDS,
+    "explore": {"address": ("string", "address of the page, printed as soon as it is served")},
+    "play": {
+        "played": ("object", "number of strokes, contacts ... by name"),
+        "step": ("number", "longest time step [s]"),
+        "n_modes": ("integer", "number of modes"),
+        "n_blocks": ("integer", "blocks computed"),
+        "slowest": ("number", "99th percentile of the computing time of a block [s]"),
+        "missed": ("integer", "blocks that missed their deadline"),
+    },
+    "new": {},
+    "mesh": {
+        "mesh": ("object", "what the mesh is, by name, in words"),
+        "edges": ("array", "of each edge name, length [m], n_facets, curved, middle [m], twins"),
+    },
+    "show": {
+        "holds": ("array", "commands that wrote what is in it, or store"),
+        "response": ("object?", "of a strike: numbers of the blow, as of `strike`"),
+        "sequence": ("object?", "of a scene with strokes: their numbers, as of `strike`"),
+        "summary": ("array", "what is in it, as sentences"),
+    },
+    "doctor": {"findings": ("array", "of each check name, works, vital, seconds [s] and remedy")},
+    "completion": {"shell": ("string", "the shell"), "script": ("string", "its script")},
+    "frf": {
+        "peaks": ("array", "of each peak response, frequency [Hz], magnitude, unit and coherence (null if not known)"),
+    },
+    "fit": _alike(
+        "see `Found.data` of `fi.fit`",
+        "values unidentifiable limited ridges intervals point per_tap errors left_out outliers whiteness compared "
+        "summary",
+    ),
+}  # fmt: skip
+
+EXAMPLES: dict[str, tuple[str, ...]] = {
+    "strike": (
+        "fem-impact strike studies/scenes/drumstick.toml --tolerance 1e-3 --out out",
+        "fem-impact strike studies/scenes/drumstick.toml --listener 0.2 0.1 1.0 --json",
+    ),
+    "plan": ("fem-impact plan studies/scenes/drumstick.toml --tolerance 1e-3",),
+    "modes": ("fem-impact modes studies/scenes/drumstick.toml --n-modes 20 --vtk out/modes.pvd",),
+    "map": ("fem-impact map studies/scenes/drumstick_map.toml --store out/store --out out",),
+    "spread": (
+        'fem-impact spread studies/scenes/drumstick.toml --vary "contact.stiffness=lognormal(695e3,0.1)"',
+    ),
+    "hammer": (
+        "fem-impact hammer studies/scenes/drumstick.toml --bandwidth 800",
+        "fem-impact hammer studies/scenes/drumstick.toml --bandwidth 800 --rove 12 --out out",
+    ),
+    "report": ("fem-impact report studies/scenes/drumstick.toml", "fem-impact report out --out page.html"),
+    "explore": ("fem-impact explore studies/scenes/drumstick.toml",),
+    "play": (
+        "fem-impact play studies/scenes/drumstick.toml --n-modes 100", "fem-impact play scene.toml --midi song.mid",
+    ),
+    "new": ("fem-impact new disk --out gong.toml",),
+    "mesh": ("fem-impact mesh drawing.svg --unit mm --out edges.png",),
+    "show": ("fem-impact show out",),
+    "schema": ("fem-impact schema", "fem-impact schema strike"),
+    "doctor": ("fem-impact doctor",),
+    "completion": ('eval "$(fem-impact completion bash)"',),
+    "frf": ("fem-impact frf studies/measured/acceleration.lvm --out out/frf.csv",),
+    "fit": ("fem-impact fit taps.lvm scene.toml --unknown contact.stiffness=1e4:1e9 --mass 0.1",),
+}  # fmt: skip
+
+
+def epilog(command: str) -> str:
+    """The end of a command's help: examples, each on an indented line, and how it may end."""
+    ends = "; ".join(f"{number} {said}" for number, said in STATUSES.items() if number != 3 or command in MISSES)
+    return "\n".join(["examples:", *(f"  {line}" for line in EXAMPLES[command]), "", f"exit status: {ends}"])
+
+
+def schema(command: str) -> dict[str, Any]:
+    """A JSON schema of what a command prints with --json."""
+    keys = {**ALL, **KEYS[command]}
+    properties: dict[str, Any] = {}
+    for name, (kind, meaning) in keys.items():
+        kinds = kind.rstrip("?").split("|")
+        properties[name] = {"description": meaning}
+        if kinds != ["any"]:
+            properties[name] |= {"type": kinds[0] if len(kinds) == 1 else kinds}
+    properties["command"] |= {"const": command}
+    return {
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": f"What `fem-impact {command} --json` prints",
+        "type": "object",
+        "properties": properties,
+        "required": [name for name, (kind, _) in keys.items() if not kind.endswith("?")],
+        "additionalProperties": False,
+    }

@@ -1,0 +1,601 @@
+"""What the commands do: each reads its options, calls the library and returns its answer; contains no physics."""
+
+import argparse
+import math
+import os
+import time
+import warnings
+import webbrowser
+from collections.abc import Sequence
+from contextlib import nullcontext
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import fem_impact as fi
+
+from . import answers
+from .display import Display, tell, width
+from .show import FORMATS
+
+MOTION_TIMES = 100  # [-] instants in motion.pvd: four seconds at 25 per second
+SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` writes any number
+
+
+class Answer(NamedTuple):
+    """What a command found: as data for programs, and as text for people."""
+
+    data: dict[str, Any]
+    said: Sequence[str | Sequence[str]] | None  # texts to wrap, and tables to print as they are; None: data only
+    missed: bool = False  # whether a tolerance was missed
+    fault: str = ""  # why the command failed all the same
+
+
+def answer(
+    data: dict[str, Any], *said: str | Sequence[str], folder: Path | None = None, files: Sequence[str] = (), **ends: Any
+) -> Answer:
+    """An answer with the files that were written to a folder, which are said last."""
+    lines = list(said)
+    if folder is not None and files:
+        one = len(files) == 1
+        lines.append(f"Files: {folder / files[0]}" if one else f"Files in {folder}{os.sep}: {', '.join(files)}")
+    where = None if folder is None or not files else str(folder)
+    return Answer({**data, "folder": where, "files": list(files)}, lines, **ends)
+
+
+def _display(options: argparse.Namespace, tells: bool = False) -> Display:
+    """The progress of a command; `tells` for one that announces long work. Quiet commands show nothing."""
+    return Display(tell if tells and not options.quiet else None, shown=not options.quiet)
+
+
+def _tell(options: argparse.Namespace, text: str) -> None:
+    if not options.quiet:
+        tell(text)
+
+
+def _folder(options: argparse.Namespace) -> Path:
+    """The folder that --out names, or one named after the scene."""
+    return options.out if options.out is not None else Path("out") / options.scene.stem
+
+
+def _file(options: argparse.Namespace, name: str) -> Path | None:
+    """The file that --out names: itself if it has an ending, otherwise ``name`` in that folder."""
+    if options.out is None or options.out.suffix:
+        return options.out
+    return options.out / name
+
+
+def strike(options: argparse.Namespace) -> Answer:
+    """Strike and write."""
+    from .impact import promise  # imported only when needed
+    from .model.target import Stages
+    from .show.painter import Painter
+
+    began = time.perf_counter()
+    scene = fi.load_scene(options.scene)
+    if options.listener is not None:
+        scene = scene.heard_from(*options.listener)
+    if scene.stroke:
+        return _strike_in_turn(options, scene)
+    folder, display = _folder(options), _display(options, tells=True)
+    with fi.export.staged(folder, "strike") as staging, Painter() if options.pictures else nullcontext() as painter:
+        place = folder.resolve()  # "." has no name of its own
+        keep = place.parent / f"{place.name}.modes.npz"  # not in the folder: an interrupted run leaves that alone
+        motion, before = options.pictures or options.vtk, partial(_announce, options, display, options.verify)
+        run = scene.run(display, before=before, verify=options.verify, motion=motion, keep=keep, **_choices(options))
+        display.predict(None)
+        if options.strict:
+            promise.kept(run.response, strict=True)
+        stages = Stages(display)
+        data = _write(staging, scene, run, options, stages, painter)
+    keep.unlink(missing_ok=True)
+    seconds = {**run.seconds, **stages.seconds, "total": time.perf_counter() - began}
+    said = [_title(scene), run.response.summary()]
+    if not run.rings:
+        said.append(
+            f"Model: {run.plan.reasons[0]}; no modes and no sound (use --target modal or --quantity sound=5000)"
+        )
+    if run.verified is not None and run.finer is not None:
+        coarse = run.finer.target in ("rigid", "infinite")
+        tested = f" (which also treats the body as {run.finer.target}: it has too many modes)" if coarse else ""
+        differences = ", ".join(f"{name} {value:.1e}" for name, value in run.verified.items())
+        said.append(f"Verified by a finer run{tested}: {differences}")
+    said += heard(data.get("sounds", ()))
+    said.append("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items()))
+    return answer(data, *said, folder=folder, files=data["files"], missed=not run.response.tolerance_met)
+
+
+def _announce(options: argparse.Namespace, display: Display, verify: bool, plan: Any) -> None:
+    """Warn of a long run before it starts, and let its prediction tell the time left."""
+    display.predict(None if verify else plan.seconds)  # the plan of the second, finer run is not known yet
+    if plan.costly:
+        text = f"{plan.cost}; Ctrl-C stops it, and the same command later reuses the modes already found"
+        _tell(options, f"{text} (`fem-impact plan` explains why)")
+
+
+def _write(
+    folder: Path, scene: Any, run: Any, options: argparse.Namespace, stages: Any, painter: Any
+) -> dict[str, Any]:
+    """Write every file of a strike; return the contents of response.json."""
+    from .scenes import hearing, results  # imported only when needed
+    from .show import sampling
+    from .show.canvas import NAMES
+
+    response, files = run.response, ["response.json", results.SAVED, "force.csv", f"force.{options.format}"]
+    extra: dict[str, Any] = {}
+    if run.plan.target == "vectors" and response.ringing is None:
+        with stages("modes"):
+            response = response.on(response.target)
+    drawn = painter is not None and run.rings
+    if drawn:
+        painter.begin(folder, response, options.format)
+    with stages("files"):
+        fi.export.write_force(folder / "force.csv", response)
+        fi.figures.save(folder / f"force.{options.format}", fi.figures.force(response))
+    if run.rings:
+        with stages("files"):
+            fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=SHAPES_WRITTEN))
+        with stages("sound"):
+            sounds = hearing.write(folder, scene, response, duration=options.duration, normalise=options.normalise)
+        first = {"at": "sound", "listener": "radiated"}  # the keys of the first point and listener
+        for heard in reversed(sounds):
+            extra.update({first[name]: heard for name in first if name in heard})
+        extra["sounds"] = sounds
+        files += ["modes.pvd", *(heard["file"] for heard in sounds)]
+        if options.vtk:
+            end = sampling.end_of(response)
+            times = [end * i / (MOTION_TIMES - 1) for i in range(MOTION_TIMES)]
+            with stages("motion"):
+                fi.export.write_vtk(folder / "motion.pvd", response.target, response, times)
+            files.append("motion.pvd")
+        if drawn:
+            with stages("pictures"):
+                missing = painter.finish()
+            if missing:
+                _tell(options, f"pictures are drawn in two dimensions; {missing}")
+            files += [*(f"{name}.{options.format}" for name in NAMES), "wave.gif"]
+    if run.verified is not None:
+        extra["verified"] = run.verified
+    changes = {name: value for name, value in run.plan.changes.items() if name in ("tolerance", "quantity")}
+    tables, copies = scene.kept(folder, **changes)
+    files += copies
+    data = fi.export.run_data(run, tables) | fi.export.plain({**extra, "files": files})
+    fi.export.write_json(folder / "response.json", data)
+    results.save(folder, response, scene.points)
+    return data
+
+
+def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
+    """Play the strokes of a scene and write what they did."""
+    from .model.target import Stages  # imported only when needed
+    from .scenes import hearing, sequence
+
+    given = {"verify": options.verify, "pictures": options.pictures, "vtk": options.vtk, "target": options.target}
+    wrong = next((name for name, value in given.items() if value), None)
+    if wrong:
+        raise ValueError(f"--{wrong} must be left out for a scene with strokes")
+    began = time.perf_counter()
+    folder, display = _folder(options), _display(options)
+    with fi.export.staged(folder, "strike") as staging, warnings.catch_warnings():
+        warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
+        stages = Stages(display)
+        found = scene.play(watch=display, strict=options.strict, **_choices(options))
+        with stages("files"):
+            fi.export.write_force(staging / "force.csv", found)
+            fi.figures.save(staging / f"force.{options.format}", fi.figures.force(found))
+            fi.export.write_vtk(staging / "modes.pvd", found.target.truncated(n_modes=SHAPES_WRITTEN))
+        with stages("sound"):
+            sounds = hearing.write(staging, scene, found, duration=options.duration, normalise=options.normalise)
+        tables, copies = scene.kept(staging, tolerance=found.tolerance)
+        pictures = [f"force.{options.format}"]
+        names = ["response.json", "force.csv", *pictures, "modes.pvd", *(each["file"] for each in sounds), *copies]
+        seconds = {**stages.seconds, "total": time.perf_counter() - began}
+        data = {**sequence.numbers(found, tables, seconds), "sounds": sounds, "files": names}
+        fi.export.write_json(staging / "response.json", data)
+    said = [_title(scene), found.summary(), *heard(sounds), f"Time: {seconds['total']:.2f} s"]
+    return answer(data, *said, folder=folder, files=names, missed=not found.tolerance_met)
+
+
+def heard(sounds: Sequence[dict[str, Any]]) -> list[str]:
+    """A line for each sound: its peak, and what a sample of 1 in its file means."""
+    lines = []
+    for each in sounds:
+        where = "Point" if "at" in each else "Listener" if "listener" in each else "Both listeners"
+        if each.get("bound") == "low":  # the other one's line tells both
+            continue
+        level = each["stated"] if "bound" in each else f"peak {each['stated']}"
+        if each["level"] is None or each["level"] == -math.inf:
+            level = "silence"
+        other = f"{each['file'].replace('_high', '_low')} and " if "bound" in each else ""
+        lines.append(
+            f"{where}: {level}; full scale of {other}{each['file']} is {each['full_scale']:.4g} {each['unit']}"
+        )
+    return lines
+
+
+def plan(options: argparse.Namespace) -> Answer:
+    """Plan, and strike nothing."""
+    scene = fi.load_scene(options.scene)
+    plan = (scene.plan_strokes if scene.stroke else scene.plan)(watch=_display(options), **_choices(options))
+    return answer(plan.data(), _title(scene), str(plan))
+
+
+def map_of(options: argparse.Namespace) -> Answer:
+    """Strike the grid of a scene."""
+    from .scenes import maps  # imported only when needed
+
+    began = time.perf_counter()
+    chosen = {word in FORMATS: word for word in options.format}  # of pictures and of numbers
+    form, picture = maps.can_write(chosen.get(False, "nc"), options.out), chosen.get(True, FORMATS[0])
+    scene = fi.load_scene(options.scene)
+    folder = _folder(options)
+    with fi.export.staged(folder, "map") as staging:
+        display = _display(options)
+        with display("cells"):
+            table = maps.map_scene(
+                scene, tolerance=options.tolerance, workers=options.workers, client=options.cluster,
+                store=options.store, watch=partial(display.report, "cells"), max_cells=options.max_cells,
+                tell=partial(_tell, options), stage=display, cells=options.cells,
+                borders=True if options.borders else None, refine=False if options.every_cell else None,
+            )  # fmt: skip
+        with display("files"):
+            names = maps.write(staging, table, form, picture)
+    axes = {str(name): size for name, size in table.n_impacts.sizes.items()}
+    single, failed = int((table.n_impacts == 1).sum()), int((table.n_impacts < 0).sum())
+    data: dict[str, Any] = {"n_blows": table.n_impacts.size, "axes": axes, "n_single": single, "n_failed": failed}
+    over = ", ".join(f"{name} ({size})" for name, size in axes.items())
+    said = [_title(scene), f"{table.n_impacts.size} blows over {over}: {single} hit once, {failed} failed"]
+    for name in ("cells", "borders"):
+        if name in table.attrs:
+            data[name] = table.attrs[name]
+            said.append(f"{name.capitalize()}: {table.attrs[name]}")
+    if "model_error" in table:
+        unknown = table.model_error.attrs["not_known"]
+        low, high = float(table.model_error.min()), float(table.model_error.max())
+        data["model_error"] = {"low": low, "high": high, "not_known": unknown}
+        not_known = f"; not known: {unknown}" if unknown else ""
+        said.append(f"Model: it errs by {low:.1g} to {high:.1g}{not_known}")
+    data |= {"notes": table.attrs["notes"].splitlines(), "seconds": {"total": time.perf_counter() - began}}
+    said += [*_noted(data["notes"]), f"Time: {data['seconds']['total']:.2f} s"]
+    return answer(data, *said, folder=folder, files=names)
+
+
+def spread(options: argparse.Namespace) -> Answer:
+    """Strike with uncertain inputs."""
+    from .scenes import uncertainty  # imported only when needed
+
+    began = time.perf_counter()
+    folder = _folder(options)
+    scene = fi.load_scene(options.scene)
+    vary = dict(_split("--vary", text) for text in options.vary)
+    pairs = [_split("--correlate", text) for text in options.correlate]
+    try:
+        correlation = {tuple(name.strip() for name in names.split(",")): float(value) for names, value in pairs}
+    except ValueError:
+        raise ValueError("--correlate must look like contact.stiffness,striker.mass=0.5") from None
+    with fi.export.staged(folder, "spread") as staging:
+        display = _display(options)
+        with display("blows"):
+            found = uncertainty.spread(
+                scene, vary, n=options.blows, correlation=correlation or None, seed=options.seed,
+                sobol=False if options.no_sobol else None, tolerance=options.tolerance,
+                max_frequency=options.max_frequency, workers=options.workers, client=options.cluster,
+                store=options.store, watch=partial(display.report, "blows"),
+            )  # fmt: skip
+        with display("files"):
+            names = uncertainty.write(staging, found, options.format)
+    seconds = time.perf_counter() - began
+    said = [_title(scene), found.summary().splitlines(), f"Time: {seconds:.2f} s"]
+    return answer({**found.data(), "seconds": {"total": seconds}}, *said, folder=folder, files=names)
+
+
+def _split(option: str, text: str) -> tuple[str, str]:
+    """What stands before and after the equals sign of an option."""
+    name, equals, value = text.partition("=")
+    if not equals or not name.strip() or not value.strip():
+        raise ValueError(f"{option} must have a name, an equals sign and a value, got {text!r:.100}")
+    return name.strip(), value.strip()
+
+
+def hammer(options: argparse.Namespace) -> Answer:
+    """Find hammers for a bandwidth, or plan a test with one that roves."""
+    from .scenes import maps  # imported only when needed
+    from .show import plots  # imported only when needed
+
+    scene = fi.load_scene(options.scene)
+    masses = options.masses or [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]
+    notes = maps.tips_for(scene)
+    if options.rove is not None:
+        return _rove(options, scene, masses, notes)
+    drawn = _drawn(options, "hammers.png")
+    with _display(options, tells=True)("hammers"):
+        hammers = maps.hammers_for(scene, options.bandwidth, masses, drop=options.drop)
+        if drawn is not None:
+            drawn.parent.mkdir(parents=True, exist_ok=True)
+            fi.figures.save(drawn, plots.hammers(hammers, options.bandwidth, options.drop))
+    notes = (*notes, *hammers[0].notes)
+    rows = [
+        (
+            f"{1e3 * hammer.mass:.4g} g",
+            f"{hammer.softest:.3g} N/m" if hammer.softest else "none",
+            f"{'> ' * hammer.unlimited}{hammer.hardest:.3g} N/m" if hammer.hardest else "none",
+            f"{hammer.reach:.4g} Hz" if hammer.reach else "-",
+        )
+        for hammer in hammers
+    ]
+    said: list[str | Sequence[str]] = [
+        _title(scene),
+        *_noted(notes),
+        f"Linear tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:",
+        _table(rows, ("mass", "softest tip", "hardest tip", "its reach")),
+    ]
+    for hammer in hammers:
+        if len(hammer.working) > 1:
+            ranges = ", ".join(f"{low:.3g} to {high:.3g} N/m" for low, high in hammer.working)
+            said.append(f"{1e3 * hammer.mass:.4g} g: every range that works: {ranges}")
+    if any(hammer.unlimited for hammer in hammers):
+        said.append(">: still a single hit with the hardest tip that the model resolves")
+    idle = ", ".join(f"{1e3 * hammer.mass:.4g} g" for hammer in hammers if not hammer.works)
+    if idle:
+        said.append(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; try lighter hammers")
+    data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [hammer.data() for hammer in hammers]}
+    return _answer_of_file({**data, "notes": notes}, said, drawn)
+
+
+def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], notes: Sequence[str]) -> Answer:
+    """Plan a test with a roving hammer."""
+    from ._base import check  # imported only when needed
+    from .taps import roving
+
+    number, drawn = check.count("--rove", options.rove), _drawn(options, "rove.png")
+    with _display(options, tells=True)("points"):
+        plan = roving.of_scene(scene, masses, options.bandwidth, options.drop, number)
+        if drawn is not None:
+            with fi.export.staged(drawn.parent) as staging:
+                fi.figures.save(staging / drawn.name, plan.figure())
+                plan.write_csv((staging / drawn.name).with_suffix(".csv"))
+    data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
+    files = [] if drawn is None else [drawn.name, drawn.with_suffix(".csv").name]
+    said = [_title(scene), *_noted(notes), plan.summary()]
+    return answer({**data, "notes": [*notes, *plan.notes]}, *said, folder=drawn and drawn.parent, files=files)
+
+
+def report(options: argparse.Namespace) -> Answer:
+    """Strike and write a page."""
+    scene = fi.report.read(options.scene)
+    path = _file(options, "report.html") or Path("out") / options.scene.stem / "report.html"
+    changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
+    with fi.export.staged(path.parent) as staging:
+        display = _display(options, tells=True)
+        before = partial(_announce, options, display, False)
+        if scene.stroke:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
+                run: Any = scene.run_strokes(display, before=before, **changes)
+        else:
+            run = scene.run(display, before=before, motion=True, **changes)
+        display.predict(None)
+        with display("page"):
+            fi.report.write(staging / path.name, scene, run)
+    said = [_title(scene), run.response.summary()]
+    missed = not run.response.tolerance_met
+    return _answer_of_file(fi.report.numbers(scene, run), said, path, missed=missed)
+
+
+def explore(options: argparse.Namespace) -> None:
+    """Serve a page until the program is stopped."""
+    scene = fi.load_scene(options.scene)
+
+    def ready(address: str) -> None:
+        options.show(answer({"address": address}, [f"{address}   (Ctrl-C stops it)"]))
+        if not options.no_open:
+            webbrowser.open(address)
+
+    fi.explore.serve(scene, port=options.port, ready=ready, watch=_display(options))
+
+
+def play(options: argparse.Namespace) -> Answer:
+    """Strike by hand or from a MIDI file, and hear it."""
+    from .live import command, devices  # imported only when needed
+
+    scene = fi.load_scene(options.scene)
+    path = _file(options, "play.wav") or Path("out") / options.scene.stem / "play.wav"
+    with fi.export.staged(path.parent) as staging:
+        with _display(options)("modes"):
+            modes = scene.modes(options.n_modes)
+        with _display(options)("preparing, and compiling if not yet done"):
+            player = command.player_of(scene, modes, options)
+        with command.source_of(options, player) as (source, told):
+            device, missing = command.device_of(options, source.live)
+            if missing:
+                _tell(options, missing)
+            _tell(options, told)
+            played = devices.perform(player, source, options.duration, device)
+        (staging / path.name).write_bytes(played.sound.wav())
+    happened = ", ".join(f"{count} {name}" for name, count in player.counted.items())
+    said = [
+        _title(scene),
+        *_noted(modes.notes),
+        f"Played: {happened} of at most {1e6 * player.step:.3g} us, {modes.n_modes} modes",
+        f"Blocks: {len(played.seconds)} of {1e3 * player.block / player.rate:.3g} ms; the 99th percentile of their "
+        f"computing time is {1e3 * played.slowest:.3g} ms; {played.missed} missed their deadline",
+    ]
+    data = {
+        "played": dict(player.counted), "step": player.step, "n_modes": modes.n_modes, "n_blocks": len(played.seconds),
+        "slowest": played.slowest, "missed": played.missed, "notes": modes.notes,
+    }  # fmt: skip
+    return _answer_of_file(data, said, path)
+
+
+def modes(options: argparse.Namespace) -> Answer:
+    """List the modes of the struck body."""
+    scene, display = fi.load_scene(options.scene), _display(options)
+    if options.vtk is None:
+        with display("modes"):
+            modes = scene.modes(options.n_modes, elastic=True)
+    else:
+        fi.export.vtk_ending(options.vtk)
+        with fi.export.staged(options.vtk.parent) as staging:  # a bad folder fails before the work, not after it
+            with display("modes"):
+                modes = scene.modes(options.n_modes, elastic=True)
+            fi.export.write_vtk(staging / options.vtk.name, modes)
+    rows = [
+        (i, f"{frequency:.5g} Hz", f"{ratio:.3g}")
+        for i, (frequency, ratio) in enumerate(zip(modes.frequencies, modes.damping_ratio), 1)
+        if i > modes.n_rigid
+    ]
+    said: list[str | Sequence[str]] = [_title(scene), *_noted(modes.notes)]
+    if modes.n_rigid:
+        said.append("Mode 1 is a rigid motion" if modes.n_rigid == 1 else
+                    f"Modes 1 to {modes.n_rigid} are rigid motions: nothing holds the body there")  # fmt: skip
+    said.append(_table(rows, ("mode", "frequency", "damping ratio")))
+    data = {"frequencies": modes.frequencies, "damping_ratios": modes.damping_ratio, "n_rigid": modes.n_rigid}
+    return _answer_of_file({**data, "mass": modes.mass, "notes": modes.notes}, said, options.vtk)
+
+
+def new(options: argparse.Namespace) -> Answer:
+    """Write a scene to begin with."""
+    from .scenes import templates  # imported only when needed
+
+    path = _file(options, f"{options.kind}.toml") or Path(f"{options.kind}.toml")
+    templates.write(path, options.kind)
+    found = _answer_of_file({}, [], path)
+    return found._replace(
+        said=[*(found.said or ()), f"Next: fem-impact {'map' if options.kind == 'map' else 'strike'} {path}"]
+    )
+
+
+def mesh(options: argparse.Namespace) -> Answer:
+    """List what supports can name."""
+    from .mesh import edge_table  # imported only when needed
+
+    drawn = _drawn(options, "mesh.png")
+    ending = options.scene.suffix.lower()
+    with _display(options)("mesh"):
+        if ending == ".toml":
+            if options.unit is not None:
+                raise ValueError("--unit must be left out for a scene, which states it")
+            mesh = fi.load_scene(options.scene).body()
+        else:
+            read = fi.mesh.outline if ending in (".svg", ".dxf") else fi.mesh.load
+            mesh = read(options.scene, unit=options.unit)
+        if drawn is not None:
+            drawn.parent.mkdir(parents=True, exist_ok=True)
+            fi.figures.save(drawn, fi.figures.edges(mesh))
+    facts, edges = edge_table.rows(mesh), edge_table.edges(mesh)
+    rows = [
+        (edge.name, f"{edge.length:.4g} m", edge.n_facets, "curved" if edge.curved else "straight",
+         f"({', '.join(f'{x:.4g}' for x in edge.middle)}) m", ", ".join(edge.twins) or "-")
+        for edge in edges
+    ]  # fmt: skip
+    heads = ("edge", "length", "facets", "form", "half way at", "the same as")
+    said = [str(options.scene), *_noted(mesh.notes), [*_table(facts), "", *_table(rows, heads)]]
+    data = {"mesh": dict(facts), "edges": [vars(edge) for edge in edges], "notes": mesh.notes}
+    return _answer_of_file(data, said, drawn)
+
+
+def show(options: argparse.Namespace) -> Answer:
+    """Say what a folder of results holds."""
+    from .scenes import results  # imported only when needed
+
+    data, said = results.describe(options.scene)
+    return answer(data, *said, folder=options.scene, files=data["files"])
+
+
+def schema(options: argparse.Namespace) -> Answer:
+    """Print a schema: of scenes, or of what a command prints as JSON."""
+    if options.of is not None:
+        return Answer(answers.schema(options.of), None)
+    from .scenes import editor_schema  # imported only when needed
+
+    return Answer(editor_schema.schema(), None)
+
+
+def doctor(options: argparse.Namespace) -> Answer:
+    """Check the installation."""
+    from . import doctor  # imported only when needed
+
+    with _display(options)("checking, and compiling if not yet done"):
+        findings = doctor.examine()
+    said: list[str | Sequence[str]] = [_table(list(fi.export.versions().items()))]
+    for finding in findings:
+        state = "works" if finding.works else "fails" if finding.vital else "missing"
+        said.append(f"{finding.name:<22} {state:<8} {finding.seconds:5.2f} s  {finding.remedy}".rstrip())
+    failed = [finding.name for finding in findings if finding.vital and not finding.works]
+    fault = f"{', '.join(failed)}: not working; see above" if failed else ""
+    return answer({"findings": [vars(finding) for finding in findings]}, *said, fault=fault)
+
+
+def _title(scene: Any) -> str:
+    return scene.title or str(scene.path)
+
+
+def _drawn(options: argparse.Namespace, name: str) -> Path | None:
+    """The picture to write, with the ending of the format asked for."""
+    path = _file(options, name)
+    return path if path is None or options.format is None else path.with_suffix(f".{options.format}")
+
+
+def _answer_of_file(
+    data: dict[str, Any], said: Sequence[str | Sequence[str]], path: Path | None, missed: bool = False
+) -> Answer:
+    """The answer of a command that wrote one file, or none."""
+    if path is None:
+        return answer(data, *said, missed=missed)
+    return answer(data, *said, folder=path.parent, files=[path.name], missed=missed)
+
+
+def _noted(notes: Sequence[str]) -> list[str]:
+    return [f"Note: {note}" for note in notes]
+
+
+def _table(rows: Sequence[Sequence[Any]], head: Sequence[str] = ()) -> list[str]:
+    """A table; on a terminal too narrow for it, each row as a list."""
+    from ._base import markup  # imports numpy, which --help and --version do not need
+
+    lines = markup.columns(rows, head)
+    if max(map(len, lines), default=0) <= width():
+        return lines
+    if not head:
+        return [f"{name}: {value}" for name, value in rows]
+    return [line for first, *rest in rows for line in (str(first), *(f"  {h}: {x}" for h, x in zip(head[1:], rest)))]
+
+
+def _choices(options: argparse.Namespace) -> dict[str, Any]:
+    names = ("tolerance", "quantity", "target", "model", "n_modes", "size")
+    return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+
+
+def frf(options: argparse.Namespace) -> Answer:
+    """List the peaks of frequency responses."""
+    from .taps import prompt  # imported only when needed
+
+    path = _file(options, "frf.csv")
+    with _display(options)("frequency responses"):
+        found, notes = prompt.frf(options)
+    peaks = prompt.peaks(found)
+    rows = [
+        (each["response"], f"{each['frequency']:.5g} Hz", f"{each['magnitude']:.4g} {each['unit']}",
+         "" if each["coherence"] is None else f"{each['coherence']:.3f}")
+        for each in peaks
+    ]  # fmt: skip
+    said = [*_noted(notes), _table(rows, ("response", "peak at", "magnitude", "coherence"))]
+    if path is not None:
+        prompt.write_frf(path, found)
+    return _answer_of_file({"peaks": peaks, "notes": notes}, said, path)
+
+
+def fit(options: argparse.Namespace) -> Answer:
+    """Find the hammer and the contact behind measured taps."""
+    from .pages import fit_page  # imported only when needed
+    from .taps import prompt  # imported only when needed
+
+    folder, display = _folder(options), _display(options)
+    with fi.export.staged(folder, "fit") as staging:
+        with display("fit"):
+            found, scene = prompt.fit(options, partial(display.report, "fits"))
+        data, files = prompt.write(staging, found, scene)
+        with display("page"):
+            target, at = (None, None) if scene is None else (scene.modes(), scene.blow.values["at"])
+            fit_page.write(staging / "fit.html", found, title=f"Taps of {options.scene.name}", target=target, at=at)
+    return answer(data, found.summary(), folder=folder, files=["fit.html", *files])

@@ -1,0 +1,289 @@
+"""Reads back what a strike wrote: the blow from response.npz, and what any folder of results holds."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray
+
+from .._base import check, kept
+from ..fe.section import Material
+from ..impact.assumption import Assumption
+from ..impact.compiled import layout
+from ..impact.contact import Contact
+from ..impact.response import Ends, Error, History, Response
+from ..impact.stretched import Stretched
+from ..impact.striker import Hand, Striker
+from ..modes import unstated
+from ..modes.modal import Modes, RigidShapes, SampledShapes
+from ..sweeps import store
+from .schema import fault
+from .sentences import si
+
+SAVED = "response.npz"  # beside response.json, whose text is its key: one of them alone, or changed, is refused
+KINDS: dict[str, type] = {
+    kind.__name__: kind
+    for kind in (Assumption, Contact, Ends, Error, Hand, History, Material, Modes, Response, RigidShapes,
+                 SampledShapes, Stretched, Striker)
+}  # fmt: skip
+# fields that are not kept: functions, and descriptions of the body that only a blow needs
+LEFT_OUT = {"rings", "audit", "vectors", "poorer", "section"}
+
+
+def save(folder: Path, response: Response, points: Any) -> str:
+    """Write what `load_response` needs beside response.json, which must be there; return the name of the file."""
+    last = len(response.bodies) - 1
+    places: dict[int, Any] = {last: points} if response.bodies[last].dimension else {}
+    bodies = tuple(_sampled(response, i, places.get(i, ())) for i in range(last + 1))
+    rung, striker = response.target, response.striker
+    if striker is not None:  # by itself; among the bodies a hand may hold it
+        striker = replace(striker, modes=_at_points(striker.modes, striker.at[None], ()))
+    whole = replace(
+        response, bodies=bodies, rings=None, vectors=None,
+        ringing=None if rung is response.bodies[last] else _at_points(rung, response.ends[last].points, points),
+        striker=striker,
+    )  # fmt: skip
+    arrays: dict[str, np.ndarray] = {}
+    told = {"response": _packed(whole, arrays), "assumptions": _packed(response.assumptions, arrays)}
+    kept.write(folder / SAVED, _key(folder), {**arrays, "told": np.array(json.dumps(told))})
+    return SAVED
+
+
+def _sampled(response: Response, body: int, points: Any) -> Modes:
+    """The modes of a body, known where it was touched and at some points."""
+    return _at_points(response.bodies[body], response.ends[body].points, points)
+
+
+def _at_points(modes: Modes, touched: np.ndarray, points: Any) -> Modes:
+    """Modes known where the body was touched, and at some points; between these, compliance is an estimate."""
+    if not modes.dimension:
+        return replace(modes, shapes=RigidShapes(modes.mass, modes.n_modes))
+    more = modes.points("points", points) if len(points) else np.zeros((0, modes.dimension))
+    new = ~(more[:, None] == touched).all(axis=2).any(axis=1)
+    places, n = np.vstack([touched, more[new]]), len(touched)
+    values = modes.shapes.at(places)
+    rest = np.column_stack(unstated.left_out(modes.omega, values, modes.mass, modes.dimension))
+    static = modes.modal_compliance(places) + np.diag(rest[:, 0])
+    static[:, :n] = modes.shapes.deflection(touched, places)  # known from the blow
+    static[:n], rest[:n] = static[:, :n].T, 0.0
+    return replace(modes, shapes=SampledShapes(places, values, static, rest=rest))
+
+
+def _key(folder: Path) -> str:
+    """The text of response.json, of any length."""
+    path = folder / "response.json"
+    if not path.is_file():
+        raise fault(path, f"{check.absent(path)}; give the folder that `fem-impact strike` wrote")
+    return path.read_text(encoding="utf-8", errors="replace")
+
+
+def _fields(kind: type) -> list[str]:
+    """The fields of a class of KINDS that are kept."""
+    return [each.name for each in fields(kind) if each.init and each.name not in LEFT_OUT]
+
+
+def _packed(value: Any, arrays: dict[str, np.ndarray]) -> Any:
+    """A value as plain data for JSON; arrays are put aside under the number that stands for them."""
+    if is_dataclass(value) and type(value).__name__ in KINDS:
+        told = {name: _packed(getattr(value, name), arrays) for name in _fields(type(value))}
+        return {"kind": type(value).__name__, "fields": told}
+    if isinstance(value, np.ndarray):
+        arrays[str(len(arrays))] = value
+        return {"array": str(len(arrays) - 1)}
+    if isinstance(value, slice):
+        return {"slice": [value.start, value.stop]}
+    if isinstance(value, Mapping):
+        return {"mapping": [[name, _packed(each, arrays)] for name, each in value.items()]}
+    if isinstance(value, (tuple, list)):
+        return [_packed(each, arrays) for each in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _unpacked(told: Any, arrays: Mapping[str, np.ndarray]) -> Any:
+    if isinstance(told, list):
+        return tuple(_unpacked(each, arrays) for each in told)
+    if not isinstance(told, dict):
+        return told
+    if "kind" in told:
+        kind = KINDS[told["kind"]]
+        return kind(**{name: _unpacked(told["fields"][name], arrays) for name in _fields(kind)})
+    if "array" in told:
+        return arrays[told["array"]]
+    if "slice" in told:
+        return slice(*told["slice"])
+    return {name: _unpacked(each, arrays) for name, each in told["mapping"]}
+
+
+@check.typed
+def load_response(folder: str | Path) -> Response:
+    """Read back the blow that `fem-impact strike` wrote to a folder.
+
+    Parameters
+    ----------
+    folder : str or Path
+        The folder, or its response.json.
+
+    Returns
+    -------
+    Response
+        With every number of the blow, its force and spectrum at any time and frequency, and the motion of the body at
+        the points that the scene observes and at the strike point. Mode shapes elsewhere are in modes.pvd.
+
+    Raises
+    ------
+    ValueError
+        If the folder holds no blow, or its files are damaged or do not belong together. Nothing in them is executed.
+
+    Examples
+    --------
+    >>> from fem_impact import cli  # at a prompt: fem-impact strike studies/scenes/disk.toml --out out
+    >>> status = cli.main(["strike", "studies/scenes/disk.toml", "--out", "out"])  # doctest: +ELLIPSIS
+    Steel ball on a clamped steel disk
+    ...
+    >>> hit = fi.load_response("out")
+    >>> round(hit.restitution, 3), hit.n_impacts
+    (0.935, 1)
+    """
+    folder = check.path("folder", folder)
+    folder = folder.parent if folder.suffix == ".json" else folder
+    if not folder.is_dir():
+        raise fault(folder, "there is no such folder; give the one that `fem-impact strike` wrote")
+    key = _key(folder)
+    again = "strike the scene again"
+    if not (folder / SAVED).is_file():
+        strokes = '"sequence"' in key
+        why = "a sequence of strokes is not read back; its numbers are in response.json" if strokes else again
+        raise fault(folder / SAVED, f"there is no such file, which a blow is read from; {why}")
+    try:
+        arrays = kept.read(folder / SAVED, key)
+        if arrays is not None:
+            told = json.loads(str(arrays["told"]))
+            return _checked(_unpacked(told["response"], arrays), _unpacked(told["assumptions"], arrays))
+    except Exception:  # what somebody else packed may raise anything
+        pass
+    raise fault(folder / SAVED, f"it is damaged, or not of the response.json beside it; {again}")
+
+
+def _checked(response: Any, assumptions: Any) -> Response:
+    """The response, if its arrays fit together: compiled kernels trust their shapes."""
+    h = response.history
+    c, n = h.shape.shape
+    shapes = {
+        "omega": (n,), "zeta": (n,), "bias": (n,), "start_q": (n,), "start_p": (n,), "end_q": (n,), "end_p": (n,),
+        "offset": (c,), "work": (c,), "now": (6, c), "law": (c, h.law.shape[1]),
+        "steps": (len(h.steps), layout.HEAD + (layout.PUSH + 1 + h.n_coefficients) * c),
+    }  # fmt: skip
+    good = all(getattr(h, name).shape == shape and getattr(h, name).dtype == float for name, shape in shapes.items())
+    good &= h.law.shape[1] in (layout.KIND, layout.WIDTH) and h.n_coefficients in (1, 2, 3, 4)
+    good &= 0 < sum(modes.n_modes for modes in response.bodies) <= n and len(response.bodies) == len(response.ends)
+    if h.stretched is not None:
+        m = h.stretched.forms.shape[1]
+        good &= h.stretched.forms.shape[1:] == (m, m) and 0 <= h.stretched.first <= n - m
+    if not good or not all(isinstance(each, Assumption) for each in assumptions):
+        raise ValueError("arrays of a response must fit together")
+    return replace(response, audit=partial(_told, assumptions))
+
+
+def _told(assumptions: tuple[Assumption, ...], _: Response) -> tuple[Assumption, ...]:
+    return assumptions
+
+
+def describe(folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """What a folder of results or a store holds: as data, and in a few lines."""
+    if not folder.is_dir():
+        raise fault(folder, "there is no such folder" + check.nearest(folder.name, _names(folder.parent)))
+    names = _names(folder)
+    if "zarr.json" in names and not (folder / "map.csv").exists():
+        done, total = store.finished(folder)
+        said = f"a store of a map or a spread: {done} of {total} blocks are finished"
+        return {"holds": ["store"], "summary": [said], "files": names}, [said]
+    data: dict[str, Any] = {"holds": [], "summary": [], "files": names}
+    for name, (command, read) in READERS.items():
+        if name in names:
+            more, lines = read(folder / name)
+            data |= more
+            data["holds"].append(command)
+            data["summary"] += [f"{command}: {lines[0]}", *(f"  {line}" for line in lines[1:])]
+    if not data["holds"]:
+        inner = next((name for name in names if set(READERS) & set(_names(folder / name))), None)
+        hint = "the folder that --out named" if inner is None else f"one in it, such as {folder / inner}"
+        raise fault(folder, f"no results of fem-impact are in it; give {hint}")
+    return data, data["summary"]
+
+
+def _names(folder: Path) -> list[str]:
+    """What is in a folder, besides what is hidden."""
+    found = folder.iterdir() if folder.is_dir() else ()
+    return sorted(path.name for path in found if not path.name.startswith("."))
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        data = json.loads(path.read_text(encoding="utf-8", errors="replace")) if path.is_file() else None
+        if isinstance(data, dict):
+            return data
+    except (ValueError, RecursionError):  # ValueError: no JSON, or an integer of thousands of digits
+        pass
+    raise fault(path, "it is damaged: not the JSON that fem-impact wrote")
+
+
+def _of_strike(path: Path) -> tuple[dict[str, Any], list[str]]:
+    """A blow, or a sequence of strokes."""
+    data = _json(path)
+    kept_there = {name: data[name] for name in ("response", "sequence") if isinstance(data.get(name), dict)}
+    if not kept_there:
+        raise fault(path, "it is damaged: it has neither response nor sequence")
+    told = next(iter(kept_there.values()))
+    count = told.get("n_impacts")
+    rebound = told.get("restitution")
+    numbers = [f"{count} impact{'s' if count != 1 else ''}"]
+    numbers += [f"{name} {si(told[key], unit)}" for key, (name, unit) in NUMBERS.items()
+                if isinstance(told.get(key), float)]  # fmt: skip
+    numbers += [f"restitution {rebound:.5g}"] if isinstance(rebound, float) else []
+    readable = [f"`fi.load_response({str(path.parent)!r})` reads it"] if path.with_name(SAVED).is_file() else []
+    scene = data.get("scene")
+    title = scene.get("title") if isinstance(scene, dict) else None
+    said = [str(title or "a scene without title"), str(told.get("verdict", "")), ", ".join(numbers), *readable]
+    return kept_there, [line for line in said if line]
+
+
+def _of_map(path: Path) -> tuple[dict[str, Any], list[str]]:
+    try:
+        with xarray.open_dataset(path, engine="scipy" if path.suffix == ".nc" else "zarr") as table:
+            counts = table["n_impacts"].load()
+            title = str(table.attrs.get("title", ""))
+    except Exception:  # what cannot be read raises many kinds of error
+        raise fault(path, "it is damaged: not the map that fem-impact wrote") from None
+    axes = ", ".join(f"{name} ({size})" for name, size in counts.sizes.items())
+    single, failed = int((counts == 1).sum()), int((counts < 0).sum())
+    lines = [f"{counts.size} blows over {axes}: {single} hit once, {failed} failed"]
+    return {}, [title, *lines] if title else lines
+
+
+def _of_spread(path: Path) -> tuple[dict[str, Any], list[str]]:
+    data = _json(path)
+    return {}, [
+        f"{data.get('title') or 'a scene without title'}",
+        f"{data.get('blows')} blows, {data.get('failed')} failed",
+    ]
+
+
+def _of_fit(path: Path) -> tuple[dict[str, Any], list[str]]:
+    found = _json(path).get("summary")
+    return {}, [str(line) for line in found] if isinstance(found, list) and found else ["a fit of measured taps"]
+
+
+def _of_page(path: Path) -> tuple[dict[str, Any], list[str]]:
+    return {}, [f"{path} is a page to open in a browser"]
+
+
+NUMBERS = {"contact_time": ("contact time", "s"), "peak_force": ("peak force", "N"), "impulse": ("impulse", "N s")}
+Reader = Callable[[Path], tuple[dict[str, Any], list[str]]]
+READERS: dict[str, tuple[str, Reader]] = {  # file: the command that wrote it, and what tells what is in it
+    "response.json": ("strike", _of_strike), "map.nc": ("map", _of_map), "map.zarr": ("map", _of_map),
+    "spread.json": ("spread", _of_spread), "fit.json": ("fit", _of_fit), "report.html": ("report", _of_page),
+}  # fmt: skip
