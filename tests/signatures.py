@@ -33,8 +33,8 @@ from fuzz import PACKAGE, Hang, limited
 from scenes import QUICK
 
 import fem_impact as fi
-from fem_impact.scenes import results
 from fem_impact.mesh.loops import Outline, circle
+from fem_impact.scenes import results
 
 PATIENCE = 30.0  # [s] per call: thrice what is promised, as other work may run beside
 MEMORY = 2 << 30  # [byte] more than the process has when it begins

@@ -34,8 +34,8 @@ SCENES = {
     "vectors of elements": FE,
     "a bar": BAR,
     "a stick in a hand": other(
-        'kind = "rigid"\nmass = 0.03', f"{STICK}\nhand = {{ stiffness = 200.0, damping = 0.5, force = 2.0 }}"
-    ),
+        'kind = "rigid"\nmass = 0.03', f"{STICK}\nhand = {{ stiffness = 200.0, damping = 0.5 }}"
+    ).replace("[strike]", "[strike]\nmax_impacts = 2"),
     "two layers": contact('kind = "layers"\nstiffness = 1e5\nexponent = 1.5\ndepth = 1e-4\nhard_stiffness = 1e7'),
     "felt": contact('kind = "felt"\nstiffness = 1e7\nexponent = 2.5\nhysteresis = 0.5\nrelaxation = 1e-3'),
 }
