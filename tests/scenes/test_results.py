@@ -199,7 +199,7 @@ def test_show_tells_what_a_folder_holds(written, capsys, tmp_path):
 def test_the_folder_that_is_advised_is_read(written, capsys):
     folder = written(SMALL)
     for wrong in (folder.parent, folder.parent / "none"):
-        with pytest.raises(ValueError, match="give the (?:folder|one) that `fem-impact strike` wrote"):
+        with pytest.raises(ValueError, match=r"give the (?:folder|one) that `fem-impact strike` wrote"):
             fi.load_response(wrong)
     assert cli.main(["show", str(folder.parent)]) == 2
     named = capsys.readouterr().err.split("give one in it, such as ")[1].strip()
