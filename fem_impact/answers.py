@@ -10,7 +10,7 @@ MISSES = ("strike", "report")  # commands that end with 3 where the tolerance is
 
 Keys = dict[str, tuple[str, str]]  # key: JSON type (with "?" if it may be left out), and meaning
 ALL: Keys = {
-    "command": ("string", "name of the command"),
+    "command": ("string", "the command"),
     "format": ("integer", f"number of this format, {FORMAT}; it grows when a key changes its meaning"),
     "notes": ("array", "what was assumed, and numbers that are probably a slip of a unit, as sentences"),
     "folder": ("string|null", "where the files are; null if none was written"),

@@ -222,7 +222,7 @@ def parser() -> argparse.ArgumentParser:
         scene="a mesh file, an .svg or .dxf drawing, or a scene, a .toml file", called="FILE",
     )  # fmt: skip
     add("--unit", metavar="U", help="unit of the numbers in the file: m, cm, mm, um, in or km (default: the file's)")
-    _add_out(add, "mesh.png, elements and named edges", "none", "picture")
+    _add_out(add, "elements and named edges, mesh.png", "none", "picture")
     _add_format(add, None)
 
     verb(commands.show, "show", "say what is in a folder of results, or how far a store is",

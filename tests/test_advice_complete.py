@@ -101,6 +101,10 @@ ELSEWHERE = {  # advice followed in a test of its own: the test, and patterns of
     "impact/test_state.py::test_the_motion_of_a_system_goes_on_in_its_modes": (
         "^start needs modes, taken as they are",
     ),
+    "scenes/test_results.py::test_the_folder_that_is_advised_is_read": (
+        "; give the (?:folder|one) that `fem-impact strike` wrote",
+        "^no results of fem-impact are in it; give",
+    ),
     "scenes/test_templates.py::test_a_new_scene_replaces_no_file": ("exists already; name another file with --out",),
     "sweeps/test_borders.py::test_borders_that_were_not_looked_for_are_none": ("make the map with borders=True",),
     "sweeps/test_store.py::test_a_store_keeps_the_results_of_its_functions_only": (

@@ -34,8 +34,8 @@ SCENES = {
     "vectors of elements": FE,
     "a bar": BAR,
     "a stick in a hand": other(
-        'kind = "rigid"\nmass = 0.03', f"{STICK}\nhand = {{ stiffness = 200.0, damping = 0.5, force = 2.0 }}"
-    ),
+        'kind = "rigid"\nmass = 0.03', f"{STICK}\nhand = {{ stiffness = 200.0, damping = 0.5 }}"
+    ).replace("[strike]", "[strike]\nmax_impacts = 2"),
     "two layers": contact('kind = "layers"\nstiffness = 1e5\nexponent = 1.5\ndepth = 1e-4\nhard_stiffness = 1e7'),
     "felt": contact('kind = "felt"\nstiffness = 1e7\nexponent = 2.5\nhysteresis = 0.5\nrelaxation = 1e-3'),
 }
@@ -196,10 +196,14 @@ def test_show_tells_what_a_folder_holds(written, capsys, tmp_path):
     assert both["response"]["restitution"] == hit.restitution
 
 
-def test_show_of_the_folder_above_names_one_that_holds_results(written, capsys):
+def test_the_folder_that_is_advised_is_read(written, capsys):
     folder = written(SMALL)
+    for wrong in (folder.parent, folder.parent / "none"):
+        with pytest.raises(ValueError, match=r"give the (?:folder|one) that `fem-impact strike` wrote"):
+            fi.load_response(wrong)
     assert cli.main(["show", str(folder.parent)]) == 2
-    assert f"no results of fem-impact are in it; give one in it, such as {folder}" in capsys.readouterr().err
+    named = capsys.readouterr().err.split("give one in it, such as ")[1].strip()
+    assert named == str(folder) and said(capsys, "show", named) and fi.load_response(named).n_impacts > 0
 
 
 def test_show_tells_how_far_a_store_is(capsys, tmp_path):
