@@ -1071,7 +1071,7 @@ class Response(Totals):
         if self.n_impacts > 20:
             lines.append(f"  ... and {self.n_impacts - 20} more")
         if self.margin < CLEAR:
-            lines.append(f"margin {self.margin:.1g}: so much of the deepest approach decides the number of impacts")
+            lines.append(f"margin {self.margin:.1g} of the deepest approach: so near is another number of impacts")
         total = self._balance["start"]
         shares = ", ".join(f"{name} {value / total:.2%}" for name, value in self.energies.items()) if total else "none"
         error = self.error

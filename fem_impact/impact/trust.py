@@ -103,7 +103,8 @@ class Trust:
 
 def examine(hit: "Response") -> Trust:
     """How far to trust each quantity that a blow was asked for."""
-    return Trust(tuple(_judged(hit, name, band) for name, band in hit.quantities.items()))
+    cure = "" if hit.tolerance_met else promise.remedy(hit)
+    return Trust(tuple(_judged(hit, name, band, cure) for name, band in hit.quantities.items()))
 
 
 def verdict(hit: "Response") -> str:
@@ -131,7 +132,7 @@ def _digits(error: float | None) -> int:
     return FEWEST if error is None else int(np.clip(np.ceil(-np.log10(max(error, 1e-9))) + 1, FEWEST, MOST))
 
 
-def _judged(hit: "Response", name: str, band: float | None) -> Judged:
+def _judged(hit: "Response", name: str, band: float | None, cure: str) -> Judged:
     found, error = hit.assumptions, hit.error
     unsure = [each for each in found if each.open and each.effect.get(name) is None]
     known = assumption.of_quantity(found, name)
@@ -139,7 +140,7 @@ def _judged(hit: "Response", name: str, band: float | None) -> Judged:
     worst = max(found, key=lambda each: each.effect.get(name) or 0.0)
     cause, size = error.dominant if error.resolvable else ("modes left out", np.inf)
     dominant = worst.name if (worst.effect.get(name) or 0.0) >= size else cause
-    remedies = [] if hit.tolerance_met else [promise.remedy(hit)]
+    remedies = [cure] if cure else []
     if known > limit:
         remedies.append(worst.remedy)
     elif unsure:

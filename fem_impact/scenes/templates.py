@@ -20,7 +20,7 @@ rho = 450.0               # kg/m^3
 
 [section]
 kind = "plate"
-thickness = 3e-3          # m; also a table over x and y, or a list of cases
+thickness = 4e-3          # m; also a table over x and y, or a list of cases
 
 [supports]                # edges not named are free; boundary means all of them
 boundary = "hinged"       # "clamped", "hinged", "free" or springs { stiffness, rotation }

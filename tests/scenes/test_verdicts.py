@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import fem_impact as fi
+from fem_impact.scenes import templates
 
 FOLDER = Path(__file__).parents[2] / "studies" / "scenes"
 NAMES = sorted(path.name for path in FOLDER.glob("*.toml"))
@@ -14,6 +15,13 @@ SHOWN = "drumstick_firm.toml"
 @pytest.mark.parametrize("name", [name for name in NAMES if name != SHOWN])
 def test_a_shipped_scene_has_an_answer_to_trust(name):
     hit = fi.load_scene(FOLDER / name).strike()
+    assert hit.trusted, hit.verdict
+
+
+@pytest.mark.parametrize("kind", templates.BODIES)
+def test_a_new_scene_has_an_answer_to_trust(kind, tmp_path):
+    templates.write(tmp_path / "new.toml", kind)
+    hit = fi.load_scene(tmp_path / "new.toml").strike()
     assert hit.trusted, hit.verdict
 
 
