@@ -4,7 +4,10 @@ import logging
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from ._base import progress
+
 logging.getLogger(__name__).addHandler(logging.NullHandler())  # silent unless the user listens to "fem_impact"
+progress.speak()  # but for what takes long
 
 # Public names and their modules, imported at first use so that the command line starts quickly.
 _NAMES = {

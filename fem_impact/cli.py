@@ -1,15 +1,12 @@
 """The command line: runs one command, prints its answer and decides the exit status; contains no physics."""
 
 import argparse
-import atexit
 import io
 import json
 import logging
 import os
-import shutil
 import signal
 import sys
-import tempfile
 import threading
 import warnings
 from collections.abc import Iterator, MutableMapping
@@ -144,32 +141,20 @@ def _prepare(environment: MutableMapping[str, str], once: bool) -> bool:
         # The dense matrices are small: on two busy cores, two threads took 18 s and one thread 4 s.
         environment.setdefault(name, "1")
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # users need not read about fonts or cache folders
-    package = Path(str(fi.__file__)).parent
     if "numba" in sys.modules:
         return False
-    cache = _find_cache(environment, package)
+    from .impact.compiled import places
+
+    kernels = Path(str(fi.__file__)).parent / "impact" / "compiled"
+    cache = places.find(environment, kernels)
     if not once or "NUMBA_DISABLE_JIT" in environment:
         return False
-    source = max(file.stat().st_mtime for file in (package / "impact" / "compiled").glob("*.py"))
+    source = max(file.stat().st_mtime for file in kernels.glob("*.py"))
     if any(file.stat().st_mtime >= source for file in cache.rglob("energy.follow-*.nbi")):
         return False
     # A single strike takes 0.3 to 1 s in plain Python; compiling takes 15 to 30 s, and `doctor` does it once.
     environment["NUMBA_DISABLE_JIT"] = "1"
     return True
-
-
-def _find_cache(environment: MutableMapping[str, str], package: Path) -> Path:
-    """The folder where numba keeps what it compiles; a temporary one if it can write to none, or it would not work."""
-    given = environment.get("NUMBA_CACHE_DIR")
-    home = os.path.join(environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "numba")
-    for place in [given] if given else [str(package / "impact" / "compiled" / "__pycache__"), home]:
-        with suppress(OSError):
-            os.makedirs(place, exist_ok=True)
-            tempfile.TemporaryFile(dir=place).close()
-            return Path(place)
-    environment["NUMBA_CACHE_DIR"] = folder = tempfile.mkdtemp(prefix="fem-impact-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return Path(folder)
 
 
 if __name__ == "__main__":

@@ -204,7 +204,7 @@ def test_scene_may_not_be_a_pipe_that_never_ends(tmp_path, capsys):
 
 def test_a_billion_modes_are_refused(scene, capsys):
     assert cli.main(["modes", str(scene), "--n-modes", "1000000000"]) == 2
-    assert "n_modes must be at most 50000 for this scene, got 1000000000" in capsys.readouterr().err
+    assert "count must be at most 50000 modes for this scene, got 1000000000" in capsys.readouterr().err
 
 
 def test_place_that_cannot_be_written_to_is_a_sentence(scene, tmp_path, capsys):

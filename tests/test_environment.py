@@ -102,7 +102,9 @@ def test_strike_needs_no_home_no_display_and_no_cache(tmp_path, missing):
 
 @pytest.mark.slow  # compiles, as nothing can be kept
 def test_kernels_compile_where_no_cache_can_be_written(tmp_path):
-    script = "from fem_impact import cli; import os; cli._find_cache(os.environ, cli.Path('/dev/null')); "
+    script = (
+        "from fem_impact.impact.compiled import places; import os; places.find(os.environ, places.Path('/dev/null')); "
+    )
     script += "import fem_impact as fi; print(fi.Contact.linear(1.0)); from fem_impact.impact.compiled import energy"
     done = run(tmp_path, f'{sys.executable} -c "{script}"', HOME="/dev/null", NUMBA_CACHE_DIR="/dev/null/cache")
     assert (done.returncode, done.stderr) == (0, "")

@@ -235,11 +235,9 @@ def keep(machine: Machine) -> bool:
 
 
 def place() -> Path | None:
-    """File beside the compiled kernels; one for each machine that shares them. None if no kernels are kept."""
-    folder = build.folder(follow)
-    return (
-        None if folder is None else folder / f"speed-{hashlib.sha256(platform.node().encode()).hexdigest()[:12]}.json"
-    )
+    """File beside the compiled kernels; one for each machine and Python that share them. None if none are kept."""
+    folder, user = build.folder(follow), f"{platform.node()} {platform.python_version()}"
+    return None if folder is None else folder / f"speed-{hashlib.sha256(user.encode()).hexdigest()[:12]}.json"
 
 
 def _stamp() -> str:

@@ -1212,4 +1212,7 @@ def strike(
         raise ValueError(
             "start needs modes, taken as they are: give those of the blow before, hit.target, and no part of a plan"
         )
-    return plan_of(modes, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options).strike(strict)
+    plan = plan_of(modes, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options)
+    if plan.seconds > progress.LONG:
+        progress.SLOW.info("striking takes %s", plan.cost)
+    return plan.strike(strict)

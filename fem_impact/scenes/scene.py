@@ -132,27 +132,27 @@ class Scene:
         """
         return sequence.run(self, watch, before=before, strict=strict, **changes)
 
-    def modes(self, n_modes: int | None = None, *, elastic: bool = False, keep: Path | None = None) -> Modes:
-        """Modes of the struck body: the first ``n_modes``, or as many as the blow needs to meet its tolerance.
+    def modes(self, count: int | None = None, *, elastic: bool = False, keep: Path | None = None) -> Modes:
+        """Modes of the struck body: the first ``count``, or as many as the blow needs to meet its tolerance.
 
         With ``elastic`` rigid motions come on top of that number. ``keep`` is an .npz file in which modes by finite
         elements are saved, and found by the same call later.
         """
-        if n_modes is None:
+        if count is None:
             return planner.struck(self.plan(target="modal"), Stages())
         target = self.built.target
         most = planner.MOST_MODES[target.kind]
-        if check.count("n_modes", n_modes) > most:
-            raise fault(self.path, f"n_modes must be at most {most} for this scene, got {n_modes}; ask for fewer")
+        if check.count("count", count) > most:
+            raise fault(self.path, f"count must be at most {most} modes for this scene, got {count}; ask for fewer")
         tolerance = self.blow.values.get("tolerance", collision.TOLERANCE)
         with self.blame("strike"):
             check.tolerance(tolerance)
-        wanted, n_modes = n_modes, min(n_modes + RIGID, most) if elastic else n_modes
+        number = min(count + RIGID, most) if elastic else count
         first = None
-        if keep is not None and target.kind == "fe" and n_modes > FIRST_LOOK:
+        if keep is not None and target.kind == "fe" and number > FIRST_LOOK:
             first = target.find(FIRST_LOOK, tolerance=tolerance)  # what is kept starts from its mesh
-        found = target.find(n_modes, tolerance=tolerance, first=first, keep=keep)
-        return target.surrounded(found.truncated(n_modes=wanted + found.n_rigid) if elastic else found)
+        found = target.find(number, tolerance=tolerance, first=first, keep=keep)
+        return target.surrounded(found.truncated(n_modes=count + found.n_rigid) if elastic else found)
 
     @check.typed
     def plan(self, *, watch: Watch | None = None, **changes: Any) -> Plan:

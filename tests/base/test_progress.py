@@ -1,5 +1,10 @@
 """Loops report to whoever listens, and to nobody else."""
 
+import io
+import logging
+import sys
+
+import fem_impact as fi
 from fem_impact._base import progress
 
 
@@ -25,3 +30,47 @@ def test_silence_returns_after_a_failure():
     except RuntimeError:
         progress.report("modes", 1, 2)
     assert heard == []
+
+
+class Screen(io.StringIO):
+    """A terminal."""
+
+    def isatty(self):
+        return True
+
+
+def shown(monkeypatch, text, handlers=(), screen=Screen):
+    """What a person sees of a line in a program with these handlers of its own."""
+    seen = screen()
+    with monkeypatch.context() as changed:
+        changed.setattr(sys, "stderr", seen)
+        changed.setattr(logging.getLogger(), "handlers", list(handlers))
+        changed.delitem(sys.modules, "ipykernel", raising=False)
+        progress.SLOW.info(text)
+    return seen.getvalue()
+
+
+def test_what_takes_long_is_one_line_on_a_terminal(monkeypatch):
+    assert shown(monkeypatch, "compiling") == "fem_impact: compiling\n"
+
+
+def test_the_line_can_be_switched_off(monkeypatch):
+    progress.SLOW.setLevel(logging.WARNING)
+    try:
+        assert shown(monkeypatch, "compiling") == ""
+    finally:
+        progress.SLOW.setLevel(logging.INFO)
+
+
+def test_a_program_with_a_log_or_without_a_terminal_gets_no_line(monkeypatch):
+    assert shown(monkeypatch, "compiling", [logging.NullHandler()]) == ""
+    assert shown(monkeypatch, "compiling", screen=io.StringIO) == ""
+
+
+def test_a_long_strike_is_announced_with_its_cost(monkeypatch, caplog):
+    plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), thickness=3e-3)
+    body = fi.assemble(fi.mesh.rectangle(0.465, 0.3), plate, supports={"boundary": "hinged"})
+    monkeypatch.setattr(progress, "LONG", 0.0)
+    with caplog.at_level(logging.INFO, logger="fem_impact.slow"):
+        fi.strike(body, fi.Striker.rigid(0.1), fi.Contact.linear(1e5), at=(0.1, 0.1), speed=0.1, tolerance=0.1)
+    assert any(text.startswith("striking takes about ") for text in caplog.messages)

@@ -54,6 +54,80 @@ def test_what_is_not_compiled_runs_as_plain_python_and_says_the_same():
     assert len(law.stored.overloads) <= known + 1
 
 
+TWICE = """
+import logging, sys
+import numpy as np
+logging.basicConfig(level=logging.INFO, format="%(name)s: %(message)s", stream=sys.stdout)
+from fem_impact.impact.compiled import build, law, places
+
+print(law.dents(np.array([[1.0, 1.0, 0.0, 0.0]])), sum(law.dents.stats.cache_hits.values()), build.folder(law.dents))
+"""
+
+
+def dents(package, **environment):
+    """Dents as a new process finds them with the package in a folder: how many kernels it read, and from where."""
+    whole = {name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    done = subprocess.run(
+        [sys.executable, "-c", TWICE], env={**whole, "PYTHONPATH": str(package), **environment}, cwd=package,
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    value, hits, place = done.stdout.split()
+    assert value == "[0.]"
+    return int(hits), Path(place)
+
+
+@pytest.fixture
+def installed(tmp_path):
+    """A copy of the package beside whose kernels nothing can be written, even by root."""
+    source = Path(fem_impact.__file__).parent
+    shutil.copytree(source, tmp_path / "site" / "fem_impact", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "site" / "fem_impact" / "impact" / "compiled" / "__pycache__").write_text("read-only")
+    return tmp_path / "site"
+
+
+@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+def test_users_of_one_installation_that_is_read_only_have_kernels_of_their_own(installed, tmp_path):
+    for user in ("one", "two"):
+        home = {"HOME": str(tmp_path / user)}
+        (first, place), (second, again) = dents(installed, **home), dents(installed, **home)
+        assert (first, second) == (0, 1) and place == again and place.is_relative_to(tmp_path / user)
+
+
+@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+def test_without_any_place_the_kernels_are_kept_for_the_process(installed):
+    hits, place = dents(installed, HOME="/dev/null")
+    assert hits == 0 and not place.exists()
+
+
+@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+def test_spoilt_and_forbidden_files_are_compiled_anew(installed, tmp_path):
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    _, place = dents(installed, **cache)
+    for name in ("nbi", "nbc"):
+        for file in place.glob(f"law.dents*.{name}"):
+            file.write_bytes(file.read_bytes()[:40])
+        assert dents(installed, **cache)[0] == 0 and dents(installed, **cache)[0] == 1
+    (index,) = place.glob("law.dents*.nbi")
+    index.unlink()
+    index.mkdir()  # as forbidden as that of another user
+    assert dents(installed, **cache)[0] == 0
+
+
+@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+def test_compiling_that_takes_long_is_announced_once(caplog):
+    compiled = []
+
+    def square(x):
+        return x * x
+
+    kernel = build.outer(seconds=5.0)(square)
+    kernel._cache = type("None", (), {"load_overload": lambda *_: None, "save_overload": lambda *_: None})()
+    with caplog.at_level("INFO", logger="fem_impact"):
+        compiled += [kernel(2.0), kernel(3.0)]
+    assert compiled == [4.0, 9.0]
+    assert caplog.messages == ["compiling the inner loops of this kind of blow, once: about 5 s of computing"]
+
+
 @pytest.mark.slow
 def test_an_edit_in_another_file_is_noticed(tmp_path):
     shutil.copytree(Path(fem_impact.__file__).parent, tmp_path / "fem_impact", ignore=shutil.ignore_patterns("*.nb?"))

@@ -9,10 +9,12 @@ run as plain Python, by a second copy of this package in which nothing is compil
 
 import gc
 import hashlib
+import logging
 import os
+import pickle
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cached_property
 from importlib import import_module, util
@@ -21,6 +23,12 @@ from typing import Any
 
 import numpy as np
 
+from . import places
+
+LOG = logging.getLogger("fem_impact.slow")
+LONG = 2.0  # [s] what takes longer is announced
+# what numba raises where a file of its cache cannot be read or written, or was cut short
+SPOILT = (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError, IndexError, KeyError, ValueError)
 PLAIN = "plain"  # name of the copy in which nothing is compiled
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"  # else as plain Python, without the import of numba
 COMPILED &= not __name__.endswith(f".{PLAIN}.build")
@@ -40,6 +48,9 @@ if COMPILED:
     if not READ_BEFORE:  # numba takes from a file in the working folder whose compiled code it runs: not for us
         config._config_fname = os.devnull
         config.reload_config()
+    places.find(os.environ)
+    if places.GIVEN in os.environ:  # numba may have been read before it was found
+        config.CACHE_DIR = os.environ[places.GIVEN]  # type: ignore[attr-defined]
     COMPILED = not config.DISABLE_JIT  # type: ignore[attr-defined]  # a file may say so too
     UNCOUNTED = hasattr(DefaultOptions, "_nrt")  # whether the compiler can leave out the counting of references
 LOOSE = {"reassoc", "contract"}  # sums may be reordered to run in parallel lanes; NaN and infinity keep their meaning
@@ -175,8 +186,25 @@ if COMPILED:
                 gc.enable()
 
 
-def outer(allocates: bool = True, **options: Any) -> Any:
-    """Compile for use from Python; other threads run meanwhile. ``allocates`` as for `inner`."""
+def _tolerant(cache: Any, call: Callable[..., Any]) -> Callable[..., Any]:
+    """A call of a cache that forgets what is there, and does nothing, where files are spoilt or forbidden."""
+
+    def tried(*arguments: Any) -> Any:
+        try:
+            return call(*arguments)
+        except SPOILT:
+            with suppress(OSError):
+                cache.flush()
+            return None
+
+    return tried
+
+
+def outer(allocates: bool = True, seconds: float = 0.0, **options: Any) -> Any:
+    """Compile for use from Python; other threads run meanwhile.
+
+    ``allocates`` as for `inner`; ``seconds`` it takes about, which is announced if it is LONG.
+    """
     if not COMPILED:
         return lambda function: function
     if UNCOUNTED:
@@ -188,11 +216,15 @@ def outer(allocates: bool = True, **options: Any) -> Any:
         # numba has no public ways to do the following; test_build.py tests all in fresh processes
         kernel._cache._cache_file._source_stamp = STAMP
         kernel.__class__ = _Kernel
+        kernel._cache.load_overload = _tolerant(kernel._cache, kernel._cache.load_overload)
+        kernel._cache.save_overload = _tolerant(kernel._cache, kernel._cache.save_overload)
         compile_it = kernel._compiler.compile
 
         def compile_unless_quick(*signature: Any) -> Any:
             if QUICK.get():
                 raise _Uncompiled
+            if seconds > LONG:
+                LOG.info("compiling the inner loops of this kind of blow, once: about %g s of computing", seconds)
             with _hastened():
                 return compile_it(*signature)
 

@@ -418,7 +418,7 @@ def prepare(shape, grid, room):
             room.contacts[MOBILITY, i] += shape[i, n] * shape[i, n]
 
 
-@outer(allocates=False)
+@outer(allocates=False, seconds=10.0)
 def follow(scene, grid, room, flights, limits, run, steps):
     """Step by step until the run ends, or until its record is FULL."""
     bodies, contacts, course = moving(scene, run), touching(run), course_of(run)

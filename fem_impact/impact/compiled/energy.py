@@ -91,7 +91,7 @@ def move_on(bodies, contacts, course, tables, slot, h, horizon):
         commit(bodies.shape, tables.lanes[slot], h, contacts.force, contacts.slope, bodies.q, bodies.p)
 
 
-@outer(allocates=False)
+@outer(allocates=False, seconds=10.0)
 def follow(scene, tables, room, limits, run, steps):
     """Step by step until the run ends, or until its record is FULL; ``room`` is for a body that stretches, or None."""
     bodies, contacts, course = moving(scene, run), touching(run), course_of(run)

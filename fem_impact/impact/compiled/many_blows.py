@@ -533,7 +533,7 @@ def made_track(n_steps: int) -> Track:
     )  # fmt: skip
 
 
-@outer(allocates=False)
+@outer(allocates=False, seconds=5.0)
 def run(cells, pairs, kernels, h, certify, band, track, out_found):
     """Follow the blows of some cells, all at unit speed, with one step length and kernel.
 

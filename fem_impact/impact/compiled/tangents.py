@@ -911,7 +911,7 @@ def deepen(blow, change, c, state, room, out_deeper):
         out_deeper[i] = dd - soft * df - force * change.law[i, c, COMPLIANCE]
 
 
-@outer()
+@outer(seconds=8.0)
 def follow(blow, change, pieces, found):
     """Follow a recorded blow and its changes through all pieces; writes into every array of ``found``."""
     n_modes, n, m, s = blow.omega.size, change.omega.shape[0], blow.offset.size, pieces.force.shape[2]
