@@ -26,6 +26,7 @@ from ..fe.eigenvalues import Flexibility, factorise, one_thread
 from .modal import Damping, Modes, Shapes, damping_notes, damping_ratios
 
 PIECE = 2**20  # [byte] of earlier vectors taken at a time: fits into the cache of a core
+LOST = 1e-8  # [-] overlap above which all vectors since the last look at it are made again
 DRIFT = 1e-11  # [-] overlap with earlier vectors above which they are removed more often; Ritz values err by its square
 # [-] vectors that there is room for, over those wanted: taking more later copies all, which so happens seldom and is
 # faster
@@ -121,6 +122,7 @@ class Krylov:
         self._carried = np.zeros((system.n_dofs, 0))  # M times the two latest blocks of vectors
         self._latest = 0, 0, 0  # where the two latest blocks of vectors begin, and where they end
         self._period, self._due = 1, 1  # [-] blocks between two looks at all vectors, and blocks until the next one
+        self._keep()
 
     def beside(self, points: np.ndarray) -> "Krylov":
         """Vectors started from other points, with the same factorisations."""
@@ -143,7 +145,10 @@ class Krylov:
                 new = new - self.system.rigid @ (self._moving.T @ new)
             self._due -= 1
             if end and self._due <= 0:
-                new = self._cleared(new)
+                cleared = self._cleared(new)
+                if cleared is None:
+                    continue
+                new = cleared
             heavy = M @ new
             gram = new.T @ heavy
             length = np.sqrt((overlap**2).sum(axis=0) + gram.diagonal())  # before `overlap` was removed
@@ -162,6 +167,12 @@ class Krylov:
             self._carried = np.hstack([self._carried[:, start - before :], latest])
             self.count, self._latest = stop, (start, end, stop)
             self._next = self._solve(latest)
+            if self._due == self._period:  # all vectors have just been looked at
+                self._keep()
+
+    def _keep(self) -> None:
+        """Remember where the last vectors are that are known to be orthogonal."""
+        self._sound = self.count, self._latest, self._carried, self._next
 
     def _make_room(self, count: int) -> None:
         """Take memory for so many vectors, and for more to come: it is not used until they do."""
@@ -172,10 +183,11 @@ class Krylov:
             self.projected = np.pad(self.projected, (0, room - len(self.projected)))
             self.vectors = vectors
 
-    def _cleared(self, new: np.ndarray) -> np.ndarray:
+    def _cleared(self, new: np.ndarray) -> np.ndarray | None:
         """New vectors without the parts along earlier ones that rounding brought back; clears the latest block alike.
 
-        The next block follows from both.
+        The next block follows from both. Where rounding grew so fast that the vectors since the last look are lost,
+        goes back there to look more often, and returns None.
         """
         start, end = self._latest[1:]
         latest = end - start
@@ -187,6 +199,10 @@ class Krylov:
             drift = heavy @ known.T
             both -= drift @ known
             worst = max(worst, float(np.abs(drift[:latest]).max()))
+        if worst > LOST and self._period > 1:
+            self.count, self._latest, self._carried, self._next = self._sound
+            self._period = self._due = max(1, self._period // 4)
+            return None
         self.vectors[start:end] = both[:latest]
         self._carried[:, -latest:] = self.system.M @ both[:latest].T
         new = both[latest:] - (both[latest:] @ self._carried[:, -latest:]) @ both[:latest]
