@@ -128,6 +128,29 @@ def test_compiling_that_takes_long_is_announced_once(caplog):
     assert caplog.messages == ["compiling the inner loops of this kind of blow, once: about 5 s of computing"]
 
 
+BLOW = """
+import fem_impact as fi
+from fem_impact.impact.compiled import energy
+
+plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=50.0, n_modes=150, damping_ratio=0.005)
+hit = fi.strike(plate, fi.Striker.rigid(0.1), fi.Contact.hertz(1e6), at=(0.45, 0.3), speed=1.0, tolerance=1e-3)
+print(hit.history.steps.tobytes().hex(), sum(energy.follow.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+def test_the_process_that_compiles_finds_the_digits_of_every_later_one(tmp_path):
+    """It did not while parts of a kernel became machine code of their own, too."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-W", "ignore", "-c", BLOW]
+    (first, none), (later, one) = (
+        subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
+        for _ in range(2)
+    )
+    assert (none, one) == ("0", "1") and first == later
+
+
 @pytest.mark.slow
 def test_an_edit_in_another_file_is_noticed(tmp_path):
     shutil.copytree(Path(fem_impact.__file__).parent, tmp_path / "fem_impact", ignore=shutil.ignore_patterns("*.nb?"))
