@@ -429,6 +429,9 @@ def play(options: argparse.Namespace) -> Answer:
 
 def modes(options: argparse.Namespace) -> Answer:
     """List the modes of the struck body."""
+    from ._base import check  # imports numpy, which --help and --version do not need
+
+    check.count("n_modes", options.n_modes)
     scene, display = fi.load_scene(options.scene), _display(options)
     if options.vtk is None:
         with display("modes"):

@@ -49,7 +49,7 @@ def test_first_example_has_a_clean_verdict():
     names = {}
     exec(compile(blocks(README, "python")[0], "README.md", "exec"), names)
     hit = names["hit"]
-    assert hit.tolerance_met and hit.model_error < 1e-2 and all(each.known for each in hit.assumptions)
+    assert hit.trusted
 
 
 def test_python_example_runs_and_writes_its_files(tmp_path, monkeypatch, capsys):
@@ -115,7 +115,7 @@ def test_commands_shown_name_scenes_that_exist_and_load():
 @pytest.mark.parametrize("line", sorted(set(OURS)))
 def test_shown_commands_are_ones_the_parser_takes(line):
     options = arguments.parser().parse_args(words_of(line))  # exits with status 2 where an option does not exist
-    assert "scene" not in options or options.scene.suffix in (".toml", ".lvm", ".msh")
+    assert "scene" not in options or options.command == "show" or options.scene.suffix in (".toml", ".lvm", ".msh")
 
 
 @pytest.mark.slow

@@ -84,8 +84,6 @@ def test_mass_orthonormal_however_many(rectangle):
     assert np.abs(gram - np.eye(200)).max() < 1e-9  # rounding, let grow to 2e-10 before it is removed
 
 
-@pytest.mark.parametrize("places", [AT, [(0.12, 0.1), (0.3, 0.2)]])
-@pytest.mark.parametrize("count", [30, 31, 32])  # a block of two vectors may be cut
 @pytest.mark.slow
 def test_a_thousand_vectors_stay_orthogonal():
     """Rounding may grow a millionfold in forty vectors; those made since the last look at all were kept, once."""
@@ -98,6 +96,8 @@ def test_a_thousand_vectors_stay_orthogonal():
     np.testing.assert_allclose(vectors @ (system.M @ vectors.T), np.eye(1000), atol=1e-8)
 
 
+@pytest.mark.parametrize("places", [AT, [(0.12, 0.1), (0.3, 0.2)]])
+@pytest.mark.parametrize("count", [30, 31, 32])  # a block of two vectors may be cut
 def test_pairs_are_those_of_the_projected_stiffness(rectangle, places, count):
     krylov = Krylov(rectangle, np.array(places), 3e4)
     krylov.grow(40)
