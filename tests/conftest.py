@@ -1,6 +1,5 @@
 """What several tests share: which of many cases alike are run, compiled kernels, a real browser."""
 
-import logging
 import shutil
 import time
 from contextlib import suppress
@@ -123,8 +122,6 @@ def read_here(monkeypatch):
 
         monkeypatch.setattr(h5py, "File", h5py.File)  # the reader of meshes replaces it
     monkeypatch.setattr(isolated, "run", run)
-    yield
-    logging.disable(logging.NOTSET)
 
 
 @pytest.fixture(scope="session")

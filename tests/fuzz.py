@@ -215,6 +215,7 @@ def quick(path: Path, reader: str, arguments: tuple[str, ...], patience: float) 
     """
     h5py = sys.modules.get("h5py")
     known = getattr(h5py, "File", None)
+    logging.disable()  # as the real one does
     try:
         with limited(SHORT_PATIENCE):
             status, answer = isolated.main(path, reader, list(arguments))

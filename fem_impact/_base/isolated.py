@@ -78,7 +78,6 @@ def run(path: Path, reader: str, arguments: tuple[str, ...], patience: float) ->
 def main(path: Path, reader: str, arguments: list[str]) -> tuple[int, bytes]:
     """What the reader process answers: exit status, and the arrays as npz bytes or the error text."""
     said = io.StringIO()
-    logging.disable()
     try:
         with redirect_stdout(said), redirect_stderr(said), np.errstate(all="ignore"):
             module, function = reader.split(":")
@@ -111,6 +110,7 @@ def limit_memory() -> None:
 
 def process() -> int:
     """The reader process itself."""
+    logging.disable()
     limit_memory()
     status, answer = main(Path(sys.argv[1]), sys.argv[2], sys.argv[3:])
     (sys.stderr if status else sys.stdout).buffer.write(answer)
