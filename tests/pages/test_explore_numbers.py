@@ -57,6 +57,6 @@ def test_only_the_latest_strike_points_are_remembered(explorer):
 def test_blows_and_rolls_are_heard_on_the_surface_and_above_it(explorer):
     start, where = explorer.setup.start, explorer.setup.start.at
     on, above, roll = (explorer.listen(start, where, h, rate) for h, rate in ((0.0, None), (1.5, None), (0.0, 12.0)))
-    assert "the surface at" in on["note"] and " above (" in above["note"] and "Pa; peak" in above["note"]
+    assert "the surface at" in on["note"] and " above (" in above["note"] and "Pa; full scale" in above["note"]
     assert len({on["uri"], above["uri"], roll["uri"]}) == 3
     assert all(each["uri"].startswith("data:audio/wav;base64,") for each in (on, above, roll))
