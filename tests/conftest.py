@@ -14,7 +14,7 @@ settings.load_profile("same")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 # What `pytest -m smoke` runs, without their slow cases: quick files of every package, physics in each.
 SMOKE = (
-    "designs/test_goals", "fe/test_beam_elements", "fe/test_membrane", "fe/test_plausible", "impact/test_collision",
+    "designs/test_goals", "fe/test_beam_elements", "fe/test_membrane", "fe/test_plausible", "impact/test_response",
     "impact/test_contact_cases", "impact/test_force_spectrum", "impact/test_threshold", "mesh/test_meshes",
     "mesh/test_triangulation", "model/test_idealisation", "modes/test_analytic",
     "modes/test_timoshenko", "scenes/test_templates", "show/test_sound", "sweeps/test_cells", "taps/test_found",
