@@ -22,7 +22,7 @@ from .compiled.law import FELT
 from .compiled.stretched import Stretch
 from .contact import Contact, acting_stiffness, wall_time
 from .gradient import LOOKS
-from .quantities import asked_for
+from .quantities import BAND_POINTS, asked_for
 from .response import Ends, Error, History, Response
 from .sensitivity import gauss
 from .state import State
@@ -59,8 +59,6 @@ RINGING = 0.5  # [-] modes with a damping ratio above this do not ring: a swing 
 # [rad] largest phase of a ringing mode in a step of the coarser run: a third of a period, seen before it comes again
 RESOLVED = 2.0
 COLLOCATION_BELOW = 1e-7  # [-] below this tolerance, collocation needs less work than A4
-# [-] number of frequencies at which two spectra are compared: several per lobe of a single pulse are enough
-BAND_POINTS = 257
 NODES = 5  # [-] of collocation; more gain nothing, because the force is not smooth at onset and release
 RESOLVABLE = 0.3  # [-] largest contact stiffness times residual compliance for which the error estimate holds
 # [-] An error estimate below 30 % of the predicted one is replaced by that 30 %, because two runs can agree by chance;

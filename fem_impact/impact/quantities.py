@@ -10,6 +10,8 @@ from .._base import check
 QUANTITIES = ("restitution", "impulse", "contact_time", "force", "n_impacts", "spectrum", "sound")
 BANDED = ("spectrum", "sound")  # quantities that need an upper frequency
 USUAL = MappingProxyType(dict.fromkeys(("restitution", "impulse", "contact_time", "force", "n_impacts")))
+# [-] number of frequencies at which spectra are looked at: several per lobe of a single pulse are enough
+BAND_POINTS = 257
 
 
 def _locked(values: dict) -> MappingProxyType:

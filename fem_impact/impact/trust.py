@@ -8,12 +8,11 @@ import numpy as np
 
 from .._base import markup
 from . import assumption, promise
-from .quantities import rebound, words
+from .quantities import BAND_POINTS, rebound, words
 
 if TYPE_CHECKING:
     from .response import Response
 
-BAND_POINTS = 256  # [-] frequencies of a band at which the largest value of a spectrum is looked for
 FEWEST, MOST = 2, 6  # [-] digits shown: as many as the error of the computation lets stand
 UNITS = {"impulse": "N s", "contact_time": "s", "force": "N", "spectrum": "N s"}
 
@@ -38,10 +37,14 @@ class Judged:
     tolerance: float  # [-] of the computation
 
     @property
+    def holds(self) -> bool:
+        """Whether the model's error is known and at most `allowed`."""
+        return self.model is not None and self.model <= self.allowed
+
+    @property
     def trusted(self) -> bool:
-        """Whether the computation meets its tolerance, and the model's error is known and at most `allowed`."""
-        computed = self.computation is not None and self.computation <= self.tolerance
-        return computed and self.model is not None and self.model <= self.allowed
+        """Whether the computation meets its tolerance, and the model holds."""
+        return self.computation is not None and self.computation <= self.tolerance and self.holds
 
     @property
     def name(self) -> str:
@@ -120,7 +123,7 @@ def verdict(hit: "Response") -> str:
 def promised(hit: "Response") -> str:
     """What follows the answer in its line: how well it is computed, and whether the model holds."""
     clause = assumption.head(hit.assumptions, hit.tolerance)
-    holds = all(each.model is not None and each.model <= each.allowed for each in hit.trust)
+    holds = all(each.holds for each in hit.trust)
     if hit.tolerance_met:
         computed = f", computed to {hit.error.total:.1g} ({promise.met(hit)})"
         return f"{computed}{'; ' if holds else ', but '}{clause}"

@@ -16,10 +16,9 @@ from ..fe.assembly import System
 from ..fe.section import Plate
 from ..impact import accuracy, assumption, collision, promise
 from ..impact.assumption import Assumption
-from ..impact.collision import BAND_POINTS
 from ..impact.compiled import build
 from ..impact.contact import Contact
-from ..impact.quantities import apart, words
+from ..impact.quantities import BAND_POINTS, apart, words
 from ..impact.response import LOOKED_AT, Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, FieldShapes, Modes, at_rest

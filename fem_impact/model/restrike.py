@@ -11,7 +11,7 @@ from .._base.check import SimulationError
 from .._base.rounding import SAME
 from ..impact import accuracy, collision
 from ..impact.compiled import layout
-from ..impact.quantities import apart
+from ..impact.quantities import BAND_POINTS, apart
 from ..impact.response import History, Response
 from ..modes.modal import Modes
 from .bending import Bending, Known, bending, known
@@ -140,7 +140,7 @@ def _change(name: str, band: float | None, one: Response, two: Response) -> floa
         return abs(one.n_impacts - two.n_impacts) / max(1, one.n_impacts)
     if name == "spectrum":
         assert band is not None
-        frequencies = np.linspace(0.0, band, collision.BAND_POINTS)
+        frequencies = np.linspace(0.0, band, BAND_POINTS)
         first, second = one.spectrum(frequencies), two.spectrum(frequencies)
         return float(np.abs(first - second).max() / (np.abs(first).max() or 1.0))
     if name == "sound":

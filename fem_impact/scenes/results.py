@@ -38,7 +38,10 @@ def save(folder: Path, response: Response, points: Any) -> str:
     """Write what `load_response` needs beside response.json, which must be there; return the name of the file."""
     last = len(response.bodies) - 1
     places: dict[int, Any] = {last: points} if response.bodies[last].dimension else {}
-    bodies = tuple(_sampled(response, i, places.get(i, ())) for i in range(last + 1))
+    bodies = tuple(
+        _at_points(modes, ends.points, places.get(i, ()))
+        for i, (modes, ends) in enumerate(zip(response.bodies, response.ends))
+    )
     rung, striker = response.target, response.striker
     if striker is not None:  # by itself; among the bodies a hand may hold it
         striker = replace(striker, modes=_at_points(striker.modes, striker.at[None], ()))
@@ -51,11 +54,6 @@ def save(folder: Path, response: Response, points: Any) -> str:
     told = {"response": _packed(whole, arrays), "assumptions": _packed(response.assumptions, arrays)}
     kept.write(folder / SAVED, _key(folder), {**arrays, "told": np.array(json.dumps(told))})
     return SAVED
-
-
-def _sampled(response: Response, body: int, points: Any) -> Modes:
-    """The modes of a body, known where it was touched and at some points."""
-    return _at_points(response.bodies[body], response.ends[body].points, points)
 
 
 def _at_points(modes: Modes, touched: np.ndarray, points: Any) -> Modes:

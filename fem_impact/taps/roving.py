@@ -13,8 +13,9 @@ from .._base.check import SimulationError
 from .._base.files import replacing
 from ..fe.assembly import System
 from ..impact import accuracy, spectra
-from ..impact.collision import BAND_POINTS, strike
+from ..impact.collision import strike
 from ..impact.contact import Contact
+from ..impact.quantities import BAND_POINTS
 from ..impact.striker import Striker
 from ..model import vectors
 from ..model.target import FIRST_LOOK, Stages, Target
