@@ -19,7 +19,8 @@ _NAMES = {
     "modes.air": "in_air",
     "impact.contact": "Contact",
     "impact.striker": "Striker Hand",
-    "impact.response": "Response Impact",
+    "impact.history": "Impact",
+    "impact.response": "Response",
     "impact.gradient": "Gradient",
     "impact.collision": "Touch collide",
     "impact.spectra": "mobility",
@@ -65,7 +66,7 @@ if TYPE_CHECKING:  # the same names for type checkers; test_typing.py compares
     from .impact.collision import collide as collide
     from .impact.contact import Contact as Contact
     from .impact.gradient import Gradient as Gradient
-    from .impact.response import Impact as Impact
+    from .impact.history import Impact as Impact
     from .impact.response import Response as Response
     from .impact.spectra import mobility as mobility
     from .impact.striker import Hand as Hand

@@ -35,7 +35,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import fem_impact as fi
-from fem_impact.impact import collision, sensitivity
+from fem_impact.impact import engine
 from fem_impact.impact.compiled import collocation, energy
 from fem_impact.impact.compiled.bundles import Limits, Scene
 
@@ -116,7 +116,7 @@ def kernel(blow: Blow, scheme: str, size: float) -> Callable[[], Answer]:
         np.array([[blow.stiffness, 1.0, 0.0, 0.0]]),
         np.zeros(n), blow.start[n:].copy(),
     )  # fmt: skip
-    nodes, contact = sensitivity.gauss(collision.NODES), np.pi * np.sqrt(MASS / blow.stiffness)
+    nodes, contact = engine.gauss(engine.NODES), np.pi * np.sqrt(MASS / blow.stiffness)
     limits = Limits(1e-19, 1e-12, np.inf, 0, 10**6)
 
     def run() -> Answer:
@@ -269,7 +269,7 @@ def whole_call(n_modes: int, mass: float, stiffness: float) -> tuple[fi.Response
     """A stick on the complete plate at 1e-6: response, best time of the call, that of its loops, number of loops."""
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=n_modes)
     stick, law = fi.Striker.stick(mass, 10e3), fi.Contact.linear(stiffness)
-    loop, taken = collision.run_energy, []
+    loop, taken = engine.run_energy, []
 
     def timed(*state: object) -> tuple:
         begin = time.perf_counter()
@@ -282,7 +282,7 @@ def whole_call(n_modes: int, mass: float, stiffness: float) -> tuple[fi.Response
 
     hit = once()
     best, loops = np.inf, np.inf
-    collision.run_energy = timed
+    engine.run_energy = timed
     try:
         for _ in range(CALLS):
             taken.clear()
@@ -290,7 +290,7 @@ def whole_call(n_modes: int, mass: float, stiffness: float) -> tuple[fi.Response
             once()
             best, loops = min(best, time.perf_counter() - begin), min(loops, sum(taken))
     finally:
-        collision.run_energy = loop
+        engine.run_energy = loop
     return hit, best, loops, len(taken)
 
 

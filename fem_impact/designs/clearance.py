@@ -12,11 +12,12 @@ from scipy.optimize import brentq
 
 from .._base.check import SimulationError
 from ..fe.variation import SectionChange
-from ..impact.compiled import layout, record
-from ..impact.gradient import LOOKS
+from ..impact.compiled import record
+from ..impact.engine import LOOKS
+from ..impact.gradient import differences
+from ..impact.history import History
 from ..impact.parameters import Parameters
-from ..impact.response import History, Response
-from ..impact.sensitivity import Sensitivity
+from ..impact.response import Response
 
 FAR = 1.0  # [-] clearance of bodies that never approach again, and the largest told
 
@@ -27,12 +28,6 @@ def nearest(hit: Response) -> tuple[float, float | None]:
     The clearance is the smallest gap after the first impact over the way that the striker goes in the time of that
     impact at the speed of its arrival; below zero the bodies would touch again, and below -1 its logarithm is told.
     """
-    gap, when = _nearest(hit)
-    return (gap if gap > -1.0 else -1.0 - np.log(-gap)), when
-
-
-def _nearest(hit: Response) -> tuple[float, float | None]:
-    """`nearest` without the logarithm."""
     history = _released(hit)
     duration = hit.impacts[0].duration
     scale = hit.speed * duration
@@ -49,25 +44,18 @@ def _nearest(hit: Response) -> tuple[float, float | None]:
         brentq(lambda time: _approach(free, np.array([time]))[1][0], times[first], times[first + 1], xtol=1e-12 * span)
     )
     gap = -float(_approach(free, np.array([when]))[0][0]) / scale
-    return (gap, history.end_time + when) if gap < FAR else (FAR, None)
+    if gap >= FAR:
+        return FAR, None
+    return (gap if gap > -1.0 else -1.0 - np.log(-gap)), history.end_time + when
 
 
-def slopes(
-    hit: Response, names: tuple[str, ...], sections: Mapping[str, SectionChange], times: np.ndarray
-) -> np.ndarray:
-    """Derivatives (n,) of the clearance in numbers of the blow; ``times`` (n,) are those of its contact time."""
-    gap, when = _nearest(hit)
-    if when is None:
+def slopes(hit: Response, names: tuple[str, ...], sections: Mapping[str, tuple[float, SectionChange]]) -> np.ndarray:
+    """Derivatives (n,) of the clearance in numbers of the blow."""
+    if nearest(hit)[1] is None:
         return np.zeros(len(names))
-    history = _released(hit)
-    row = np.zeros((1, history.steps.shape[1]))
-    row[0, [layout.START, layout.LENGTH]] = history.end_time, when - history.end_time
-    longer = replace(history, steps=np.vstack([history.steps, row]), end_time=when, status=record.HORIZON)
-    found = Sensitivity.of(longer, Parameters(hit, sections).change(names), peak=False)
-    scale = hit.speed * hit.impacts[0].duration
-    faster = np.array([float(name == "strike.speed") for name in names])
-    change = -found.found.ends[-1, 0, 0] / scale - gap * (times / hit.impacts[0].duration + faster / hit.speed)
-    return np.asarray(change / max(1.0, -gap))
+    parameters = Parameters(hit, {name: change for name, (_, change) in sections.items()})
+    numbers = np.array([sections[name][0] if name in sections else parameters.values[name] for name in names])
+    return differences(hit, parameters, names, numbers, lambda blow: [nearest(blow)[0]])[0][0]
 
 
 def _released(hit: Response) -> History:

@@ -518,11 +518,10 @@ def _hit_slopes(hit: Response, labels: list[str], values: Mapping[str, float], r
         return np.zeros((len(labels), len(rates)))
     marked = {f"free {name}": each for name, each in sections.items()}  # apart from numbers of the blow
     names = (*numbers, *marked)
-    told = dict.fromkeys(["contact_time", *(label for label in labels if label != "clearance")])
-    found = {name: each.slopes for name, each in gradient.gradients(hit, tuple(told), names, marked).items()}
+    told = tuple(dict.fromkeys(label for label in labels if label != "clearance"))
+    found = {name: each.slopes for name, each in gradient.gradients(hit, told, names, marked).items()} if told else {}
     if "clearance" in labels:
-        changes = {name: change for name, (_, change) in marked.items()}
-        found["clearance"] = clearance.slopes(hit, names, changes, found["contact_time"])
+        found["clearance"] = clearance.slopes(hit, names, marked)
     chain = np.zeros((len(names), len(rates)))
     for j, (name, rate) in enumerate(rates.items()):
         for number, slope in rate.numbers.items():

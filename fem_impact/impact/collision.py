@@ -10,36 +10,24 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
-from .._base.rounding import EPSILON, ROUNDING
+from .._base.rounding import ROUNDING
 from ..modes.modal import Modes, left_out
 from ..modes.stretching import Stretching, stretch
-from . import accuracy, force_spectrum, promise
-from .compiled import build, layout, record
-from .compiled.bundles import Limits, Scene
-from .compiled.collocation import run_collocation
-from .compiled.energy import run_energy
+from . import accuracy, engine, force_spectrum, promise
+from .compiled import layout, record
 from .compiled.law import FELT
-from .compiled.stretched import Stretch
-from .contact import Contact, acting_stiffness, wall_time
-from .gradient import LOOKS
+from .contact import Contact
+from .engine import TOLERANCE
+from .history import History, System
 from .quantities import BAND_POINTS, asked_for
-from .response import Ends, Error, History, Response
-from .sensitivity import gauss
+from .response import Ends, Error, Response
 from .state import State
 from .stretched import Stretched
 from .striker import Striker
 
-TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
 SCHEMES = ("A", "A4", "collocation")
-MAX_STEPS = 500_000  # [-] of one run: a time limit of about one second
-# [-] modes, or entries of the forms of stretching, times steps of one run: a time limit of some seconds
-MAX_WORK = 1_000_000_000
-# [-] modes times steps of one run in plain Python: the same time limit, as it is 3 000 times slower than the kernels
-PLAIN_WORK = 300_000
 # [-] tolerance advised over the error reached: steps twice as long, to which it may lead, err 16 times more
 REACHED = 20.0
-SOONER = 0.2  # [-] of a run that was given up, what is advised: the last run of a blow halves the steps twice
-FIRST_STEPS = 24.0  # [-] steps per contact with which A4 meets TOLERANCE in most blows; cheapest first run of 12 to 32
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
 # [-] fraction of the usual steps that averages over the blow need: errors of single instants cancel in them
 AVERAGED = 0.5
@@ -59,7 +47,6 @@ RINGING = 0.5  # [-] modes with a damping ratio above this do not ring: a swing 
 # [rad] largest phase of a ringing mode in a step of the coarser run: a third of a period, seen before it comes again
 RESOLVED = 2.0
 COLLOCATION_BELOW = 1e-7  # [-] below this tolerance, collocation needs less work than A4
-NODES = 5  # [-] of collocation; more gain nothing, because the force is not smooth at onset and release
 RESOLVABLE = 0.3  # [-] largest contact stiffness times residual compliance for which the error estimate holds
 # [-] An error estimate below 30 % of the predicted one is replaced by that 30 %, because two runs can agree by chance;
 # 30 % is the median over many blows.
@@ -102,24 +89,6 @@ class Touch:
         for name in ("first_at", "second_at"):
             if (point := getattr(self, name)) is not None:
                 check.finite(name, check.numbers(name, point, "m"), "m")
-
-
-@dataclass(frozen=True, eq=False)
-class _System:
-    """The modes of all bodies in one list, and their contacts: the input of a kernel."""
-
-    omega: np.ndarray
-    zeta: np.ndarray
-    shape: np.ndarray
-    offset: np.ndarray
-    bias: np.ndarray
-    law: np.ndarray
-    start_q: np.ndarray
-    start_p: np.ndarray
-    stretched: Stretched | None = None  # if one of the bodies stretches
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)  # always: numba would compile the kernels again for writable arrays
 
 
 @dataclass(frozen=True)
@@ -328,11 +297,11 @@ def met(
     return _follow(bodies, contacts, parts, arriving, options, others=others)
 
 
-def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[_System, float]:
+def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[System, float]:
     """Two bodies that are to touch, the first moving, as the kernels take them, and how long the contact may last."""
     parts, _ = _parts(bodies, [touch], [speed, 0.0], None, None, residual)
     system = _joined(parts, [touch])
-    return system, _pace(system)[0]
+    return system, engine.pace_of(system)[0]
 
 
 def _moving(part: _Part, q: np.ndarray, p: np.ndarray) -> _Part:
@@ -356,7 +325,7 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
             "duration or max_impacts must be given, because a constant force keeps pressing the bodies together"
         )
     held = np.concatenate([np.arange(len(part.omega)) < part.held for part in parts])
-    pace = _pace(system, np.append(held, np.zeros(len(system.omega) - len(held), bool)))
+    pace = engine.pace_of(system, np.append(held, np.zeros(len(system.omega) - len(held), bool)))
     _check_way(system, pace[0] * pace[1], options.tolerance)
     last = options.horizon, options.n_max
     differ = partial(_difference, options.quantities)
@@ -367,7 +336,8 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
     truncation, resolvable = _truncation(parts, told, contacts, system, coarse, ran, size, differ, pace, *last)
     truncation = truncation + _unstated(bodies, parts, contacts, coarse, ran, size, differ, pace, last)
     mesh_error = _mesh_error(bodies, parts, contacts, system, coarse, ran, size, differ, options.tolerance, pace, last)
-    inherited = sum((differ(_run(_joined(other, contacts), ran, size, pace, *last), coarse) for other in others), NONE)
+    moved = (engine.follow(_joined(other, contacts), ran, size, pace, *last) for other in others)
+    inherited = sum((differ(run, coarse) for run in moved), NONE)
     parted = {"step": step_error, "truncation": truncation, "mesh": mesh_error, "inherited": inherited}
     parted["idealisation"] = NONE
     for i, body in enumerate(bodies):
@@ -376,7 +346,7 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
             poorer = [*parts[:i], _poorer(parts[i], other), *parts[i + 1 :]]
             try:
                 # in fine steps, because the fastest modes of two descriptions differ, and so do their step errors
-                less = _run(_joined(poorer, contacts), ran, step, pace, *last)
+                less = engine.follow(_joined(poorer, contacts), ran, step, pace, *last)
                 parted[cause] = parted[cause] + differ(less, before) + float(_may_touch(before, less, pace[0]))
                 before = less
             except SimulationError:  # the poorer body cannot be followed, so it tells nothing
@@ -394,7 +364,7 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
     )  # fmt: skip
 
 
-def _check_way(system: _System, depth: float, tolerance: float) -> None:
+def _check_way(system: System, depth: float, tolerance: float) -> None:
     """Raise ValueError if rounding of a large offset would spoil the approach in contact, about ``depth`` [m]."""
     way = float(np.abs(system.offset).max())
     if np.finfo(float).eps * way > tolerance * depth:
@@ -404,7 +374,7 @@ def _check_way(system: _System, depth: float, tolerance: float) -> None:
         )
 
 
-def _ends(parts: Sequence[_Part], system: _System) -> tuple[Ends, ...]:
+def _ends(parts: Sequence[_Part], system: System) -> tuple[Ends, ...]:
     """Where every body is touched; a constant force makes left-out modes dip only if a series spring replaces them."""
     found, rated = [], _rated(system.law)
     last = sum(len(part.omega) for part in parts)
@@ -492,7 +462,7 @@ def _part(
     )  # fmt: skip
 
 
-def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
+def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> System:
     """Join the modes of all bodies; series springs or replacement modes stand in for the left-out modes.
 
     A series spring is exact only for a body with one lossless contact. Otherwise each eigenvector of the residual
@@ -531,7 +501,7 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> _System:
         shape = np.ascontiguousarray(np.hstack([shape, *(mode[2][:, None] for mode in extra)]))
         lists = [[*one, np.array([mode[k] for mode in extra])] for one, k in zip(lists, (0, 1, 3, 4, 5))]
     omega, zeta, bias, q, p = (np.concatenate(one) for one in lists)
-    return _System(omega, zeta, shape, offset, bias, law, q, p, stretched)
+    return System(omega, zeta, shape, offset, bias, law, q, p, stretched=stretched)
 
 
 def _rated(law: np.ndarray) -> np.ndarray:
@@ -578,7 +548,7 @@ def _may_touch(history: History, other: History, duration: float) -> bool:
         end += max(0.0, float(ahead.max(initial=0.0)))
     start = max(float(found.contacts[:, 1].min()) for found in (history, other))
     end = max(start, end)
-    times = np.linspace(start, end, int(min(LOOKS[1], LOOKS[0] * (end - start) / duration)) + 2)
+    times = np.linspace(start, end, int(min(engine.LOOKS[1], engine.LOOKS[0] * (end - start) / duration)) + 2)
     surface, opened = history.surfaces(times)
     approach, doubt = history.motion(times) - surface, np.zeros((len(times), 1))
     doubt[:, 0] = np.maximum.accumulate(np.abs(approach - other.motion(times) + other.surfaces(times)[0]).max(axis=1))
@@ -615,42 +585,6 @@ def _thinned(part: _Part, wanted: float) -> tuple[_Part, float]:
     return thin, float(flexible[-1] / part.omega[n - 1])
 
 
-def _pace(system: _System, held: np.ndarray | bool = False) -> tuple[float, float]:
-    """Shortest expected duration [s] of an undisturbed contact, and its approach speed [m/s].
-
-    ``held`` (n_modes,) says which modes count as masses, though a hand makes them swing.
-    """
-    rate = system.omega * np.maximum(1.0, 2.0 * system.zeta)  # an overdamped mode acts as a dashpot, not as a mass
-    rate = np.where(held, 0.0, rate)
-    order = np.argsort(rate, kind="stable")
-    omega = rate[order]
-    last = np.concatenate([omega[1:] > omega[:-1], [True]])  # the last mode of each distinct frequency
-    beyond = np.concatenate([omega[last][1:], [np.inf]])
-    shortest, fastest = np.inf, 0.0
-    for i, law in enumerate(system.law):
-        k, exponent, compliance = law[layout.STIFFNESS], law[layout.EXPONENT], law[layout.COMPLIANCE]
-        mobile = np.cumsum(system.shape[i, order] ** 2)[last]  # [1/kg] sum over the modes up to each
-        above, mobile = beyond[mobile > 0.0], mobile[mobile > 0.0]
-        if not mobile.size:
-            continue
-        approach = system.offset[i] + float(system.shape[i] @ system.start_q)
-        pull = max(0.0, float(system.shape[i] @ system.bias))  # [m/s**2]
-        speed = float(np.abs(system.shape[i]) @ np.abs(system.start_p))
-        speed = max(speed, np.sqrt(2.0 * pull * max(0.0, -approach)))
-        speed = max(speed, np.sqrt(pull * (pull / (k * mobile[-1])) ** (1.0 / exponent)))
-        if approach > 0.0:
-            speed = max(speed, approach * np.sqrt(k * approach ** (exponent - 1.0) * mobile[-1]))
-        if speed == 0.0:
-            continue
-        free = wall_time(acting_stiffness(law, mobile, speed), exponent, mobile, speed, compliance)
-        shortest = min(shortest, float(free[np.argmax(np.pi / free < above)]))
-        fastest = max(fastest, float(speed))
-    if not np.isfinite(shortest):
-        k, exponent = system.law[0, :2]
-        return float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0
-    return shortest, fastest
-
-
 def _scheme_for(tolerance: float, exponent: float) -> str:
     """The scheme that meets a tolerance with the least work."""
     return "collocation" if tolerance < COLLOCATION_BELOW and exponent >= 1.0 else "A4"
@@ -658,7 +592,7 @@ def _scheme_for(tolerance: float, exponent: float) -> str:
 
 def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float | None]) -> float:
     """Steps per contact in the first run."""
-    count = FIRST_STEPS * (TOLERANCE / tolerance) ** (0.5 if scheme == "A" else 0.25)
+    count = engine.FIRST_STEPS * (TOLERANCE / tolerance) ** (0.5 if scheme == "A" else 0.25)
     return max(6.0, count * (AVERAGED if set(quantities) <= AVERAGES else 1.0))
 
 
@@ -744,8 +678,8 @@ def _controlled(
     shortest = min(pace[0], horizon)  # or the horizon could cut both runs to one step, and they would always agree
     if dt is not None:
         dt = min(dt, 0.5 * horizon)
-        fine = _run(system, scheme, dt, pace, horizon, n_max, "dt")
-        coarse = _run(system, scheme, 2.0 * dt, pace, horizon, n_max, "dt")
+        fine = engine.follow(system, scheme, dt, pace, horizon, n_max, "dt")
+        coarse = engine.follow(system, scheme, 2.0 * dt, pace, horizon, n_max, "dt")
         return fine, compared(coarse, fine), scheme, coarse, (dt, 2.0 * dt)
     if scheme == "collocation":
         sizes = [max(1e-15, tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)]
@@ -755,17 +689,17 @@ def _controlled(
         sizes = [first * 0.5**n for n in range(DOUBLINGS + 1)]
     aim = tolerance if scheme == "collocation" else share * tolerance
     try:
-        runs = [_run(system, scheme, size, pace, horizon, n_max) for size in sizes[:2]]
+        runs = [engine.follow(system, scheme, size, pace, horizon, n_max) for size in sizes[:2]]
     except SimulationError as exhausted:  # so many steps are out of reach: longer ones may do
         sizes = [4.0 * sizes[0], 2.0 * sizes[0], *sizes]
         try:
-            runs = [_run(system, scheme, size, pace, horizon, n_max) for size in sizes[:2]]
+            runs = [engine.follow(system, scheme, size, pace, horizon, n_max) for size in sizes[:2]]
         except SimulationError:
             raise exhausted from None
     best, met, grazes = np.inf, None, 0 if counted else GRAZES
     for i, (before, size) in enumerate(pairwise(sizes)):
         if i:
-            runs = [runs[1], _run(system, scheme, size, pace, horizon, n_max)]
+            runs = [runs[1], engine.follow(system, scheme, size, pace, horizon, n_max)]
         coarse, fine = runs
         estimate = compared(coarse, fine)
         best = min(best, estimate[0])
@@ -775,7 +709,7 @@ def _controlled(
             if grazes == GRAZES or fine.margin > estimate[1]:
                 break
             grazes += 1
-        if 2 * len(fine.steps) > _most_steps(system):
+        if 2 * len(fine.steps) > engine.most_steps(system):
             break  # the next run would exceed the step limit
     if met is not None:
         return met
@@ -802,7 +736,7 @@ def _agreed(coarse: History, fine: History, apart: float) -> int:
     return n if same.all() else int(same.argmin())
 
 
-def _longest_lossy(system: _System, pace: tuple[float, float], tolerance: float) -> float:
+def _longest_lossy(system: System, pace: tuple[float, float], tolerance: float) -> float:
     """Longest step [s] that resolves the modes whose ringing shows in a lossy contact force; infinite without loss.
 
     A lossy force depends on the approach rate. A force that rises like a spring's makes each mode ring in that rate,
@@ -824,71 +758,6 @@ def _longest_lossy(system: _System, pace: tuple[float, float], tolerance: float)
     return longest
 
 
-def _most_steps(system: _System) -> int:
-    """Steps after which a run gives up."""
-    if build.limited():
-        return max(100, PLAIN_WORK // len(system.omega))
-    if system.stretched is not None:
-        return min(MAX_STEPS, max(1000, MAX_WORK // system.stretched.forms.size))
-    return min(MAX_STEPS, max(1000, MAX_WORK // len(system.omega)))
-
-
-def _run(
-    system: _System, scheme: str, size: float, pace: tuple[float, float], horizon: float, n_max: int,
-    chosen_by: str = "tolerance",
-) -> History:  # fmt: skip
-    """One run; ``size`` is the step in contact [s], for collocation the allowed misfit [-]; and what it comes from."""
-    parts = (
-        system.omega, system.zeta, system.shape, system.offset, system.bias, system.law, system.start_q, system.start_p
-    )  # fmt: skip
-    most = _most_steps(system)
-    limits = Limits(float(EPSILON * pace[0] * pace[1]), float(ROUNDING * pace[1]), float(horizon), n_max, most)
-    stretched, stretch = system.stretched, None
-    if stretched is not None:
-        stretched = replace(stretched, base=float(size), ramp=scheme == "A4")
-        stretch = Stretch(stretched.forms, stretched.first)
-    if scheme == "collocation":
-        nodes, powers = gauss(NODES)
-        result = run_collocation(Scene(*parts), nodes, powers, pace[0] / 2.0, float(size) * pace[1], limits)
-    else:
-        result = run_energy(Scene(*parts), stretch, int(scheme == "A4"), float(size), limits)
-    history = replace(History(*parts, *result), stretched=stretched)
-    time, status = result[5], result[6]
-    if status == record.EXHAUSTED:
-        raise SimulationError(
-            f"no final separation was reached in {most} steps, up to {time:.4g} s; raise {chosen_by}, or give "
-            f"{_sooner(history)}"
-        )
-    if status == record.FAILED:
-        if scheme == "collocation":
-            raise SimulationError(f"scheme collocation found no valid next step at {time:.4g} s; use A4")
-        raise SimulationError(f"scheme {scheme} found no valid next step at {time:.4g} s; check the units of the scene")
-    return history
-
-
-def _sooner(history: History) -> str:
-    """A duration, and a number of impacts if some ended, that leave steps for runs of half the step."""
-    time = SOONER * history.end_time
-    ended = int(SOONER * np.count_nonzero(history.contacts[:, 1] < history.end_time))
-    return f"a duration of at most {float(f'{time:.1e}'):g} s" + (
-        f" or max_impacts of at most {ended}" if ended else ""
-    )
-
-
-def again(history: History, **changed: Any) -> History:
-    """The same blow with other modes or contacts, by A4 in the steps of a first run, to compare with another such run.
-
-    ``changed`` are fields of the history; without any, it is the blow to compare with.
-    """
-    fields = ("omega", "zeta", "shape", "offset", "bias", "law", "start_q", "start_p", "stretched")
-    before = _System(*(getattr(history, name) for name in fields))
-    system = replace(before, **changed)
-    pace = _pace(before)
-    horizon = history.end_time if history.status == record.HORIZON else np.inf
-    most = len(history.contacts) if history.status == record.IMPACTS else 0
-    return _run(system, "A4", pace[0] / FIRST_STEPS, pace, horizon, most)
-
-
 def _difference(
     quantities: Mapping[str, float | None], coarse: History, fine: History, over: tuple[float, float] = (1.0, 1.0)
 ) -> np.ndarray:
@@ -905,7 +774,7 @@ def _difference(
     speed = np.abs(coarse.end_p[coarse.omega == 0.0] - fine.end_p[rigid])
     found = {"restitution": float(speed.max(initial=0.0)) / momentum / over[0]}
     if len(fine.contacts):
-        one, two = (_totals(history) for history in (coarse, fine))
+        one, two = (engine.totals(history) for history in (coarse, fine))
         shares = {"impulse": over[0], "contact_time": over[1], "force": over[1]}
         found |= {name: abs(x - y) / (y or 1.0) / shares[name] for name, x, y in zip(shares, one, two)}
     for name, band in quantities.items():
@@ -920,12 +789,6 @@ def _difference(
     return np.array([largest, abs(coarse.margin - fine.margin)])
 
 
-def _totals(history: History) -> tuple[float, float, float]:
-    """Impulse [N s], contact time [s] and peak force [N] of a run with impacts."""
-    rows = history.contacts.tolist()
-    return sum(row[3] for row in rows), sum(row[1] - row[0] for row in rows), max(row[2] for row in rows)
-
-
 def _sensitivity(coarse: History, fine: History) -> float:
     """Growth [-] of the difference of two runs between the end of the first and of the last impact."""
     if len(coarse.contacts) != len(fine.contacts):
@@ -937,7 +800,7 @@ def _sensitivity(coarse: History, fine: History) -> float:
     return max(1.0, float((abs(one[-1] - two[-1]) + least) / (abs(one[0] - two[0]) + least)))
 
 
-def _truncation(parts, told, contacts, system: _System, whole: History, scheme, size, differ, pace, horizon, n_max):
+def _truncation(parts, told, contacts, system: System, whole: History, scheme, size, differ, pace, horizon, n_max):
     """Estimated error [-] of leaving out modes, and whether the estimate can be trusted.
 
     Repeats the run with the upper modes of one body replaced by their compliance. The error falls at least with the
@@ -964,13 +827,13 @@ def _truncation(parts, told, contacts, system: _System, whole: History, scheme, 
             thin, ratio = _thinned(part, wanted)
             if 1.0 < ratio < np.inf:
                 less = [*parts[:i], thin, *parts[i + 1 :]]
-                change = differ(_run(_joined(less, contacts), scheme, size, pace, horizon, n_max), whole)
+                change = differ(engine.follow(_joined(less, contacts), scheme, size, pace, horizon, n_max), whole)
                 guesses.append(change / (ratio ** FALLING[int(part.zeta[-1] > RINGING)] - 1.0))
         found = found + np.max(guesses, axis=0)
     return np.maximum(found, AT_LEAST * float(expected)), resolvable
 
 
-def _mesh_error(bodies, parts, contacts, system: _System, coarse: History, scheme, size, differ, tolerance, pace, last):
+def _mesh_error(bodies, parts, contacts, system: System, coarse: History, scheme, size, differ, tolerance, pace, last):
     """Estimated error [-] due to the mesh errors of frequencies and static compliances.
 
     Repeats the run with every frequency lowered and every compliance raised by its error, so that the estimate grows
@@ -989,7 +852,7 @@ def _mesh_error(bodies, parts, contacts, system: _System, coarse: History, schem
         softer.append(replace(part, omega=lower, rest=part.rest + np.diag(part.doubt)))
     if not matters:
         return NONE
-    return differ(_run(_joined(softer, contacts), scheme, size, pace, *last), coarse)
+    return differ(engine.follow(_joined(softer, contacts), scheme, size, pace, *last), coarse)
 
 
 def _unstated(bodies, parts, contacts, coarse: History, scheme, size, differ, pace, last):
@@ -1008,7 +871,7 @@ def _unstated(bodies, parts, contacts, coarse: History, scheme, size, differ, pa
         trials = [[replace(part, rest=rest) for rest in others], [_loosened(part)] if part.loose.size else []]
         for trial in trials:
             changed = ([*parts[:i], one, *parts[i + 1 :]] for one in trial)
-            runs = (_run(_joined(each, contacts), scheme, size, pace, *last) for each in changed)
+            runs = (engine.follow(_joined(each, contacts), scheme, size, pace, *last) for each in changed)
             error = error + np.max([NONE, *(differ(run, coarse) for run in runs)], axis=0)
     return error
 

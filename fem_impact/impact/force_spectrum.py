@@ -67,6 +67,13 @@ def of_pieces(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
     return _interpolated(time, impulse, span, int(count), frequencies)
 
 
+def of_impulses(time: np.ndarray, impulse: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
+    """Sum of impulses (n,) [N s] at ascending times (n,) [s], times exp(-i omega t); even frequencies from zero on."""
+    if len(time) * len(frequencies) <= FEW:
+        return np.asarray(np.exp(-2j * np.pi * frequencies[:, None] * time) @ impulse)
+    return _transform(time, impulse, frequencies[1], len(frequencies))
+
+
 def directly(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
     """The same, summed over the closed forms of all pieces: for few of them, and for very high frequencies.
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,7 @@ from ..fe.variation import DIFFERENCES, SectionChange
 from ..modes import varied
 from ..modes.modal import Modes
 from .compiled import layout
-from .compiled.law import LAYERS, PLASTIC, POWER
-from .compiled.tangents import Change
-from .sensitivity import no_change
+from .compiled.law import FELT, PLASTIC
 
 if TYPE_CHECKING:
     from .response import Response
@@ -43,6 +41,22 @@ SCALE: dict[type[object], tuple[float, float]] = {Plate: (-2.0, 2.0), Beam: (-2.
 # [-] distance for the slope of a shape in radians of the shortest wave, and of the static compliance in lengths of the
 # body: errs by the fourth power, 1e-12, and leaves 1e-9 of the rounding of a compliance
 SHIFT = 1e-3
+
+
+ONE_SIDED = ".loss", ".damping_ratio"  # numbers that are never negative
+
+
+class Change(NamedTuple):
+    """What a unit of each of some numbers changes in a `System`."""
+
+    omega: np.ndarray  # (n, n_modes)
+    zeta: np.ndarray  # (n, n_modes)
+    shape: np.ndarray  # (n, n_contacts, n_modes)
+    bias: np.ndarray  # (n, n_modes)
+    start_q: np.ndarray  # (n, n_modes)
+    start_p: np.ndarray  # (n, n_modes)
+    offset: np.ndarray  # (n, n_contacts)
+    law: np.ndarray  # (n, n_contacts, 9 or 4)
 
 
 def unit(name: str) -> str:
@@ -88,8 +102,9 @@ class Parameters:
         for name, c in self.laws.items():
             law = hit.contacts[c]
             parts = list(LAW)[: 6 if law.hard_stiffness else 3]
-            if hit.history.law.shape[1] == layout.WIDTH and hit.history.law[c, layout.KIND] == PLASTIC:
-                parts = ["stiffness", "exponent", "yield_approach"]  # it has no loss
+            kind = hit.history.law[c, layout.KIND] if hit.history.law.shape[1] == layout.WIDTH else None
+            if kind in (PLASTIC, FELT):  # they have no loss
+                parts = ["stiffness", "exponent", *(["yield_approach"] if kind == PLASTIC else [])]
             found |= {f"{name}.{part}": float(getattr(law, part)) for part in (*parts, "gap")}
         if self.struck:
             found["strike.speed"] = hit.speed
@@ -239,7 +254,8 @@ class Parameters:
 
     def change(self, names: tuple[str, ...]) -> Change:
         """What a unit of each number changes in the run."""
-        found = no_change(self.hit.history, len(names))
+        h = self.hit.history
+        found = Change(*(np.zeros((len(names), *getattr(h, name).shape)) for name in Change._fields))
         axes = {}
         for i, name in enumerate(names):
             if name in self.sections:
@@ -251,6 +267,20 @@ class Parameters:
         if axes:
             self._shift(found, axes)
         return found
+
+    def faster(self, names: tuple[str, ...]) -> np.ndarray:
+        """What a unit of each number adds to the speed of arrival, (n,) [m/s]."""
+        moving = next((b for b, ends in enumerate(self.hit.ends) if ends.speed), 0)
+        own = "strike.speed" if self.struck else f"speeds.{moving}"
+        return np.array([float(name == own) for name in names])
+
+    def size(self, name: str) -> float:
+        """What counts as much of a number that is zero."""
+        if name.endswith(".loss"):
+            return 1.0 / (abs(self.hit.speed) or 1.0)
+        if name in ("strike.x", "strike.y"):
+            return max(float(np.ptp(column)) for column in self.hit.bodies[1].shapes.grid()[0].T)
+        return abs(self.hit.speed) if name.startswith("speeds.") and self.hit.speed else 1.0
 
     def _enter(self, found: Change, i: int, name: str) -> None:
         home, _, part = name.rpartition(".")
@@ -381,6 +411,3 @@ def _stencil(target: Modes, at: np.ndarray, axis: int, distance: float) -> tuple
         if target.shapes.contains(points).all():
             return points, np.array(weights)
     raise check.SimulationError("no gradient in the strike point: the body is too narrow there")
-
-
-POSSIBLE = POWER, LAYERS, PLASTIC  # kinds of contact laws with a gradient

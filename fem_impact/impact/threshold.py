@@ -9,7 +9,6 @@ from scipy import optimize
 from .._base import check
 from ..modes.modal import Modes
 from .accuracy import left_out_density
-from .sensitivity import gauss, shares
 from .spectra import half_sine_spectrum
 
 # [-] ratio of frequencies in the search: only from the hundredth on is a lobe of the pulse's spectrum narrower
@@ -17,7 +16,8 @@ STEP = 1.01
 AT_ONCE = 64  # [-] of these frequencies tried together, to limit the work
 # [-] width in contact frequencies of each piece of the integral over the modes left out, fact: that of one lobe
 PIECE = 2.0
-NODES = 12  # [-] Gauss points of each piece: integrate cos**2 over a lobe to 1e-18
+# Gauss nodes of each piece and their weights: integrate cos**2 over a lobe to 1e-18
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 # [-] log of the highest contact frequency tried [rad/s]: its fourth power is still finite; no threshold above
 HARDEST = np.log(1e70)
 SETTLED = 40.0  # [-] above this many contact frequencies, cos**2 is replaced by its mean: changes the sum by 1e-7
@@ -63,8 +63,8 @@ def _energy(omega: np.ndarray, squared: np.ndarray, density: float, exponent: fl
     settled = np.maximum(SETTLED, last)
     edges = np.minimum(last[:, None] + PIECE * np.arange(SETTLED / PIECE + 1.0), settled[:, None])
     width = np.diff(edges)[..., None]
-    x = edges[:, :-1, None] + width * gauss(NODES)[0][:-1]  # (n, n_pieces, n_nodes)
-    tail = np.sum(width * shares(NODES) * half_sine_spectrum(x, 1.0) ** 2 * x**-exponent, axis=(1, 2))
+    x = edges[:, :-1, None] + width * (0.5 * (NODES + 1.0))  # (n, n_pieces, n_nodes)
+    tail = np.sum(width * 0.5 * WEIGHTS * half_sine_spectrum(x, 1.0) ** 2 * x**-exponent, axis=(1, 2))
     tail += 0.5 * settled ** (-3.0 - exponent) / (3.0 + exponent)
     return total + density * omega_c ** (1.0 - exponent) * tail
 

@@ -17,7 +17,7 @@ from ..fe.section import Material
 from ..impact.assumption import Assumption
 from ..impact.compiled import layout
 from ..impact.contact import YIELDS, Contact, loss_number
-from ..impact.response import History
+from ..impact.history import History
 from ..modes.modal import SampledShapes
 from .restrike import Struck, softer
 from .thinness import wavenumber

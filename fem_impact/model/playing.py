@@ -15,8 +15,9 @@ from ..impact import collision, promise
 from ..impact.collision import TOLERANCE, Touch
 from ..impact.compiled import record
 from ..impact.contact import Contact
+from ..impact.history import Impact
 from ..impact.quantities import words
-from ..impact.response import Impact, Response, Totals
+from ..impact.response import Response, Totals
 from ..impact.state import State
 from ..impact.striker import Striker
 from ..modes.modal import Modes

@@ -9,10 +9,12 @@ import numpy as np
 
 from .._base.check import SimulationError
 from .._base.rounding import SAME
-from ..impact import accuracy, collision
+from ..impact import accuracy
 from ..impact.compiled import layout
+from ..impact.engine import again
+from ..impact.history import History
 from ..impact.quantities import BAND_POINTS, apart
-from ..impact.response import History, Response
+from ..impact.response import Response
 from ..modes.modal import Modes
 from .bending import Bending, Known, bending, known
 
@@ -79,7 +81,7 @@ class Struck:
     @cached_property
     def before(self) -> Response:
         """The blow to compare with: as found, in the steps of a first run."""
-        return replace(self.hit, history=collision.again(self.hit.history), audit=None)
+        return replace(self.hit, history=again(self.hit.history), audit=None)
 
     def changes(self, **changed: Any) -> dict[str, float | None]:
         """Change of each quantity: absolute for the restitution, relative for the others, None if that blow fails.
@@ -97,8 +99,8 @@ class Struck:
         if self.foreseen or (not start and all(same)):
             return dict.fromkeys(self.quantities, 0.0)
         try:
-            before = replace(self.before, history=collision.again(h, **start)) if start else self.before
-            after = replace(self.before, history=collision.again(h, **end))
+            before = replace(self.before, history=again(h, **start)) if start else self.before
+            after = replace(self.before, history=again(h, **end))
         except SimulationError:
             return dict.fromkeys(self.quantities)
         return {name: _change(name, band, before, after) for name, band in self.hit.quantities.items()}

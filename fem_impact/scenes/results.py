@@ -15,7 +15,8 @@ from ..fe.section import Material
 from ..impact.assumption import Assumption
 from ..impact.compiled import layout
 from ..impact.contact import Contact
-from ..impact.response import Ends, Error, History, Response
+from ..impact.history import History
+from ..impact.response import Ends, Error, Response
 from ..impact.stretched import Stretched
 from ..impact.striker import Hand, Striker
 from ..modes import unstated

@@ -17,7 +17,7 @@ from ..impact.compiled import layout, record
 from ..impact.compiled.bundles import Limits, Scene
 from ..impact.compiled.energy import run_energy
 from ..impact.contact import Contact
-from ..impact.response import History
+from ..impact.history import History
 from ..impact.striker import Striker
 from ..modes.modal import Modes
 from . import rig as rigs

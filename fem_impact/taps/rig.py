@@ -7,7 +7,8 @@ import numpy as np
 
 from .._base import check
 from ..impact.compiled import propagation
-from ..impact.response import History, Response
+from ..impact.history import History
+from ..impact.response import Response
 from . import arguments
 from .records import RATES, Taps
 from .triggers import LONGEST

@@ -16,11 +16,11 @@ from test_kernels import drift, plate, run
 from warming import locked
 
 import fem_impact as fi
-from fem_impact.impact import collision
+from fem_impact.impact import engine
 from fem_impact.impact.collision import Touch, collide
 from fem_impact.impact.compiled import collocation, propagation, record
 from fem_impact.impact.compiled.bundles import Limits, Scene
-from fem_impact.impact.sensitivity import gauss
+from fem_impact.impact.engine import gauss
 
 EPS = np.finfo(float).eps
 SCHEMES = ["A", "A4"]
@@ -281,21 +281,21 @@ def test_lossy_chatter_is_passed_in_ever_longer_rests():
 @pytest.fixture
 def runs(monkeypatch):
     """Steps of every run that `collide` makes, in order."""
-    taken, whole = [], collision._run
+    taken, whole = [], engine.follow
 
     def counted(*arguments):
         history = whole(*arguments)
         taken.append(len(history.steps))
         return history
 
-    monkeypatch.setattr(collision, "_run", counted)
+    monkeypatch.setattr(engine, "follow", counted)
     return taken
 
 
 @pytest.mark.parametrize("n_modes", [3, 60])
 def test_a_run_that_cannot_end_gives_up_by_its_work(monkeypatch, runs, n_modes):
     """Two clamped bodies set swinging never part: steps times modes are bounded, whatever the clock says."""
-    monkeypatch.setattr(collision, "MAX_WORK", 200_000)
+    monkeypatch.setattr(engine, "MAX_WORK", 200_000)
     bodies = [measured(3, 1), measured(n_modes, 2)]
     touches = [Touch(fi.Contact.linear(1e5), 0, 1, [0.0], [0.0])]
     states = [(np.zeros(3), np.full(3, 0.1)), (np.zeros(n_modes), np.zeros(n_modes))]
@@ -307,7 +307,7 @@ def test_a_run_that_cannot_end_gives_up_by_its_work(monkeypatch, runs, n_modes):
 
 def test_no_run_is_begun_that_cannot_come_to_its_end(monkeypatch, runs):
     """Scheme A would need millions of steps for ten digits: it says so after the last run that fits the bound."""
-    monkeypatch.setattr(collision, "MAX_STEPS", 4000)
+    monkeypatch.setattr(engine, "MAX_STEPS", 4000)
     plate_of_80 = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=80)
     with pytest.raises(fi.SimulationError, match=r"step error stays at .* with \d+ steps; leave out scheme"):
         fi.strike(

@@ -13,7 +13,7 @@ from fem_impact.impact.compiled.bundles import Limits, Scene
 from fem_impact.impact.compiled.collocation import run_collocation
 from fem_impact.impact.compiled.energy import run_energy
 from fem_impact.impact.compiled.stretched import Stretch
-from fem_impact.impact.sensitivity import gauss
+from fem_impact.impact.engine import gauss
 
 LINES, PARAMETERS = 100, 8  # of a kernel: what fits on two pages, and what a reader keeps in mind
 

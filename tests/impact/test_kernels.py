@@ -20,7 +20,7 @@ from warming import locked
 from fem_impact.impact.compiled import arrays, build, collocation, energy, propagation, record, schemes
 from fem_impact.impact.compiled import law as laws
 from fem_impact.impact.compiled.bundles import Limits, Scene
-from fem_impact.impact.sensitivity import gauss
+from fem_impact.impact.engine import gauss
 
 EPS = np.finfo(float).eps
 
@@ -679,11 +679,11 @@ PLAIN = """
 import json
 import numpy as np
 from warming import locked
-from fem_impact.impact.sensitivity import gauss
 from fem_impact.impact.compiled.bundles import Limits, Scene
 from fem_impact.impact.compiled.collocation import run_collocation
 from fem_impact.impact.compiled.energy import run_energy
 from fem_impact.impact.compiled.propagation import replay
+from fem_impact.impact.engine import gauss
 
 def after(run, n_coefficients):
     times = np.linspace(0.0, 2e-3, 9)

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import fem_impact as fi
-from fem_impact.impact import collision
+from fem_impact.impact import engine
 from fem_impact.impact.compiled import record
 from fem_impact.impact.compiled.bundles import Limits, Scene
 from fem_impact.impact.compiled.energy import run_energy
@@ -237,7 +237,7 @@ def test_an_early_end_and_a_first_number_of_impacts():
 
 def test_a_blow_again_is_the_same_blow():
     hit = blow(plate(8), fi.Contact.linear(1e5), 2.0, tolerance=1e-4)
-    again = collision.again(hit.history)
+    again = engine.again(hit.history)
     assert again.end_p[0] == pytest.approx(hit.history.end_p[0], rel=1e-3)
     assert again.stretched.forms is hit.history.stretched.forms
 

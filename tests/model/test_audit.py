@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fem_impact as fi
-from fem_impact.impact import assumption, collision
+from fem_impact.impact import assumption, engine
 from fem_impact.model import audit, bending, restrike
 from fem_impact.model.target import Target
 
@@ -235,7 +235,7 @@ def test_contacts_that_lose_are_examined_and_struck_again_as_they_are(law, schem
     for name in ("thin target", "small deflections", "still air", "stated damping", "quasi-static contact"):
         assert found[name].known and found[name].worst < 0.05, found[name].sentence
     assert found["thin target"].worst > 0.0
-    again = collision.again(hit.history)  # the blow to compare with is the one found
+    again = engine.again(hit.history)  # the blow to compare with is the one found
     before = restrike.Struck(replace(hit, audit=None), None, None).before
     assert before.peak_force == pytest.approx(hit.peak_force, rel=2e-2)  # a coarse first run
     assert len(again.contacts) == len(hit.history.contacts)

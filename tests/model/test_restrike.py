@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 import fem_impact as fi
-from fem_impact.impact import collision
-from fem_impact.model import bending
+from fem_impact.impact import engine
+from fem_impact.model import bending, restrike
 from fem_impact.model.restrike import Struck, softer
 
 PLATE = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=60)
@@ -57,9 +57,9 @@ def test_sound_is_the_shift_of_what_rings():
 
 def test_a_limit_of_the_blow_stays():
     hit = fi.strike(PLATE, HAMMER, LAW, duration=5e-4, **BLOW)
-    assert collision.again(hit.history).end_time == pytest.approx(hit.history.end_time, rel=1e-12)
+    assert engine.again(hit.history).end_time == pytest.approx(hit.history.end_time, rel=1e-12)
     first = fi.strike(PLATE, fi.Striker.rigid(0.2), LAW, max_impacts=1, **BLOW)
-    assert len(collision.again(first.history).contacts) == 1
+    assert len(engine.again(first.history).contacts) == 1
 
 
 def test_frequency_of_the_contact_is_that_of_its_longest_impact():
@@ -73,5 +73,5 @@ def test_a_blow_that_cannot_be_struck_again_is_not_known(monkeypatch):
     def fails(history, **changed):
         raise fi.SimulationError("no final separation was reached")
 
-    monkeypatch.setattr(collision, "again", fails)
+    monkeypatch.setattr(restrike, "again", fails)
     assert set(case.changes(omega=0.9 * case.hit.history.omega).values()) == {None}

@@ -22,6 +22,8 @@ GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before; 
 SLOW_LOOKS = 300  # [-] looks of a flight that lead hardly on before a stepping scheme takes over
 AWAY = 1e14  # [-] over rounding of the approach: bodies that come no nearer than so much of it, 2 %, touch by no error
 LASTING = 200  # [-] looks after which a proof that nothing touches again does without that
+# [rad] of the fastest swing per look of bodies that only nearly touch: cubics then miss a turn by 1e-5 of the swing
+TURNS = 0.25
 ONSET, NEVER, LATER, SLOW, UNPROVED = range(5)  # how a flight ends, see `find_onset`
 LOOK_LIMIT = 20_000_000  # [-] looks ahead times modes in one free flight: a time limit of some 0.1 s
 
@@ -90,6 +92,13 @@ def made_flights(n_modes: int, base: float, shortest: float) -> Flights:
     return Flights(np.empty((GLIDES + 1, N_LANE, n_modes)), np.zeros(GLIDES + 1), base, shortest)
 
 
+@inner()
+def turned_back(d0, v0, d1, v1, h, out_miss):
+    """Raise ``out_miss`` (1,) to where an approach turned back in a time h, by the cubic through both ends."""
+    if v1 < 0.0 < v0:
+        out_miss[0] = max(out_miss[0], -lowest(-d0, -v0, -d1, -v1, h))
+
+
 @inner(allocates=True)
 def find_onset(bodies, offset, flights, limits, limit, out_miss):
     """Advance a state without contact in place to the next onset, never passing one (conservative advancement).
@@ -107,7 +116,7 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
     slow = 0
     pushed = any_of(bias)
     bounds = np.empty((m, 6))
-    before = np.empty((m, 2))
+    before = np.zeros((m, 2))
     wait = 0.0
     away = AWAY * limits.depth
     old_q = q.copy()
@@ -131,8 +140,8 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
             if parted and (look == 0 or before[i, 1] <= 0.0):
                 continue
             d, v = approach(shape, offset, i, q, p)
-            if look > 0 and v < 0.0 < before[i, 1]:
-                out_miss[0] = max(out_miss[0], -lowest(-before[i, 0], -before[i, 1], -d, -v, last))
+            if look > 0:
+                turned_back(before[i, 0], before[i, 1], d, v, last, out_miss)
             before[i, 0] = d
             before[i, 1] = v
             if parted:
@@ -151,7 +160,7 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
             if r2 <= 0.0 and r0 + reach <= 0.0:
                 bound = max(bound, quadratic_wait(r0 + reach, max(0.0, r1), 0.0))
                 if hardest > 0.0:  # it cannot touch, but turns back near enough to be told
-                    bound = min(bound, bounds[i, FASTEST] / hardest)
+                    bound = min(bound, TURNS * bounds[i, FASTEST] / hardest)
             if bound < wait:
                 wait = bound
                 first = i
@@ -182,6 +191,9 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
             flights.known[slot] = 1.0
         glide(flights.lanes[slot], wait, bias, q, p)
         if over:
+            for i in range(m):
+                d, v = approach(shape, offset, i, q, p)
+                turned_back(before[i, 0], before[i, 1], d, v, wait, out_miss)
             return limit, -1, LATER
         elapsed += wait
         for i in range(m):

@@ -17,6 +17,7 @@ from .rounding import NEAR
 
 FEW, CLOSER = 3, 16  # [-] parts into which the search for a largest force cuts all steps, and what is left, thrice
 HIGH = 0.9  # [-] of the largest mean force of a step: only steps with so much are searched for the peak
+RELEASED = 0.01  # [-] of the force at the start of the last step: felt that carries less at its end has let go
 HIGH_ENOUGH = 0.95  # [-] of the largest force: only steps with so much are looked at more closely
 # [-] error of the peak force over the misfit in `force_missed`, for a power law and for one with loss, layers or memory
 MISFIT = 1.5, 5.0
@@ -329,10 +330,17 @@ def stays(steps, row, first, slack):
 
 
 @inner()
-def still_pressed(now, law, i, d):
-    """Whether contact i presses at the end of a run, where the approach from its dent is d."""
-    if law.shape[1] == WIDTH and law[i, KIND] == FELT and now[REMEMBERED, i] < 0.0:
-        return False
+def still_pressed(steps, now, law, n_coefficients, i, d):
+    """Whether contact i presses at the end of a run, where the approach from its dent is d.
+
+    Felt lets go while the body is still in its dent: where its force ends.
+    """
+    if law.shape[1] == WIDTH and law[i, KIND] == FELT:
+        first = HEAD + (PUSH + n_coefficients) * i + PUSH
+        end = 0.0
+        for k in range(n_coefficients):
+            end += steps[-1, first + k]
+        return now[REMEMBERED, i] >= 0.0 and end > RELEASED * steps[-1, first]
     return d > NEAR * abs(now[APPROACH, i])
 
 
@@ -403,7 +411,8 @@ def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
                 peak = max(peak, peak_in(steps, now, law, n_coefficients, near, i, looks))
             left = -rate_within(steps, now, law, n_coefficients, row - 1, i, part)
             low = dent(law, i, memory_of(steps, law, n_coefficients, row - 1, i))
-            if row == n_steps and part >= 1.0 and still_pressed(now, law, i, now[APPROACH, i] - low):
+            pressed = still_pressed(steps, now, law, n_coefficients, i, now[APPROACH, i] - low)
+            if row == n_steps and part >= 1.0 and pressed:
                 left = np.nan
             result[count, 0] = start
             result[count, 1] = end

@@ -1,0 +1,146 @@
+"""One run of a system through the kernels."""
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from .._base.check import SimulationError
+from .._base.rounding import EPSILON, ROUNDING
+from .compiled import build, layout, record
+from .compiled.bundles import Limits
+from .compiled.collocation import run_collocation
+from .compiled.energy import run_energy
+from .compiled.stretched import Stretch
+from .contact import acting_stiffness, wall_time
+from .history import History, System
+
+TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
+MAX_STEPS = 500_000  # [-] of one run: a time limit of about one second
+# [-] modes, or entries of the forms of stretching, times steps of one run: a time limit of some seconds
+MAX_WORK = 1_000_000_000
+# [-] modes times steps of one run in plain Python: the same time limit, as it is 3 000 times slower than the kernels
+PLAIN_WORK = 300_000
+SOONER = 0.2  # [-] of a run that was given up, what is advised: the last run of a blow halves the steps twice
+FIRST_STEPS = 24.0  # [-] steps per contact with which A4 meets TOLERANCE in most blows; cheapest first run of 12 to 32
+# [-] times per contact at which a flight is searched for near misses or two motions are compared, and their most
+LOOKS = 16.0, 20_000
+NODES = 5  # [-] of collocation; more gain nothing, because the force is not smooth at onset and release
+
+
+@cache
+def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss nodes on [0, 1] with 1 appended, (count + 1,), and Lagrange polynomials in powers, (count, count)."""
+    nodes = 0.5 * (np.polynomial.legendre.leggauss(count)[0] + 1.0)
+    powers = np.linalg.inv(np.vander(nodes, increasing=True)).T
+    return np.append(nodes, 1.0), np.ascontiguousarray(powers)
+
+
+def steps_per_contact(tolerance: float) -> float:
+    """Steps per contact with which scheme A4 meets a tolerance in most blows."""
+    return float(FIRST_STEPS * (TOLERANCE / tolerance) ** 0.25)
+
+
+def follow(
+    system: System, scheme: str, size: float, pace: tuple[float, float], horizon: float, n_max: int,
+    chosen_by: str = "tolerance",
+) -> History:  # fmt: skip
+    """One run; ``size`` is the step in contact [s], for collocation the allowed misfit [-]; and what it comes from."""
+    most = most_steps(system)
+    limits = Limits(float(EPSILON * pace[0] * pace[1]), float(ROUNDING * pace[1]), float(horizon), n_max, most)
+    stretched, stretch = system.stretched, None
+    if stretched is not None:
+        stretched = replace(stretched, base=float(size), ramp=scheme == "A4")
+        stretch = Stretch(stretched.forms, stretched.first)
+    if scheme == "collocation":
+        nodes, powers = gauss(NODES)
+        result = run_collocation(system.scene, nodes, powers, pace[0] / 2.0, float(size) * pace[1], limits)
+    else:
+        result = run_energy(system.scene, stretch, int(scheme == "A4"), float(size), limits)
+    history = History(*system.scene, *result, stretched=stretched)
+    time, status = result[5], result[6]
+    if status == record.EXHAUSTED:
+        raise SimulationError(
+            f"no final separation was reached in {most} steps, up to {time:.4g} s; raise {chosen_by}, or give "
+            f"{_sooner(history)}"
+        )
+    if status == record.FAILED:
+        if scheme == "collocation":
+            raise SimulationError(f"scheme collocation found no valid next step at {time:.4g} s; use A4")
+        raise SimulationError(f"scheme {scheme} found no valid next step at {time:.4g} s; check the units of the scene")
+    return history
+
+
+def _sooner(history: History) -> str:
+    """A duration, and a number of impacts if some ended, that leave steps for runs of half the step."""
+    time = SOONER * history.end_time
+    ended = int(SOONER * np.count_nonzero(history.contacts[:, 1] < history.end_time))
+    return f"a duration of at most {float(f'{time:.1e}'):g} s" + (
+        f" or max_impacts of at most {ended}" if ended else ""
+    )
+
+
+def again(history: History, step: float | None = None, **changed: Any) -> History:
+    """The same blow with other modes or contacts, by A4 in steps [s] of its own, to compare with another such run.
+
+    ``changed`` are fields of the history; without any, it is the blow to compare with. Steps are by default those of a
+    first run.
+    """
+    before = System(*history.scene, stretched=history.stretched)
+    system = replace(before, **changed)
+    pace = pace_of(before)
+    horizon = history.end_time if history.status == record.HORIZON else np.inf
+    most = int(np.isfinite(history.contacts[:, 6]).sum()) if history.status == record.IMPACTS else 0
+    return follow(system, "A4", pace[0] / FIRST_STEPS if step is None else step, pace, horizon, most)
+
+
+def pace_of(system: System, held: np.ndarray | bool = False) -> tuple[float, float]:
+    """Shortest expected duration [s] of an undisturbed contact, and its approach speed [m/s].
+
+    ``held`` (n_modes,) says which modes count as masses, though a hand makes them swing.
+    """
+    rate = system.omega * np.maximum(1.0, 2.0 * system.zeta)  # an overdamped mode acts as a dashpot, not as a mass
+    rate = np.where(held, 0.0, rate)
+    order = np.argsort(rate, kind="stable")
+    omega = rate[order]
+    last = np.concatenate([omega[1:] > omega[:-1], [True]])  # the last mode of each distinct frequency
+    beyond = np.concatenate([omega[last][1:], [np.inf]])
+    shortest, fastest = np.inf, 0.0
+    for i, law in enumerate(system.law):
+        k, exponent, compliance = law[layout.STIFFNESS], law[layout.EXPONENT], law[layout.COMPLIANCE]
+        mobile = np.cumsum(system.shape[i, order] ** 2)[last]  # [1/kg] sum over the modes up to each
+        above, mobile = beyond[mobile > 0.0], mobile[mobile > 0.0]
+        if not mobile.size:
+            continue
+        approach = system.offset[i] + float(system.shape[i] @ system.start_q)
+        pull = max(0.0, float(system.shape[i] @ system.bias))  # [m/s**2]
+        speed = float(np.abs(system.shape[i]) @ np.abs(system.start_p))
+        speed = max(speed, np.sqrt(2.0 * pull * max(0.0, -approach)))
+        speed = max(speed, np.sqrt(pull * (pull / (k * mobile[-1])) ** (1.0 / exponent)))
+        if approach > 0.0:
+            speed = max(speed, approach * np.sqrt(k * approach ** (exponent - 1.0) * mobile[-1]))
+        if speed == 0.0:
+            continue
+        free = wall_time(acting_stiffness(law, mobile, speed), exponent, mobile, speed, compliance)
+        shortest = min(shortest, float(free[np.argmax(np.pi / free < above)]))
+        fastest = max(fastest, float(speed))
+    if not np.isfinite(shortest):
+        k, exponent = system.law[0, :2]
+        return float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0
+    return shortest, fastest
+
+
+def most_steps(system: System) -> int:
+    """Steps after which a run gives up."""
+    if build.limited():
+        return max(100, PLAIN_WORK // len(system.omega))
+    if system.stretched is not None:
+        return min(MAX_STEPS, max(1000, MAX_WORK // system.stretched.forms.size))
+    return min(MAX_STEPS, max(1000, MAX_WORK // len(system.omega)))
+
+
+def totals(history: History) -> tuple[float, float, float]:
+    """Impulse [N s], contact time [s] and peak force [N] of a run with impacts."""
+    rows = history.contacts.tolist()
+    return sum(row[3] for row in rows), sum(row[1] - row[0] for row in rows), max(row[2] for row in rows)

@@ -1,0 +1,303 @@
+"""The system that a blow follows, and what one run of it leaves behind."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from .._base.rounding import ROUNDING, SAME
+from . import force_spectrum
+from .compiled import law, layout, propagation, record
+from .compiled.bundles import Scene
+from .contact import sunk
+from .free_motion import swing
+from .stretched import Stretched
+
+# [-] of the largest force of a blow: a push that stays below is rounding; a steep law gives 1e-24 to a touch of 1e-8
+# of the deepest approach
+FAINT = 1e-30
+# [-] of the largest approach: bodies nearer than this touch, an atom's width in most blows; errors of the first step
+# part bodies that are pressed from rest by less
+TOUCH = 1e-6
+PEAK_LOOKS = 16  # [-] samples per step in the search for the peak force; misses (pi/11/16)**2/8 before the parabola
+CLEAR = 0.05  # [-] margins are told up to this: no error that meets a tolerance moves a blow across more
+
+
+@dataclass(frozen=True)
+class Impact:
+    """One impact: the time in which a contact carries force without a break."""
+
+    start: float  # [s]
+    end: float  # [s]
+    peak_force: float  # [N]
+    impulse: float  # [N s]
+    contact: int = 0  # index of the contact
+    approach_speed: float = 0.0  # [m/s] with which its points met; 0 if they touched already
+    separation_speed: float | None = None  # [m/s] with which they parted; None if they still press each other
+
+    @property
+    def duration(self) -> float:
+        """Time in contact [s]."""
+        return self.end - self.start
+
+    @property
+    def restitution(self) -> float | None:
+        """Speed with which the points of the contact parted over that with which they met [-].
+
+        Both are relative speeds, so what the struck surface does counts. None while the bodies still press each other,
+        and where they touched already when the force began.
+        """
+        if self.separation_speed is None or not self.approach_speed:
+            return None
+        return self.separation_speed / self.approach_speed
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class System:
+    """The modes of all bodies in one list, and their contacts: what a run follows."""
+
+    omega: np.ndarray  # (n_modes,) [rad/s] modes of all bodies
+    zeta: np.ndarray  # (n_modes,) [-]
+    shape: np.ndarray  # (n_contacts, n_modes) [kg**-0.5] signed: the approach is offset + shape @ q
+    offset: np.ndarray  # (n_contacts,) [m]
+    bias: np.ndarray  # (n_modes,) [N kg**-0.5] constant modal forces
+    law: np.ndarray  # (n_contacts, 9 or 4) stiffness, exponent, loss, series compliance, .. as `law.spring_of` reads it
+    start_q: np.ndarray  # (n_modes,) [m kg**0.5]
+    start_p: np.ndarray  # (n_modes,) [m kg**0.5/s]
+    stretched: Stretched | None = field(default=None, kw_only=True)  # if one of the bodies stretches
+
+    def __repr__(self) -> str:
+        return check.brief(self)
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)  # always: numba would compile the kernels again for writable arrays
+
+    @property
+    def n_contacts(self) -> int:
+        return len(self.offset)
+
+    @property
+    def scene(self) -> Scene:
+        """The input of a kernel."""
+        bodies = self.omega, self.zeta, self.shape, self.offset, self.bias
+        return Scene(*bodies, self.law, self.start_q, self.start_p)
+
+
+@dataclass(frozen=True, eq=False)
+class History(System):
+    """A run: the system, its start and every step."""
+
+    steps: np.ndarray  # (n_steps, 3 + (4 + n_coefficients) n_contacts), see `energy.run_energy`
+    end_q: np.ndarray  # (n_modes,)
+    end_p: np.ndarray  # (n_modes,)
+    now: np.ndarray  # (6, n_contacts) at the end; row 0 approach [m], row 4 rate [m/s], row 5 memory
+    work: np.ndarray  # (n_contacts,) [J] integral of force times approach rate
+    end_time: float  # [s]
+    status: int  # why the run ended, see `record`
+    n_fallback: int  # [-] steps in which scheme A4 fell back to A
+    n_blind: int  # [-] steps that passed over contact events without locating them
+    miss: float | None = None  # [m] highest approach at which the bodies turned back in flight, if they did
+    reached: dict[str, Any] = field(default_factory=dict, init=False, repr=False)  # where its motion goes on
+
+    @property
+    def n_coefficients(self) -> int:
+        """Number of coefficients of each step's force polynomial, per contact."""
+        return (self.steps.shape[1] - layout.HEAD) // self.n_contacts - layout.PUSH - 1
+
+    def _column(self, first: int) -> np.ndarray:
+        width = layout.PUSH + self.n_coefficients
+        return self.steps[:, layout.HEAD + first : layout.HEAD + width * self.n_contacts : width]
+
+    @cached_property
+    def impulses(self) -> np.ndarray:
+        """Impulse of every step and contact [N s], (n_steps, n_contacts)."""
+        mean = sum(self._column(layout.PUSH + k) / (k + 1.0) for k in range(self.n_coefficients))
+        return self.steps[:, 1:2] * mean
+
+    @cached_property
+    def pressed(self) -> np.ndarray:
+        """True where a contact carries force in a step, (n_steps, n_contacts)."""
+        return self._column(layout.CLOSED) > 0.0
+
+    def force(self, steps: np.ndarray, contact: int, part: np.ndarray) -> np.ndarray:
+        """Contact force [N] at fractions of steps, (n_steps, n_parts)."""
+        rows, parts = np.broadcast_arrays(steps[:, None], part)
+        return self.force_of(rows.ravel(), contact, parts.ravel())[0].reshape(rows.shape)
+
+    def force_of(self, steps: np.ndarray, contact: int, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Contact force [N] and its rate [N/s] at a fraction of each of some steps, (n,) each."""
+        found = np.empty((2, len(steps)))
+        rows, parts = np.array(steps, np.int64), np.array(part, float)
+        record.forces(self.steps, self.now, self.law, self.n_coefficients, rows, contact, parts, found)
+        return found[0], found[1]
+
+    def force_at(self, times: np.ndarray, contact: int) -> tuple[np.ndarray, np.ndarray]:
+        """Contact force [N] and its rate [N/s] at any times, (n_times,) each; zero after the end."""
+        if not len(self.steps):
+            return np.zeros(len(times)), np.zeros(len(times))
+        rows = np.clip(np.searchsorted(self.steps[:, layout.START], times, side="right") - 1, 0, None)
+        part = np.clip((times - self.steps[rows, layout.START]) / self.steps[rows, layout.LENGTH], 0.0, 1.0)
+        force, rate = self.force_of(rows, contact, part)
+        acts = self.pressed[rows, contact] & (force > 0.0) & (times <= self.end_time)
+        return np.where(acts, force, 0.0), np.where(acts, rate, 0.0)
+
+    @cached_property
+    def end_law(self) -> np.ndarray:
+        """The law with what the contacts remember at the end."""
+        if self.law.shape[1] < layout.WIDTH:
+            return self.law
+        found = np.column_stack([self.law[:, : layout.MEMORY], self.now[layout.REMEMBERED]])
+        found.setflags(write=False)  # or numba would compile the kernels again for writable arrays
+        return found
+
+    def states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Modal displacements and velocities (n_times, n_modes) at ascending times; free motion after the end."""
+        if self.stretched is not None:
+            return self.stretched.states(self, times)
+        q, p = np.empty((len(times), len(self.omega))), np.empty((len(times), len(self.omega)))
+        propagation.replay(self.scene, self.steps, self.n_coefficients, times, q, p)
+        return q, p
+
+    def motion(self, times: np.ndarray) -> np.ndarray:
+        """Approach [m] of the modes at equally spaced times, (n_times, n_contacts), without the dip of those left out.
+
+        Needs the end state, which only the modes of the run itself have.
+        """
+        n = int(np.searchsorted(times, (1.0 - SAME) * self.end_time))  # nearer to it, as at the end
+        found = self.offset + np.vstack(
+            [self.states(times[:n])[0] @ self.shape.T, np.zeros((len(times) - n, self.n_contacts))]
+        )
+        after = times[n:] - self.end_time
+        if not len(after):
+            return found
+        ended = replace(self, start_q=self.end_q, start_p=self.end_p, steps=self.steps[:0])
+        if self.stretched is not None:
+            found[n:] += ended.states(after)[0] @ self.shape.T
+            return found
+        rigid, t = self.omega == 0.0, after[:, None]
+        drift = self.end_q[rigid] + t * (self.end_p[rigid] + 0.5 * t * self.bias[rigid])
+        found[n:] += drift @ self.shape[:, rigid].T
+        q, p = (state[0, ~rigid] for state in ended.states(after[:1]))
+        bodies = self.omega[~rigid], self.zeta[~rigid], self.bias[~rigid]
+        for i, row in enumerate(self.shape[:, ~rigid]):
+            found[n:, i] += swing(*bodies, (q, p), after, row[None]) + row @ (bodies[2] / bodies[0] ** 2)
+        return found
+
+    def surfaces(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Approach [m] at which each contact would touch, and whether it is open, (n_times, n_contacts) each."""
+        rows = np.searchsorted(self.steps[:, layout.START], times, side="right") - 1
+        ended = times >= self.end_time
+        closed = self.pressed[rows] & ~ended[:, None]
+        if self.law.shape[1] < layout.WIDTH:
+            return np.zeros(closed.shape), ~closed
+        since = np.where(ended, times - self.end_time, times - self.steps[rows, layout.START])
+        memory = np.where(ended[:, None], self.now[layout.REMEMBERED], self.steps[rows, -self.n_contacts :])
+        closed &= memory >= 0.0  # felt from which the body has parted
+        felt = self.law[:, layout.KIND] == law.FELT
+        rate = np.where(
+            felt, (1.0 - self.law[:, layout.SHARE]) / np.where(felt, self.law[:, layout.RELAXATION], 1.0), 0.0
+        )
+        return sunk(self.law, memory * np.where(closed, 1.0, np.exp(-rate * since[:, None]))), ~closed
+
+    @cached_property
+    def contacts(self) -> np.ndarray:
+        """All impacts, (n_impacts, 7), sorted by contact.
+
+        Columns are start, end, peak force, impulse, contact index, and with what speed the bodies meet and part.
+        """
+        size = np.abs(self.shape)
+        rate = np.abs(self._column(1)).max(initial=0.0)
+        way = (size @ (np.abs(self.start_q) + self.end_time * np.abs(self.start_p))).max()
+        slack = float(max(ROUNDING * way, TOUCH * self._column(0).max(initial=0.0)))
+        found = record.find_impacts(
+            self.steps, self.now, self.law, self.n_coefficients, PEAK_LOOKS, ROUNDING * rate, slack
+        )
+        found = found[found[:, 2] > FAINT * found[:, 2].max(initial=0.0)]
+        if (found[:, 7] < np.inf).any():
+            found[:, 0] = self._force_begins(found, size)
+        return found[:, :7]
+
+    def _force_begins(self, pushes: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """When the force of each push begins [s], (n,), for those of `record.find_impacts`.
+
+        Bodies that touch at rest press each other as soon as a force acts on one of them: a constant one, or that of a
+        push at another contact. ``size`` (n_contacts, n_modes) is that of the shapes.
+        """
+        which, seen, end, since = pushes[:, 4].astype(int), pushes[:, 0], pushes[:, 1], pushes[:, 7]
+        driven = np.abs(self.shape @ self.bias) > ROUNDING * (size @ np.abs(self.bias))
+        start = np.where(since == np.inf, seen, np.where(driven[which], since, np.inf))
+        acts = (size @ size.T > 0.0)[np.ix_(which, which)] & (end >= seen[:, None])
+        for _ in start:  # a force reaches one more contact at a time
+            start = np.minimum(start, np.maximum(np.where(acts, start, np.inf).min(axis=1), since))
+        return np.where(start < end, start, seen)
+
+    @cached_property
+    def impacts(self) -> tuple[Impact, ...]:
+        """All impacts in order of their start."""
+        rows = self.contacts.tolist()
+        found = [
+            Impact(start, end, peak, impulse, int(i), met, None if np.isnan(left) else left)
+            for start, end, peak, impulse, i, met, left in rows
+        ]
+        return tuple(sorted(found, key=lambda impact: (impact.start, impact.contact)))
+
+    @cached_property
+    def nearest_turn(self) -> float:
+        """How near to zero an approach turns back, over the farthest it ever turns [-]; infinity where none does."""
+        miss = -np.inf if self.miss is None else self.miss
+        return float(record.nearest_turn(self.steps, self.now, self.law, self.n_coefficients, miss))
+
+    @property
+    def margin(self) -> float:
+        """How near the run is to one impact more or fewer; see `Response.margin`."""
+        return CLEAR if self.bias.any() else min(CLEAR, self.nearest_turn)
+
+    @cached_property
+    def force_missed(self) -> float:
+        """Error [-] of the peak force if steps are too long for its ripples, on which two runs may agree by chance."""
+        if self.n_coefficients > 2 or not len(self.contacts):
+            return 0.0
+        peak = float(self.contacts[:, 2].max())
+        return float(record.force_missed(self.steps, self.now, self.law, self.n_coefficients, peak))
+
+    def samples(self, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+        """Times [s], (n_times,), dense enough for a tolerance, and the forces [N] there, (n_times, n_contacts)."""
+        steps, contacts = self.steps, range(self.n_contacts)
+        if not len(steps):
+            return np.zeros(1), np.zeros((1, self.n_contacts))
+        busy = np.asarray(self.pressed.any(axis=1))
+        per_step = 4.0
+        if busy.any():
+            per_impact = busy.sum() / max(1, len({impact.start for impact in self.impacts}))
+            wanted = max((3.0 / max(tolerance, 1e-10)) ** 0.5, force_spectrum.LEAST_SAMPLES)
+            per_step = np.clip(np.ceil(wanted / per_impact), 4, 4096)
+        part = np.arange(int(per_step)) / per_step
+
+        def within(rows: np.ndarray, i: int, part: np.ndarray) -> np.ndarray:
+            return np.where(self.pressed[rows, i][:, None], self.force(rows, i, part[None]), 0.0).ravel()
+
+        times, forces = [], []
+        edges = np.flatnonzero(np.diff(np.concatenate([[-1], busy.astype(int)])))
+        for first, last in zip(edges, np.append(edges[1:], len(steps))):
+            rows = np.arange(first, last)
+            if busy[first]:
+                times.append((steps[rows, :1] + part * steps[rows, 1:2]).ravel())
+                forces.append(np.stack([within(rows, i, part) for i in contacts], axis=1))
+            else:
+                times.append(steps[rows, layout.START])
+                forces.append(np.zeros((len(rows), self.n_contacts)))
+        times.append(np.array([self.end_time]))
+        forces.append(np.array([[within(np.array([len(steps) - 1]), i, np.ones(1))[0] for i in contacts]]))
+        return np.concatenate(times), np.concatenate(forces)
+
+    def energy(self, q: np.ndarray, p: np.ndarray, modes: slice = slice(None)) -> float:
+        """Energy [J] of some modes at a state, in the field of the constant forces."""
+        linear = float(mode_energy(self.omega[modes], q[modes], p[modes]).sum() - self.bias[modes] @ q[modes])
+        return linear if self.stretched is None else linear + self.stretched.energy(q, modes)
+
+
+def mode_energy(omega: np.ndarray, q: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Kinetic and elastic energy [J] of each mode, (..., n_modes)."""
+    return 0.5 * (p**2 + (omega * q) ** 2)
