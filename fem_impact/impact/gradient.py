@@ -36,11 +36,11 @@ TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a change 
 NUDGE = 1e-5  # [-] relative change of a number: its square is far below any tolerance, rounding over it below 1e-9
 # [-] difference of the slopes on both sides, over the value or the largest slope: 1e-4 to 5e-4 where a blow is smooth
 KINK = 0.02
-# [-] steps of the blow over those of three runs, and changes of a number in them: what bends the slopes shows, too
-RUNS = (2.0, NUDGE), (1.0, 2.0 * NUDGE), (0.5, 4.0 * NUDGE)
-GAIN = 16.0  # [-] difference of the rougher two over that of the finer two, with which these hardly agree by chance
+# [-] steps of the blow over those of the runs, and changes of a number in them: the first give the slopes, the others,
+# which err some ten times less, the error
+RUNS = (2.0, 2.0 * NUDGE), (4.0, NUDGE)
+CAUTION = 3.0  # [-] error stated over the difference of both
 LEAST = 1e-8  # [-] of the largest slope per relative change: rounding over `NUDGE`
-SHARED = 0.02  # [-] of the largest error per relative change, what each slope errs at least: runs may agree on one
 UNSURE = 5.0  # [-] times the error of when the force is largest: its top is flat, and ripples move it
 # Gauss nodes of a step and their weights: a force that sets in like x**1.5 loses 1e-9 of its impulse
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -156,11 +156,10 @@ def differences(
     one_sided = np.array([number == 0.0 and name.endswith(ONE_SIDED) for name, number in zip(names, numbers)])
     runs = [replace(again, step=again.step / finer).slopes(sizes, one_sided, nudge) for finer, nudge in RUNS]
     found = []
-    for fine, rough, rougher in zip(*runs):
-        error = np.maximum(np.abs(fine - rough), np.abs(rough - rougher) / GAIN)
-        error = np.maximum(error, np.maximum(LEAST * np.abs(fine).max(axis=0), SHARED * error.max(axis=0)))
-        by = sizes.reshape(-1, *[1] * (fine.ndim - 1))
-        found.append((fine / by, error / by))
+    for slopes, finer in zip(*runs):
+        error = CAUTION * np.abs(slopes - finer) + LEAST * np.abs(slopes).max(axis=0)
+        by = sizes.reshape(-1, *[1] * (slopes.ndim - 1))
+        found.append((slopes / by, error / by))
     return found
 
 

@@ -791,7 +791,7 @@ def test_the_tolerance_advised_is_met_and_hardly_looser_than_what_was_reached():
 
 @pytest.mark.parametrize("given", ["duration", "max_impacts"])
 def test_the_end_advised_to_a_run_without_end_leaves_room_for_finer_steps(monkeypatch, given):
-    monkeypatch.setattr(collision, "MAX_STEPS", 4000)
+    monkeypatch.setattr("fem_impact.impact.engine.MAX_STEPS", 4000)
     bodies, touches = [measured(3, 1), measured(3, 2)], [Touch(fi.Contact.linear(1e5), 0, 1, [0.0], [0.0])]
     swing = {"states": [(np.zeros(3), np.full(3, 0.1)), (np.zeros(3), np.zeros(3))], "tolerance": 1e-6}
     with pytest.raises(fi.SimulationError, match="no final separation") as caught:
