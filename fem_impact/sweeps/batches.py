@@ -32,7 +32,6 @@ PER_PERIOD = 2.0  # [-] steps per period of the highest frequency in the centroi
 # [-] an error below this many times the accepted one cuts the step by sqrt(2) instead of 2: always 2 leaves 13 % of
 # stiff blows at 3e-5 undone instead of 8 %, always sqrt(2) a third of those with loss
 MILD = 8.0
-MENDED = 3.0  # [-] error of the peak force over the correction applied to it: the largest measured
 HEARD = 3.0  # [-] ringing left unresolved, over tolerance times force: only part of it becomes an error
 LENGTHS = (48, 192, 768, 3072)  # [-] kernel lengths in steps, tried in turn until the blow fits
 SLACK = 2.0  # [-] a touch or gap counts only above this many times tolerance times deepest approach
@@ -422,5 +421,5 @@ class _Engine:
         absolute = np.abs(coarse[FOUND_IMPULSE] - fine[FOUND_IMPULSE]) * self.own_rigid[cells]
         same = coarse[FOUND_IMPACTS] == fine[FOUND_IMPACTS]
         same &= (coarse[FOUND_STATUS] <= many_blows.DOUBTFUL) & (fine[FOUND_STATUS] == many_blows.DONE)
-        found = np.maximum(np.fmax(change, absolute) / (ratio**ORDER - 1.0), MENDED * fine[FOUND_MISFIT])
+        found = np.maximum(np.fmax(change, absolute) / (ratio**ORDER - 1.0), fine[FOUND_MISFIT])
         return np.where(same, found, np.inf)

@@ -306,7 +306,7 @@ def cells(area: str, number: int, truths: Truths, *, seed: int = 1) -> Iterator[
     rng = np.random.default_rng([seed, 200, number])
     body, at = random_body(rng)
     at = tuple(map(float, at))
-    law = replace(random_law(rng, 0.05, 1.0, steep=False), loss=0.0)
+    law = random_law(rng, 0.05, 1.0, steep=False)
     second = str(rng.choice(["stiffness", "speed"]))
     spread = 1.5 if second == "stiffness" else 0.7
     centre = law.stiffness if second == "stiffness" else 1.0

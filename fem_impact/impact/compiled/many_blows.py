@@ -16,6 +16,7 @@ from .bundles import Track
 from .centroids import centroid
 from .cubics import LOOKS, crossing, cubic, parted, turning
 from .law import Point, Spring, at, simple
+from .misfit import misfit
 from .schemes import Free, Own, solve_constant, solve_ramp
 
 from .convolution import (  # isort: skip
@@ -25,9 +26,8 @@ from .convolution import RATE as RATE_ROW  # isort: skip
 from .layout import (  # isort: skip
     APPROACH, BEGAN, BENDS, BLOW_COUNTS, BLOW_STATES, COMPLIANCE, COMPRESSION, DEEPEST, END_AHEAD, ENDING, ENERGY,
     EXPONENT, FORCE, FOUND_CENTROID, FOUND_IMPACTS, FOUND_IMPULSE, FOUND_MISFIT, FOUND_PEAK, FOUND_STATUS, FOUND_STEPS,
-    FOUND_SWING, FOUND_TIME, HELD, HIGHEST, IMPULSE, JUMPS, KNOWN, LARGEST, LOSS, LOWEST, MARGIN, MEAN_AHEAD, MENDED,
-    MOMENT, N_CONTACTS, N_SEGMENTS, NEEDED, PEAK, PRESSED, RATE, RATE_AHEAD, RIPPLE, RIPPLE_AT, SLOPED, STIFFNESS,
-    SWING, TOUCHED,
+    FOUND_SWING, FOUND_TIME, HELD, HIGHEST, IMPULSE, JUMPS, KNOWN, LOSS, LOWEST, MARGIN, MEAN_AHEAD, MOMENT,
+    N_CONTACTS, N_SEGMENTS, NEEDED, PEAK, PRESSED, RATE, RATE_AHEAD, SLOPED, STIFFNESS, SWING, TOUCHED,
 )  # fmt: skip
 
 DONE, DOUBTFUL, AWKWARD, LONG = 0, 1, 2, 3  # how a blow ended: proved apart; with something that the steps may have
@@ -39,7 +39,6 @@ PIECES = 3  # [-] of the step in which a contact opens, integrated by themselves
 FEWEST = 1.0  # [-] steps of a contact at least; briefer ones are looked at closer
 LETTING_GO = 0.9  # [-] loss times rate of parting from which a blow is left to the modal engine: at 1 it stops pushing
 TINY = 1e-15  # [-] curvature of a straight line
-NEAR_PEAK = 0.5  # [-] of the largest force: steps that reach it are held to the law
 DIP = 0.2  # [-] of the lesser approach at a step's ends: one that dips lower in between is looked at closer
 
 
@@ -304,7 +303,7 @@ def push(blow, track, n, f, s):
 
 @inner(part=True)
 def mend(blow, track, n, point, rate):
-    """Write the end of step n to the record, mended by what the scheme's straight force misses there; return that."""
+    """Write the end of step n to the record, mended by what the scheme's straight force misses there."""
     spring, y, missed = blow.spring, point.approach, 0.0
     if y > 0.0:
         missed = point.force * (1.0 + spring.loss * rate) - track.force[n] - 0.5 * track.ramp[n]
@@ -314,26 +313,6 @@ def mend(blow, track, n, point, rate):
             missed *= 1.0 / (1.0 + point.force * (spring.exponent / y * blow.swift + spring.loss * blow.swift_rate))
     track.ends[n + 1] = y - missed * blow.swift
     track.rates[n + 1] = rate - missed * blow.swift_rate
-    return missed
-
-
-@inner(part=True)
-def mark_ripple(blow, track, n):
-    """What the force of step n misses of the law near the peak: two runs may agree on a ripple they both miss."""
-    state, spring, h, loss = track.state, blow.spring, blow.h, blow.spring.loss
-    d0, v0, d1, v1 = track.ends[n], track.rates[n], track.ends[n + 1], track.rates[n + 1]
-    begin = at(max(d0, 0.0), spring).force * max(0.0, 1.0 + loss * v0)
-    d, speed = cubic(d0, v0 * h, d1, v1 * h, 0.5)
-    middle = at(d, spring).force * max(0.0, 1.0 + loss * speed * blow.per_step)
-    final = at(d1, spring).force * max(0.0, 1.0 + loss * v1)
-    top = max(begin, middle, final)
-    largest = max(state[LARGEST], top)
-    state[LARGEST] = largest
-    miss = abs(track.force[n] - (begin + 4.0 * middle + final) / 6.0)
-    near = top >= NEAR_PEAK * largest
-    if state[RIPPLE_AT] < NEAR_PEAK * largest or (near and miss > state[RIPPLE]):
-        state[RIPPLE] = miss if near else 0.0
-        state[RIPPLE_AT] = top if near else largest
 
 
 @inner()
@@ -355,22 +334,16 @@ def lossy_peak(d0, v0, d1, v1, spring, loss):
 
 
 @inner(part=True)
-def mark_peak(blow, track, n, missed):
-    """Keep the deepest approach so far and in this contact, the largest lossy force, and how far each was mended."""
+def mark_peak(blow, track, n):
+    """Keep the deepest approach so far and in this contact, and the largest lossy force."""
     state, spring, h = track.state, blow.spring, blow.h
     d0, v0, d1, v1 = track.ends[n], track.rates[n] * h, track.ends[n + 1], track.rates[n + 1] * h
-    if d1 > state[DEEPEST]:
-        state[DEEPEST] = d1
-        state[MENDED] = spring.exponent * abs(missed * blow.swift) / d1
     state[HIGHEST] = max(state[HIGHEST], d1)
     if v0 > 0.0 and v1 < 0.0:
         state[HIGHEST] = max(state[HIGHEST], turning(d0, v0, d1, v1))
-        state[DEEPEST] = max(state[DEEPEST], state[HIGHEST])
+    state[DEEPEST] = max(state[DEEPEST], state[HIGHEST])
     if spring.loss > 0.0:
-        top = lossy_peak(d0, v0, d1, v1, spring, spring.loss / h)
-        if top > state[PEAK]:
-            state[PEAK] = top
-            state[MENDED] = abs(missed) / top
+        state[PEAK] = max(state[PEAK], lossy_peak(d0, v0, d1, v1, spring, spring.loss / h))
     state[MARGIN] = blow.slack * state[DEEPEST]
 
 
@@ -462,10 +435,8 @@ def press(blow, track, n, free):
     dips = v0 < 0.0 < rate and d0 > 0.0 and y > 0.0
     if dips and turning(d0, v0 * h, y, rate * h) < max(DIP * min(d0, y), state[MARGIN]):
         track.counts[ENDING] = DOUBTFUL
-    missed = mend(blow, track, n, point, rate)
-    if y > 0.0:
-        mark_ripple(blow, track, n)
-    mark_peak(blow, track, n, missed)
+    mend(blow, track, n, point, rate)
+    mark_peak(blow, track, n)
     if blow.spring.loss * track.rates[n + 1] < -LETTING_GO:
         return False
     if y <= 0.0:
@@ -509,17 +480,30 @@ def follow(kernels, blow, track):
 
 
 @inner(part=True)
+def force_missed(blow, track, peak):
+    """Largest error [N] of the peak force that `misfit` finds in the steps."""
+    worst = 0.0
+    for contact in range(track.counts[N_SEGMENTS]):
+        for n in range(track.segments[contact, 0], track.segments[contact, 1]):
+            d0, v0, d1, v1 = track.ends[n], track.rates[n], track.ends[n + 1], track.rates[n + 1]
+            worst = max(worst, misfit(track.force[n], d0, v0, d1, v1, blow.h, blow.spring, peak))
+    return worst
+
+
+@inner(part=True)
 def write(blow, track, status, n, cell, out_found):
     """Write what was found of a blow to its column of the results."""
     state, counts = track.state, track.counts
-    deepest, touched, largest = state[DEEPEST], state[TOUCHED], state[LARGEST]
+    deepest, touched = state[DEEPEST], state[TOUCHED]
+    peak = state[PEAK] if blow.spring.loss > 0.0 else at(deepest, blow.spring).force
     out_found[FOUND_IMPACTS, cell] = counts[N_CONTACTS]
     out_found[FOUND_TIME, cell] = touched
     out_found[FOUND_IMPULSE, cell] = state[IMPULSE]
-    out_found[FOUND_PEAK, cell] = state[PEAK] if blow.spring.loss > 0.0 else at(deepest, blow.spring).force
+    out_found[FOUND_PEAK, cell] = peak
     out_found[FOUND_CENTROID, cell] = 0.0
     out_found[FOUND_STATUS, cell] = status
-    out_found[FOUND_MISFIT, cell] = max(state[MENDED], state[RIPPLE] / largest) if largest > 0.0 else state[MENDED]
+    if status == DONE and blow.certify:  # else nobody asks
+        out_found[FOUND_MISFIT, cell] = force_missed(blow, track, peak) / peak
     out_found[FOUND_STEPS, cell] = n if status == LONG else state[NEEDED]
     out_found[FOUND_SWING, cell] = deepest * state[SWING] / touched if touched > 0.0 else np.inf
 

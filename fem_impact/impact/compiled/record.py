@@ -11,20 +11,15 @@ import numpy as np
 
 from .build import ONE, ZERO, inner, outer
 from .events import hermite_root, letting_go, lowest
-from .law import FELT, LAYERS, PLASTIC, POWER, at, dent, growth, soaked, spring_with, steepness, stored
+from .law import FELT, LAYERS, PLASTIC, dent, spring_with, stored
 from .layout import APPROACH, CLOSED, HEAD, KIND, LENGTH, LOSS, PUSH, RATE, REMEMBERED, SPEED, START, WIDTH
+from .misfit import force_on, misfit
 from .rounding import NEAR
 
 FEW, CLOSER = 3, 16  # [-] parts into which the search for a largest force cuts all steps, and what is left, thrice
 HIGH = 0.9  # [-] of the largest mean force of a step: only steps with so much are searched for the peak
 RELEASED = 0.01  # [-] of the force at the start of the last step: felt that carries less at its end has let go
 HIGH_ENOUGH = 0.95  # [-] of the largest force: only steps with so much are looked at more closely
-# [-] error of the peak force over the misfit in `force_missed`, for a power law and for one with loss, layers or memory
-MISFIT = 1.5, 5.0
-# [-] nodes and weights of Gauss and Legendre for a step: a spring that sets in like x**1.5 is integrated 13 times as
-# well as by Simpson's rule
-GAUSS = (0.5 - 0.6**0.5 / 2.0, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.5 + 0.6**0.5 / 2.0, 5.0 / 18.0)
-NEAR_PEAK = 0.8, 0.35  # [-] that misfit counts only above this fraction of the peak force, for both
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = range(6)  # why a run ended
 FULL = -1  # it did not: its record is full
 
@@ -87,28 +82,8 @@ def force_and_rate(steps, now, law, n_coefficients, row, i, part):
             value = value * part + steps[row, first + PUSH + k]
         return max(value, 0.0), slope / h if value > 0.0 else 0.0
     d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
-    a = 2.0 * (d0 - d1) + h * (v0 + v1)
-    b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
-    d = d0 + part * (h * v0 + part * (b + part * a))
-    if d <= 0.0:
-        return 0.0, 0.0
-    rate = v0 + part * (2.0 * b + 3.0 * a * part) / h
     spring = spring_with(law, i, memory_of(steps, law, n_coefficients, row, i))
-    point = at(d, spring)
-    factor = 1.0 + spring.loss * rate
-    if not point.force * factor > 0.0:
-        return 0.0, 0.0
-    turn = (2.0 * b + 6.0 * a * part) / (h * h)
-    steep = steepness(point.compression, point.force, spring)
-    if spring.kind == FELT:
-        g0, r0, _ = growth(at(d0, spring), v0, spring)
-        g1, r1, _ = growth(at(d1, spring), v1, spring)
-        z = soaked(h, part, g0, g1, r0, r1, spring)[0]
-        fade = (point.force / spring.stiffness - z) / spring.relaxation
-        return max(0.0, point.force - spring.hard * z), steep * rate - spring.hard * fade
-    return point.force * factor, steep / (
-        1.0 + spring.compliance * steep
-    ) * rate * factor + point.force * spring.loss * turn
+    return force_on(d0, v0, d1, v1, h, part, spring)
 
 
 @outer()
@@ -184,26 +159,24 @@ def mean_push(steps, n_coefficients, row, first):
 
 @outer()
 def force_missed(steps, now, law, n_coefficients, peak):
-    """How far the largest mean forces of steps are from those of the law on the cubic through both ends.
+    """Largest error [-] of the peak force that `misfit` finds in the steps.
 
-    Over the peak force, and times MISFIT, the error of that. At a corner of the law a single step may miss, which
-    hardly changes the peak: there two in turn count.
+    At a corner of the law a single step may miss, which hardly changes the peak: there two in turn count.
     """
     worst = 0.0
     for i in range(law.shape[0]):
-        rough = int(law[i, LOSS] > 0.0 or (law.shape[1] == WIDTH and law[i, KIND] != POWER))
         corner = law.shape[1] == WIDTH and (law[i, KIND] == LAYERS or law[i, KIND] == PLASTIC)
         before = 0.0
         for row in range(steps.shape[0]):
             first = HEAD + (PUSH + n_coefficients) * i
-            mean = mean_push(steps, n_coefficients, row, first)
             miss = 0.0
-            if steps[row, first + CLOSED] > 0.0 and mean > NEAR_PEAK[rough] * peak:
-                miss = mean
-                for part, weight in GAUSS:
-                    miss -= weight * force_within(steps, now, law, n_coefficients, row, i, part)
-            worst = max(worst, MISFIT[rough] * (min(abs(miss), before) if corner else abs(miss)))
-            before = abs(miss)
+            if steps[row, first + CLOSED] > 0.0:
+                mean = mean_push(steps, n_coefficients, row, first)
+                d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
+                spring = spring_with(law, i, memory_of(steps, law, n_coefficients, row, i))
+                miss = misfit(mean, d0, v0, d1, v1, steps[row, LENGTH], spring, peak)
+            worst = max(worst, min(miss, before) if corner else miss)
+            before = miss
     return worst / peak
 
 
