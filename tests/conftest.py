@@ -1,5 +1,6 @@
 """What several tests share: which of many cases alike are run, compiled kernels, a real browser."""
 
+import os
 import shutil
 import time
 from contextlib import suppress
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import settings
 from warming import compile_all
 
+os.environ.setdefault("NUMBA_DISABLE_JIT", "0")  # or a first blow would be plain Python, see `model.fresh`
 settings.register_profile("same", derandomize=True)  # the same cases in every run
 settings.load_profile("same")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

@@ -827,7 +827,7 @@ def _longest_lossy(system: _System, pace: tuple[float, float], tolerance: float)
 def _most_steps(system: _System) -> int:
     """Steps after which a run gives up."""
     if build.limited():
-        return max(100, PLAIN_WORK // len(system.omega))
+        return build.most_steps(max(100, PLAIN_WORK // len(system.omega)))
     if system.stretched is not None:
         return min(MAX_STEPS, max(1000, MAX_WORK // system.stretched.forms.size))
     return min(MAX_STEPS, max(1000, MAX_WORK // len(system.omega)))
