@@ -28,7 +28,7 @@ from ..modes.modal import Modes
 
 SWITCH = "NUMBA_DISABLE_JIT"  # variable of numba; where a user sets it, to 0 or 1, nothing is decided here
 MARK = "compiling"  # name of the file that is there while a process compiles
-PATIENCE = 120.0  # [s] age of a mark whose process was killed: compiling takes 15 s, 60 s on a busy machine
+PATIENCE = 300.0  # [s] age of a mark whose process was killed: compiling takes 15 s, a minute or two on a busy machine
 STEPS = 10_000  # [-] most steps of one run as plain Python: about a second
 
 
