@@ -1,5 +1,6 @@
 """What several tests share: which of many cases alike are run, compiled kernels, a real browser."""
 
+import os
 import shutil
 import time
 from contextlib import suppress
@@ -9,14 +10,16 @@ import pytest
 from hypothesis import settings
 from warming import compile_all
 
+os.environ.setdefault("NUMBA_DISABLE_JIT", "0")  # or a first blow would be plain Python, see `model.fresh`
 settings.register_profile("same", derandomize=True)  # the same cases in every run
 settings.load_profile("same")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-# What `pytest -m smoke` runs, without their slow cases: quick files of every package, physics in each.
+# What `pytest -m smoke` runs, without their slow cases: quick files of every package, physics in each. They compile the
+# kernels of A4 and of maps, but neither collocation nor changes.
 SMOKE = (
     "designs/test_goals", "fe/test_beam_elements", "fe/test_membrane", "fe/test_plausible", "impact/test_response",
-    "impact/test_contact_cases", "impact/test_force_spectrum", "impact/test_threshold", "mesh/test_meshes",
-    "mesh/test_triangulation", "model/test_idealisation", "modes/test_analytic",
+    "impact/test_contact", "impact/test_force_spectrum", "impact/test_threshold", "mesh/test_meshes",
+    "mesh/test_triangulation", "model/test_thinness", "modes/test_analytic",
     "modes/test_timoshenko", "scenes/test_templates", "show/test_sound", "sweeps/test_cells", "taps/test_found",
     "taps/test_rig", "test_end_to_end", "test_figures_of_the_source",
 )  # fmt: skip

@@ -134,7 +134,7 @@ def pace_of(system: System, held: np.ndarray | bool = False) -> tuple[float, flo
 def most_steps(system: System) -> int:
     """Steps after which a run gives up."""
     if build.limited():
-        return max(100, PLAIN_WORK // len(system.omega))
+        return build.most_steps(max(100, PLAIN_WORK // len(system.omega)))
     if system.stretched is not None:
         return min(MAX_STEPS, max(1000, MAX_WORK // system.stretched.forms.size))
     return min(MAX_STEPS, max(1000, MAX_WORK // len(system.omega)))

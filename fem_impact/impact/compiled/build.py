@@ -32,17 +32,20 @@ SPOILT = (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError
 PLAIN = "plain"  # name of the copy in which nothing is compiled
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"  # else as plain Python, without the import of numba
 COMPILED &= not __name__.endswith(f".{PLAIN}.build")
-QUICK: ContextVar[bool] = ContextVar("QUICK", default=False)  # whether to compile nothing
+QUICK: ContextVar[float] = ContextVar("QUICK", default=0.0)  # [-] most steps of a run; 0: it may compile
 if COMPILED:
     READ_BEFORE = "numba" in sys.modules
     from numba import config, njit
     from numba._dynfunc import make_function
-    from numba.core import compiler, types
+    from numba.core import compiler, event, types
     from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler_lock import global_compiler_lock
     from numba.core.compiler_machinery import register_pass
     from numba.core.options import DefaultOptions
+    from numba.core.postproc import PostProcessor, VariableLifetime
     from numba.core.registry import CPUDispatcher
     from numba.core.targetconfig import ConfigStack
+    from numba.core.transforms import canonicalize_cfg
     from numba.core.typed_passes import NativeLowering
 
     if not READ_BEFORE:  # numba takes from a file in the working folder whose compiled code it runs: not for us
@@ -68,9 +71,9 @@ STAMP = _stamp()
 
 
 @contextmanager
-def uncompiled() -> Iterator[None]:
-    """Compile nothing meanwhile."""
-    token = QUICK.set(True)
+def uncompiled(most: float = np.inf) -> Iterator[None]:
+    """Compile nothing meanwhile, and let runs give up after ``most`` steps."""
+    token = QUICK.set(most)
     try:
         yield
     finally:
@@ -79,7 +82,12 @@ def uncompiled() -> Iterator[None]:
 
 def limited() -> bool:
     """Whether a run may be plain Python, and therefore must be short."""
-    return not COMPILED or QUICK.get()
+    return not COMPILED or QUICK.get() > 0.0
+
+
+def most_steps(otherwise: int) -> int:
+    """Steps after which a run in plain Python gives up, if not after ``otherwise``."""
+    return int(min(otherwise, QUICK.get() or otherwise))
 
 
 def _plain(kernel: Any) -> Any:
@@ -161,29 +169,64 @@ if COMPILED:
             builder.finalize()
             return [builder]
 
-    @contextmanager
-    def _hastened() -> Iterator[None]:
-        """Look up the type of each operation on numbers once, and collect no garbage: a third of the time."""
-        function: Any = types.BaseFunction
-        slow, found = function.get_call_type, {}
+    class _Whole(compiler.CompilerBase):
+        """The passes of the compiler for what Python calls: numba's own, also while they are others."""
 
-        def quick(self: Any, context: Any, arguments: Any, keywords: Any) -> Any:
-            if keywords or not all(isinstance(each, (types.Number, types.Boolean)) for each in arguments):
+        define_pipelines = compiler.Compiler.define_pipelines
+
+    DATA = types.Number, types.Boolean, types.Array, types.BaseTuple, types.SliceType
+
+    def _looked_up_once(found: dict[Any, Any], slow: Any) -> Callable[..., Any]:
+        """The type of each operation on data."""
+
+        def call_type(self: Any, context: Any, arguments: Any, keywords: Any) -> Any:
+            if keywords or not all(isinstance(each, DATA) for each in arguments):
                 return slow(self, context, arguments, keywords)
             key = self, tuple(arguments), ConfigStack.top_or_none()
             if key not in found:
                 found[key] = slow(self, context, arguments, keywords)
             return found[key]
 
-        collects = gc.isenabled()
-        gc.disable()
-        function.get_call_type = quick
-        try:
-            yield
-        finally:
-            function.get_call_type = slow
-            if collects:
-                gc.enable()
+        return call_type
+
+    def _without_lives(self: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+        """What is done to a function after each pass, without the search for what lives how long until it is used."""
+        if emit_dels or self.func_ir.is_generator:
+            return PROCESS(self, emit_dels, extend_lifetimes)
+        self.func_ir.blocks = canonicalize_cfg(self.func_ir.blocks)
+        self.func_ir.variable_lifetime = VariableLifetime(self.func_ir.blocks)
+        self.func_ir.generator_info = None
+        return None
+
+    PROCESS = PostProcessor.run
+
+    @contextmanager
+    def _hastened() -> Iterator[None]:
+        """Leave out what the compiler does for nothing, a third of its time and more.
+
+        Types are looked up again and again, lives of variables found after each pass, locks reported; what numba itself
+        is made of becomes machine code that is never called; and garbage is collected.
+        """
+        function: Any = types.BaseFunction
+        with global_compiler_lock:
+            broadcast, collects = event.broadcast, gc.isenabled()
+            swaps: tuple[tuple[Any, str, Any], ...] = (
+                (function, "get_call_type", _looked_up_once({}, function.get_call_type)),
+                (PostProcessor, "run", _without_lives),
+                (compiler.Compiler, "define_pipelines", _Parts.define_pipelines),
+                (event, "broadcast", lambda told: None if told.kind == "numba:llvm_lock" else broadcast(told)),
+            )
+            before = [getattr(owner, name) for owner, name, _ in swaps]
+            gc.disable()
+            try:
+                for owner, name, value in swaps:
+                    setattr(owner, name, value)
+                yield
+            finally:
+                for (owner, name, _), value in zip(swaps, before):
+                    setattr(owner, name, value)
+                if collects:
+                    gc.enable()
 
 
 def _tolerant(cache: Any, call: Callable[..., Any]) -> Callable[..., Any]:
@@ -210,6 +253,7 @@ def outer(allocates: bool = True, seconds: float = 0.0, **options: Any) -> Any:
     if UNCOUNTED:
         options["_nrt"] = allocates
     wrapped: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
+    wrapped["pipeline_class"] = _Whole
 
     def compiled(function: Any) -> Any:
         kernel = njit(**wrapped, **options)(function)
@@ -262,3 +306,11 @@ def inner(allocates: bool = False, arrays: Any = None, part: bool = False, **opt
 def folder(kernel: Any) -> Path | None:
     """Where a kernel from `outer` is kept on disk; None if it is not compiled."""
     return Path(kernel.stats.cache_path) if COMPILED else None
+
+
+def kept(kernel: Any) -> bool:
+    """Whether a kernel from `outer` that is still good lies on disk."""
+    try:
+        return COMPILED and bool(kernel._cache._cache_file._load_index())
+    except SPOILT:
+        return False

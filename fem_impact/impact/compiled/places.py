@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 GIVEN = "NUMBA_CACHE_DIR"  # variable of numba that says where
+PASSING = "fem-impact-"  # how the name of a temporary folder begins
 
 
 def find(environment: MutableMapping[str, str], kernels: Path = Path(__file__).parent) -> Path:
@@ -23,6 +24,11 @@ def find(environment: MutableMapping[str, str], kernels: Path = Path(__file__).p
                 os.makedirs(place, exist_ok=True)
                 tempfile.TemporaryFile(dir=place).close()
                 return Path(place)
-    environment[GIVEN] = folder = tempfile.mkdtemp(prefix="fem-impact-")
+    environment[GIVEN] = folder = tempfile.mkdtemp(prefix=PASSING)
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return Path(folder)
+
+
+def lasting(environment: MutableMapping[str, str]) -> bool:
+    """Whether what is kept outlives this process."""
+    return not environment.get(GIVEN, "").startswith(os.path.join(tempfile.gettempdir(), PASSING))

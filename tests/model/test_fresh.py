@@ -1,0 +1,152 @@
+"""The first blow after an installation is plain Python and as good, while one other process compiles."""
+
+import os
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+
+import pytest
+
+import fem_impact as fi
+from fem_impact.impact import collision
+from fem_impact.impact.compiled import build, places
+from fem_impact.model import fresh
+
+pytestmark = pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+
+
+def half_sine():
+    """A blow on a wall by a linear contact, of which everything is known."""
+    return fi.strike(fi.Modes.rigid(1e6), fi.Striker.rigid(0.01), fi.Contact.linear(1e6), at=None, speed=1.0)
+
+
+class Compiler:
+    """What stands for the compiler: a process that sleeps, and how often one was begun."""
+
+    def __init__(self, mark):
+        self.mark, self.begun = mark, 0
+
+    def python(self, *_, **variables):
+        assert variables[fresh.SWITCH] == "0" and self.mark.exists()
+        self.begun += 1
+        return [sys.executable, "-c", "import time; time.sleep(60)"], dict(os.environ)
+
+    def stop(self):
+        """Kill it, and wait until its mark is gone."""
+        process = fresh._begun(self.mark)
+        process.kill()
+        until = time.monotonic() + 60.0
+        while self.mark.exists() and time.monotonic() < until:
+            time.sleep(0.01)
+        assert process.returncode is not None and not self.mark.exists()  # no zombie, no mark
+
+
+@pytest.fixture
+def compiler(monkeypatch, tmp_path):
+    """As after an installation: no kernel known, none on disk."""
+    one = Compiler(tmp_path / "kernels" / fresh.MARK)
+    monkeypatch.delenv(fresh.SWITCH, raising=False)
+    monkeypatch.setattr(fresh, "energy", SimpleNamespace(follow=SimpleNamespace(overloads={})))
+    monkeypatch.setattr(build, "kept", lambda _: False)
+    monkeypatch.setattr(build, "folder", lambda _: one.mark.parent)
+    monkeypatch.setattr(fresh, "child", one)
+    fresh._begun.cache_clear()
+    yield one
+    if one.begun:
+        one.stop()
+    fresh._begun.cache_clear()
+
+
+def limited(**outcome):
+    """What `fresh.answer` returns of a function that tells whether it runs as plain Python."""
+    said = {"tolerance_met": True, **outcome}
+    return fresh.answer(lambda: SimpleNamespace(plain=build.limited(), **said), True).plain
+
+
+def test_the_first_blow_is_plain_and_meets_its_tolerance(compiler, monkeypatch):
+    plain: list[bool] = []
+    run_energy = collision.run_energy
+    monkeypatch.setattr(collision, "run_energy", lambda *them: plain.append(build.limited()) or run_energy(*them))
+    known, n_runs = half_sine(), len(plain)
+    assert all(plain) and n_runs and compiler.begun == 1
+    compiler.stop()
+    compiled = half_sine()
+    assert not any(plain[n_runs:])
+    for name in ("restitution", "impulse", "contact_time", "peak_force"):
+        told = known.error.total + compiled.error.total  # each may err by its own estimate
+        assert getattr(known, name) == pytest.approx(getattr(compiled, name), rel=told)
+
+
+def test_one_process_compiles_however_many_blows_wait(compiler):
+    assert [limited() for _ in range(3)] == [True] * 3
+    assert compiler.begun == 1
+    compiler.stop()
+    assert not limited() and compiler.begun == 1  # one that failed is not begun again
+
+
+def test_a_process_of_others_that_compiles_is_enough(compiler):
+    compiler.mark.parent.mkdir()
+    compiler.mark.touch()
+    assert limited() and compiler.begun == 0
+    long_ago = time.time() - 2.0 * fresh.PATIENCE
+    os.utime(compiler.mark, (long_ago, long_ago))  # it was killed
+    assert limited() and compiler.begun == 1
+
+
+def test_what_takes_long_or_misses_the_tolerance_is_compiled(compiler):
+    assert not fresh.answer(lambda: SimpleNamespace(plain=build.limited(), tolerance_met=True), False).plain
+    assert compiler.begun == 0
+    assert not limited(tolerance_met=False)
+
+    def endless():
+        if build.limited():
+            raise fi.SimulationError("no final separation")
+        return "compiled"
+
+    assert fresh.answer(endless, True) == "compiled"
+
+
+@pytest.mark.parametrize("value", ["0", "1"])
+def test_the_switch_of_numba_decides(compiler, monkeypatch, value):
+    monkeypatch.setenv(fresh.SWITCH, value)
+    assert not limited() and compiler.begun == 0
+
+
+def test_nothing_is_begun_where_nothing_can_be_kept(compiler, monkeypatch, tmp_path):
+    compiler.mark.parent.write_text("a file where a folder should be")
+    assert not limited()
+    environment: dict[str, str] = {"XDG_CACHE_HOME": str(compiler.mark.parent)}
+    places.find(environment, compiler.mark.parent)
+    assert not places.lasting(environment)
+    monkeypatch.setenv(places.GIVEN, environment[places.GIVEN])
+    monkeypatch.setattr(build, "folder", lambda _: tmp_path)
+    assert not limited() and compiler.begun == 0
+
+
+def test_runs_of_a_first_blow_give_up_early():
+    with build.uncompiled(7):
+        assert build.limited() and build.most_steps(100) == 7 and build.most_steps(3) == 3
+    assert not build.limited() and build.most_steps(100) == 100
+
+
+@pytest.mark.slow
+def test_after_the_first_blow_everything_is_on_disk(tmp_path):
+    """The process goes on when the one that began it has ended; the next process only reads."""
+    code = (
+        "import fem_impact as fi; from fem_impact.impact.compiled import energy\n"
+        "hit = fi.strike(fi.Modes.rigid(1.0), fi.Striker.rigid(1.0), fi.Contact.linear(1e5), at=None, speed=1.0)\n"
+        "print(len(energy.follow.overloads), sum(energy.follow.stats.cache_hits.values()))"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != fresh.SWITCH}
+    environment["NUMBA_CACHE_DIR"] = str(tmp_path)
+
+    def strike():
+        run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        return run.stdout.split()
+
+    assert strike() == ["0", "0"]
+    until = time.monotonic() + 400.0
+    while list(tmp_path.rglob(fresh.MARK)) and time.monotonic() < until:
+        time.sleep(0.2)
+    assert strike() == ["1", "1"]  # read from disk
