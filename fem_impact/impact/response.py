@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
+from .._base.explained import below, noted, pointed
 from .._base.rounding import ROUNDING, SAME
 from ..fe import plausible
 from ..modes.modal import Modes, SampledShapes, at_rest
@@ -1100,8 +1101,8 @@ class Response(Totals):
                 "trust the number of impacts and averages, not single values"
             )
         if self.audit is not None:
-            lines += [f"Model: {line}" for line in self.model_verdict[1:]]
-        lines[1:1] = [f"Note: {note}" for note in self.notes]  # a slip of a unit makes all that follows wrong
+            lines += [f"Model: {pointed(line)}" for line in self.model_verdict[1:]]
+        lines[1:1] = [*below(self.verdict), *noted(self.notes)]  # a slip of a unit makes all that follows wrong
         return "\n".join(lines)
 
     def to_xarray(self) -> Any:

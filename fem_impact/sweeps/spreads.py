@@ -10,6 +10,7 @@ import xarray
 from scipy import stats
 
 from .._base import check, markup
+from .._base.explained import noted
 from .._base.rounding import SAME
 from .inputs import Input
 from .solving import LAYERS
@@ -279,7 +280,7 @@ class Spread:
             )
         for name, error in self.rescaled.items():
             lines.append(f"{name}: modes were rescaled; a body made anew differs by at most {error:.1e}")
-        return lines + [f"Note: {note}" for note in self.notes]
+        return lines + noted(self.notes)
 
     def data(self) -> dict[str, Any]:
         """All numbers but those of single blows, as plain data."""
