@@ -169,7 +169,7 @@ def _write(
 def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
     """Play the strokes of a scene and write what they did."""
     from .model.target import Stages  # imported only when needed
-    from .scenes import hearing, sequence
+    from .scenes import hearing, results, sequence
 
     given = {"verify": options.verify, "pictures": options.pictures, "vtk": options.vtk, "target": options.target}
     wrong = next((name for name, value in given.items() if value), None)
@@ -189,10 +189,12 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
             sounds = hearing.write(staging, scene, found, duration=options.duration, normalise=options.normalise)
         tables, copies = scene.kept(staging, tolerance=found.tolerance)
         pictures = [f"force.{options.format}"]
-        names = ["response.json", "force.csv", *pictures, "modes.pvd", *(each["file"] for each in sounds), *copies]
+        names = ["response.json", results.SAVED, "force.csv", *pictures, "modes.pvd"]
+        names += [*(each["file"] for each in sounds), *copies]
         seconds = {**stages.seconds, "total": time.perf_counter() - began}
         data = {**sequence.numbers(found, tables, seconds), "sounds": sounds, "files": names}
         fi.export.write_json(staging / "response.json", data)
+        results.save(staging, found, scene.points)
     said = [_title(scene), found.summary(), *heard(sounds), f"Time: {seconds['total']:.2f} s"]
     return answer(data, *said, folder=folder, files=names, missed=not found.tolerance_met)
 

@@ -219,8 +219,7 @@ class Spread:
                 ("quantity", "5 %", "median", "95 %", f"{100 * self.confidence:g} % interval of the median"),
             ),
         ]
-        twice = self.chance()
-        lines += ["", f"Chance of a double hit: {_percent(twice)}"]
+        lines += ["", f"Chance of a double hit: {double_hits(self)}"]
         if self.chaotic:
             counts = self.values("n_impacts")
             lines.append(
@@ -312,5 +311,9 @@ def _whole(share: float) -> str:
     return f"{100.0 * min(1.0, max(0.0, share)):.0f}"
 
 
-def _percent(share: Estimate) -> str:
+def double_hits(found: Spread) -> str:
+    """The chance of a double hit and its interval in words."""
+    share = found.chance()
+    if share.value == 0.0:
+        return f"none seen, at most {100 * share.high:.2g} %"
     return f"{100 * share.value:.3g} % ({100 * share.low:.3g} to {100 * share.high:.3g} %)"
