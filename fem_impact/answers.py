@@ -13,6 +13,7 @@ ALL: Keys = {
     "command": ("string", "the command"),
     "format": ("integer", f"number of this format, {FORMAT}; it grows when a key changes its meaning"),
     "notes": ("array", "what was assumed, and numbers that are probably a slip of a unit, as sentences"),
+    "see": ("array", "headings that explain what is said, as `notes.md#not-resolvable` of `studies/notes.md`"),
     "folder": ("string|null", "where the files are; null if none was written"),
     "files": ("array", "names of the files in that folder"),
     "versions": ("object", "versions of Python and of the packages that compute the numbers"),

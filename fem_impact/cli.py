@@ -18,6 +18,7 @@ from typing import Any
 import fem_impact as fi
 
 from . import answers
+from ._base.explained import named
 from ._base.files import undo_all
 from .arguments import BAD_INPUT, parser
 from .commands import Answer
@@ -78,7 +79,8 @@ def _print(options: argparse.Namespace, found: Answer) -> None:
         _print_json(found.data)
     elif options.json:
         ours = {"command": options.command, "format": answers.FORMAT, **found.data}
-        rest = {"notes": [], "versions": fi.export.versions()}
+        said = ("\n".join([part] if isinstance(part, str) else part) for part in found.said)
+        rest = {"notes": [], "see": named(said), "versions": fi.export.versions()}
         _print_json(ours | {name: value for name, value in rest.items() if name not in ours})
     else:
         for part in found.said:

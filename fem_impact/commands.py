@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import fem_impact as fi
 
 from . import answers
+from ._base.explained import noted
 from .display import Display, tell, width
 from .show import FORMATS
 
@@ -168,7 +169,7 @@ def _write(
 def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
     """Play the strokes of a scene and write what they did."""
     from .model.target import Stages  # imported only when needed
-    from .scenes import hearing, sequence
+    from .scenes import hearing, results, sequence
 
     given = {"verify": options.verify, "pictures": options.pictures, "vtk": options.vtk, "target": options.target}
     wrong = next((name for name, value in given.items() if value), None)
@@ -188,10 +189,12 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
             sounds = hearing.write(staging, scene, found, duration=options.duration, normalise=options.normalise)
         tables, copies = scene.kept(staging, tolerance=found.tolerance)
         pictures = [f"force.{options.format}"]
-        names = ["response.json", "force.csv", *pictures, "modes.pvd", *(each["file"] for each in sounds), *copies]
+        names = ["response.json", results.SAVED, "force.csv", *pictures, "modes.pvd"]
+        names += [*(each["file"] for each in sounds), *copies]
         seconds = {**stages.seconds, "total": time.perf_counter() - began}
         data = {**sequence.numbers(found, tables, seconds), "sounds": sounds, "files": names}
         fi.export.write_json(staging / "response.json", data)
+        results.save(staging, found, scene.points)
     said = [_title(scene), found.summary(), *heard(sounds), f"Time: {seconds['total']:.2f} s"]
     return answer(data, *said, folder=folder, files=names, missed=not found.tolerance_met)
 
@@ -256,7 +259,7 @@ def map_of(options: argparse.Namespace) -> Answer:
         not_known = f"; not known: {unknown}" if unknown else ""
         said.append(f"Model: it errs by {low:.1g} to {high:.1g}{not_known}")
     data |= {"notes": table.attrs["notes"].splitlines(), "seconds": {"total": time.perf_counter() - began}}
-    said += [*_noted(data["notes"]), f"Time: {data['seconds']['total']:.2f} s"]
+    said += [*noted(data["notes"]), f"Time: {data['seconds']['total']:.2f} s"]
     return answer(data, *said, folder=folder, files=names)
 
 
@@ -325,7 +328,7 @@ def hammer(options: argparse.Namespace) -> Answer:
     ]
     said: list[str | Sequence[str]] = [
         _title(scene),
-        *_noted(notes),
+        *noted(notes),
         f"Linear tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:",
         _table(rows, ("mass", "softest tip", "hardest tip", "its reach")),
     ]
@@ -356,7 +359,7 @@ def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], note
                 plan.write_csv((staging / drawn.name).with_suffix(".csv"))
     data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
     files = [] if drawn is None else [drawn.name, drawn.with_suffix(".csv").name]
-    said = [_title(scene), *_noted(notes), plan.summary()]
+    said = [_title(scene), *noted(notes), plan.summary()]
     return answer({**data, "notes": [*notes, *plan.notes]}, *said, folder=drawn and drawn.parent, files=files)
 
 
@@ -415,7 +418,7 @@ def play(options: argparse.Namespace) -> Answer:
     happened = ", ".join(f"{count} {name}" for name, count in player.counted.items())
     said = [
         _title(scene),
-        *_noted(modes.notes),
+        *noted(modes.notes),
         f"Played: {happened} of at most {1e6 * player.step:.3g} us, {modes.n_modes} modes",
         f"Blocks: {len(played.seconds)} of {1e3 * player.block / player.rate:.3g} ms; the 99th percentile of their "
         f"computing time is {1e3 * played.slowest:.3g} ms; {played.missed} missed their deadline",
@@ -447,7 +450,7 @@ def modes(options: argparse.Namespace) -> Answer:
         for i, (frequency, ratio) in enumerate(zip(modes.frequencies, modes.damping_ratio), 1)
         if i > modes.n_rigid
     ]
-    said: list[str | Sequence[str]] = [_title(scene), *_noted(modes.notes)]
+    said: list[str | Sequence[str]] = [_title(scene), *noted(modes.notes)]
     if modes.n_rigid:
         said.append("Mode 1 is a rigid motion" if modes.n_rigid == 1 else
                     f"Modes 1 to {modes.n_rigid} are rigid motions: nothing holds the body there")  # fmt: skip
@@ -492,7 +495,7 @@ def mesh(options: argparse.Namespace) -> Answer:
         for edge in edges
     ]  # fmt: skip
     heads = ("edge", "length", "facets", "form", "half way at", "the same as")
-    said = [str(options.scene), *_noted(mesh.notes), [*_table(facts), "", *_table(rows, heads)]]
+    said = [str(options.scene), *noted(mesh.notes), [*_table(facts), "", *_table(rows, heads)]]
     data = {"mesh": dict(facts), "edges": [vars(edge) for edge in edges], "notes": mesh.notes}
     return _answer_of_file(data, said, drawn)
 
@@ -548,10 +551,6 @@ def _answer_of_file(
     return answer(data, *said, folder=path.parent, files=[path.name], missed=missed)
 
 
-def _noted(notes: Sequence[str]) -> list[str]:
-    return [f"Note: {note}" for note in notes]
-
-
 def _table(rows: Sequence[Sequence[Any]], head: Sequence[str] = ()) -> list[str]:
     """A table; on a terminal too narrow for it, each row as a list."""
     from ._base import markup  # imports numpy, which --help and --version do not need
@@ -582,7 +581,7 @@ def frf(options: argparse.Namespace) -> Answer:
          "" if each["coherence"] is None else f"{each['coherence']:.3f}")
         for each in peaks
     ]  # fmt: skip
-    said = [*_noted(notes), _table(rows, ("response", "peak at", "magnitude", "coherence"))]
+    said = [*noted(notes), _table(rows, ("response", "peak at", "magnitude", "coherence"))]
     if path is not None:
         prompt.write_frf(path, found)
     return _answer_of_file({"peaks": peaks, "notes": notes}, said, path)

@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Column
 from rich.text import Text
 
+from ._base.explained import pointed
 from ._base.files import undoable
 from ._base.progress import heard
 
@@ -47,7 +48,7 @@ def tell(text: str) -> None:
 def complain(error: object, status: int) -> int:
     """Print an error on one line of stderr; return the exit status."""
     with suppress(OSError):  # if stderr is closed, the exit status must suffice
-        print(f"fem-impact: {_printable(str(error))}", file=sys.stderr, flush=True)
+        print(f"fem-impact: {_printable(pointed(str(error)))}", file=sys.stderr, flush=True)
     return status
 
 

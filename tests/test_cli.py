@@ -119,6 +119,7 @@ def test_json_is_printed_as_it_is_written(scene, tmp_path, capsys):
     assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out"), "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     ours = {"command": "strike", "format": answers.FORMAT, "folder": str(tmp_path / "out")}
+    ours["see"] = ["notes.md#not-known", "notes.md#still-air"]
     assert printed == json.loads((tmp_path / "out" / "response.json").read_text()) | ours
 
 

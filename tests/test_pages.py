@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from fem_impact._base import explained
 from fem_impact.impact import assumption
 
 ROOT = Path(__file__).parents[1]
@@ -71,14 +72,31 @@ def test_the_page_of_scene_keys_is_current():
     assert script.PAGE.read_text(encoding="utf-8") == script.page(), "run python studies/scene_keys.py"
 
 
+def sayings():
+    """The phrases that the page of notes quotes, by the anchor of their heading."""
+    page = (ROOT / "studies" / "notes.md").read_text(encoding="utf-8")
+    found = {}
+    for part in page.split("\n### ")[1:]:
+        title, _, text = part.partition("\n")
+        said = [" ".join(each.split()) for list_ in SAYS.findall(text) for each in re.findall(r"`([^`]+)`", list_)]
+        found[title.lower().replace(" ", "-")] = tuple(said or [f"{title.lower()}: "])
+    return found
+
+
+def test_messages_name_each_heading_of_the_page_of_notes_by_the_phrases_that_it_quotes():
+    assert sayings() == explained.HEADINGS
+    assert set(explained.HEADINGS) <= anchors(ROOT / "studies" / "notes.md")
+
+
 def test_every_assumption_is_explained_under_its_name():
-    assert {name.replace(" ", "-") for name in assumption.ALL} <= anchors(ROOT / "studies" / "notes.md")
+    assert {name.replace(" ", "-") for name in assumption.ALL} <= set(explained.HEADINGS)
 
 
 def test_messages_that_the_page_of_notes_quotes_are_said_so():
-    page = (ROOT / "studies" / "notes.md").read_text(encoding="utf-8")
-    code = " ".join(path.read_text(encoding="utf-8") for path in (ROOT / "fem_impact").rglob("*.py"))
+    places = [path for path in (ROOT / "fem_impact").rglob("*.py") if path.name != "explained.py"]
+    code = " ".join(path.read_text(encoding="utf-8") for path in places)
     code = re.sub(r'"\s*\n\s*f?"', "", code)  # texts that go on in the next line
-    quoted = [" ".join(each.split()) for part in SAYS.findall(page) for each in re.findall(r"`([^`]+)`", part)]
+    names = {f"{name}: " for name in assumption.ALL}
+    quoted = [each for said in sayings().values() for each in said if each not in names]
     assert len(quoted) > 25
     assert [each for each in quoted if each not in code] == []

@@ -15,6 +15,8 @@ from typing import Any, TypeVar, get_args, get_origin
 
 import numpy as np
 
+from .explained import pointed
+
 LONGEST = 500  # [-] characters quoted from a file or another library; longer text is cut
 FEW = 4  # [-] entries of an array that `brief` shows: some 50 characters, which fit on a line
 SHOWN = 80  # [-] characters quoted from a value the user passed; longer text is cut
@@ -47,6 +49,9 @@ Function = TypeVar("Function", bound=Callable)
 
 class SimulationError(RuntimeError):
     """A run missed its accuracy or failed; the text says what went wrong and what to change."""
+
+    def __str__(self) -> str:
+        return pointed(super().__str__())
 
 
 class ToleranceWarning(UserWarning):
@@ -239,7 +244,7 @@ def on_body(name: str, points: np.ndarray, inside: np.ndarray, corners: np.ndarr
         lost = ", ".join(f"{x:g}" for x in points[~inside][0])
         low, high = corners.min(axis=0), corners.max(axis=0)
         extent = " x ".join(f"[{a:g}, {b:g}]" for a, b in zip(low, high))
-        raise ValueError(f"{name} must lie on the body, got ({lost}) m; the body extends over {extent} m")
+        raise ValueError(pointed(f"{name} must lie on the body, got ({lost}) m; the body extends over {extent} m"))
 
 
 def band(name: str, value: Any, unit: str) -> tuple[float, float]:
@@ -351,4 +356,4 @@ def extra(module: str, name: str, purpose: str) -> Any:
         return importlib.import_module(module)
     except ImportError:
         package = module.partition(".")[0]
-        raise ValueError(f"{purpose} needs {package}: pip install 'fem-impact[{name}]'") from None
+        raise ValueError(pointed(f"{purpose} needs {package}: pip install 'fem-impact[{name}]'")) from None

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from .explained import noted
+
 WIDTH, HEIGHT = 360.0, 210.0  # [px] size of a picture; narrow pages shrink it
 MARGIN = 16.0  # [px] empty border, so that markers on the edge are not cut off
 SAMPLES = 400  # [-] points kept of a curve: about one per pixel
@@ -48,7 +50,7 @@ def columns(rows: Iterable[Sequence[Any]], head: Sequence[str] = ()) -> list[str
 
 def notes(lines: Iterable[str]) -> str:
     """Notes, each a paragraph; all text is escaped."""
-    return "".join(f"<p>Note: {html.escape(line)}</p>" for line in lines)
+    return "".join(f"<p>{html.escape(line)}</p>" for line in noted(lines))
 
 
 def paragraphs(lines: Iterable[str]) -> str:

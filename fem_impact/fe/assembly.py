@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import eigh, qr
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, eye_array, vstack
 
-from .._base import check, markup
+from .._base import check, explained, markup
 from .._base.rounding import ROUNDING, SAME
 from .._base.untyped import Sparse
 from ..mesh import sketch
@@ -330,7 +330,7 @@ def _check_on(space: Any, frame: Frame, name: str, points: np.ndarray) -> None:
     inside = space.locate(frame.local(points))[1]
     if not inside.all():
         where = ", ".join(f"{x:g}" for x in points[int(np.argmin(inside))])
-        raise ValueError(f"{name} must lie on the body, got ({where}) m")
+        raise ValueError(explained.pointed(f"{name} must lie on the body, got ({where}) m"))
 
 
 def reassemble(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._base import explained
 from .._base.check import SimulationError, ToleranceWarning
 from ..modes.modal import FieldShapes, Modes
 from . import accuracy
@@ -88,7 +89,7 @@ def kept(hit: Any, strict: bool = False) -> Any:
         said = hit.promise
         if strict:
             raise SimulationError(said)
-        warnings.warn(said, ToleranceWarning, stacklevel=_callers_level())
+        warnings.warn(explained.pointed(said), ToleranceWarning, stacklevel=_callers_level())
     return hit
 
 

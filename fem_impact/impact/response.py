@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
+from .._base.explained import below, noted, pointed
 from .._base.rounding import SAME
 from ..fe import plausible
 from ..modes.modal import Modes, SampledShapes, at_rest
@@ -54,14 +55,18 @@ class Error:
     @property
     def dominant(self) -> tuple[str, float]:
         """The largest part, in words, and its size [-]."""
-        parts = {
+        return max(self._parts.items(), key=lambda part: part[1])
+
+    @property
+    def _parts(self) -> dict[str, float]:
+        """Size [-] of each part by its name in words."""
+        return {
             "time steps": self.step,
             "modes left out": self.truncation,
             "the finite elements": self.mesh,
             "the simplified target": self.idealisation,
             "the blow before": self.inherited,
         }
-        return max(parts.items(), key=lambda part: part[1])
 
     def __float__(self) -> float:
         return float(self.total)
@@ -800,9 +805,8 @@ class Response(Totals):
             f"impulse {self.impulse:.5g} N s",
             f"restitution {rebound(self, 5)} at {self.speed:g} m/s",
             f"energy {total:.5g} J: {shares}",
-            f"estimated error {error.total:.1e} of {words(self.quantities)}: step {error.step:.1e}, truncation "
-            f"{error.truncation:.1e}, mesh {error.mesh:.1e}, idealisation {error.idealisation:.1e}"
-            + (f", the blow before {error.inherited:.1e}" if error.inherited else "")
+            f"estimated error {error.total:.1e} of {words(self.quantities)}: "
+            + ", ".join(f"{name} {size:.1e}" for name, size in error._parts.items() if size or name == "time steps")
             + f"; energy error {self.energy_error:.1e}",
         ]
         if self.moving:
@@ -813,15 +817,15 @@ class Response(Totals):
             lines.insert(-1, f"the target moved at the start: {began}; gained in the blow: {gained}")
         if several:
             each = ", ".join(f"contact {i} {1e3 * time:.5g} ms" for i, time in enumerate(self.contact_times))
-            lines.append(f"time in contact: {each}; any of them {1e3 * self.touching_time:.5g} ms")
+            lines.append(f"contact time: {each}; any of them {1e3 * self.touching_time:.5g} ms")
         if error.sensitivity > CHAOTIC:
             lines.append(
                 f"chaotic: small differences grow {error.sensitivity:.0e}-fold from the first impact to the last; "
                 "trust the number of impacts and averages, not single values"
             )
         if self.audit is not None:
-            lines += [f"Model: {line}" for line in self.model_verdict[1:]]
-        lines[1:1] = [f"Note: {note}" for note in self.notes]  # a slip of a unit makes all that follows wrong
+            lines += [f"Model: {pointed(line)}" for line in self.model_verdict[1:]]
+        lines[1:1] = [*below(self.verdict), *noted(self.notes)]  # a slip of a unit makes all that follows wrong
         return "\n".join(lines)
 
     def to_xarray(self) -> Any:

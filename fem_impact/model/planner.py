@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup, progress
+from .._base.explained import below, noted, pointed
 from ..fe import plausible, refinement
 from ..fe.assembly import System
 from ..fe.section import Plate
@@ -189,11 +190,11 @@ class Plan:
         kept = "met" if self.meets else "MISSED"
         model, *doubts = assumption.lines(self.assumptions, self.tolerance)
         first = f"tolerance {self.tolerance:g} of {wanted} will be {kept}: predicted error {self.error:.1e}; {model}"
-        lines = [first, *(f"Note: {note}" for note in self.notes), *(f"  {line}" for line in self.reasons)]
+        lines = [first, *below(first), *noted(self.notes), *(f"  {line}" for line in self.reasons)]
         lines.append("Predicted errors:")
         errors = [*self.errors.items(), ("total", self.error)]
         lines += [f"  {line}" for line in markup.columns([(name, f"{error:.1e}") for name, error in errors])]
-        lines += [f"Model: {line}" for line in doubts]
+        lines += [f"Model: {pointed(line)}" for line in doubts]
         lines.append(f"Cost: {self.cost}")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")

@@ -11,6 +11,7 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
+from .._base.explained import below, noted
 from ..impact import collision, promise
 from ..impact.collision import TOLERANCE, Touch
 from ..impact.compiled import record
@@ -211,6 +212,7 @@ class Strokes(Totals):
         """The sequence in a few readable lines."""
         lines = [
             self.verdict,
+            *below(self.verdict),
             f"{len(self.strokes)} strokes, {self.n_impacts} impacts in {self.impacts[-1].end - self.starts[0]:.4g} s"
             if self.impacts
             else f"{len(self.strokes)} strokes, no impact",
@@ -229,7 +231,7 @@ class Strokes(Totals):
             f"energy {told}",
             f"the last blow: {self.hits[-1].outcome}",
         ]
-        return "\n".join([*lines, *(f"Note: {note}" for note in self.notes)])
+        return "\n".join([*lines, *noted(self.notes)])
 
 
 @dataclass(eq=False)

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.io import wavfile
 
 from .._base import check, markup
+from .._base.explained import noted
 from .._base.files import replacing
 from ..impact import spectra
 from ..impact.assumption import SILENT, Assumption
@@ -139,7 +140,7 @@ def _of_blow(scene: Scene, run: Run) -> dict[str, Any]:
     """What the page tells of a single blow only."""
     response = run.response
     return {
-        "words": (*(f"Note: {note}" for note in run.notes), *words(scene, response)),
+        "words": (*noted(run.notes), *words(scene, response)),
         "strokes": (), "outcome": response.outcome, "error": response.error.total,
         "energy_error": response.energy_error,
         "budget": _budget(response),
@@ -175,7 +176,7 @@ def _of_strokes(scene: Scene, run: Played) -> dict[str, Any]:
     played = f"It is struck {len(strokes)} times in {si(found.strokes[-1].when - found.strokes[0].when, 's')}."
     energies = {name: found.energies[name] for name in ("target", "dissipated", "taken away")}
     return {
-        "words": (*(f"Note: {note}" for note in found.notes), body(scene, found.target), played, *laws),
+        "words": (*noted(found.notes), body(scene, found.target), played, *laws),
         "strokes": strokes, "outcome": found.hits[-1].outcome, "error": found.error,
         "energy_error": max(hit.energy_error for hit in found.hits),
         "budget": budget[:LISTED],

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from ..impact.history import History
 from ..impact.response import Ends, Error, Response
 from ..impact.stretched import Stretched
 from ..impact.striker import Hand, Striker
+from ..model.playing import Stroke, Strokes
 from ..modes import unstated
 from ..modes.modal import Modes, RigidShapes, SampledShapes
 from ..sweeps import store
@@ -29,32 +30,57 @@ SAVED = "response.npz"  # beside response.json, whose text is its key: one of th
 KINDS: dict[str, type] = {
     kind.__name__: kind
     for kind in (Assumption, Contact, Ends, Error, Hand, History, Material, Modes, Response, RigidShapes,
-                 SampledShapes, Stretched, Striker)
+                 SampledShapes, Stretched, Striker, Stroke, Strokes)
 }  # fmt: skip
 # fields that are not kept: functions, and descriptions of the body that only a blow needs
 LEFT_OUT = {"rings", "audit", "vectors", "poorer", "section"}
 
 
-def save(folder: Path, response: Response, points: Any) -> str:
-    """Write what `load_response` needs beside response.json, which must be there; return the name of the file."""
-    last = len(response.bodies) - 1
-    places: dict[int, Any] = {last: points} if response.bodies[last].dimension else {}
-    bodies = tuple(
-        _at_points(modes, ends.points, places.get(i, ()))
-        for i, (modes, ends) in enumerate(zip(response.bodies, response.ends))
-    )
-    rung, striker = response.target, response.striker
-    if striker is not None:  # by itself; among the bodies a hand may hold it
-        striker = replace(striker, modes=_at_points(striker.modes, striker.at[None], ()))
-    whole = replace(
-        response, bodies=bodies, rings=None, vectors=None,
-        ringing=None if rung is response.bodies[last] else _at_points(rung, response.ends[last].points, points),
-        striker=striker,
-    )  # fmt: skip
+def save(folder: Path, found: Response | Strokes, points: Any) -> str:
+    """Write what `load_response` needs beside response.json, which must be there; return the name of the file.
+
+    Of a sequence, the assumptions of its hardest blow are kept, which its verdict is about.
+    """
+    judged: Response
+    whole: Response | Strokes
+    if isinstance(found, Strokes):
+        judged, whole = found.hits[found.hardest], _sequence(found, points)
+    else:
+        judged, whole = found, _known_at(found, points)
     arrays: dict[str, np.ndarray] = {}
-    told = {"response": _packed(whole, arrays), "assumptions": _packed(response.assumptions, arrays)}
+    told = {"response": _packed(whole, arrays), "assumptions": _packed(judged.assumptions, arrays)}
     kept.write(folder / SAVED, _key(folder), {**arrays, "told": np.array(json.dumps(told))})
     return SAVED
+
+
+def _sequence(found: Strokes, points: Any) -> Strokes:
+    """A sequence whose body is known at some points and where it was struck."""
+    struck = np.array([np.atleast_1d(each.at) for each in found.strokes])
+    places = np.unique(np.vstack([struck, *([points] if len(points) else [])]), axis=0)
+    strokes = tuple(each._replace(striker=_alone(each.striker)) for each in found.strokes)
+    hits = tuple(_known_at(hit, places) for hit in found.hits)
+    return replace(found, target=_at_points(found.target, struck[:1], places), strokes=strokes, hits=hits)
+
+
+def _alone(striker: Striker) -> Striker:
+    """A striker known at its contact point only, by itself: among the bodies of a blow a hand may hold it."""
+    return replace(striker, modes=_at_points(striker.modes, striker.at[None], ()))
+
+
+def _known_at(response: Response, points: Any) -> Response:
+    """A blow whose bodies are known where they touched and the last one at some points, too."""
+    last = len(response.bodies) - 1
+    places: dict[int, Any] = {last: points} if response.bodies[last].dimension else {}
+    touched = [ends.points for ends in response.ends] or [np.atleast_2d(points[0])]  # nothing touched: it swings freely
+    bodies = tuple(
+        _at_points(modes, each, places.get(i, ())) for i, (modes, each) in enumerate(zip(response.bodies, touched))
+    )
+    rung, striker = response.target, response.striker
+    return replace(
+        response, bodies=bodies, rings=None, vectors=None,
+        ringing=None if rung is response.bodies[last] else _at_points(rung, touched[last], points),
+        striker=None if striker is None else _alone(striker),
+    )  # fmt: skip
 
 
 def _at_points(modes: Modes, touched: np.ndarray, points: Any) -> Modes:
@@ -82,12 +108,14 @@ def _key(folder: Path) -> str:
 
 def _fields(kind: type) -> list[str]:
     """The fields of a class of KINDS that are kept."""
+    if kind is Stroke:
+        return list(Stroke._fields)
     return [each.name for each in fields(kind) if each.init and each.name not in LEFT_OUT]
 
 
 def _packed(value: Any, arrays: dict[str, np.ndarray]) -> Any:
     """A value as plain data for JSON; arrays are put aside under the number that stands for them."""
-    if is_dataclass(value) and type(value).__name__ in KINDS:
+    if type(value).__name__ in KINDS:
         told = {name: _packed(getattr(value, name), arrays) for name in _fields(type(value))}
         return {"kind": type(value).__name__, "fields": told}
     if isinstance(value, np.ndarray):
@@ -118,8 +146,8 @@ def _unpacked(told: Any, arrays: Mapping[str, np.ndarray]) -> Any:
 
 
 @check.typed
-def load_response(folder: str | Path) -> Response:
-    """Read back the blow that `fem-impact strike` wrote to a folder.
+def load_response(folder: str | Path) -> Response | Strokes:
+    """Read back the blow, or the sequence of strokes, that `fem-impact strike` wrote to a folder.
 
     Parameters
     ----------
@@ -128,9 +156,9 @@ def load_response(folder: str | Path) -> Response:
 
     Returns
     -------
-    Response
-        With every number of the blow, its force and spectrum at any time and frequency, and the motion of the body at
-        the points that the scene observes and at the strike point. Mode shapes elsewhere are in modes.pvd.
+    Response or Strokes
+        With every number, the force and the spectrum at any time and frequency, and the motion of the body at the
+        points that the scene observes and at the strike points. Mode shapes elsewhere are in modes.pvd.
 
     Raises
     ------
@@ -154,21 +182,23 @@ def load_response(folder: str | Path) -> Response:
     key = _key(folder)
     again = "strike the scene again"
     if not (folder / SAVED).is_file():
-        strokes = '"sequence"' in key
-        why = "a sequence of strokes is not read back; its numbers are in response.json" if strokes else again
-        raise fault(folder / SAVED, f"there is no such file, which a blow is read from; {why}")
+        raise fault(folder / SAVED, f"there is no such file, which a blow is read from; {again}")
     try:
         arrays = kept.read(folder / SAVED, key)
         if arrays is not None:
             told = json.loads(str(arrays["told"]))
-            return _checked(_unpacked(told["response"], arrays), _unpacked(told["assumptions"], arrays))
+            found, assumptions = (_unpacked(told[name], arrays) for name in ("response", "assumptions"))
+            if not isinstance(found, Strokes):
+                return _checked(found, assumptions)
+            judged = [assumptions if i == found.hardest else None for i in range(len(found.hits))]
+            return replace(found, hits=tuple(map(_checked, found.hits, judged)))
     except Exception:  # what somebody else packed may raise anything
         pass
     raise fault(folder / SAVED, f"it is damaged, or not of the response.json beside it; {again}")
 
 
 def _checked(response: Any, assumptions: Any) -> Response:
-    """The response, if its arrays fit together: compiled kernels trust their shapes."""
+    """The response, if its arrays fit together: compiled kernels trust their shapes. Its assumptions may be missing."""
     h = response.history
     c, n = h.shape.shape
     shapes = {
@@ -178,13 +208,13 @@ def _checked(response: Any, assumptions: Any) -> Response:
     }  # fmt: skip
     good = all(getattr(h, name).shape == shape and getattr(h, name).dtype == float for name, shape in shapes.items())
     good &= h.law.shape[1] in (layout.KIND, layout.WIDTH) and h.n_coefficients in (1, 2, 3, 4)
-    good &= 0 < sum(modes.n_modes for modes in response.bodies) <= n and len(response.bodies) == len(response.ends)
+    good &= 0 < sum(modes.n_modes for modes in response.bodies) <= n and len(response.ends) in (0, len(response.bodies))
     if h.stretched is not None:
         m = h.stretched.forms.shape[1]
         good &= h.stretched.forms.shape[1:] == (m, m) and 0 <= h.stretched.first <= n - m
-    if not good or not all(isinstance(each, Assumption) for each in assumptions):
+    if not good or not all(isinstance(each, Assumption) for each in assumptions or ()):
         raise ValueError("arrays of a response must fit together")
-    return replace(response, audit=partial(_told, assumptions))
+    return response if assumptions is None else replace(response, audit=partial(_told, assumptions))
 
 
 def _told(assumptions: tuple[Assumption, ...], _: Response) -> tuple[Assumption, ...]:

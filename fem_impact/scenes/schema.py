@@ -352,15 +352,25 @@ def read_part(path: Path, table: str, values: dict[str, Any], folder: Path, call
     return Part(kind, MappingProxyType(values))
 
 
-def _check_keys(selector: str, kind: str, values: dict[str, Any], maker: Callable[..., Any]) -> None:
+def _arguments(maker: Callable[..., Any]) -> dict[str, inspect.Parameter]:
+    """The arguments of a function that are keys of its table."""
     supplied = SUPPLIED | OF_TARGET if maker is collision.strike else SUPPLIED
     supplied = supplied - set(NESTED) if maker is stroke_values else supplied
-    arguments = {n: p for n, p in inspect.signature(maker).parameters.items() if n not in supplied}
+    return {n: p for n, p in inspect.signature(maker).parameters.items() if n not in supplied}
+
+
+def _check_keys(selector: str, kind: str, values: dict[str, Any], maker: Callable[..., Any]) -> None:
+    arguments = _arguments(maker)
     known = [selector, *arguments] if selector else list(arguments)
     for key in values:
         if key not in arguments:
-            hint = check.nearest(key, known) or f"; it has {', '.join(known)}"
-            raise ValueError(f"{key} is not a key of this table{hint}")
+            homes = [
+                f"[{name}]"
+                for name, (_, makers) in MAKERS.items()
+                if any(key in _arguments(m) for m in makers.values())
+            ]
+            elsewhere = f"; it is one of {' and '.join(homes)}" if homes else f"; it has {', '.join(known)}"
+            raise ValueError(f"{key} is not a key of this table{check.nearest(key, known) or elsewhere}")
     for key, argument in arguments.items():
         if argument.default is inspect.Parameter.empty and key not in values:
             raise ValueError(f"{key} is missing" + (f" for {selector} = {kind!r}" if selector else ""))

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .._base import check, markup
+from .._base.explained import below, noted, pointed
 from ..impact import assumption, collision, quantities
 from ..model import cost, planner, playing
 from ..model.planner import Plan
@@ -95,12 +96,13 @@ class SequencePlan:
         more = [f"... and {count - playing.LISTED} more"] if count > playing.LISTED else []
         lines = [
             shared,
+            *below(shared),
             *(f"  {line}" for line in (*table, *more, *reasons)),
         ]
         if body.assumptions:
             said = assumption.lines(body.assumptions, self.tolerance)
-            lines += [f"Model of stroke {self.needed}: {line}" for line in said]
-        return "\n".join([*lines, f"Cost: {body.cost}", *(f"Note: {note}" for note in body.notes)])
+            lines += [f"Model of stroke {self.needed}: {pointed(line)}" for line in said]
+        return "\n".join([*lines, f"Cost: {body.cost}", *noted(body.notes)])
 
 
 class Played(NamedTuple):

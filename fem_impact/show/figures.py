@@ -24,7 +24,7 @@ from ..mesh.mesh_files import boundary, quartered
 from ..mesh.meshes import Mesh
 from ..model.playing import Strokes
 from ..modes.modal import Modes
-from ..sweeps.spreads import DOUBLE, QUANTITIES, Spread
+from ..sweeps.spreads import DOUBLE, QUANTITIES, Spread, double_hits
 from . import sampling
 from .canvas import COLOURS, VERMILION
 
@@ -420,12 +420,10 @@ def spread(found: Spread) -> Figure:
         keys = next((named for panel in panels[:, 2] if (named := panel.get_legend_handles_labels())[0]), None)
         if keys is not None:
             figure.legend(*keys, loc="outside lower right", ncols=2, fontsize=8)  # beside the bars of the same colours
-        twice = found.chance()
-        said = f"double hit {100 * twice.value:.3g} % ({100 * twice.low:.3g} to {100 * twice.high:.3g} %)"
-        if twice.value == 0.0:
-            said = f"no double hit (at most {100 * twice.high:.2g} %)"
         figure.suptitle(
-            f"{markup.literal(found.title or 'Spread')}: {len(found.own)} independent blows, {said}", fontsize=11
+            f"{markup.literal(found.title or 'Spread')}: {len(found.own)} independent blows; "
+            f"double hits: {double_hits(found)}",
+            fontsize=11,
         )
     return figure
 

@@ -27,6 +27,7 @@ PALETTE = "cividis"  # perceptually uniform, also for colour-blind readers
 FINER = 8  # [-] each pixel is split into this many parts to draw contours
 FINEST = 400  # [-] parts along an axis at most, or one for each pixel
 PALETTE_OF_POINTS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY)
+SAMPLES = 100  # [-] points for each mass of hammers: the end of a range is drawn within a percent of its place
 BORDER = VERMILION  # between numbers of impacts: seen on all colours of the palette
 MOST_NAMES = 5  # [-] most names along an axis: more would overlap
 FEW = 10  # [-] a range of fewer whole numbers gets one colour per number
@@ -235,26 +236,48 @@ def _edges(centres: np.ndarray, log: bool) -> np.ndarray:
 
 
 def hammers(found: Sequence[Hammer], bandwidth: float, drop: float = 10.0) -> Any:
-    """Draw the range of tips that work, over the mass of the hammer.
+    """Draw the range of tips that work, over the mass of the hammer: computed at the dots, straight in between.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
+    found = sorted(found, key=lambda hammer: hammer.mass)
     mass = 1e3 * np.array([hammer.mass for hammer in found])
     hardest = np.array([hammer.hardest or np.nan for hammer in found])
     ended = np.array([hammer.limit for hammer in found])
     softest = np.array([hammer.softest or np.nan for hammer in found])
     wanted = accuracy.resonant_stiffness(mass / 1e3, bandwidth / half_sine_reach(drop))
     drawn = [
-        Curve(mass, hardest, "hardest tip that hits once", VERMILION),
-        Curve(mass, softest, "softest tip that reaches the bandwidth", BLUE),
+        Curve(mass, hardest, "hardest tip that hits once", VERMILION, "o-"),
+        Curve(mass, softest, "softest tip that reaches the bandwidth", BLUE, "o-"),
         Curve(mass, wanted, "softest tip on a rigid wall", GREY, "--"),
         Curve(mass, ended, "hardest tip that the model resolves", GREY, ":"),
     ]
     x, y = Axis("mass of the hammer", "g", log=True), Axis("stiffness of the tip", "N/m", log=True)
     title = f"Hammers for {bandwidth:g} Hz at -{drop:g} dB without a double hit"
-    return curves(drawn, x=x, y=y, title=title, between=(mass, softest, hardest))
+    return curves(drawn, x=x, y=y, title=title, between=_working(mass, softest, hardest, wanted))
+
+
+def _working(
+    mass: np.ndarray, softest: np.ndarray, hardest: np.ndarray, wanted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Masses, and the softest and the hardest tip that work: between two masses straight in the logarithms.
+
+    Beside a mass without such a tip, the softest keeps its ratio to that on a wall, up to where the range closes.
+    """
+    works = np.isfinite(softest)
+    if not works.any():
+        return mass, softest, hardest
+    log = np.log(mass)
+    x = np.unique(np.concatenate([log, np.linspace(log[0], log[-1], SAMPLES * len(log))]))
+    ratio = np.interp(x, log[works], np.log(softest / wanted)[works])
+    low, high = np.interp(x, log, np.log(wanted)) + ratio, np.interp(x, log, np.log(hardest))
+    idle = ~works & ~(hardest < np.exp(np.interp(log, x, low)))  # some other reason: nothing is known beside it
+    left = np.clip(np.searchsorted(log, x, side="right") - 1, 0, len(log) - 1)
+    right = np.minimum(left + (x > log[left]), len(log) - 1)
+    shown = (works[left] | works[right]) & ~idle[left] & ~idle[right] & (low <= high)
+    return np.exp(x), np.where(shown, np.exp(low), np.nan), np.where(shown, np.exp(high), np.nan)
 
 
 def places(

@@ -10,6 +10,7 @@ import xarray
 from scipy import stats
 
 from .._base import check, markup
+from .._base.explained import noted
 from .._base.rounding import SAME
 from .inputs import Input
 from .solving import LAYERS
@@ -218,8 +219,7 @@ class Spread:
                 ("quantity", "5 %", "median", "95 %", f"{100 * self.confidence:g} % interval of the median"),
             ),
         ]
-        twice = self.chance()
-        lines += ["", f"Chance of a double hit: {_percent(twice)}"]
+        lines += ["", f"Chance of a double hit: {double_hits(self)}"]
         if self.chaotic:
             counts = self.values("n_impacts")
             lines.append(
@@ -279,7 +279,7 @@ class Spread:
             )
         for name, error in self.rescaled.items():
             lines.append(f"{name}: modes were rescaled; a body made anew differs by at most {error:.1e}")
-        return lines + [f"Note: {note}" for note in self.notes]
+        return lines + noted(self.notes)
 
     def data(self) -> dict[str, Any]:
         """All numbers but those of single blows, as plain data."""
@@ -311,5 +311,9 @@ def _whole(share: float) -> str:
     return f"{100.0 * min(1.0, max(0.0, share)):.0f}"
 
 
-def _percent(share: Estimate) -> str:
+def double_hits(found: Spread) -> str:
+    """The chance of a double hit and its interval in words."""
+    share = found.chance()
+    if share.value == 0.0:
+        return f"none seen, at most {100 * share.high:.2g} %"
     return f"{100 * share.value:.3g} % ({100 * share.low:.3g} to {100 * share.high:.3g} %)"

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
+from .._base.explained import noted
 from .._base.rounding import SAME
 from ..impact.collision import strike
 from ..impact.contact import Contact
@@ -323,7 +324,7 @@ class Found:
             for end, other in zip(("below", "above"), self.profiles[name].held_by):
                 if other:
                     lines.append(f"Note: {name} is limited {end} only by the range given for {other}")
-        lines += [f"Note: {note}" for note in self.notes]
+        lines += noted(self.notes)
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from .._base import check, markup
+from .._base.explained import noted
 from . import arguments, channels, readers, triggers
 
 RATES = (1.0, 1e9)  # [Hz] sampling rates allowed: beyond, the unit is a mistake
@@ -234,7 +235,7 @@ class Taps:
             for i, (name, peak, impulse, pulses) in enumerate(zip(self.labels, self.peak, self.impulse, self.n_pulses))
         ]
         lines += markup.columns(rows, ("", "peak", "impulse", "pulses", "cut off"))
-        return "\n".join(lines + [f"Note: {note}" for note in self.notes])
+        return "\n".join(lines + noted(self.notes))
 
     def _cut(self, tap: int) -> list[str]:
         """Names of the sensors that are cut off in a tap."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._base import check, progress
 from .._base.check import SimulationError
+from .._base.explained import noted
 from .._base.files import replacing
 from ..fe.assembly import System
 from ..impact import accuracy, spectra
@@ -171,7 +172,7 @@ class Roving:
                 lines.append(f"  {verdict} with every tip: {len(where)} points, at {told} m"[:400])
         sharp = "" if self.lines is None else f", {self.lines:.2g} lines in the half-power width of the sharpest mode"
         lines.append(f"records of {self.duration:.3g} s resolve {self.resolution:.3g} Hz{sharp}")
-        return "\n".join([*lines, *(f"Note: {note}" for note in self.notes)])
+        return "\n".join([*lines, *noted(self.notes)])
 
 
 def _blank(values: np.ndarray) -> list[Any]:

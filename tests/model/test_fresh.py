@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 import fem_impact as fi
-from fem_impact.impact import collision
+from fem_impact.impact import engine
 from fem_impact.impact.compiled import build, places
 from fem_impact.model import fresh
 
@@ -66,8 +66,8 @@ def limited(**outcome):
 
 def test_the_first_blow_is_plain_and_meets_its_tolerance(compiler, monkeypatch):
     plain: list[bool] = []
-    run_energy = collision.run_energy
-    monkeypatch.setattr(collision, "run_energy", lambda *them: plain.append(build.limited()) or run_energy(*them))
+    run_energy = engine.run_energy
+    monkeypatch.setattr(engine, "run_energy", lambda *them: plain.append(build.limited()) or run_energy(*them))
     known, n_runs = half_sine(), len(plain)
     assert all(plain) and n_runs and compiler.begun == 1
     compiler.stop()

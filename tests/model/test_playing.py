@@ -174,8 +174,8 @@ def test_a_pause_after_a_lift_and_a_start_from_before_carry_the_motion():
 def test_the_summary_tells_the_sequence(roll):
     text = roll.summary().splitlines()
     assert text[0].startswith("tolerance 0.01 met by all: estimated error")
-    assert text[1].startswith("5 strokes, ")
-    assert "stroke 0, peak" in text[2]
+    assert text[1].startswith("See notes.md#") and text[2].startswith("5 strokes, ")
+    assert "stroke 0, peak" in text[3]
     assert any(line.startswith("energy start 0 J, brought") for line in text)
     assert "Strokes(" in repr(roll)
     fi.figures.force(roll)

@@ -257,6 +257,7 @@ def test_every_scene_of_the_studies_loads_with_a_title(path):
 
 BAD = [
     ("length = 0.465", "lenght = 0.465", r"\[mesh\] lenght is not a key of this table; did you mean 'length'\?"),
+    ("length = 0.465", 'theory = "mindlin"', r"\[mesh\] theory is not a key of this table; it is one of \[target\]"),
     ("length = 0.465", "", r"\[mesh\] length is missing for shape = 'rectangle'"),
     ("length = 0.465", 'length = "long"', r"\[mesh\] length must be a number in m, got 'long'"),
     ("length = 0.465", "length = true", r"\[mesh\] length must be a number in m, got True"),

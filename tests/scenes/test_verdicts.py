@@ -40,3 +40,16 @@ def test_the_scene_that_is_not_trusted_names_its_cure(tmp_path):
     chosen = fi.load_scene(FOLDER / SHOWN).run(model="auto")
     assert chosen.response.restitution == pytest.approx(cured.restitution, abs=1e-9)
     assert sum("that took" in note for note in chosen.notes) == 2
+
+
+UNTRUSTED = "ball_toughened_pane", "ball_window_pane", "drumhead_buzz", "timpano_felt"
+EVERYDAY = sorted((FOLDER / "everyday").glob("*.toml"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", EVERYDAY, ids=lambda path: path.stem)
+def test_an_everyday_scene_is_trusted_or_says_why_it_is_not(path):
+    found = fi.load_scene(path)
+    hit = found.play() if found.stroke else found.strike()
+    text = " ".join(path.read_text(encoding="utf-8").replace("\n#", " ").split())
+    assert hit.trusted == (path.stem not in UNTRUSTED) == ("ot trusted" not in text), hit.verdict

@@ -5,6 +5,7 @@ from dataclasses import replace
 import matplotlib.image
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from fem_impact import mesh
 from fem_impact.impact.collision import strike
@@ -12,7 +13,8 @@ from fem_impact.impact.contact import Contact
 from fem_impact.impact.striker import Striker
 from fem_impact.modes import analytic
 from fem_impact.modes.modal import Modes
-from fem_impact.show import figures
+from fem_impact.show import figures, plots
+from fem_impact.sweeps.hammers import Hammer
 
 
 @pytest.fixture(scope="module")
@@ -112,3 +114,15 @@ def test_names_between_dollar_signs_are_no_formulas(tmp_path, monkeypatch):
     figures.save(tmp_path / "edges.svg", figures.edges(named))
     text = (tmp_path / "edges.svg").read_text()
     assert f">{name}<" in text and ">x$<" in text
+
+
+def test_the_range_of_tips_of_hammers_closes_between_the_masses_tried():
+    """In between, the hardest tip falls with mass**-2 and the softest keeps rising with the mass."""
+    made = [Hammer(m, ((1e2, high),), ((low, high),) if low else (), 1e6, 1e3, 1e-4) for m, low, high in (
+        (1e-3, 5e3, 4e4), (2e-3, 1e4, 4e4), (4e-3, None, 1e4), (8e-3, None, 9e5))]  # fmt: skip
+    (axes,) = plots.hammers(made[::-1], 500.0).axes
+    (region,) = (each for each in axes.collections if len(each.get_paths()))
+    masses = np.concatenate([path.vertices[:, 0] for path in region.get_paths()])
+    assert_allclose(masses.min(), 1.0, rtol=1e-12)
+    meeting = 2.0 * 4.0 ** (1.0 / 3.0)  # g: 4e4 (m/2)**-2 = 1e4 (m/2)
+    assert_allclose(masses.max(), meeting, rtol=0.01)  # drawn from 100 points per mass

@@ -1,0 +1,72 @@
+"""Names the headings of studies/notes.md that explain a message, so that a reader of one finds the other."""
+
+import re
+from collections.abc import Iterable
+
+# what a message says, under the heading that explains it; the page quotes the same
+HEADINGS: dict[str, tuple[str, ...]] = {
+    "tolerance-missed": ("MISSED",),
+    "not-resolvable": ("not resolvable",),
+    "number-of-impacts-in-doubt": ("how often the bodies touch cannot be told", "number in doubt"),
+    "no-final-separation": ("no final separation was reached",),
+    "step-error-stays": ("the step error stays at",),
+    "thin-target": ("thin target: ",),
+    "thin-striker": ("thin striker: ",),
+    "small-deflections": ("small deflections: ",),
+    "no-yielding": ("no yielding: ",),
+    "local-contact": ("local contact: ",),
+    "quasi-static-contact": ("quasi-static contact: ",),
+    "still-air": ("still air: ",),
+    "stated-damping": ("stated damping: ",),
+    "not-known": ("it is not known whether the model holds", "the model is not examined"),
+    "beyond-this-estimate": ("beyond this estimate",),
+    "slips-of-units": ("softer than rubber", "are expected"),
+    "drawings": (
+        "states no unit", "y points down in an SVG file", "points along gentle bends were joined", "was closed",
+    ),
+    "mesh-files": (
+        "duplicate nodes were merged", "inverted triangles were flipped", "triangles were split at hanging nodes",
+        "sides of the rim were replaced by smooth curves", "not on the rim, so it cannot be supported",
+    ),
+    "strike-points-that-cannot-move": ("it lies on a support",),
+    "rolling-shear": ("G_yz is not stated",),
+    "modes-from-elsewhere": ("the static compliance is not given", "no rigid motion is given"),
+    "air": ("with a rigid wall around",),
+    "too-many-modes-or-unknowns": ("more than the limit of",),
+    "strike-points-beside-the-body": ("must lie on the body",),
+    "outlines-that-cannot-be-meshed": ("the mesher could not fill the outline",),
+    "extras": ("pip install 'fem-impact[",),
+    "no-gradient": ("no gradient",),
+    "nothing-changes-in-a-design": ("no derivative in",),
+}  # fmt: skip
+POINTER = re.compile(r" \((notes\.md#[^()]+)\)")
+
+
+def where(text: str) -> str:
+    """The headings that explain a message, such as "notes.md#air, #not-known"; "" if none does."""
+    found = [f"#{heading}" for heading, said in HEADINGS.items() if any(each in text for each in said)]
+    return f"notes.md{', '.join(found)}" if found else ""
+
+
+def pointed(text: str) -> str:
+    """The message, ending with the headings that explain it in brackets."""
+    bare = POINTER.sub("", text)  # it may hold a message that has its own already
+    place = where(bare)
+    return f"{bare} ({place})" if place else bare
+
+
+def below(first: str) -> list[str]:
+    """The line that follows the first line of a summary, which itself stays short; none if nothing explains it."""
+    place = where(first)
+    return [f"See {place}"] if place else []
+
+
+def noted(notes: Iterable[str]) -> list[str]:
+    """Notes as lines of text, each with the headings that explain it."""
+    return [f"Note: {pointed(note)}" for note in notes]
+
+
+def named(lines: Iterable[str]) -> list[str]:
+    """Every heading that lines of text name, each as notes.md#heading."""
+    found = (each for line in lines for each in re.findall(r"(?:notes\.md|, )(#[a-z-]+)", line))
+    return [f"notes.md{each}" for each in dict.fromkeys(found) if each[1:] in HEADINGS]
