@@ -419,11 +419,8 @@ def _flight(found: Sensitivity, begin: int, end: float) -> tuple[np.ndarray, np.
 
     Times (n,) [s], approaches [m] and rates [m/s] there (n, n_contacts, 2), and that all contacts are open.
     """
-    history, mark, start = found.history, found.pieces.mark[begin], found.time[begin]
-    if mark >= 0:
-        q, p = found.found.q[mark].copy(), found.found.p[mark].copy()
-    else:
-        q, p = (x[0] for x in history.states(np.array([start])))
+    history, start = found.history, found.time[begin]
+    q, p = (x[0] for x in history.states(np.array([start])))
     free = replace(history, start_q=q, start_p=p, steps=history.steps[:0])
     count = int(np.clip(LOOKS[0] * (end - start) / max(_duration(history), 1e-300), 16, LOOKS[1]))
     times = np.linspace(0.0, end - start, count + 1)[:-1]

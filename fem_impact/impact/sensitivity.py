@@ -124,8 +124,7 @@ class Sensitivity:
         pieces = Pieces(length, closed, forces, memory[kept], yields[kept], mark, nodes, powers)
         found = Found(
             np.zeros((len(time), m, 2)), np.zeros((len(marks), m, 5)), np.zeros((len(marks), m, 4, n)),
-            np.zeros((len(marks), m, 1 + n)),
-            np.zeros((len(marks), n_modes)), np.zeros((len(marks), n_modes)), np.zeros((len(length), m, s, n)),
+            np.zeros((len(marks), m, 1 + n)), np.zeros((len(length), m, s, n)),
             np.zeros((n, n_modes)), np.zeros((n, n_modes)),
         )  # fmt: skip
         blow = Blow(
@@ -267,12 +266,12 @@ class Sensitivity:
     def end_speeds(self) -> np.ndarray:
         """Change (n_modes, n) of the modal velocities at the end of the run, which moves."""
         h, found = self.history, self.found
-        rate = h.bias - h.omega * (2.0 * h.zeta * found.p[-1] + h.omega * found.q[-1])
+        rate = h.bias - h.omega * (2.0 * h.zeta * h.end_p + h.omega * h.end_q)
         return (found.dp + rate * self.end[:, None]).T
 
     def speed(self, modes: np.ndarray, c: int) -> np.ndarray:
         """Change (n,) of the final speed [m/s] of the point of contact c in some modes."""
-        u, p = self.history.shape[c, modes], self.found.p[-1, modes]
+        u, p = self.history.shape[c, modes], self.history.end_p[modes]
         return np.asarray(self.change.shape[:, c, modes] @ p + u @ self.end_speeds[modes])
 
     def rebound(self, rigid: np.ndarray, contacts: Sequence[int]) -> tuple[float, np.ndarray, np.ndarray]:
@@ -293,7 +292,7 @@ class Sensitivity:
 
     def energies(self, modes: slice) -> np.ndarray:
         """Change (n_modes, n) of the energy left in each of some modes at the end [J]."""
-        omega, q, p = self.history.omega[modes], self.found.q[-1, modes], self.found.p[-1, modes]
+        omega, q, p = (each[modes] for each in (self.history.omega, self.history.end_q, self.history.end_p))
         dq = self.found.dq[:, modes].T + p[:, None] * self.end
         return (
             p[:, None] * self.end_speeds[modes]
@@ -636,8 +635,6 @@ def _cut(
     ``most`` steps make one, in all of which a contact yields (n_steps, n_contacts) or in none.
     """
     steps, pressed = history.steps, history.pressed
-    if not len(steps):
-        return np.zeros(1), np.zeros(0, int), np.zeros(0), np.zeros(0, int)
     inside: defaultdict[int, set[float]] = defaultdict(set)
     places = np.clip(np.searchsorted(steps[:, layout.START], times, side="right") - 1, 0, len(steps) - 1)
     for i, when in zip(places.tolist(), times):

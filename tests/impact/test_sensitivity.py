@@ -4,34 +4,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.testing import assert_allclose
+from warming import locked
 
 import fem_impact as fi
-from fem_impact.impact.compiled import one_mode, record, tangents
+from fem_impact.impact.compiled import build, one_mode, record, tangents
 from fem_impact.impact.compiled.build import ZERO
 from fem_impact.impact.sensitivity import Sensitivity, gauss, no_change
 
 
-@njit
-def moments_of(omega, zeta, t, out_moments):
-    tangents.moments_of(omega, zeta, t, out_moments)
-
-
-@njit
 def moments_alone(omega, zeta, out_moments):
     work = np.empty((2, out_moments.shape[0] - 2))
     for n in range(omega.size):
         alone = np.empty(out_moments.shape[0] - 1)
-        out_moments[0, n] = one_mode.mode_moments(omega[n], zeta[n], 1.0, alone, work)[2]
+        out_moments[0, n] = build.plain(one_mode.mode_moments)(omega[n], zeta[n], 1.0, alone, work)[2]
         out_moments[1:, n] = alone
-
-
-@njit
-def moment_slopes(omega, zeta, t, moments, out_faster, out_damped):
-    per, own = np.empty(omega.size), np.empty(omega.size)
-    tangents.divisors(omega, zeta, per, own)
-    tangents.moment_slopes(omega, zeta, t, moments, per, own, out_faster, out_damped)
 
 
 @pytest.mark.parametrize("count", [4, 6])
@@ -41,26 +28,27 @@ def test_moments_of_many_modes_are_those_of_each(zeta, count):
     omega = np.append(0.0, np.geomspace(1e-5, 1e3, 60))
     damping = np.where(omega > 0.0, zeta, 0.0)
     found, alone = np.empty((2, count + 2, len(omega)))
-    moments_of(omega, damping, 1.0, found)
+    build.plain(tangents.moments_of)(omega, damping, 1.0, found)
     moments_alone(omega, damping, alone)
     # two orders of the recursion divide rounding by the square of a half; beside it 3e-15 of a phase of a thousand
     assert_allclose(found, alone, rtol=0, atol=1e-15 * 4.0 ** ((count + 1) // 2) + 3e-15)
 
 
-@pytest.mark.slow  # compiles for half a minute
 @pytest.mark.parametrize("count", [4, 6])
 @pytest.mark.parametrize("zeta", [0.0, 0.02, 0.95, 1.0, 3.0])
 def test_changes_of_moments_are_differences_of_moments(zeta, count):
+    """As plain Python, for the compiler would take half a minute."""
     omega = np.array([0.0, 1e-3, 0.3, 2.0, 40.0, 700.0])
     damping = np.where(omega > 0.0, zeta, 0.0)
 
     def moments(omega, damping):
         found = np.empty((count + 2, len(omega)))
-        moments_of(omega, damping, 1.0, found)
+        build.plain(tangents.moments_of)(omega, damping, 1.0, found)
         return found
 
-    faster, damped = np.empty((count + 1, 6)), np.empty((count + 1, 6))
-    moment_slopes(omega, damping, 1.0, moments(omega, damping), faster, damped)
+    per, own, faster, damped = np.empty(6), np.empty(6), np.empty((count + 1, 6)), np.empty((count + 1, 6))
+    build.plain(tangents.divisors)(omega, damping, per, own)
+    build.plain(tangents.moment_slopes)(omega, damping, 1.0, moments(omega, damping), per, own, faster, damped)
     near, far = ((moments(omega * (1 + h), damping) - moments(omega * (1 - h), damping)) / h for h in (1e-5, 2e-5))
     # four-point differences of numbers of order one; they move fast where the phase is 700
     assert_allclose(faster * omega, ((4.0 * near - far) / 6.0)[:-1], atol=1e-9)
@@ -220,3 +208,22 @@ def test_the_impulse_of_a_smooth_law_grows_with_the_mass_alone():
     hit = fi.strike(wall, ball, fi.Contact.power(1e6, 1.2), at=None, speed=1.0, tolerance=1e-9)
     slopes = hit.gradient("impulse", ("striker.mass", "contact.stiffness", "strike.speed"))
     assert_allclose(slopes.relative, [1.0, 0.0, 1.0], atol=5e-9)  # 2e-9 were measured
+
+
+def test_a_contact_that_stays_elastic_has_the_largest_force_of_one_that_cannot_yield():
+    laws = fi.Contact.power(1e7, 1.4), fi.Contact.elastic_plastic(1e7, exponent=1.4, yield_approach=0.009)
+    hits = [fi.collide([fi.Modes.rigid(0.2)], [fi.Touch(law, 0, None)], speeds=[0.5]) for law in laws]
+    elastic, plastic = (Sensitivity.of(hit.history, no_change(hit.history, 1)).largest for hit in hits)
+    assert plastic == pytest.approx(elastic, rel=1e-12) and elastic == pytest.approx(hits[0].peak_force, rel=1e-2)
+
+
+@pytest.mark.parametrize("before", [0.01, 0.7])  # [s] of the step before the longest
+def test_a_peak_just_before_the_end_of_a_long_step_is_found(before):
+    """Of a half sine of pi seconds, whose look nearest to the peak is the start of the short step after it."""
+    ends = np.array([0.0, 0.8 - before, 0.8, 0.5 * np.pi + 0.01, 0.5 * np.pi + 0.02, np.pi])
+    steps, now, law = np.zeros((5, 8)), np.zeros((6, 1)), np.array([[1e3, 1.0, 0.0, 0.0]])
+    steps[:, 0], steps[:, 1], steps[:, 5] = ends[:-1], np.diff(ends), 1.0
+    steps[:, 3], steps[:, 4] = np.sin(ends[:-1]), np.cos(ends[:-1])
+    now[4] = -1.0
+    time, top, _ = record.largest_force(*locked(steps, now, law), 2, ZERO)
+    assert_allclose([time, top], [0.5 * np.pi, 1e3], rtol=1e-3)  # of the cubics

@@ -78,8 +78,6 @@ class Found(NamedTuple):
     base: np.ndarray  # (n_marks, n_contacts, 5) approach and its first three rates, force
     ends: np.ndarray  # (n_marks, n_contacts, 4, n) changes of approach, rate, acceleration and force
     dents: np.ndarray  # (n_marks, n_contacts, 1 + n) dent of a plastic contact, and its changes
-    q: np.ndarray  # (n_marks, n_modes)
-    p: np.ndarray  # (n_marks, n_modes)
     force: np.ndarray  # (n_pieces, n_contacts, s, n) change of the forces at the nodes
     dq: np.ndarray  # (n, n_modes) changes of the state at the end
     dp: np.ndarray  # (n, n_modes)
@@ -961,7 +959,6 @@ def follow(blow, change, pieces, found):
         mark = pieces.mark[j]
         if mark >= 0:
             look(blow, change, pressed, state, found.base[mark], found.ends[mark], found.dents[mark])
-            restore(q, p, found.q[mark], found.p[mark])
         if end:
             break
         h, closed = pieces.length[j], n_acting > 0
