@@ -12,7 +12,8 @@ order. Kernels are run as plain Python by those of their tests that are quick th
 are compiled only if none of these fails. `mutants.csv` keeps
 
 holder   the first test that failed when the mutant was first examined: it fails with the mutant, and not without. A
-         test that does not end is a failure, too, if without the mutant it ends in a quarter of the time
+         test that does not end is a failure, too, if without the mutant it ends in a quarter of the time. "none of the
+         quick": a kernel that was not compiled, as a test was written for it at once, or as nothing can notice it
 since    the test, written since, that notices what no test noticed at first; or that the line is gone, as nothing
          needed it
 reason   why a mutant that no test can notice changes no result: written by hand
