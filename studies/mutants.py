@@ -323,8 +323,9 @@ def main() -> None:
     since = sum(bool(row["since"]) for row in rows) - gone
     equal = sum(bool(row["reason"]) for row in rows)
     left = sum(alive(row) for row in rows)
-    print(f"{len(rows)} wrong lines were examined. Tests noticed {at_once} at once and {since} since; {gone} lines are")
-    print(f"gone, as nothing needed them; {equal} change no result; {left} survive.")
+    print(f"{len(rows)} wrong lines were examined; {FOUND.name} tells each.")
+    print(f"Tests noticed {at_once} at once and {since} since. {gone} lines are gone, as nothing needed them.")
+    print(f"{equal} change no result; {left} survive.")
 
 
 if __name__ == "__main__":
