@@ -193,6 +193,7 @@ def quick() -> dict[str, tuple[float, list[str]]]:
         return json.loads(REACH.read_text("utf-8"))
     import numba
     import pytest
+    import warming
 
     kernels, found = PACKAGE / KERNELS.replace(".", "/"), {}
     files = dict.fromkeys(test for path in sorted(kernels.glob("*.py")) for test in tests(f"{KERNELS}.{path.stem}"))
@@ -227,6 +228,7 @@ def quick() -> dict[str, tuple[float, list[str]]]:
 
     failed: set[str] = set()
     if not (child := os.fork()):
+        warming.compile_all = lambda: None
         os.environ["NUMBA_DISABLE_JIT"], numba.config.DISABLE_JIT = "1", 1
         pytest.main(["-n", "0", "-q", "-p", "no:cacheprovider", "--tb=no", *files], plugins=[Watch()])
         REACH.parent.mkdir(exist_ok=True)
