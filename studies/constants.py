@@ -28,11 +28,13 @@ change, the tests are all that import any kernel.
 import argparse
 import ast
 import csv
+import hashlib
 import importlib.abc
 import importlib.util
 import os
 import re
 import resource
+import shutil
 import signal
 import sys
 import tempfile
@@ -50,7 +52,7 @@ KINDS = ("layout", "fact", "picture", "limit", "resource", "rounding", "tuning")
 FACT = r"\bfact:|\bexact for\b|\([A-Z][^()]* (19|20)\d\d\)"
 CHEAP = r"to limit (the )?(memory|work)|limits the memory|is faster|% slower|time limit|does not change the result"
 SECONDS = 60  # [s] of CPU that the tests of one changed constant may take; longer ones count as not failed
-KERNEL_SECONDS = 300  # [s] the same where kernels are compiled first
+KERNEL_SECONDS = 180  # [s] the same where kernels are compiled first
 KERNELS = "impact.compiled"
 NONE, SLOW = "none", f"none within {SECONDS} s"
 
@@ -179,6 +181,8 @@ def factors(constant: Constant) -> tuple[float, float]:
 class Changing(importlib.abc.MetaPathFinder, importlib.abc.SourceLoader):
     """Imports one module with one of its constants changed."""
 
+    plain = False  # whether kernels run as plain Python
+
     def __init__(self, constant: Constant, factor: float) -> None:
         self.constant, self.factor = constant, factor
         self.kernels = constant.package == KERNELS
@@ -186,7 +190,8 @@ class Changing(importlib.abc.MetaPathFinder, importlib.abc.SourceLoader):
         self.path = PACKAGE / (constant.module.replace(".", "/") + ".py")
 
     def find_spec(self, name, path=None, target=None):
-        return importlib.util.spec_from_file_location(name, self.path, loader=self) if name == self.full else None
+        own = name.replace(".plain.", ".") == self.full  # kernels are read once more to run as plain Python
+        return importlib.util.spec_from_file_location(name, self.path, loader=self) if own else None
 
     def get_filename(self, name):
         return str(self.path)
@@ -196,6 +201,21 @@ class Changing(importlib.abc.MetaPathFinder, importlib.abc.SourceLoader):
 
     def get_code(self, name):
         return compile(ast.fix_missing_locations(self.tree()), str(self.path), "exec")
+
+    def spare(self, folder: Path) -> None:
+        """Put into a folder for compiled kernels those that do not call into the changed module."""
+        home, texts = self.path.parent, {path.stem: path.read_text("utf-8") for path in self.path.parent.glob("*.py")}
+        used = {name: set(re.findall(r"^from \.(\w+) import|^from \. import (\w+)", text, re.M))
+                for name, text in texts.items()}  # fmt: skip
+        calling, more = set(), {self.path.stem}
+        while more - calling:
+            calling |= more
+            more = {name for name, pairs in used.items() if calling & {part for pair in pairs for part in pair}}
+        target = folder / f"{home.name}_{hashlib.sha1(str(home).encode()).hexdigest()}"  # where numba looks
+        target.mkdir()
+        for path in home.glob("__pycache__/*.nb[ci]"):
+            if path.name.partition(".")[0] not in calling:
+                shutil.copy2(path, target)
 
     def tree(self) -> ast.Module:
         """The changed module."""
@@ -211,9 +231,15 @@ class Changing(importlib.abc.MetaPathFinder, importlib.abc.SourceLoader):
 
 
 class First:
-    """A plugin of pytest that remembers what failed first."""
+    """A plugin of pytest that writes into a file which test runs, and at the end what failed first."""
 
     holder = NONE
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def pytest_runtest_logstart(self, nodeid):
+        self.path.write_text(f"{SLOW}, at {nodeid}")
 
     def pytest_runtest_logreport(self, report):
         if report.failed and self.holder == NONE:
@@ -243,16 +269,19 @@ def tests_of(constant: Constant) -> list[str]:
     return found or [str(path) for path in naming]
 
 
-def first_failure(tests: list[str], change: Changing | None) -> str:
-    """The first test that fails with a constant changed, found in a process of its own."""
+def first_failure(tests: list[str], change: Changing | None, share: float = 1.0) -> str:
+    """The first test that fails with a constant changed, found in a process of its own.
+
+    If none does in a `share` of the time there is, it says which test ran last.
+    """
     import numba
     import pytest
     import warming
 
-    kernels = change is not None and change.kernels
-    seconds = KERNEL_SECONDS if kernels else SECONDS
+    kernels = change is not None and change.kernels and not change.plain
+    seconds = int(share * (KERNEL_SECONDS if kernels else SECONDS))
     folder = tempfile.TemporaryDirectory()
-    answer, told = os.pipe()
+    told = Path(folder.name) / "told"
     child = os.fork()
     if not child:
         quiet = os.open(os.devnull, os.O_WRONLY)
@@ -262,20 +291,21 @@ def first_failure(tests: list[str], change: Changing | None) -> str:
         warming.compile_all = lambda: None  # kernels are on disk, or compiled as needed
         if change:
             sys.meta_path.insert(0, change)
+        if change and change.plain:
+            os.environ["NUMBA_DISABLE_JIT"], numba.config.DISABLE_JIT = "1", 1
         if kernels:
             numba.config.CACHE_DIR = folder.name
-        first = First()
+            change.spare(Path(folder.name))
+        first = First(told)
         status = pytest.main(["-x", "-n", "0", "-q", "-p", "no:cacheprovider", "--no-header", *tests], plugins=[first])
         if status not in (0, 1, 2, 5) and first.holder == NONE:
             first.holder = "import"
-        os.write(told, first.holder.encode())
+        told.write_text(first.holder)
         os._exit(0)
-    os.close(told)
     _, status = os.waitpid(child, 0)
+    said = told.read_text() if told.exists() else SLOW
     folder.cleanup()
-    with os.fdopen(answer) as pipe:
-        said = pipe.read()
-    return said or (SLOW if status in (signal.SIGXCPU, signal.SIGKILL) else "crash")
+    return said if status in (0, signal.SIGXCPU, signal.SIGKILL) else "crash"
 
 
 def recorded() -> dict[str, dict[str, str]]:

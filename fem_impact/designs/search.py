@@ -430,7 +430,7 @@ class _Search:
                 sides += [(i, s, end) for s, end in ((1.0, goal.low), (-1.0, goal.high)) if math.isfinite(end)]
         constraints = [self._constraint(*side) for side in sides]
         found = minimize(
-            lambda x: self.sign * (x[which] - first[which]) / (high[which] - low[which]), first,
+            lambda x: self.sign * x[which] / (high[which] - low[which]), first,
             jac=lambda x: self.sign * unit / (high[which] - low[which]), bounds=list(zip(low, high)),
             constraints=constraints, method="SLSQP", options={"maxiter": solver.ENOUGH, "ftol": CLOSE},
         )  # fmt: skip

@@ -363,7 +363,7 @@ class Parameters:
         found.omega[i, part] = seen.omega
         found.shape[i, 0, part] = -seen.shape
         found.bias[i, part] = hit._push * seen.shape
-        self._raise(found, i, 1, seen.omega[-1] / target.omega[-1] if target.omega[-1] else 0.0)
+        self._raise(found, i, 1, seen.omega[-1] / max(target.omega[-1], np.finfo(float).tiny))
         flexible = target.omega > 0.0
         row, omega = target.shapes.at(hit.at[None])[0, flexible], target.omega[flexible]
         carried = 2.0 * row / omega**2 @ (seen.shape[flexible] - row * seen.omega[flexible] / omega)

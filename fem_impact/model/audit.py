@@ -107,9 +107,8 @@ def foresee(
     except SimulationError:
         return unexamined(how["quantity"], "the same blow on a wall cannot be computed", "strike")
     hit = replace(hit, striker=striker, contacts=(contact,), quantities=how["quantity"])
-    own = bending.known(striker.modes) if striker.modes.dimension and (striker.modes.omega > 0.0).any() else None
     clearance = _clearance(modes, known, mesh, place[0])
-    struck = Struck(hit, known, own, ideal, clearance, place, (striker.modes, modes))
+    struck = Struck(hit, known, bending.known(striker.modes), ideal, clearance, place, (striker.modes, modes))
     return tuple(replace(examiner(struck), effect={}) for examiner in EXAMINERS)
 
 
@@ -120,9 +119,7 @@ def _struck(hit: Response, simplified: Simplified | None) -> Struck:
     else:
         whole, ideal = replace(modes, mass=simplified.mass), simplified.kind
         target = bending.around(whole, simplified.section, simplified.mesh, simplified.supports)
-    striker = hit.bodies[0] if hit.striker is not None else None
-    flexible = striker is not None and striker.dimension and (striker.omega > 0.0).any()
-    known = bending.known(striker) if striker is not None and flexible else None
+    known = bending.known(hit.bodies[0]) if hit.striker is not None else None
     mesh = None if simplified is None else simplified.mesh
     return Struck(hit, target, known, ideal, _clearance(modes, target, mesh, hit.at))
 

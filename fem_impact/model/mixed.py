@@ -77,8 +77,8 @@ def absorbing(mobility: float, frequency: float, highest: float) -> tuple[np.nda
     """
     number = max(1, int(np.ceil(np.log(highest / frequency) / RATIO)))
     omega = 2.0 * np.pi * frequency * np.exp(RATIO * (np.arange(number) + 0.5))
-    squared = mobility * np.cos(ANGLE) / (0.5 * np.pi - ANGLE) * RATIO * omega
-    return omega, np.sqrt(squared), float(2.0 * mobility / np.pi / (omega[-1] * np.exp(0.5 * RATIO)))
+    dense = mobility * np.cos(ANGLE) / (0.5 * np.pi - ANGLE)  # squared shapes per frequency; above, they act as springs
+    return omega, np.sqrt(dense * RATIO * omega), float(dense / (omega[-1] * np.exp(0.5 * RATIO)))
 
 
 def kept(omega: np.ndarray, mobility: float, above: np.ndarray, shape: np.ndarray) -> np.ndarray:

@@ -45,7 +45,6 @@ class Found:
 
     borders: tuple[Border, ...]
     doubtful: np.ndarray  # (n, n) whether the number of impacts of a cell depends on the tolerance, or was refused
-    n_coarse: int  # [-] points told to the cell only
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,17 +138,17 @@ def find_borders(grid: Any, count: np.ndarray, solve: Solve) -> Found:
     doubtful = (fine < 0) | (count < 0) | (fine != count)
     curves, vertices = _joined(fine)
     if not curves:
-        return Found((), doubtful, 0)
+        return Found((), doubtful)
     edges, which = np.unique(vertices, axis=0, return_inverse=True)
-    places, error, coarse = _located(plane, fine, edges)
+    places, error = _located(plane, fine, edges)
     values = plane.values(places)[which.reshape(-1)]
-    error, coarse = error[which.reshape(-1)], coarse[which.reshape(-1)]
+    error = error[which.reshape(-1)]
     ends = np.cumsum([n for _, n in curves])[:-1]
     borders = tuple(
         Border(level, plane.names, points, errors)
         for (level, _), points, errors in zip(curves, np.split(values, ends), np.split(error, ends))
     )
-    return Found(borders, doubtful, int(coarse.sum()))
+    return Found(borders, doubtful)
 
 
 def _recounted(plane: Plane, count: np.ndarray) -> np.ndarray:
@@ -182,8 +181,8 @@ def _joined(count: np.ndarray) -> tuple[list[tuple[int, int]], np.ndarray]:
     return curves, np.concatenate(vertices)
 
 
-def _located(plane: Plane, count: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where borders cross edges (n, 3): places (n, 2), their errors (n,) [-], and which are told to the cell only."""
+def _located(plane: Plane, count: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where borders cross edges (n, 3): places (n, 2) and their errors (n,) [-]."""
     level, middle = edges[:, 0], edges[:, 1:]
     along = (middle % 2 == 1).argmax(axis=1)
     low, high = middle // 2, (middle + 1) // 2
@@ -207,7 +206,7 @@ def _located(plane: Plane, count: np.ndarray, edges: np.ndarray) -> tuple[np.nda
         width[some[known]] *= 0.5
         todo[some[~known]] = False
         turn += 1
-    return 0.5 * (low + high), 0.5 * width, width > WIDTH
+    return 0.5 * (low + high), 0.5 * width
 
 
 def add_borders(table: xarray.Dataset, found: Found, smallest: float) -> xarray.Dataset:
@@ -242,7 +241,8 @@ def _told(found: Found, smallest: float) -> str:
     error = np.concatenate([border.error for border in found.borders])
     fine = error[error <= 0.5 * WIDTH]
     located = f"located to {fine.max():.1g} of the axes" if len(fine) else "not located"
-    coarse = f", {found.n_coarse} of {len(error)} points only to the cell" if found.n_coarse else ""
+    n_coarse = len(error) - len(fine)
+    coarse = f", {n_coarse} of {len(error)} points only to the cell" if n_coarse else ""
     curves = f"{len(found.borders)} curve{'s' if len(found.borders) > 1 else ''}"
     return f"{curves} between numbers of impacts, {located}{coarse}; {beside}; {missed}"
 

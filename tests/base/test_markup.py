@@ -44,6 +44,17 @@ def test_response_shows_its_force(scene):
     assert min(heights) == pytest.approx(2.0 * markup.MARGIN, abs=0.1) and len(heights) <= markup.SAMPLES + 1
 
 
+def test_a_response_shows_its_impacts_only():
+    """A hand holds the striker, so that the run goes on to its end."""
+    held = fi.Striker.rigid(0.02).held(fi.Hand(stiffness=100.0, damping=1.0, force=0.1))
+    plate = fi.analytic.rectangle(0.4, 0.3, mass=1.0, first_frequency=200.0, n_modes=5)
+    how = {"at": (0.13, 0.1), "speed": 1.0, "tolerance": 1e-2, "duration": 0.05}
+    hit = fi.strike(plate, held, fi.Contact.linear(1e5), **how)
+    (told,) = (each.text for each in parsed(hit._repr_html_()).iter(f"{SVG}text") if each.text.endswith(" s"))
+    assert float(told.split()[0]) == pytest.approx(hit.impacts[-1].end, rel=1e-2)
+    assert hit.impacts[-1].end < 0.97 * hit.time[-1]
+
+
 def test_modes_and_meshes_show_themselves():
     modes = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=30)
     text = "".join(parsed(modes._repr_html_()).itertext())

@@ -9,6 +9,7 @@ from skfem.element import DiscreteField
 from skfem.helpers import dd, ddot, eye, trace
 
 from fem_impact import mesh
+from fem_impact.fe import assembly
 from fem_impact.fe.assembly import assemble
 from fem_impact.fe.elements import ArgyrisSpace
 from fem_impact.fe.section import Beam, Material, Plate
@@ -108,6 +109,15 @@ def test_triangles_shrink_towards_a_point(at):
     assert errors[1] < 0.05 * errors[0]  # 0.03 and less were measured; what is left is the flat triangles around it
     points = np.random.default_rng(0).uniform(0.01, 0.99, (50, 2))
     assert graded.contains(points).all()
+
+
+@pytest.mark.parametrize("kind", ["free", "hinged", "clamped"])
+@pytest.mark.parametrize("coarseness", [1.0, 16.0])
+def test_unknowns_are_counted_before_they_are_assembled(kind, coarseness):
+    shape, at, held = mesh.rectangle(1.0, 0.7, size=0.1), (0.37, 0.41), {"boundary": kind}
+    made = assemble(shape, PLATE, held, near=at, coarseness=coarseness).n_dofs
+    told = assembly.unknowns_near(shape, PLATE, held, np.array([at]), coarseness=coarseness)
+    assert abs(told / made - 1.0) < 0.02  # the docstring says 1 %
 
 
 @pytest.mark.parametrize("at", [(0.37, 0.41), (0.37, 0.03)])  # inside and near a clamped edge

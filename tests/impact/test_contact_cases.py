@@ -510,6 +510,13 @@ def test_force_at_any_time_is_the_sampled_force():
     )  # the same cubic at fractions of a step that were rounded otherwise
 
 
+def test_force_begins_as_the_spring_is_pressed():
+    """F = k v t within the first step, but for the share (omega t)^2 / 6 of it by which the contact slows."""
+    hit = fi.strike(fi.Modes.rigid(1e3), fi.Striker.rigid(0.1), fi.Contact.linear(1e5), at=None, speed=2.0)
+    times = hit.history.steps[0, 1] * np.array([0.1, 0.5])
+    assert_allclose(hit.history.force_at(times, 0)[0], 1e5 * 2.0 * times, rtol=float(times[1] ** 2 * 1e5 / 0.1))
+
+
 def free_bar(n_modes):
     return fi.analytic.beam(0.5, ends=("free", "free"), mass=0.1, first_frequency=300.0, n_modes=n_modes)
 

@@ -1,12 +1,14 @@
 """Free flight against closed forms: the time of the next onset, and the proof that there is none."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numba import njit
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
-from fem_impact.impact.compiled import flight, propagation
+from fem_impact.impact.compiled import build, flight, propagation, stretched
 from fem_impact.impact.compiled.bundles import Bodies, Flights, Limits
 from fem_impact.impact.compiled.flight import LATER, NEVER, ONSET
 
@@ -88,3 +90,15 @@ def test_how_near_a_flight_passes_is_known(gap):
     assert found == NEVER
     # the cubic through two looks about the turn errs by the fourth power of their distance
     assert 0.8 * gap < -miss[0] < 1.2 * gap
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.7, 0.5 * np.pi])  # displaced, both, moving
+@pytest.mark.parametrize(("reach", "over"), [(0.9e-3, True), (1.1e-3, False)])
+def test_a_mode_that_stretches_may_swing_as_far_as_its_energy(phase, reach, over):
+    """The striker is 1 mm away and recedes; the mode's amplitude at the contact decides whether they can meet."""
+    omega, shape = np.array([0.0, 1e3]), np.array([[1.0, 2.0]])
+    q, p = np.array([-1e-3, 0.5 * reach * np.cos(phase)]), np.array([-0.1, 0.5e3 * reach * np.sin(phase)])
+    bodies = SimpleNamespace(omega=omega, shape=shape, q=q, p=p, bias=np.zeros(2))
+    contacts, still = SimpleNamespace(end=np.zeros(1), offset=np.zeros(1)), SimpleNamespace(still=0.0, depth=0.0)
+    parted = build.plain(stretched.parted)(bodies, contacts, stretched.Stretch(np.zeros((1, 1, 1)), 1), still)
+    assert parted == over

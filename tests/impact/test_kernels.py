@@ -128,6 +128,18 @@ def exact_moments(w, z, h, count):
         return [float(v) for v in (c + z * w * s, s, c - z * w * s)], [float(v) for v in moments]
 
 
+@pytest.mark.parametrize("share", [1e-3, 0.3, 0.7, 0.999])
+def test_moments_of_slow_modes_are_those_of_a_sine(share):
+    """Integrals of the impulse response of undamped modes with powers of time, by series and in closed form."""
+    th = share * propagation.SERIES_END
+    found = np.empty((7, 1))
+    build.plain(propagation.near_moments)(np.array([th / 1e-5]), 1e-5, np.zeros(1), 0, found)
+    with mp.workdps(60):
+        th = mp.mpf(th)
+        wanted = [(th - mp.sin(th)) / th**3, (th * th / 2 - 1 + mp.cos(th)) / th**4]
+    assert_allclose(found[5:, 0], [float(each) for each in wanted], rtol=1e-14)  # rounding, of the angle too
+
+
 @pytest.mark.parametrize("zeta", [0.0, 1e-3, 0.3, 0.9, 1.0 - 1e-9, 1.0, 1.0 + 1e-7, 1.15, 1.3, 3.0, 50.0, 1e3, 1e6])
 @pytest.mark.parametrize("angle", [1e-9, 1e-3, 0.999, 1.001, 2.5, 4.9, 5.1, 10.0, 100.0, 1e4])
 def test_moments_are_exact_to_rounding(zeta, angle):
@@ -733,3 +745,19 @@ def test_a_run_leaves_other_threads_free():
         time.sleep(1e-3)
         ticks += 1
     assert ticks > 10  # with the lock held the first sleep lasts as long as the run: 1 or 2
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 3.0])
+def test_forces_of_a_stiff_contact_are_found_however_slowly(exponent):
+    """One node of one contact, f = k (d - c f)**a: far off, each step of Newton leaves 1 - 1/a of what is missing."""
+    c, d, k = 1e-6, 1e-3, 1e4 * 1e3 / 1e-3**exponent
+    nodes, free, inner = np.zeros((4, 1, 1)), np.zeros((2, 1, 1)), np.zeros((2, 1, 1, 1, 1))
+    free[collocation.MOVED], inner[collocation.MOVED] = d, c
+    room = SimpleNamespace(
+        matrix=np.zeros((2, 1)), nodes=nodes, active=np.zeros(1, int), free=free, contacts=np.zeros((8, 1))
+    )
+    contacts = SimpleNamespace(law=np.array([[k, exponent, 0.0, 0.0]]), pressed=np.ones(1, bool))
+    assert build.plain(collocation.solve_collocation)(contacts, room, inner)
+    force = nodes[collocation.FORCES, 0, 0]
+    exact = brentq(lambda f: f - k * (d - c * f) ** exponent, 0.0, d / c, xtol=1e-12)
+    assert_allclose(force, exact, rtol=1e-9)  # that of the search for the exact force, and rounding of d - c f

@@ -1,11 +1,12 @@
 """The contact law: its force is the slope of its energy, and the average slopes hold for any two approaches."""
 
+import mpmath as mp
 import numpy as np
 import pytest
 from numba import njit
 from numpy.testing import assert_allclose
 
-from fem_impact.impact.compiled import law
+from fem_impact.impact.compiled import build, law
 
 LAWS = [(1e5, 1.0, 0.0), (1e7, 1.5, 0.0), (3e6, 1.3, 0.0), (1e5, 1.0, 3e-6), (1e7, 1.5, 1e-7), (1e4, 0.7, 1e-5)]
 
@@ -66,6 +67,17 @@ def test_average_slopes_of_close_approaches_are_force_and_tangent(k, a, c):
     assert_allclose(force, tangent / (1.0 + c * tangent), rtol=1e-13)
 
 
+@pytest.mark.parametrize("a", [1.3, 1.5, 2.5, 3.5])
+@pytest.mark.parametrize("apart", [1e-9, 1.9e-4, 2.1e-4, 0.1])  # below and above where a series takes over
+def test_average_slopes_are_exact_at_any_distance(a, apart):
+    k, d0, d1 = 1e6, 2e-4, 2e-4 * (1.0 + apart)
+    with mp.workdps(40):
+        energy, force = (
+            k / (a + 1) ** n * (mp.mpf(d1) ** (a + n) - mp.mpf(d0) ** (a + n)) / (mp.mpf(d1) - d0) for n in (1, 0)
+        )
+    assert_allclose(slopes(d0, d1, k, a, 0.0), [float(energy), float(force)], rtol=1e-12)  # r**4 = 1e-16, and rounding
+
+
 @pytest.mark.parametrize("x, v", [(2e-4, 0.5), (2e-4, -1.5), (-1e-4, 0.2)])
 @pytest.mark.parametrize("k, a", [(1e5, 1.0), (1e7, 1.5), (3e6, 2.0)])
 def test_slopes_of_a_lossy_force_by_central_differences(x, v, k, a):
@@ -80,3 +92,12 @@ def test_slopes_of_a_lossy_force_by_central_differences(x, v, k, a):
 
 def test_a_lossy_contact_never_pulls():
     assert smooth_force(1e-4, -4.0, 1e5, 1.5, 0.3) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.1])
+@pytest.mark.parametrize("kind", [law.POWER, law.LAYERS, law.PLASTIC, law.FELT])
+def test_forces_with_corners_are_told_from_smooth_ones(kind, loss):
+    """A corner is where a head's second layer is reached, a contact yields or turns back, or a lossy one lets go."""
+    table = np.array([[1e6, 1.5, 0.0, 0.0, law.POWER, 0, 0, 0, 0], [1e6, 1.5, loss, 0.0, kind, 1e-3, 1e7, 1.5, 0.0]])
+    special = kind != law.POWER
+    assert build.plain(law.special_of)(table) == (special, special or loss > 0.0)

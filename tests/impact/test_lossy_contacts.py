@@ -1,6 +1,7 @@
 """Contacts that yield, have two layers or are felt: against scipy, closed forms, and their own energy balance."""
 
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.impact.accuracy import contact_duration
+from fem_impact.impact.compiled import build, events, layout
+from fem_impact.impact.compiled import law as laws
 
 PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20)
 WALL, AT = fi.Modes.rigid(1e6), (0.45, 0.3)
@@ -205,3 +208,18 @@ def test_a_stick_that_bends_too_little_to_matter_still_meets_a_lossy_contact():
     found = [fi.strike(PLATE, stick, law, at=AT, speed=0.1, tolerance=tolerance) for tolerance in (0.1, 1e-4)]
     assert found[0].n_impacts == 1
     assert found[0].impulse == pytest.approx(found[1].impulse, rel=1e-2)  # a tenth of what was asked for
+
+
+@pytest.mark.parametrize(("depth", "left"), [(0.3, False), (0.45, True)])
+def test_felt_is_left_within_a_step_where_it_comes_back_too_slowly(depth, left):
+    """Felt at rest keeps half of what pressed it: the body leaves it at 1 - 0.5**(2/3) = 0.37 of its indentation."""
+    pressed, h, exponent = 1e-3, 1e-4, 1.5
+    law, now, rate = np.zeros((1, layout.WIDTH)), np.zeros((6, 1)), 4.0 * depth * pressed / h  # there and back
+    memory = pressed**exponent
+    law[0, [layout.STIFFNESS, layout.EXPONENT, layout.KIND]] = 1e6, exponent, laws.FELT
+    law[0, [layout.SHARE, layout.RELAXATION, layout.MEMORY]] = 0.5, 1e3 * h, memory
+    now[layout.APPROACH], now[layout.RATE] = pressed, -rate
+    contacts = SimpleNamespace(
+        law=law, now=now, end=np.array([pressed]), rate=np.array([rate]), after=np.array([memory])
+    )
+    assert build.plain(events.dipped_felt)(contacts, h, 0) == left

@@ -372,3 +372,15 @@ def test_a_scene_keeps_the_simple_model_where_it_is_enough(tmp_path):
     path.write_text(AUTO.format(model="auto", **soft))
     run = fi.load_scene(path).run()
     assert run.plan.blow.target.theory is None and run.plan.blow.target.air is None
+
+
+def test_a_bar_that_strikes_is_foreseen_by_its_own_thickness():
+    rod = fi.analytic.beam(0.4, ends=("hinged", "free"), section=fi.Beam.circular(STEEL, diameter=0.03), n_modes=20)
+    bar, rigid = fi.Striker.flexible(rod, at=0.4), fi.Striker.rigid(0.1)
+    how = {"at": (0.12, 0.1), "speed": 1.0, "tolerance": 1e-2}
+    before, other = (
+        named(fi.plan(modal(), striker, fi.Contact.hertz(1e9), **how).assumptions)["thin striker"]
+        for striker in (bar, rigid)
+    )
+    assert before.state == "foreseen" and 0.1 < before.value < 3.0  # as of the blow itself
+    assert other.value is None and other.worst == 0.0  # nothing bends

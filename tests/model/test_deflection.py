@@ -247,3 +247,14 @@ def test_a_drumhead_may_swing_by_many_thicknesses():
     skin = fi.Plate(fi.Material(E=4e9, nu=0.38, rho=1390.0), 0.1e-3, tension=4000.0)
     bends, loose = shares(fi.mesh.disk(0.3), skin, {"boundary": "hinged"}, 5)
     assert (bends == 1.0).all() and (loose < 0.05).all()
+
+
+def test_what_a_body_taken_as_rigid_gives_goes_with_the_square_of_the_speed():
+    """Stiffening goes with the square of the deflection, and that with the impulse; it changes a share of an error."""
+    steel = fi.assemble(fi.mesh.rectangle(2.0, 1.5), fi.Plate(STEEL, 0.1))
+    how = {"at": (0.9, 0.7), "tolerance": 1e-2}
+    hits = [fi.strike(steel, fi.Striker.rigid(0.01), fi.Contact.linear(1e5), speed=v, **how) for v in (1.0, 2.0)]
+    slow, fast = (next(each for each in hit.assumptions if each.name == "small deflections") for hit in hits)
+    assert fast.value == pytest.approx(2.0 * slow.value, rel=1e-3)
+    assert fast.worst == pytest.approx(4.0 * slow.worst, rel=1e-2, abs=0.0)
+    assert 0.0 < fast.worst < 1e-3 * hits[0].error.total

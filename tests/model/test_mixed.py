@@ -63,6 +63,12 @@ def test_share_that_modes_keep_falls_from_one_to_zero():
     assert share[2] > 0.999 and 0.3 < share[4] < 0.7 and share[5] < 0.02
 
 
+def test_what_lies_above_the_oscillators_gives_as_more_of_them_would():
+    static = [(shape**2 / omega**2).sum() + rest for omega, shape, rest in
+              (mixed.absorbing(0.04, 1e4, highest) for highest in (2e4, 1e5, 1e8))]  # fmt: skip
+    assert_allclose(static, static[-1], rtol=1e-4)  # a sum in place of an integral: RATIO**2 / 24 = 5e-5
+
+
 @pytest.mark.parametrize("frequency", [2e4, 4e4, 8e4])
 def test_blow_errs_by_no_more_than_it_states(frequency):
     """A plate of 1 mm, of which 15 190 modes tell everything: a ball that stops dead and is thrown back by echoes."""

@@ -398,3 +398,13 @@ def test_steps_of_a_tight_tolerance_are_in_the_predicted_time():
         fi.plan(modes, fi.Striker.rigid(0.02), fi.Contact.hertz(1e7), tolerance=t, **how) for t in (1e-3, 1e-9)
     )
     assert tight.scheme == "collocation" and tight.seconds - cost.START > 10.0 * (loose.seconds - cost.START)
+
+
+def test_motion_costs_the_modes_it_is_told_by(scene, monkeypatch):
+    """A look at a few modes, then as many as ring: here no more, so that both cost the same."""
+    monkeypatch.setattr(planner, "_ringing_count", lambda _: planner.FIRST_LOOK)
+    still, moving = (
+        scene(PLATE + extra, mass=20.0).plan(target="vectors") for extra in ("", "[observe]\npoints = [[0.1, 0.1]]\n")
+    )
+    look = cost.by_modes(cost.PER_MODE * planner.FIRST_LOOK, planner.FIRST_LOOK)
+    assert moving.seconds - still.seconds == pytest.approx(2.0 * look.seconds, rel=1e-6)

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.fe import refinement
+from fem_impact.model.target import Target
 
 ALUMINIUM = fi.Material(E=70e9, nu=0.33, rho=2700.0)
 STICK = fi.Striker.stick(0.1, 1000.0)
@@ -182,3 +183,13 @@ def test_a_system_that_only_checks_frequencies_is_not_struck_itself(function):
     )
     with pytest.raises(ValueError, match="assemble it with 'argyris', or give its modes"):
         function(plate, STICK, SOFT, at=(0.1, 0.1), speed=1.0, tolerance=0.3)
+
+
+@pytest.mark.parametrize("tension", [0.0, 1e3, 1e6])
+@pytest.mark.parametrize("frequency", [50.0, 5e3])
+def test_waves_obey_the_equation_of_a_stretched_plate(tension, frequency):
+    """omega^2 times the mass per area is bending k^4 plus tension k^2."""
+    plate = fi.Plate(ALUMINIUM, 2e-3, tension=tension)
+    k = Target(fi.mesh.rectangle(0.5, 0.3), plate, {"boundary": "hinged"}).wave(frequency)
+    bending = 70e9 * 2e-3**3 / (12.0 * (1.0 - 0.33**2))
+    assert_allclose(bending * k**4 + tension * k**2, 2700.0 * 2e-3 * (2.0 * np.pi * frequency) ** 2, rtol=1e-12)

@@ -48,7 +48,7 @@ def test_a_closed_curve_is_where_its_equation_says():
     assert (border.error <= 0.75e-3).all() and (border.error > 0.0).all()
     # located along one axis: the radius errs by no more
     assert (np.abs(radius(*border.points.T) - 0.251) <= border.error).all()
-    assert not found.doubtful.any() and found.n_coarse == 0
+    assert not found.doubtful.any()
     halvings = [n for turn, n, _ in rounds if turn.startswith("halving")]
     assert len(halvings) == 6  # 1/14 of an axis is 1.1e-3 of it after six
     assert {tolerance for _, _, tolerance in rounds} == {borders.FINER * 1e-3}
@@ -71,7 +71,7 @@ def test_what_cannot_be_told_is_in_doubt_and_not_enclosed():
     assert found.doubtful[7:].all() and not found.doubtful[:7].any()
     assert [border.impacts for border in found.borders] == [1]  # none between numbers and refusals
     gap, _ = found_of(lambda m, k: np.where(abs(m - 0.2125) < 1e-3, np.nan, 1.0 + (m > 0.2)), mass, stiffness)
-    assert gap.n_coarse == len(gap.borders[0].points)  # the first halving is refused
+    assert (gap.borders[0].error > borders.WIDTH).all()  # the first halving is refused
     assert_allclose(gap.borders[0].error, 0.5 / 8)
 
 
@@ -146,3 +146,9 @@ def test_borders_that_were_not_looked_for_are_none():
     assert fi.read_borders(fi.sweep(bare.modes, bare.striker, bare.contact, **shared, borders=True))
     with pytest.raises(ValueError, match="table must be a map"):
         fi.read_borders({})
+
+
+def test_points_that_are_known_to_the_cell_only_are_told_apart():
+    line = borders.Border(1, ("mass", "stiffness"), np.ones((4, 2)), np.array([2e-4, 0.05, 7e-4, 0.1]))
+    told = borders._told(borders.Found((line,), np.zeros((3, 3), bool)), 0.02)
+    assert "located to 0.0007 of the axes, 2 of 4 points only to the cell" in told

@@ -1,6 +1,7 @@
 """Residuals, their derivatives and the search."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -86,3 +87,18 @@ def test_a_blow_six_samples_before_its_trigger_is_found(found):
     x[n + 2 :] += 6.0
     improved = found.problem.aligned(x)
     assert np.abs(improved[n + 2 :] - found.best.x[n + 2 :]).max() < 0.5  # searches go on from there
+
+
+def test_a_chord_follows_a_straight_valley_to_its_end_and_a_wrong_one_gives_up():
+    """With the right derivatives of a linear problem the first step is the last; with a third of them it leads off."""
+    rng = np.random.default_rng(3)
+    matrix, wanted = rng.normal(size=(9, 3)), np.array([0.2, -0.1, 0.3])
+    target = matrix @ wanted + 1e-3 * rng.normal(size=9)
+    problem = SimpleNamespace(
+        residual=lambda x: matrix @ x - target, bounds=(np.full(3, -1.0), np.full(3, 1.0)), needless=[]
+    )
+    solved, ended = solver.chord(problem, np.zeros(3), matrix)
+    exact = np.linalg.lstsq(matrix, target, rcond=None)[0]
+    assert ended and solved.ended and np.abs(solved.x - exact).max() < 1e-12  # rounding
+    stuck, ended = solver.chord(problem, np.zeros(3), 0.3 * matrix)  # goes three times too far, so gains nothing
+    assert not ended and (stuck.x == 0.0).all()

@@ -90,8 +90,10 @@ def most_steps(otherwise: int) -> int:
     return int(min(otherwise, QUICK.get() or otherwise))
 
 
-def _plain(kernel: Any) -> Any:
+def plain(kernel: Any) -> Any:
     """A kernel as plain Python, with all that it calls."""
+    if not COMPILED:
+        return kernel
     package, _, module = kernel.__module__.rpartition(".")
     copy = f"{package}.{PLAIN}"
     if copy not in sys.modules:
@@ -114,7 +116,7 @@ if COMPILED:
             try:
                 return super().__call__(*arguments)
             except _Uncompiled:
-                return _plain(self)(*arguments)
+                return plain(self)(*arguments)
 
     class _Flags(compiler.Flags):
         """Options of a kernel that are compared quickly: numba does so at each operation, a tenth of its time."""

@@ -59,7 +59,6 @@ def parted(d0, v0, d1, v1, error, rate_error):
     a = 2.0 * (d0 - d1) + v0 + v1
     b = 3.0 * (d1 - d0) - 2.0 * v0 - v1
     falling = True
-    rising = False
     dt = 1.0 / LOOKS
     value, slope = d0, v0
     for look in range(LOOKS):
@@ -73,12 +72,9 @@ def parted(d0, v0, d1, v1, error, rate_error):
                 low = min(low, turn)
                 high = max(high, turn)
         falling = falling and high + rate_error < 0.0
-        rising = rising and low - rate_error > 0.0
-        if not falling and not rising:
+        if not falling and not low - rate_error > 0.0:
             top = max(value, after) + 4.0 / 27.0 * dt * (max(0.0, slope) + max(0.0, -steep))
             if not top + error < 0.0:
-                rising = low - rate_error > 0.0
-                if not rising:
-                    return False
+                return False
         value, slope = after, steep
-    return d1 <= 0.0 or rising
+    return d1 <= 0.0 or not falling

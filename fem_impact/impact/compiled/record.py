@@ -238,7 +238,7 @@ def largest_force(steps, now, law, n_coefficients, i):
     if time < 0.0:
         return time, top, rival
     if first > 0:
-        near = max(near, min(steps[first - 1, LENGTH] / CLOSER, time - steps[first - 1, START]))
+        near = max(near, steps[first - 1, LENGTH] / CLOSER)
     while first > 0 and steps[first, START] > time - near:
         first -= 1
     low, high = time - near, time + near
