@@ -66,10 +66,8 @@ def test_a_plan_is_shown_in_words_and_a_sound_by_a_player(hit, tmp_path):
 
 def test_a_collision_says_which_contact_each_impact_belongs_to(cradle):
     said = cradle.summary()
-    assert [f"contact {impact.contact}" in line for impact, line in zip(cradle.impacts, said.splitlines()[2:])] == [
-        True,
-        True,
-    ]
+    lines = [line for line in said.splitlines() if "ms: peak" in line]
+    assert all(f"contact {impact.contact}" in line for impact, line in zip(cradle.impacts, lines, strict=True))
     assert sum(cradle.contact_times) == pytest.approx(cradle.contact_time)
     closed = (cradle.force > 0.0).any(axis=1)
     union = np.ptp(cradle.time[closed])  # both contacts overlap; samples leave out the two ends

@@ -360,7 +360,6 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
     return Response(
         tuple(bodies), laws, history, speed, options.tolerance, ran, error, striker, at, _ends(parts, system),
         options.quantities,
-        coarse=coarse,
     )  # fmt: skip
 
 

@@ -228,7 +228,7 @@ class Again:
                 f"no gradient: runs of different steps find {len(history.contacts)} and {len(h.contacts)} impacts; "
                 "give a smaller tolerance and no dt, or max_impacts"
             )
-        return self.told(replace(self.hit, history=history, speed=self.hit.speed + by * self.faster[i], coarse=None))
+        return self.told(replace(self.hit, history=history, speed=self.hit.speed + by * self.faster[i]))
 
     def slopes(self, sizes: np.ndarray, one_sided: np.ndarray, nudge: float) -> list[np.ndarray]:
         """Of each quantity its slopes per relative change of each number, from changes by ``nudge`` of their sizes."""

@@ -85,7 +85,7 @@ class System:
         return Scene(*bodies, self.law, self.start_q, self.start_p)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class History(System):
     """A run: the system, its start and every step."""
 

@@ -138,7 +138,6 @@ class Response(Totals):
     # examines whether the model itself is right, when that is asked for
     audit: Callable[["Response"], tuple[Assumption, ...]] | None = field(default=None, repr=False)
     vectors: Modes | None = field(default=None, repr=False)  # all Ritz pairs of the target, if it is described by them
-    coarse: History | None = field(default=None, repr=False)  # the last run before `history`, of longer steps
 
     def __repr__(self) -> str:
         return check.brief(self)
