@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from test_studies import study
 
 import fem_impact as fi
 
@@ -211,3 +212,38 @@ def test_the_start_of_a_contact_behind_a_gap_moves_with_that_gap():
     gap, speed = ((blow(*more).contact_time - blow(*less).contact_time) for less, more in (
         ((0.99e-4, 1.0), (1.01e-4, 1.0)), ((1e-4, 0.999), (1e-4, 1.001))))  # fmt: skip
     assert_allclose(found.slopes, [gap / 2e-6, speed / 2e-3], rtol=1e-4, atol=1e-7)
+
+
+def beam_and_stop(gap):
+    """A hinged beam of one mode, struck in the middle, swings towards a stop; the run ends with the duration."""
+    beam = fi.analytic.beam(1.0, ends=("hinged", "hinged"), mass=0.3, first_frequency=40.0, n_modes=1)
+    laws = fi.Contact.linear(1e6, gap=1e-4), fi.Contact.linear(1e6, gap=gap)
+    touches = [fi.Touch(laws[0], 0, 1, None, [0.5]), fi.Touch(laws[1], 1, None, [0.5])]
+    return fi.collide([fi.Modes.rigid(0.05), beam], touches, speeds=[1.0, 0.0], duration=8e-3, residual=False)
+
+
+def test_a_near_miss_in_the_flight_that_a_duration_cuts_is_in_the_margin():
+    swing = float(beam_and_stop(1.0).displacement([[0.5]], np.linspace(0.0, 8e-3, 4001), body=1).max())
+    for factor in (1.0 + 1e-5, 1.0 + 1e-3):
+        hit = beam_and_stop(factor * swing)
+        deepest = float(hit.history._column(0).max())
+        # cubics over a quarter of a radian miss the turn by some 1e-5 of the swing
+        assert hit.margin == pytest.approx((factor - 1.0) * swing / deepest, abs=2e-4)
+
+
+def test_contacts_that_part_for_good_at_once_leave_no_margin_behind():
+    """A second stick, not yet in contact, has parted when the first look at it is made."""
+    contacts = study("gradient_contacts")
+    for seed, kind in ((3, "two sticks"), (10, "buzz"), (13, "buzz"), (14, "over a stop")):
+        numbers = contacts.random_numbers(np.random.default_rng(seed), kind)
+        assert 0.0 <= contacts.strike(numbers, 1e-4, kind=kind).margin <= 0.05
+
+
+def test_felt_that_ends_a_run_has_let_go():
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=50.0, n_modes=40, damping_ratio=0.01)
+    felt, ball = fi.Contact.felt(1e10, 2.5, hysteresis=0.4, relaxation=1e-3), fi.Striker.rigid(0.03)
+    blow = {"at": (0.45, 0.3), "speed": 1.0, "tolerance": 1e-5, "residual": False}
+    whole, first = (fi.strike(plate, ball, felt, **blow, max_impacts=most) for most in (None, 1))
+    assert first.restitution == pytest.approx(whole.restitution, abs=1e-5)
+    held = fi.strike(plate, ball, felt, **blow, duration=0.5 * whole.contact_time)
+    assert held.restitution is None and held.in_contact
