@@ -23,7 +23,7 @@ import numpy as np
 
 import fem_impact as fi
 from fem_impact.impact.compiled import energy
-from fem_impact.impact.compiled.bundles import Limits, Scene
+from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 from fem_impact.sweeps import batches
 
 COUNTS = [10, 30, 100, 300, 1000, 3000, 10000]
@@ -103,7 +103,7 @@ def step_time(n_modes: int, compliance: float = 0.0) -> float:
     zeros, law = np.zeros(n_modes), np.array([[1e4, 1.5, 0.0, compliance]])
     p = zeros.copy()
     p[0] = 1.0
-    scene = Scene(omega, zeros, shape, np.zeros(1), zeros, law, zeros, p)
+    scene = KernelSystem(omega, zeros, shape, np.zeros(1), zeros, law, zeros, p)
 
     def run(n_steps: int) -> float:
         return best(lambda: energy.run_energy(scene, None, 1, 1e-7, Limits(0.0, 0.0, np.inf, 0, n_steps)))

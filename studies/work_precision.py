@@ -37,7 +37,7 @@ from scipy.integrate import solve_ivp
 import fem_impact as fi
 from fem_impact.impact import engine
 from fem_impact.impact.compiled import collocation, energy
-from fem_impact.impact.compiled.bundles import Limits, Scene
+from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 
 MASS, SPEED = 0.005, 1.0  # [kg], [m/s]
 BLOWS = [((0.465, 0.31), 3.0e5), ((0.465, 0.33), 2.8e5), ((0.60, 0.40), 3.1e5), ((0.50, 0.37), 3.3e5)]  # [m], [N/m]
@@ -111,7 +111,7 @@ def call(blow: Blow, scheme: str, tolerance: float) -> Answer:
 def kernel(blow: Blow, scheme: str, size: float) -> Callable[[], Answer]:
     """A run of the compiled loop with a given step (A, A4) or misfit (collocation)."""
     n = len(blow.omega)
-    scene = Scene(
+    scene = KernelSystem(
         blow.omega, np.zeros(n), blow.shape[None], np.zeros(1), np.zeros(n),
         np.array([[blow.stiffness, 1.0, 0.0, 0.0]]),
         np.zeros(n), blow.start[n:].copy(),

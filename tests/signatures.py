@@ -56,7 +56,7 @@ INNER = {
     "export.plain", "export.versions", "export.csv_text", "export.run_data", "export.vtk_ending", "figures.snapshot",
     "figures.in_hertz", "figures.styled", "sound.Sound",
     "hammers.Hammer", "hammers.bandwidth_of", "hammers.half_sine_reach",
-    "report.Player", "report.audio", "report.template",
+    "report.SoundPlayer", "report.audio", "report.template",
     "explore.serve",  # ends at an interruption only, see test_explore
     "ToleranceWarning", "analytic.closed_form", "Striker.let_go",
     "Taps", "Taps.summary",  # made by read_taps and Taps.from_arrays

@@ -23,7 +23,7 @@ from .section import KINDS, SOFT, Beam, Elastic, Plate, directional, evaluate
 from .shear_beam import TimoshenkoSpace
 from .splitting import towards_points
 from .springs import beam_springs, check_masses, check_posts, edge_springs, plate_springs
-from .supports import Rim, cells_of_facets, constrain
+from .supports import SupportedRim, cells_of_facets, constrain
 from .thick import MindlinSpace, ThickStrain
 
 THEORIES = {2: ("kirchhoff", "mindlin"), 1: ("euler", "timoshenko")}  # by dimension; the first is the default
@@ -136,7 +136,8 @@ class System:
     # (n_rigid + n_sprung,) unknowns that, when fixed, just prevent these motions
     held: np.ndarray = field(repr=False)
     graded: bool = True  # whether rings of shrinking triangles surround singular corners
-    rim: Rim | None = field(default=None, repr=False)  # boundary of the triangles used, in the frame; None on a beam
+    # boundary of the triangles used, in the frame; None on a beam
+    rim: SupportedRim | None = field(default=None, repr=False)
     order: float = np.inf  # [-] power of the element size with which corners let the frequency error fall
     softness: float = 1.0  # [-] largest inertia over stiffness on the body, in the frame; sets the shortest waves
     point_masses: tuple[Any, ...] = ()  # pairs of point [m] and mass [kg]
@@ -672,7 +673,7 @@ def _assemble_plate(mesh: Mesh, section: Plate, supports: dict, masses: Attached
         K[cells], M[cells] = _integrated(space, cells, x, *weighted)
     held = support_of_facets(mesh, supports)
     elastic = edge_springs(held, frame)
-    rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, _kinds(held), elastic)
+    rim = SupportedRim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, _kinds(held), elastic)
     expand, project, dofs = constrain(rim, space.vertices, *numbering(plane, space))
     n_all = expand.shape[0]
     springs = csc_matrix((n_all, n_all))
@@ -717,7 +718,7 @@ def _assemble_thick(mesh: Mesh, section: Plate, supports: dict, masses: Attached
         raise ValueError("tension needs every edge supported, because a free edge cannot be pulled; add supports")
     kinds, elastic = _kinds(held), edge_springs(held, frame)
     thin = [thick.held_as_thin(kind) for kind in kinds]
-    rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, thin, elastic)
+    rim = SupportedRim(mesh.facets, mesh.tangents, mesh.curvatures * length, points, thin, elastic)
     expand, project, dofs = thick.constrain(space, rim, kinds, plane, numbering(plane, space.flat))
     n_all = expand.shape[0]
     K, M, pulled = thick.matrices(space, fields, section.tension * length**2 / frame.stiffness)

@@ -8,7 +8,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Range:
+class PlausibleRange:
     """What a quantity can be in the real world."""
 
     low: float
@@ -28,19 +28,21 @@ class Range:
 # (Cremer, Heckl and Petersson, Structure-Borne Sound, 3rd ed. 2005, section 3.4).
 STIFFNESS = "Pa are expected, and 210 GPa is 210e9"
 RANGES = {
-    "E": Range(1e6, "softer than rubber", 1.3e12, "stiffer than diamond", "Pa", STIFFNESS),
-    "E_across": Range(1e6, "softer than rubber", 1.3e12, "stiffer than diamond", "Pa", STIFFNESS),
-    "G": Range(3e5, "softer than rubber", 6e11, "stiffer than diamond", "Pa", STIFFNESS),
-    "rho": Range(
+    "E": PlausibleRange(1e6, "softer than rubber", 1.3e12, "stiffer than diamond", "Pa", STIFFNESS),
+    "E_across": PlausibleRange(1e6, "softer than rubber", 1.3e12, "stiffer than diamond", "Pa", STIFFNESS),
+    "G": PlausibleRange(3e5, "softer than rubber", 6e11, "stiffer than diamond", "Pa", STIFFNESS),
+    "rho": PlausibleRange(
         25.0, "lighter than cork", 2.3e4, "heavier than osmium", "kg/m^3",
         "kg/m^3 are expected, and 7.85 g/cm^3 is 7850",
     ),
-    "damping_ratio": Range(
+    "damping_ratio": PlausibleRange(
         0.0, "", 0.2, "more than any plate or beam has", "",
         "a fraction of critical damping is expected, and 5 % is 0.05",
     ),
-    "speed": Range(0.0, "", 300.0, "as fast as a bullet, and no contact stays elastic", "m/s", "m/s are expected"),
-    "length": Range(
+    "speed": PlausibleRange(
+        0.0, "", 300.0, "as fast as a bullet, and no contact stays elastic", "m/s", "m/s are expected"
+    ),
+    "length": PlausibleRange(
         1e-3, "smaller than a grain of rice", 50.0, "larger than anything usually struck", "m",
         "m are expected, and 465 mm is 0.465",
     ),
@@ -53,7 +55,7 @@ THICK = 0.3
 
 
 def number(name: str, value: Any) -> Iterator[str]:
-    """A note if a number lies outside the `Range` of that name; none for a function of place."""
+    """A note if a number lies outside the `PlausibleRange` of that name; none for a function of place."""
     known = RANGES[name]
     if callable(value) or value is None or known.low <= value <= known.high:
         return

@@ -15,7 +15,7 @@ SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in sci
 
 
 @dataclass(frozen=True, eq=False)
-class Rim:
+class SupportedRim:
     """The boundary of a plate and its supports."""
 
     facets: np.ndarray  # (n_facets, 2) vertices, with the body on the left
@@ -69,7 +69,7 @@ def _left(conditions: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray
 
 
 def _split(
-    vertex: int, at: list, around: np.ndarray, rim: Rim, cells: np.ndarray, facet_cell: np.ndarray
+    vertex: int, at: list, around: np.ndarray, rim: SupportedRim, cells: np.ndarray, facet_cell: np.ndarray
 ) -> np.ndarray:
     """Conditions (n_rows, 3 + 3 n) at a vertex where each of its triangles (n,) has its own second derivatives."""
     slot = {int(cell): 3 + 3 * i for i, cell in enumerate(around)}
@@ -109,7 +109,7 @@ def cells_of_facets(facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, 
     return found // 3, found % 3
 
 
-def constrain(rim: Rim, cells: np.ndarray, dofs: np.ndarray, n_all: int) -> tuple[Sparse, Sparse, np.ndarray]:
+def constrain(rim: SupportedRim, cells: np.ndarray, dofs: np.ndarray, n_all: int) -> tuple[Sparse, Sparse, np.ndarray]:
     """Remove from the Argyris unknowns those that the supports fix.
 
     Each boundary vertex keeps the null space of the conditions of its two facets. At a corner, at a change of support
@@ -118,7 +118,7 @@ def constrain(rim: Rim, cells: np.ndarray, dofs: np.ndarray, n_all: int) -> tupl
 
     Parameters
     ----------
-    rim : Rim
+    rim : SupportedRim
     cells : ndarray, shape (n_cells, 3), vertices of the triangles
     dofs : ndarray, shape (21, n_cells), numbers of their unknowns
     n_all : int, number of unknowns

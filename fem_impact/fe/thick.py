@@ -252,7 +252,7 @@ def held_as_thin(kind: str) -> str:
 
 
 def constrain(
-    space: MindlinSpace, rim: supports.Rim, kinds: list[str], mesh: Cells, flat: tuple[np.ndarray, int]
+    space: MindlinSpace, rim: supports.SupportedRim, kinds: list[str], mesh: Cells, flat: tuple[np.ndarray, int]
 ) -> tuple[Sparse, Sparse, np.ndarray]:
     """Remove the unknowns that the supports fix; the same results as `supports.constrain`.
 
@@ -314,8 +314,8 @@ def constrain(
 
 
 def _without_slip(
-    space: MindlinSpace, rim: supports.Rim, slips: np.ndarray, cells: np.ndarray, sides: np.ndarray, dofs: np.ndarray,
-    expand: csr_matrix, project: csr_matrix,
+    space: MindlinSpace, rim: supports.SupportedRim, slips: np.ndarray, cells: np.ndarray, sides: np.ndarray,
+    dofs: np.ndarray, expand: csr_matrix, project: csr_matrix,
 ) -> tuple[csr_matrix, csr_matrix]:  # fmt: skip
     """Make the slope across curved held edges ``slips`` (n,) cubic along them, by their mid-side unknowns.
 

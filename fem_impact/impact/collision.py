@@ -18,7 +18,7 @@ from .compiled import layout, record
 from .compiled.law import FELT
 from .contact import Contact
 from .engine import TOLERANCE
-from .history import History, System
+from .history import History, ModalSystem
 from .quantities import BAND_POINTS, asked_for
 from .response import Ends, Error, Response
 from .state import State
@@ -297,7 +297,7 @@ def met(
     return _follow(bodies, contacts, parts, arriving, options, others=others)
 
 
-def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[System, float]:
+def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[ModalSystem, float]:
     """Two bodies that are to touch, the first moving, as the kernels take them, and how long the contact may last."""
     parts, _ = _parts(bodies, [touch], [speed, 0.0], None, None, residual)
     system = _joined(parts, [touch])
@@ -363,7 +363,7 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
     )  # fmt: skip
 
 
-def _check_way(system: System, depth: float, tolerance: float) -> None:
+def _check_way(system: ModalSystem, depth: float, tolerance: float) -> None:
     """Raise ValueError if rounding of a large offset would spoil the approach in contact, about ``depth`` [m]."""
     way = float(np.abs(system.offset).max())
     if np.finfo(float).eps * way > tolerance * depth:
@@ -373,7 +373,7 @@ def _check_way(system: System, depth: float, tolerance: float) -> None:
         )
 
 
-def _ends(parts: Sequence[_Part], system: System) -> tuple[Ends, ...]:
+def _ends(parts: Sequence[_Part], system: ModalSystem) -> tuple[Ends, ...]:
     """Where every body is touched; a constant force makes left-out modes dip only if a series spring replaces them."""
     found, rated = [], _rated(system.law)
     last = sum(len(part.omega) for part in parts)
@@ -461,7 +461,7 @@ def _part(
     )  # fmt: skip
 
 
-def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> System:
+def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> ModalSystem:
     """Join the modes of all bodies; series springs or replacement modes stand in for the left-out modes.
 
     A series spring is exact only for a body with one lossless contact. Otherwise each eigenvector of the residual
@@ -500,7 +500,7 @@ def _joined(parts: Sequence[_Part], contacts: Sequence[Touch]) -> System:
         shape = np.ascontiguousarray(np.hstack([shape, *(mode[2][:, None] for mode in extra)]))
         lists = [[*one, np.array([mode[k] for mode in extra])] for one, k in zip(lists, (0, 1, 3, 4, 5))]
     omega, zeta, bias, q, p = (np.concatenate(one) for one in lists)
-    return System(omega, zeta, shape, offset, bias, law, q, p, stretched=stretched)
+    return ModalSystem(omega, zeta, shape, offset, bias, law, q, p, stretched=stretched)
 
 
 def _rated(law: np.ndarray) -> np.ndarray:
@@ -735,7 +735,7 @@ def _agreed(coarse: History, fine: History, apart: float) -> int:
     return n if same.all() else int(same.argmin())
 
 
-def _longest_lossy(system: System, pace: tuple[float, float], tolerance: float) -> float:
+def _longest_lossy(system: ModalSystem, pace: tuple[float, float], tolerance: float) -> float:
     """Longest step [s] that resolves the modes whose ringing shows in a lossy contact force; infinite without loss.
 
     A lossy force depends on the approach rate. A force that rises like a spring's makes each mode ring in that rate,
@@ -799,7 +799,7 @@ def _sensitivity(coarse: History, fine: History) -> float:
     return max(1.0, float((abs(one[-1] - two[-1]) + least) / (abs(one[0] - two[0]) + least)))
 
 
-def _truncation(parts, told, contacts, system: System, whole: History, scheme, size, differ, pace, horizon, n_max):
+def _truncation(parts, told, contacts, system: ModalSystem, whole: History, scheme, size, differ, pace, horizon, n_max):
     """Estimated error [-] of leaving out modes, and whether the estimate can be trusted.
 
     Repeats the run with the upper modes of one body replaced by their compliance. The error falls at least with the
@@ -832,7 +832,9 @@ def _truncation(parts, told, contacts, system: System, whole: History, scheme, s
     return np.maximum(found, AT_LEAST * float(expected)), resolvable
 
 
-def _mesh_error(bodies, parts, contacts, system: System, coarse: History, scheme, size, differ, tolerance, pace, last):
+def _mesh_error(
+    bodies, parts, contacts, system: ModalSystem, coarse: History, scheme, size, differ, tolerance, pace, last
+):
     """Estimated error [-] due to the mesh errors of frequencies and static compliances.
 
     Repeats the run with every frequency lowered and every compliance raised by its error, so that the estimate grows

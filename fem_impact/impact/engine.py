@@ -14,7 +14,7 @@ from .compiled.collocation import run_collocation
 from .compiled.energy import run_energy
 from .compiled.stretched import Stretch
 from .contact import acting_stiffness, wall_time
-from .history import History, System
+from .history import History, ModalSystem
 
 TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
 MAX_STEPS = 500_000  # [-] of one run: a time limit of about one second
@@ -43,7 +43,7 @@ def steps_per_contact(tolerance: float) -> float:
 
 
 def follow(
-    system: System, scheme: str, size: float, pace: tuple[float, float], horizon: float, n_max: int,
+    system: ModalSystem, scheme: str, size: float, pace: tuple[float, float], horizon: float, n_max: int,
     chosen_by: str = "tolerance",
 ) -> History:  # fmt: skip
     """One run; ``size`` is the step in contact [s], for collocation the allowed misfit [-]; and what it comes from."""
@@ -87,7 +87,7 @@ def again(history: History, step: float | None = None, **changed: Any) -> Histor
     ``changed`` are fields of the history; without any, it is the blow to compare with. Steps are by default those of a
     first run.
     """
-    before = System(*history.scene, stretched=history.stretched)
+    before = ModalSystem(*history.scene, stretched=history.stretched)
     system = replace(before, **changed)
     pace = pace_of(before)
     horizon = history.end_time if history.status == record.HORIZON else np.inf
@@ -95,7 +95,7 @@ def again(history: History, step: float | None = None, **changed: Any) -> Histor
     return follow(system, "A4", pace[0] / FIRST_STEPS if step is None else step, pace, horizon, most)
 
 
-def pace_of(system: System, held: np.ndarray | bool = False) -> tuple[float, float]:
+def pace_of(system: ModalSystem, held: np.ndarray | bool = False) -> tuple[float, float]:
     """Shortest expected duration [s] of an undisturbed contact, and its approach speed [m/s].
 
     ``held`` (n_modes,) says which modes count as masses, though a hand makes them swing.
@@ -131,7 +131,7 @@ def pace_of(system: System, held: np.ndarray | bool = False) -> tuple[float, flo
     return shortest, fastest
 
 
-def most_steps(system: System) -> int:
+def most_steps(system: ModalSystem) -> int:
     """Steps after which a run gives up."""
     if build.limited():
         return build.most_steps(max(100, PLAIN_WORK // len(system.omega)))

@@ -10,7 +10,7 @@ from .._base import check
 from .._base.rounding import ROUNDING, SAME
 from . import force_spectrum
 from .compiled import law, layout, propagation, record
-from .compiled.bundles import Scene
+from .compiled.bundles import KernelSystem
 from .contact import sunk
 from .free_motion import swing
 from .stretched import Stretched
@@ -55,7 +55,7 @@ class Impact:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class System:
+class ModalSystem:
     """The modes of all bodies in one list, and their contacts: what a run follows."""
 
     omega: np.ndarray  # (n_modes,) [rad/s] modes of all bodies
@@ -79,14 +79,14 @@ class System:
         return len(self.offset)
 
     @property
-    def scene(self) -> Scene:
+    def scene(self) -> KernelSystem:
         """The input of a kernel."""
         bodies = self.omega, self.zeta, self.shape, self.offset, self.bias
-        return Scene(*bodies, self.law, self.start_q, self.start_p)
+        return KernelSystem(*bodies, self.law, self.start_q, self.start_p)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class History(System):
+class History(ModalSystem):
     """A run: the system, its start and every step."""
 
     steps: np.ndarray  # (n_steps, 3 + (4 + n_coefficients) n_contacts), see `energy.run_energy`

@@ -7,7 +7,7 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
-from .compiled.bundles import Scene
+from .compiled.bundles import KernelSystem
 from .compiled.stretched import Stretch, energies_of_stretching, replay_stretched
 
 
@@ -45,8 +45,8 @@ class Stretched:
         for array in begin[2:]:
             array.setflags(write=False)  # as the others; numba would compile the kernel again for writable ones
         failed, *begin = replay_stretched(
-            Scene(*bodies, *begin[3:]), Stretch(self.forms, self.first), history.steps, int(self.ramp), self.base,
-            begin[:3], np.array(times, float), states,
+            KernelSystem(*bodies, *begin[3:]), Stretch(self.forms, self.first), history.steps, int(self.ramp),
+            self.base, begin[:3], np.array(times, float), states,
         )  # fmt: skip
         history.reached["last"] = tuple(begin)
         if failed:

@@ -10,7 +10,7 @@ from ..modes.modal import Modes
 from ..scenes.scene import Scene
 from .controllers import KEYS, Hands, Score, Source, keys, port, read_midi, spread
 from .devices import Clock, Device, Speaker
-from .player import Player, Stroke
+from .player import PlayedStroke, Player
 
 FASTER = 2.0  # [-] fastest stroke over the speed of the scene, which then is a stroke of half strength
 N_POINTS = len(KEYS[0])  # points to strike, one for each column of keys
@@ -25,7 +25,7 @@ def player_of(scene: Scene, modes: Modes, options: argparse.Namespace) -> Player
         modes, scene.make_striker(), scene.make_contact(), points=points, fastest=fastest, listen=scene.points[0],
         block=options.block,
     )  # fmt: skip
-    peak = max(abs(player.play([Stroke(0, 0, player.fastest)], 0.1).samples).max(), 1e-30)
+    peak = max(abs(player.play([PlayedStroke(0, 0, player.fastest)], 0.1).samples).max(), 1e-30)
     player.gain /= player.sticks * float(peak)  # a stroke by every stick at once does not clip
     player.reset()
     return player

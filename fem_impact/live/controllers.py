@@ -15,7 +15,7 @@ import numpy as np
 from .._base import check
 from ..modes.modal import Modes
 from ..modes.viewing import grid
-from .player import AT_ONCE, Stroke
+from .player import AT_ONCE, PlayedStroke
 
 # [-] fact: the MIDI note in the middle of a keyboard; it is the first point, each semitone up the next, round and round
 FIRST_NOTE = 60
@@ -32,7 +32,7 @@ class Source(Protocol):
 
     live: bool  # whether strokes come at any moment, and not from a file
 
-    def due(self, begin: int, end: int) -> Sequence[Stroke]:
+    def due(self, begin: int, end: int) -> Sequence[PlayedStroke]:
         """The strokes of a block, by frames of the block."""
 
     def over(self, frame: int) -> bool:
@@ -44,11 +44,11 @@ class Score:
 
     live = False
 
-    def __init__(self, strokes: Sequence[Stroke]) -> None:
-        self.strokes: list[Stroke] = sorted(strokes)
+    def __init__(self, strokes: Sequence[PlayedStroke]) -> None:
+        self.strokes: list[PlayedStroke] = sorted(strokes)
         self._next = 0
 
-    def due(self, begin: int, end: int) -> list[Stroke]:
+    def due(self, begin: int, end: int) -> list[PlayedStroke]:
         """The strokes of a block, by frames of the block; what is too much at once comes in the next."""
         first = self._next
         while self._next < len(self.strokes) and self.strokes[self._next].frame < end and self._next - first < AT_ONCE:
@@ -66,18 +66,18 @@ class Hands:
     live = True
 
     def __init__(self) -> None:
-        self._waiting: deque[Stroke] = deque()
+        self._waiting: deque[PlayedStroke] = deque()
         self._ended = threading.Event()
 
     def strike(self, point: int, speed: float) -> None:
         """Strike as soon as possible."""
-        self._waiting.append(Stroke(0, point, speed))
+        self._waiting.append(PlayedStroke(0, point, speed))
 
     def stop(self) -> None:
         """Let the playing end."""
         self._ended.set()
 
-    def due(self, begin: int, end: int) -> list[Stroke]:
+    def due(self, begin: int, end: int) -> list[PlayedStroke]:
         """What came since the last block."""
         return [self._waiting.popleft() for _ in range(min(len(self._waiting), AT_ONCE))]
 
@@ -106,7 +106,7 @@ def of_note(note: int, velocity: int, n_points: int, fastest: float) -> tuple[in
     return (note - FIRST_NOTE) % n_points, fastest * velocity / LOUDEST_NOTE
 
 
-def read_midi(path: Path, n_points: int, fastest: float, rate: int) -> list[Stroke]:
+def read_midi(path: Path, n_points: int, fastest: float, rate: int) -> list[PlayedStroke]:
     """The notes of all tracks of a MIDI file as strokes; pauses, controllers and the ends of notes say nothing."""
     mido = check.extra("mido", "play", "a MIDI file")
     if not path.is_file():
@@ -119,7 +119,7 @@ def read_midi(path: Path, n_points: int, fastest: float, rate: int) -> list[Stro
             now += message.time
             if message.type == "note_on" and message.velocity > 0:
                 struck = of_note(message.note, message.velocity, n_points, fastest)
-                strokes.append(Stroke(round(now * rate), *struck))
+                strokes.append(PlayedStroke(round(now * rate), *struck))
     except (EOFError, IndexError, KeyError, OSError, TypeError, ValueError, ZeroDivisionError) as error:
         if isinstance(error, OSError) and error.errno:
             raise

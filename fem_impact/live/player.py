@@ -26,7 +26,7 @@ LASTING = 1.0  # [s] after which a stick that still rests on the body is lifted:
 AT_ONCE = 64  # [-] strokes in one block, far more than hands or a keyboard make; what comes on top waits for the next
 
 
-class Stroke(NamedTuple):
+class PlayedStroke(NamedTuple):
     """A stroke of a player."""
 
     frame: int  # [-] since the start of the sound
@@ -94,7 +94,7 @@ class Player:
         shortest = min(duration for _, duration in found)
         listen = self.points[0] if listen is None else listen
         self.step = self._arrays([system for system, _ in found], shortest, sticks, n_trace, listen)
-        self._strokes = live.Strokes(np.zeros(AT_ONCE, np.int64), np.zeros(AT_ONCE, np.int64), np.zeros(AT_ONCE))
+        self._strokes = live.PlayStrokes(np.zeros(AT_ONCE, np.int64), np.zeros(AT_ONCE, np.int64), np.zeros(AT_ONCE))
         self.gain = 1.0 / FULL_SCALE
 
     def _arrays(self, systems: list, duration: float, sticks: int, n_trace: int, listen: Any) -> float:
@@ -128,11 +128,11 @@ class Player:
         listening = np.zeros(omega.size)
         heard = (modes.omega > 0.0) & (modes.omega < np.pi * self.rate)
         listening[-n_body:] = np.where(heard, modes.shape_at(modes.point("listen", listen))[0], 0.0)
-        self._body = live.Body(omega, zeta, 2.0 * zeta * omega, _tables(omega, zeta, period), listening)
+        self._body = live.PlayedBody(omega, zeta, 2.0 * zeta * omega, _tables(omega, zeta, period), listening)
         laws = np.array([system.law[0] for system in systems])
         offsets = np.array([system.offset[0] for system in systems])
         self._pads = live.Pads(rows, mine, laws, offsets, motion, push)
-        self._limits = live.Limits(
+        self._limits = live.PlayLimits(
             level, min(level + CLOSING, live.LEVELS - 1), level + OPENING, level + FLIGHT, round(LASTING * self.rate),
             period, EPSILON * duration * self.fastest, ROUNDING * self.fastest,
         )  # fmt: skip
@@ -144,15 +144,15 @@ class Player:
         for array in self._state:
             array[:] = 0
 
-    def fill(self, strokes: Sequence[Stroke], out: np.ndarray) -> None:
+    def fill(self, strokes: Sequence[PlayedStroke], out: np.ndarray) -> None:
         """Compute the next block into ``out`` (n_frames,) float32, with the strokes in it, by frames of the block."""
         count = min(len(strokes), AT_ONCE)
-        now = live.Strokes(*(array[:count] for array in self._strokes))
+        now = live.PlayStrokes(*(array[:count] for array in self._strokes))
         for i in range(count):
             now.when[i], now.pad[i], now.speed[i] = strokes[i]
         live.play(self._body, self._pads, self._limits, self._state, now, self.gain, out)
 
-    def play(self, strokes: Sequence[Stroke | tuple[int, int, float]], duration: float) -> Sound:
+    def play(self, strokes: Sequence[PlayedStroke | tuple[int, int, float]], duration: float) -> Sound:
         """The sound [m/s] of strokes, by frames since now, for a duration [s]; the same strokes give the same bits."""
         score = sorted(self._checked(stroke) for stroke in strokes)
         out = np.zeros(round(check.positive("duration", duration, "s") * self.rate), np.float32)
@@ -166,11 +166,11 @@ class Player:
             first = last
         return Sound(out.astype(float), self.rate, 1.0 / self.gain)
 
-    def _checked(self, stroke: Any) -> Stroke:
+    def _checked(self, stroke: Any) -> PlayedStroke:
         frame, point, speed = stroke
         check.count("point of a stroke", point, low=0, high=len(self.points) - 1)
         frame = check.count("frame of a stroke", frame, low=0)
-        return Stroke(frame, point, check.between("speed of a stroke", speed, 0.0, self.fastest, "m/s"))
+        return PlayedStroke(frame, point, check.between("speed of a stroke", speed, 0.0, self.fastest, "m/s"))
 
     @property
     def counted(self) -> dict[str, int]:
@@ -202,7 +202,7 @@ def _tables(omega: np.ndarray, zeta: np.ndarray, period: float) -> np.ndarray:
     return found
 
 
-def _state(n_modes: int, sticks: int, n_trace: int) -> live.State:
+def _state(n_modes: int, sticks: int, n_trace: int) -> live.PlayState:
     """A body at rest, and no stick."""
     size = max(4, 2 * sticks)
     numbers: dict[str, Any] = {
@@ -214,4 +214,4 @@ def _state(n_modes: int, sticks: int, n_trace: int) -> live.State:
     counts |= dict.fromkeys(("slot", "pad", "until"), sticks)
     made = {name: np.zeros(shape) for name, shape in numbers.items()}
     made |= {name: np.zeros(shape, np.int64) for name, shape in counts.items()}
-    return live.State(pressed=np.zeros(sticks, np.bool_), **made)
+    return live.PlayState(pressed=np.zeros(sticks, np.bool_), **made)

@@ -16,7 +16,7 @@ ARM = 2  # [-] points used on each side of a vertex to fit curves other than cir
 
 
 @dataclass(frozen=True, eq=False)
-class Rim:
+class SmoothRim:
     """The fitted curve, facet by facet."""
 
     middles: np.ndarray  # (n_facets, 2) [m]
@@ -25,7 +25,7 @@ class Rim:
     n_curved: int  # number of curved facets
 
 
-def follow(points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndarray]) -> Rim:
+def follow(points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndarray]) -> SmoothRim:
     """Recover the curve that a rim was drawn with.
 
     Parameters
@@ -51,7 +51,7 @@ def follow(points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndar
     ends = points[np.concatenate(loops)]
     sag = np.linalg.norm(middles - ends.mean(axis=1), axis=1)
     curved = sag > 1e-9 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    return Rim(middles, tangents, curvatures, int(curved.sum()))
+    return SmoothRim(middles, tangents, curvatures, int(curved.sum()))
 
 
 def join(pairs: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> None:

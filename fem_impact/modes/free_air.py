@@ -118,7 +118,7 @@ def jumps(modes: Modes, wanted: npt.NDArray[np.bool_], speed: float) -> Iterator
             points, inside = _lattice(modes.shapes, size)
             shapes = modes.shapes.take(int(some[-1]) + 1).at(points[inside])[:, some]
             core = binary_erosion(inside)
-            sheets = Sheet(core, size), Sheet(inside, size)
+            sheets = AirSheet(core, size), AirSheet(inside, size)
             solved = [
                 np.stack([sheet.jump(shape, omega / speed) for shape, omega in zip(rows.T, modes.omega[some])], axis=1)
                 for sheet, rows in zip(sheets, (shapes[core[inside]], shapes))
@@ -128,7 +128,7 @@ def jumps(modes: Modes, wanted: npt.NDArray[np.bool_], speed: float) -> Iterator
             yield Jumps(some, points[inside], size, inner, solved[1])
 
 
-class Sheet:
+class AirSheet:
     """Cells of a square lattice that make up a plate.
 
     Parameters

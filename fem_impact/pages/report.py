@@ -296,7 +296,7 @@ def _force_picture(response: Response | Strokes) -> str:
 
 
 @dataclass(frozen=True)
-class Player:
+class SoundPlayer:
     """One sound on the page."""
 
     name: str
@@ -312,7 +312,7 @@ def _end(response: Response | Strokes) -> float:
     return last + (sampling.AFTER - 1.0) * (last - float(response.starts[0]))
 
 
-def _sounds(scene: Scene, response: Response | Strokes) -> list[Player]:
+def _sounds(scene: Scene, response: Response | Strokes) -> list[SoundPlayer]:
     """The sound at each observation point and, for a plate, at each listener (default: `DISTANCE` from the plate)."""
     heard = [
         (f"Motion at {place(point)}", sound.synthesise(response, point, duration=_duration(response)))
@@ -329,11 +329,13 @@ def _sounds(scene: Scene, response: Response | Strokes) -> list[Player]:
     for name, samples in heard:
         level = samples.peak_level
         stated = f"peak {samples.said}; full scale {samples.full_scale:g} {samples.unit}, as in every report"
-        players.append(Player(name, stated, audio(samples.samples, samples.rate)))
+        players.append(SoundPlayer(name, stated, audio(samples.samples, samples.rate)))
         if -math.inf < level < QUIET:
             raised = samples.samples * 10.0 ** (-level / 20.0)
             players.append(
-                Player(name, f"the same sound amplified by {-level:.1f} dB to full scale", audio(raised, samples.rate))
+                SoundPlayer(
+                    name, f"the same sound amplified by {-level:.1f} dB to full scale", audio(raised, samples.rate)
+                )
             )
     return players
 

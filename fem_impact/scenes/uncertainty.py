@@ -140,7 +140,7 @@ def spread(
     values = drawn(inputs, points, mixer)
     if not np.isfinite(values).all() or np.abs(values).max() > REACH:
         raise ValueError(f"vary must stay finite and below {REACH:g}; choose distributions with shorter tails")
-    asked = _Asked(blow, told, inputs, values, limit, band, grid.kept_beside(store))
+    asked = _SpreadAsked(blow, told, inputs, values, limit, band, grid.kept_beside(store))
     base, axes = asked.cases()
     exact = Cloud(base, axes, limit, blow.arguments.get("residual", True), band)
     rough = replace(exact, axes=cloud.few(base, axes), kernels={})
@@ -189,7 +189,7 @@ def _grouped(sobol: bool | None, mixer: Any, n: int, n_inputs: int) -> tuple[boo
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
+class _SpreadAsked:
     """A blow and the values of its inputs: which axes of a map they are."""
 
     blow: Blow

@@ -40,7 +40,7 @@ class Border:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FoundBorders:
     """The borders of a map, and what is known of the number of impacts beside them."""
 
     borders: tuple[Border, ...]
@@ -115,7 +115,7 @@ def _sizes(grid: Any) -> str:
     return ", ".join(f"{name} ({len(values)})" for name, values in grid.axes.items())
 
 
-def find_borders(grid: Any, count: np.ndarray, solve: Solve) -> Found:
+def find_borders(grid: Any, count: np.ndarray, solve: Solve) -> FoundBorders:
     """The borders between numbers of impacts.
 
     Parameters
@@ -138,7 +138,7 @@ def find_borders(grid: Any, count: np.ndarray, solve: Solve) -> Found:
     doubtful = (fine < 0) | (count < 0) | (fine != count)
     curves, vertices = _joined(fine)
     if not curves:
-        return Found((), doubtful)
+        return FoundBorders((), doubtful)
     edges, which = np.unique(vertices, axis=0, return_inverse=True)
     places, error = _located(plane, fine, edges)
     values = plane.values(places)[which.reshape(-1)]
@@ -148,7 +148,7 @@ def find_borders(grid: Any, count: np.ndarray, solve: Solve) -> Found:
         Border(level, plane.names, points, errors)
         for (level, _), points, errors in zip(curves, np.split(values, ends), np.split(error, ends))
     )
-    return Found(borders, doubtful)
+    return FoundBorders(borders, doubtful)
 
 
 def _recounted(plane: Plane, count: np.ndarray) -> np.ndarray:
@@ -209,7 +209,7 @@ def _located(plane: Plane, count: np.ndarray, edges: np.ndarray) -> tuple[np.nda
     return 0.5 * (low + high), 0.5 * width
 
 
-def add_borders(table: xarray.Dataset, found: Found, smallest: float) -> xarray.Dataset:
+def add_borders(table: xarray.Dataset, found: FoundBorders, smallest: float) -> xarray.Dataset:
     """Write borders into a map; islands narrower than ``smallest`` [-] of an axis can be missing."""
     meaning = "whether the number of impacts depends on the tolerance or the body's description, or was refused"
     table["doubtful"] = (table.n_impacts.dims, found.doubtful, {"units": "1", "long_name": meaning})
@@ -231,7 +231,7 @@ def add_borders(table: xarray.Dataset, found: Found, smallest: float) -> xarray.
     return table
 
 
-def _told(found: Found, smallest: float) -> str:
+def _told(found: FoundBorders, smallest: float) -> str:
     """What is known of the borders, in a sentence."""
     doubt = int(found.doubtful.sum())
     beside = f"{doubt} cells whose number of impacts is in doubt"

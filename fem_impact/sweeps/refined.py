@@ -101,7 +101,7 @@ def beside_change(count: np.ndarray) -> np.ndarray:
     return found
 
 
-class Sheet:
+class MapSheet:
     """The numbers of all cells of a map as far as they are known.
 
     Parameters
@@ -199,7 +199,7 @@ def refine(
     beside a kink. Last, borders between numbers of impacts are followed until no interpolated cell is beside another
     number.
     """
-    sheet = Sheet(shape, layers)
+    sheet = MapSheet(shape, layers)
     blocks, turn = first_blocks(shape), 0
     sheet.add(blocks.cells(shape[1]), compute, "round-0")
     while len(blocks.along):

@@ -14,7 +14,7 @@ from .._base.check import SimulationError
 from .._base.rounding import EPSILON, ROUNDING
 from ..impact.collision import rest_mode
 from ..impact.compiled import layout, record
-from ..impact.compiled.bundles import Limits, Scene
+from ..impact.compiled.bundles import KernelSystem, Limits
 from ..impact.compiled.energy import run_energy
 from ..impact.contact import Contact
 from ..impact.history import History
@@ -110,7 +110,7 @@ def _body(modes: Modes, row: np.ndarray, motion: np.ndarray, rows: np.ndarray, r
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class StruckPair:
     """Striker and struck body in the lists of the engine."""
 
     omega: np.ndarray
@@ -127,7 +127,7 @@ class Pair:
         return check.brief(self)
 
 
-def pair(striker: Body, target: Body, contact: Contact) -> Pair:
+def pair(striker: Body, target: Body, contact: Contact) -> StruckPair:
     """Both bodies with one contact; their residual compliances as `impact.collision` joins them."""
     n, m = len(striker.omega), len(target.omega)
     omega, zeta = np.append(striker.omega, target.omega), np.append(striker.zeta, target.zeta)
@@ -142,12 +142,12 @@ def pair(striker: Body, target: Body, contact: Contact) -> Pair:
         above, damping = rest_mode(body.dimension, body.omega[-1], body.zeta[-1], True)
         omega, zeta = np.append(omega, above), np.append(zeta, damping)
         shape, motion = np.append(shape, sign * np.sqrt(body.rest) * above), np.append(motion, 0.0)
-    return Pair(
+    return StruckPair(
         omega, zeta, shape[None], motion, law, slice(0, n), slice(n, n + m), target.rows, contact.rated
     )  # fmt: skip
 
 
-def run(bodies: Pair, speed: float, step: float, horizon: float) -> History:
+def run(bodies: StruckPair, speed: float, step: float, horizon: float) -> History:
     """One blow at a speed [m/s] with a step in contact [s], up to a time [s]."""
     n = len(bodies.omega)
     still = np.zeros(n)
@@ -157,13 +157,13 @@ def run(bodies: Pair, speed: float, step: float, horizon: float) -> History:
         part.setflags(write=False)  # or numba would compile the kernel again for writable arrays
     rounding = float(EPSILON * STEPS * step * speed), float(ROUNDING * speed)
     limits = Limits(*rounding, float(horizon), 0, MOST_STEPS)
-    result = run_energy(Scene(*parts), None, 1, float(step), limits)
+    result = run_energy(KernelSystem(*parts), None, 1, float(step), limits)
     if result[6] in (record.EXHAUSTED, record.FAILED):
         raise SimulationError(f"a blow at {speed:.3g} m/s did not end within {MOST_STEPS} steps of {step:.2g} s")
     return History(*parts, *result)
 
 
-def longest_step(bodies: Pair, duration: float) -> float:
+def longest_step(bodies: StruckPair, duration: float) -> float:
     """Step [s] for contacts of about ``duration`` [s], short enough for the modes that the contact feels."""
     step = duration / STEPS
     if bodies.rated:
@@ -176,7 +176,7 @@ def longest_step(bodies: Pair, duration: float) -> float:
 
 
 def records(
-    bodies: Pair, speeds: np.ndarray, *, duration: float, n_times: int, lead: int, rig: Rig, tip_mass: float
+    bodies: StruckPair, speeds: np.ndarray, *, duration: float, n_times: int, lead: int, rig: Rig, tip_mass: float
 ) -> np.ndarray:
     """Fine records of blows, (n_blows, 1 + n_points, FINE (n_times + 2 MARGIN)): cell force [N], accelerations.
 

@@ -13,7 +13,7 @@ NEAR_ZERO = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class RidgePath:
     """A straight way through the coordinates, from a point where all but coordinate ``j`` fit best.
 
     Along a ridge values go by factors: then coordinates that are parts of a range from zero, such as the loss, go by
@@ -57,7 +57,7 @@ class Way:
         here = self.x[self.j]
         return abs(here * np.expm1(sign * nearest)) if self.factors[self.j] else nearest, meets
 
-    def on(self, x: np.ndarray) -> "Way":
+    def on(self, x: np.ndarray) -> "RidgePath":
         """The way on from another point that fits best, in the direction from the last one to it."""
         factors = self.factors & (x > NEAR_ZERO)
         if factors[self.j] != self.factors[self.j]:
@@ -70,7 +70,7 @@ class Way:
 def way(
     problem: Problem, x: np.ndarray, j: int, bounds: tuple[np.ndarray, np.ndarray], noise: float, ridge: float,
     stopped: np.ndarray | None = None,
-) -> Way:  # fmt: skip
+) -> RidgePath:  # fmt: skip
     """The way from ``x`` by the derivatives there; by factors if a rise by one takes coordinate j beyond ``ridge``."""
     stopped = np.zeros(len(x), bool) if stopped is None else stopped
     jacobian = problem.jacobian(x)
@@ -90,4 +90,4 @@ def way(
     slope[factors] /= x[factors]
     if factors[j]:
         slope *= x[j]
-    return Way(j, x, slope, factors, stopped, bounds, spread, jacobian[:, ~apart])
+    return RidgePath(j, x, slope, factors, stopped, bounds, spread, jacobian[:, ~apart])

@@ -176,7 +176,7 @@ class Setting:
     def __repr__(self) -> str:
         return check.brief(self)
 
-    def blow(self, values: Mapping[str, float]) -> tuple[blows.Pair, float, float]:
+    def blow(self, values: Mapping[str, float]) -> tuple[blows.StruckPair, float, float]:
         """Both bodies and the contact that the values make, the mass of the tip [kg], and `duration`."""
         law = changed(self.contact, values)
         tip_mass = values.get("striker.tip_mass", self.rig.tip_mass)

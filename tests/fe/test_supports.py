@@ -6,7 +6,7 @@ from numpy.polynomial import Polynomial
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.fe.supports import SIDES, Rim, cells_of_facets, constrain
+from fem_impact.fe.supports import SIDES, SupportedRim, cells_of_facets, constrain
 
 X, Y = Polynomial([0.0, 1.0]), Polynomial([0.0, 1.0])
 BUMP = X * (1.0 - X)  # of a unit square's side: zero at both ends
@@ -45,7 +45,7 @@ def unknowns(mesh, supports):
     for name, kind in supports.items():
         for facet in mesh.edges[name]:
             kinds[facet] = kind
-    rim = Rim(mesh.facets, mesh.tangents, mesh.curvatures, mesh.points, kinds, np.zeros((len(mesh.facets), 2)))
+    rim = SupportedRim(mesh.facets, mesh.tangents, mesh.curvatures, mesh.points, kinds, np.zeros((len(mesh.facets), 2)))
     pairs = np.sort(np.stack([mesh.cells[:, side] for side in SIDES], axis=1), axis=2)
     sides, number = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
     n_vertices = len(mesh.points)

@@ -14,7 +14,7 @@ from fem_impact.impact import accuracy
 from fem_impact.impact.collision import Touch, collide
 from fem_impact.impact.compiled import bundles, energy, layout, many_blows, propagation, record
 from fem_impact.impact.compiled import law as laws
-from fem_impact.impact.compiled.bundles import Limits, Scene
+from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 from fem_impact.sweeps import batches
 
 EPS = np.finfo(float).eps
@@ -29,7 +29,7 @@ def run(omega, shape, p, *, k, exponent=1.0, scheme="A4", h, q=None, bias=None, 
         still if q is None else q, p,
     )  # fmt: skip
     limits = Limits(0.0, 0.0, float(horizon), n_max, 400_000)
-    return energy.run_energy(Scene(*scene), None, SCHEMES[scheme], h, limits)
+    return energy.run_energy(KernelSystem(*scene), None, SCHEMES[scheme], h, limits)
 
 
 def struck(n_modes=20, u_striker=10.0, u_plate=2.0):

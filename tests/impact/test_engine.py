@@ -19,7 +19,7 @@ import fem_impact as fi
 from fem_impact.impact import engine
 from fem_impact.impact.collision import Touch, collide
 from fem_impact.impact.compiled import collocation, propagation, record
-from fem_impact.impact.compiled.bundles import Limits, Scene
+from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 from fem_impact.impact.engine import gauss
 
 EPS = np.finfo(float).eps
@@ -162,7 +162,7 @@ def test_eight_nodes_and_ten_agree(exponent):
     for count in (8, 10):
         scene = locked(omega, still, shape[None], np.zeros(1), still, law, still, p)
         limits = Limits(0.0, 0.0, np.inf, 0, 5000)
-        out = collocation.run_collocation(Scene(*scene), *gauss(count), 1e-4, 1e-13, limits)
+        out = collocation.run_collocation(KernelSystem(*scene), *gauss(count), 1e-4, 1e-13, limits)
         speeds.append(10.0 * out[2][0])
     # onset and release are located to 1e-11 of the approach about them, which leaves 2e-12 of the speed
     assert_allclose(speeds[0], speeds[1], rtol=0, atol=5e-12)

@@ -9,7 +9,7 @@ from warming import locked
 
 from fem_impact.impact import compiled
 from fem_impact.impact.compiled import frame
-from fem_impact.impact.compiled.bundles import Limits, Scene
+from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 from fem_impact.impact.compiled.collocation import run_collocation
 from fem_impact.impact.compiled.energy import run_energy
 from fem_impact.impact.compiled.stretched import Stretch
@@ -23,7 +23,7 @@ LINES, PARAMETERS = 100, 8  # of a kernel: what fits on two pages, and what a re
 )
 def test_a_record_that_grows_is_the_same(scheme, stretch, monkeypatch):
     """A run that stops at each full record and goes on, against one whose record has room for all: bit for bit."""
-    scene = Scene(
+    scene = KernelSystem(
         *locked(
             np.array([0.0, 3e3, 9e3]), np.array([0.0, 0.01, 0.02]), np.array([[1.0, -1.3, 0.8]]), np.zeros(1),
             np.zeros(3), np.array([[1e5, 1.5, 0.0, 0.0]]), np.zeros(3), np.array([1.0, 0.0, 0.0]),

@@ -19,7 +19,7 @@ from warming import locked
 
 from fem_impact.impact.compiled import arrays, build, collocation, energy, propagation, record, schemes
 from fem_impact.impact.compiled import law as laws
-from fem_impact.impact.compiled.bundles import Limits, Scene
+from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 from fem_impact.impact.engine import gauss
 
 EPS = np.finfo(float).eps
@@ -70,9 +70,9 @@ def run(
     state = locked(omega, zeta, shape, offset, bias, law, q, p)
     limits = Limits(*noise, horizon, n_max, max_steps)
     if scheme == "collocation":
-        out = collocation.run_collocation(Scene(*state), *gauss(5), h, 1e-10 * abs(speed), limits)
+        out = collocation.run_collocation(KernelSystem(*state), *gauss(5), h, 1e-10 * abs(speed), limits)
     else:
-        out = energy.run_energy(Scene(*state), None, int(scheme == "A4"), h, limits)
+        out = energy.run_energy(KernelSystem(*state), None, int(scheme == "A4"), h, limits)
     steps, q1, p1, now, done, time, status, n_fallback, n_blind, _ = out
 
     def stored(d):
@@ -256,7 +256,7 @@ def test_long_free_flight_keeps_energy_and_phase():
     out_q, out_p = np.empty((1001, 3)), np.empty((1001, 3))
     nothing = np.zeros((0, 3 + 5))
     law = np.zeros((1, 4))
-    scene = Scene(omega, np.zeros(3), np.ones((1, 3)), np.zeros(1), np.zeros(3), law, q, p)
+    scene = KernelSystem(omega, np.zeros(3), np.ones((1, 3)), np.zeros(1), np.zeros(3), law, q, p)
     propagation.replay(scene, nothing, 2, t, out_q, out_p)
     sine = np.where(omega > 0.0, np.sin(omega * t[:, None]) / np.maximum(omega, 1.0), t[:, None])
     wanted = q * np.cos(omega * t[:, None]) + p * sine
@@ -317,7 +317,7 @@ def test_modal_damping_takes_what_its_integral_says():
     x, weight = np.polynomial.legendre.leggauss(20)
     times = (r.steps[:, :1] + 0.5 * (x + 1.0) * r.steps[:, 1:2]).ravel()
     q, p = np.empty((len(times), 2)), np.empty((len(times), 2))
-    scene = Scene(omega, zeta, u, np.zeros(1), np.zeros(2), np.zeros((1, 4)), np.zeros(2), np.array([0.1, 0.0]))
+    scene = KernelSystem(omega, zeta, u, np.zeros(1), np.zeros(2), np.zeros((1, 4)), np.zeros(2), np.array([0.1, 0.0]))
     propagation.replay(scene, r.steps, 2, times, q, p)
     taken = (0.5 * r.steps[:, 1:2] * weight * (2.0 * 0.2 * 3000.0 * p[:, 1] ** 2).reshape(len(r.steps), -1)).sum()
     assert_allclose(taken, r.before - r.after, rtol=1e-12)  # quadrature exact to rounding
@@ -691,7 +691,7 @@ PLAIN = """
 import json
 import numpy as np
 from warming import locked
-from fem_impact.impact.compiled.bundles import Limits, Scene
+from fem_impact.impact.compiled.bundles import Limits, KernelSystem
 from fem_impact.impact.compiled.collocation import run_collocation
 from fem_impact.impact.compiled.energy import run_energy
 from fem_impact.impact.compiled.propagation import replay
@@ -700,7 +700,7 @@ from fem_impact.impact.engine import gauss
 def after(run, n_coefficients):
     times = np.linspace(0.0, 2e-3, 9)
     q, p = np.empty((9, 3)), np.empty((9, 3))
-    replay(Scene(*scene), *locked(run[0]), n_coefficients, times, q, p)
+    replay(KernelSystem(*scene), *locked(run[0]), n_coefficients, times, q, p)
     return [len(run[0]), *run[2], *(1e3 * q).ravel(), *p.ravel()]
 
 w, z = np.array([0.0, 4e3, 9e3]), np.zeros(3)
@@ -713,8 +713,8 @@ for m, zeta, bias in (
 ):
     body = locked(w, zeta, shapes[:m])
     scene = *body, *locked(np.array([-1e-5, -3e-5])[:m], bias, law[:m], z, start)
-    found += after(run_energy(Scene(*scene), None, 1, 5e-5, limits), 2)
-    found += after(run_collocation(Scene(*scene), *gauss(4), 2e-4, 1e-4, limits), 4)
+    found += after(run_energy(KernelSystem(*scene), None, 1, 5e-5, limits), 2)
+    found += after(run_collocation(KernelSystem(*scene), *gauss(4), 2e-4, 1e-4, limits), 4)
 print(json.dumps(list(map(float, found))))
 """
 

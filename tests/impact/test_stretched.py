@@ -12,7 +12,7 @@ from scipy.special import ellipk
 import fem_impact as fi
 from fem_impact.impact import engine
 from fem_impact.impact.compiled import record
-from fem_impact.impact.compiled.bundles import Limits, Scene
+from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 from fem_impact.impact.compiled.energy import run_energy
 from fem_impact.impact.compiled.stretched import Stretch, energies_of_stretching
 from fem_impact.modes.stretching import stretch
@@ -149,7 +149,7 @@ def test_energy_is_kept_over_ten_thousand_steps():
     for array in arrays:
         array.setflags(write=False)
     base = 3e-5
-    scene, limits = Scene(*arrays[:-1]), Limits(1e-18, 1e-10, 1e4 * base, 0, 100_000)
+    scene, limits = KernelSystem(*arrays[:-1]), Limits(1e-18, 1e-10, 1e4 * base, 0, 100_000)
     result = run_energy(scene, Stretch(arrays[-1], 1), 1, base, limits)
     (steps, q, p, now), status = result[:4], result[6]
     for array in (steps, now):

@@ -10,7 +10,7 @@ import pytest
 
 import fem_impact as fi
 from fem_impact.impact.compiled import build
-from fem_impact.live.player import Player, Stroke
+from fem_impact.live.player import PlayedStroke, Player
 
 pytestmark = pytest.mark.xdist_group("live")  # one worker compiles
 POINTS = [(0.1395, 0.09), (0.05, 0.05), (0.2, 0.15)]
@@ -45,7 +45,7 @@ LAWS = {
 def test_the_force_of_a_blow_is_that_of_strike(name, point, speed):
     striker, law = LAWS[name]
     game = player(striker, law, n_trace=20_000)
-    sound = game.play([Stroke(0, point, speed)], 0.05)
+    sound = game.play([PlayedStroke(0, point, speed)], 0.05)
     hit = fi.strike(game.modes, striker, law, at=POINTS[point], speed=speed, tolerance=1e-6, duration=0.05)
     end, length, struck, mean, _, force = game.trace.T
     assert (struck == point).all()
@@ -62,7 +62,7 @@ def test_strokes_on_a_body_still_moving_are_those_of_strokes():
     game = player(n_modes=100, n_trace=20_000)
     when = [0, 960, 1920, 1940]  # frames; the last two sticks are on the body together
     speeds, at = [1.0, 0.5, 2.0, 1.5], [0, 1, 2, 0]
-    sound = game.play([*map(Stroke, when, at, speeds)], 0.1)
+    sound = game.play([*map(PlayedStroke, when, at, speeds)], 0.1)
     strokes = [(w / 48e3, STICK, HERTZ, POINTS[i], v) for w, i, v in zip(when, at, speeds)]
     roll = fi.strokes(game.modes, strokes, tolerance=1e-4, duration=0.1)
     heard = fi.sound.synthesise(roll, POINTS[0], duration=0.1)
@@ -76,7 +76,7 @@ def test_strokes_on_a_body_still_moving_are_those_of_strokes():
 def test_a_stick_held_by_a_hand_comes_back():
     held = fi.Striker.rigid(0.02).held(fi.Hand(stiffness=200.0, force=2.0))
     game = player(held, n_modes=30, n_trace=20_000)
-    game.play([Stroke(0, 0, 1.0)], 0.1)
+    game.play([PlayedStroke(0, 0, 1.0)], 0.1)
     hit = fi.strike(game.modes, held, HERTZ, at=POINTS[0], speed=1.0, tolerance=1e-4, duration=0.03)
     end, length, _, mean, _, _ = game.trace.T
     assert hit.n_impacts >= 3
@@ -87,7 +87,7 @@ def test_a_stick_held_by_a_hand_comes_back():
 @pytest.mark.slow
 def test_the_same_strokes_give_the_same_bits_in_blocks_of_any_length():
     rng = np.random.default_rng(3)
-    strokes = [Stroke(int(f), int(p), float(v)) for f, p, v in zip(
+    strokes = [PlayedStroke(int(f), int(p), float(v)) for f, p, v in zip(
         rng.integers(0, 20_000, 40), rng.integers(0, 3, 40), rng.uniform(0.05, 2.0, 40)
     )]  # fmt: skip
     first = player(n_modes=60).play(strokes, 0.5).wav()
@@ -102,7 +102,7 @@ def test_the_same_strokes_give_the_same_bits_in_blocks_of_any_length():
 @pytest.mark.slow
 def test_a_stick_too_many_takes_the_place_of_another_and_all_leave_at_last():
     game = player(n_modes=30, sticks=2)
-    game.play([Stroke(100 * i, i % 3, 0.5) for i in range(6)], 0.05)
+    game.play([PlayedStroke(100 * i, i % 3, 0.5) for i in range(6)], 0.05)
     assert game.counted["strokes"] == 6 and game.counted["stolen"] > 0
     game.play([], 1.5)
     assert game._state.place[0] == 0 and not game._state.q[: game._state.q.size - 30].any()
@@ -112,7 +112,7 @@ def test_a_stick_too_many_takes_the_place_of_another_and_all_leave_at_last():
 def test_a_free_body_does_not_fly_away():
     bar = fi.analytic.beam(0.4, ends=("free", "free"), mass=0.1, first_frequency=200.0, n_modes=20, damping_ratio=0.01)
     game = Player(bar, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), points=[[0.2]], fastest=1.0, n_trace=20_000)
-    game.play([Stroke(9600 * i, 0, 1.0) for i in range(10)], 2.0)
+    game.play([PlayedStroke(9600 * i, 0, 1.0) for i in range(10)], 2.0)
     end, length, _, mean, _, _ = game.trace.T
     each = [(mean * length)[(end > 0.2 * i) & (end <= 0.2 * (i + 1))].sum() for i in range(10)]
     assert each == pytest.approx([each[0]] * 10, rel=0.2)  # what rings on changes it a little
@@ -124,13 +124,13 @@ def test_a_block_allocates_nothing_and_leaves_other_threads_alone():
     code = f"""
 import numpy as np, sys
 sys.path.insert(0, {os.path.dirname(__file__)!r})
-from test_player import player, Stroke
+from test_player import player, PlayedStroke
 from numba.core.runtime import rtsys
 game = player(n_modes=30)
 for n in (64, 48_000):
     out = np.zeros(n, np.float32)
     before = rtsys.get_allocation_stats().alloc
-    game.fill([Stroke(n // 70 * i, i % 3, 1.0) for i in range(60)], out)
+    game.fill([PlayedStroke(n // 70 * i, i % 3, 1.0) for i in range(60)], out)
     print(rtsys.get_allocation_stats().alloc - before)
 print(len(game._body) + len(game._pads) + len(game._state) + 4)
 """

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy import special
 
 from fem_impact.modes import analytic, free_air
-from fem_impact.modes.free_air import Sheet
+from fem_impact.modes.free_air import AirSheet
 
 SINES = np.array([0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9])  # [-] of the angles between the axis and the directions
 
@@ -54,8 +54,8 @@ def of_disk(m, profile, wave, across):
     r, angle = np.hypot(points[..., 0], points[..., 1]), np.arctan2(points[..., 1], points[..., 0])
     shape = profile(r) * np.cos(m * angle)
     inner = np.zeros((inside.sum(), 1), complex)
-    inner[core[inside], 0] = Sheet(core, size).jump(shape[core], wave)
-    outer = Sheet(inside, size).jump(shape[inside], wave)[:, None]
+    inner[core[inside], 0] = AirSheet(core, size).jump(shape[core], wave)
+    outer = AirSheet(inside, size).jump(shape[inside], wave)[:, None]
     both = free_air.Jumps(np.array([0]), points[inside], size, inner, outer)
     far = 1e4  # [m] so that phases across the disk err by k / 2e4
     places = far * np.stack([SINES, 0.0 * SINES, np.sqrt(1.0 - SINES**2)], axis=1)
@@ -108,7 +108,7 @@ def test_slow_ellipses_lie_between_the_lattices_and_come_close_as_these_are_refi
         x, y = ((np.arange(n) - 0.5 * (n - 1)) * size for n in (int(2.0 * a / size) + 1, int(2.0 * b / size) + 1))
         inside = (x[:, None] / a) ** 2 + (y / b) ** 2 < 1.0
         low, high = (
-            Sheet(mask, size).jump(np.ones(mask.sum()), 0.0).real.sum() * size**2
+            AirSheet(mask, size).jump(np.ones(mask.sum()), 0.0).real.sum() * size**2
             for mask in (free_air.binary_erosion(inside), inside)
         )
         assert low < wanted < high
@@ -122,7 +122,7 @@ def test_a_long_strip_moves_the_air_of_a_bar():
     b, n = 0.1, 16
     mask = np.ones((40 * n, n), bool)
     low, high = (
-        Sheet(each, b / n).jump(np.ones(each.sum()), 0.0).real.reshape(-1, each[20 * n].sum())[20 * n].sum() * b / n
+        AirSheet(each, b / n).jump(np.ones(each.sum()), 0.0).real.reshape(-1, each[20 * n].sum())[20 * n].sum() * b / n
         for each in (np.pad(mask[1:-1, 1:-1], 1), mask)
     )
     assert low < np.pi * b**2 / 4.0 < high < 1.25 * np.pi * b**2 / 4.0

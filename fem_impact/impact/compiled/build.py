@@ -131,7 +131,7 @@ if COMPILED:
         def __eq__(self, other: object) -> bool:
             return self is other or (isinstance(other, _Flags) and self._known == other._known)
 
-    class _Part(JITCodeLibrary):
+    class _PartLibrary(JITCodeLibrary):
         """What is only ever part of kernels becomes machine code with them, not once more by itself."""
 
         sums = False  # whether sums are reordered, which is decided here, not by what surrounds them in a kernel
@@ -151,7 +151,7 @@ if COMPILED:
         _name = "lowering_of_a_part"
 
         def run_pass(self, state: Any) -> bool:
-            state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
             state.library.sums = bool(state.flags.fastmath)
             state.flags.no_compile = True
             super().run_pass(state)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Scene(NamedTuple):
+class KernelSystem(NamedTuple):
     """What a run starts from: the modes of all bodies in one list, and their contacts."""
 
     omega: np.ndarray  # (n_modes,) [rad/s]
@@ -28,7 +28,7 @@ class Limits(NamedTuple):
     max_steps: int
 
 
-class Run(NamedTuple):
+class KernelRun(NamedTuple):
     """The arrays of a run, few because each one costs time to hand over; `frame` cuts the following from them."""
 
     q: np.ndarray  # (n_modes,) state

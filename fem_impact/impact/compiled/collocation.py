@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .build import FALSE, LOOSE, TRUE, inner, outer
-from .bundles import Limits, Scene
+from .bundles import KernelSystem, Limits
 from .events import EVENT_LIMIT, dipped, strayed
 from .exact import freshen
 from .flight import NEVER, ONSET, SLOW, UNPROVED, made_flights
@@ -30,15 +30,15 @@ from .layout import (  # isort: skip
     LENGTH, LEVEL, LOOKS, MEMORY, PUSH, RATE, RELAXATION, SEEKS, SHARE, START, STEPS, TARGET, TIME, TRIES, WIDTH,
 )  # fmt: skip
 
-MOBILITY, BEYOND = 0, 1  # rows of `Room.contacts`
-GUESS, FORCES, SQUEEZE = range(3)  # and of `Room.nodes`
-BEGINS, ENDS, MOMENTS = range(3)  # and of `Grid.work`
+MOBILITY, BEYOND = 0, 1  # rows of `CollocationRoom.contacts`
+GUESS, FORCES, SQUEEZE = range(3)  # and of `CollocationRoom.nodes`
+BEGINS, ENDS, MOMENTS = range(3)  # and of `NodeGrid.work`
 PUSHED = 4  # row after those of free motion: displacement by a constant force
 MOVED, SPED = 0, 1  # rows of what force polynomials do: to the approach and to its rate
 WELL, TURNED, LONG = range(3)  # how a step looks: take it so, take it again otherwise pressed, take a shorter one
 
 
-class Grid(NamedTuple):
+class NodeGrid(NamedTuple):
     """Polynomials of s Gauss nodes, and the tables of steps: `tabulate`."""
 
     nodes: np.ndarray  # (s + 1,) fractions of the step, the last one 1
@@ -53,7 +53,7 @@ class Grid(NamedTuple):
     limit: float  # [m/s] misfit at most
 
 
-class Room(NamedTuple):
+class CollocationRoom(NamedTuple):
     """Where a step is worked out."""
 
     contacts: np.ndarray  # (2, n_contacts) mobility [1/kg], and whether the step runs beyond the corner of the law
@@ -507,30 +507,30 @@ def follow(scene, grid, room, flights, limits, run, steps):
     return status
 
 
-def made_grid(nodes: np.ndarray, powers: np.ndarray, shape: np.ndarray, base: float, limit: float) -> Grid:
+def made_grid(nodes: np.ndarray, powers: np.ndarray, shape: np.ndarray, base: float, limit: float) -> NodeGrid:
     """Room for the tables of steps, none known."""
     (m, n_modes), s, n_levels = shape.shape, len(nodes) - 1, LEVELS + 1
     free, last = np.empty((n_levels, s + 1, 5, n_modes)), np.empty((n_levels, 2 * s, n_modes))
     tables = free, last, np.empty((n_levels, 2, s, s, m, m)), np.zeros(n_levels)
-    return Grid(nodes, powers, *tables, np.empty((3, s + 1)), np.empty((2, s)), base, limit)
+    return NodeGrid(nodes, powers, *tables, np.empty((3, s + 1)), np.empty((2, s)), base, limit)
 
 
-def made_room(m: int, s: int) -> Room:
+def made_room(m: int, s: int) -> CollocationRoom:
     """Arrays for the work of a step."""
-    return Room(
+    return CollocationRoom(
         np.zeros((2, m)), np.zeros((3, s, m)), np.zeros((m, s + 1, s + 1)), np.zeros((2, s + 1, m)),
         np.zeros((s * m + 1, s * m)), np.zeros(m, np.int64),
     )  # fmt: skip
 
 
 def run_collocation(
-    scene: Scene, nodes: np.ndarray, powers: np.ndarray, base: float, limit: float, limits: Limits
+    scene: KernelSystem, nodes: np.ndarray, powers: np.ndarray, base: float, limit: float, limits: Limits
 ) -> tuple[Any, ...]:
     """Follow bodies in contact with exponential Gauss collocation of the contact forces; the reference scheme.
 
     The forces are polynomials through s nodes per step that obey the law at the nodes. Onset and release are located,
     steps are halved where the polynomial misses the force at a step's ends (weighed to a speed) by more than ``limit``
-    [m/s], and doubled where it does not. nodes, powers: see `Grid`; the rest, and the results, as in
+    [m/s], and doubled where it does not. nodes, powers: see `NodeGrid`; the rest, and the results, as in
     `energy.run_energy`. The status is FAILED where the halvings are used up.
     """
     m, n_modes = scene.shape.shape

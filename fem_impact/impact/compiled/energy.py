@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .build import FALSE, TRUE, inner, outer
-from .bundles import Flights, Limits, Scene
+from .bundles import Flights, KernelSystem, Limits
 from .events import EVENT_LIMIT, dipped, strayed
 from .exact import advance, freshen, keep_in_mind, made_tables, predict, record, solve_step, tabulate
 from .flight import NEVER, SLOW, UNPROVED
@@ -191,7 +191,7 @@ def follow(scene, tables, room, limits, run, steps):
     return status
 
 
-def run_energy(scene: Scene, stretch: Stretch | None, ramp: int, base: float, limits: Limits) -> tuple[Any, ...]:
+def run_energy(scene: KernelSystem, stretch: Stretch | None, ramp: int, base: float, limits: Limits) -> tuple[Any, ...]:
     """Follow bodies in contact with the energy-exact schemes A (ramp 0) or A4 (ramp 1).
 
     ``base`` is the longest step in contact; ``stretch`` is None if nothing stretches.

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .build import inner
-from .bundles import Bodies, Contacts, Course, Run, Scene
+from .bundles import Bodies, Contacts, Course, KernelRun, KernelSystem
 from .flight import NEVER, ONSET, SLOW, approach, find_onset
 from .law import FELT, dent, harden, rest_of
 from .record import EXHAUSTED, FULL, HORIZON, IMPACTS, total_energy
@@ -33,16 +33,16 @@ NOTHING, CROSSING, CORNER = 0, 1, 2  # what a step is to end at: a contact that 
 TAKEN, TRY, AFRESH, LOST = range(4)  # a try is good; another length is sought; start again; there was nothing to find
 
 
-def made_run(scene: Scene) -> Run:
+def made_run(scene: KernelSystem) -> KernelRun:
     """A run that has not begun."""
     n_modes, m = len(scene.omega), len(scene.offset)
-    return Run(
+    return KernelRun(
         scene.q.copy(), scene.p.copy(), np.empty((3, n_modes)), np.zeros((CONTACT_ROWS, m)), scene.law.copy(),
         np.zeros(CLOCKS + 6), np.zeros(COUNTERS, np.int64),
     )  # fmt: skip
 
 
-def followed(follow: Callable[..., int], arguments: tuple[Any, ...], run: Run, width: int) -> tuple[Any, ...]:
+def followed(follow: Callable[..., int], arguments: tuple[Any, ...], run: KernelRun, width: int) -> tuple[Any, ...]:
     """What a run found, see `energy.run_energy`, with as many rows of its record as it needs."""
     steps = np.empty((FIRST_ROWS, width))
     while (status := follow(*arguments, run, steps)) == FULL:

@@ -26,14 +26,14 @@ from .layout import (  # isort: skip
 
 FULL = 1 << 20  # [-] ticks of a frame: the shortest step is one, 2e-11 s at 48 kHz
 LEVELS = FULL.bit_length()  # lengths of steps, from a frame to a tick
-N_ON, N_LOOKS, FRAME, FORCED = range(4)  # places of `State.place`
+N_ON, N_LOOKS, FRAME, FORCED = range(4)  # places of `PlayState.place`
 LOOKS = 64  # [-] looks of a flight after which its bounds are drawn anew, as they loosen
 FAINT = 1e-140  # [-] of sqrt(J): a mode with less is at rest, before its numbers get slow to calculate with
 SWEEP = 1024  # [-] frames after which modes are looked at for that, to limit the work
 STRUCK, STOLEN, TOUCHED, TRACED, STEPS, LOST, COUNTERS = 0, 1, 2, 3, 4, 5, 6  # what is counted; how many counters
 
 
-class Body(NamedTuple):
+class PlayedBody(NamedTuple):
     """The modes of all sticks and of the body, and what is known of them beforehand."""
 
     omega: np.ndarray  # (n_modes,) [rad/s]
@@ -54,7 +54,7 @@ class Pads(NamedTuple):
     push: np.ndarray  # (n_own,) constant modal forces on a stick
 
 
-class Limits(NamedTuple):
+class PlayLimits(NamedTuple):
     """Levels of steps, and when contacts end."""
 
     contact: int  # longest step while something touches
@@ -67,7 +67,7 @@ class Limits(NamedTuple):
     still: float  # [m/s] speeds that are rounding
 
 
-class Strokes(NamedTuple):
+class PlayStrokes(NamedTuple):
     """What is struck during a block, in the order of time."""
 
     when: np.ndarray  # (n,) frames of the block
@@ -75,7 +75,7 @@ class Strokes(NamedTuple):
     speed: np.ndarray  # (n,) [m/s]
 
 
-class State(NamedTuple):
+class PlayState(NamedTuple):
     """What moves, for up to n_sticks sticks on the body; the first ``m`` rows are in use."""
 
     q: np.ndarray  # (n_modes,)

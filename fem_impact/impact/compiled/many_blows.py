@@ -52,7 +52,7 @@ class Straight(NamedTuple):
     over: float  # [-] approach at the end per free one
 
 
-class Blow(NamedTuple):
+class MapBlow(NamedTuple):
     """What stays the same during one blow."""
 
     h: float  # [s] step
@@ -122,7 +122,7 @@ def blow_of(pairs, cell, h, certify, rows):
     stiff = 1.0 / (1.0 + k * swift)
     shares = (pairs.shares[0, cell], pairs.shares[1, cell])
     rigid, static, slack = pairs.rigid[cell], pairs.static[cell], pairs.slack[cell]
-    return Blow(
+    return MapBlow(
         h, 1.0 / h, certify, shares, spring, own, once, straight, swift, swift_rate, stiff, rigid, static, slack
     )  # fmt: skip
 

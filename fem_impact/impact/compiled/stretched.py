@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .build import LOOSE, TRUE, ZERO, inner, outer
-from .bundles import Scene
+from .bundles import KernelSystem
 from .exact import made_tables, predict, solve_step
 from .frame import LEVELS, begin, course_of, made_run, moving, touching
 from .propagation import any_of, commit, lane_table, restore
@@ -43,7 +43,7 @@ class Stretch(NamedTuple):
     first: int
 
 
-class Room(NamedTuple):
+class StretchRoom(NamedTuple):
     """The same, and where a step is worked out."""
 
     forms: np.ndarray
@@ -223,10 +223,10 @@ def finish(bodies, contacts, room, lanes, h):
         room.hint[i] = room.pull[1, i] / h
 
 
-def made_room(stretch: Stretch, n_modes: int, n_contacts: int) -> Room:
+def made_room(stretch: Stretch, n_modes: int, n_contacts: int) -> StretchRoom:
     """Arrays for the work of a step."""
     n_forms, count = stretch.forms.shape[:2]
-    return Room(
+    return StretchRoom(
         stretch.forms, stretch.first, np.zeros((3, n_contacts)), np.zeros((3, count)), np.zeros((3, n_forms, count)),
         np.zeros((4, count)), np.zeros((3, count)), np.zeros(count), np.zeros((2, n_modes)), np.zeros((2, n_contacts)),
     )  # fmt: skip
@@ -399,8 +399,8 @@ def follow_record(scene, run, room, tables, steps, start, times, out):
 
 
 def replay_stretched(
-    scene: Scene, stretch: Stretch, steps: np.ndarray, ramp: int, base: float, start: tuple[float, int, np.ndarray],
-    times: np.ndarray, out: np.ndarray,
+    scene: KernelSystem, stretch: Stretch, steps: np.ndarray, ramp: int, base: float,
+    start: tuple[float, int, np.ndarray], times: np.ndarray, out: np.ndarray,
 ) -> tuple[bool, float, int, np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
     """States (2, n_times, n_modes) at ascending times, by the contact forces of a record.
 
