@@ -1,4 +1,4 @@
-"""`design`: the numbers of a body and a blow that make both come out as wanted, by optimisers with exact gradients."""
+"""`design`: the numbers of a body and a blow that make both come out as wanted, by optimisers with gradients."""
 
 import math
 import warnings
@@ -202,10 +202,9 @@ def design(
     Notes
     -----
     Goals alone are met by least squares within bounds (``scipy.optimize.least_squares``), with ``least`` or ``most`` by
-    sequential quadratic programming (SLSQP). All derivatives are exact but for the finite elements: those of a blow
-    from its recorded steps (`Response.gradient`), those of frequencies and shapes from the derivatives of stiffness and
-    mass along the modes. Modes that share a frequency answer a blow smoothly, but their single frequencies split, which
-    is refused.
+    sequential quadratic programming (SLSQP). Derivatives of a blow are those of `Response.gradient`, those of
+    frequencies and shapes come from the derivatives of stiffness and mass along the modes. Modes that share a frequency
+    answer a blow smoothly, but their single frequencies split, which is refused.
 
     Examples
     --------

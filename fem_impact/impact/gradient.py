@@ -15,7 +15,7 @@ from .._base import check, markup
 from .._base.check import SimulationError
 from ..fe.variation import SectionChange
 from . import engine, force_spectrum
-from .compiled import layout, record
+from .compiled import layout
 from .history import History, mode_energy
 from .parameters import ONE_SIDED, Change, Parameters, unit
 from .quantities import rebound
@@ -44,7 +44,8 @@ LEAST = 1e-8  # [-] of the largest slope per relative change: rounding over `NUD
 UNSURE = 5.0  # [-] times the error of when the force is largest: its top is flat, and ripples move it
 # Gauss nodes of a step and their weights: a force that sets in like x**1.5 loses 1e-9 of its impulse
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
-ZOOMS, LOOKS = 3, np.linspace(-1.0, 1.0, 17)  # how often and where the time of the largest force is looked for
+FEW, MANY = 2, 16  # [-] looks per step for the largest force, and for others nearly as large
+ZOOMS, ABOUT = 3, np.linspace(-1.0, 1.0, 17)  # how often and where about the largest of these looks it is looked for
 INSTEAD = "take differences of runs with the number changed, told to a smaller tolerance"
 
 
@@ -276,27 +277,40 @@ def _told(
     return found
 
 
+def _looks(history: History, c: int, count: int) -> np.ndarray:
+    """Force [N] of contact c at so many equal fractions of every step, in order of time; zero where it is open."""
+    force = np.zeros((len(history.steps), count))
+    rows = np.flatnonzero(history.pressed[:, c])
+    force[rows] = history.force(rows, c, np.arange(count) / count)
+    return force.ravel()
+
+
 def largest(history: History) -> tuple[float, float]:
     """When a force is largest [s], and that force [N]."""
-    best = 0.0, 0.0, 0
-    for c, pressed in enumerate(history.pressed.T):
-        rows = np.repeat(np.flatnonzero(pressed), 2)
-        force = history.force_of(rows, c, np.arange(len(rows)) % 2 / 2.0)[0]
-        if force.max(initial=0.0) > best[0]:
-            best = float(force.max()), float(rows[force.argmax()] + force.argmax() % 2 / 2.0), c
-    place, c = best[1:]
-    times = np.append(history.steps[:, layout.START], history.end_time)
-    time, width = (float(np.interp(each, np.arange(len(times)), times)) for each in (place, place + 0.5))
-    width -= time
+    looks = [_looks(history, c, FEW) for c in range(history.n_contacts)]
+    c = int(np.argmax([each.max(initial=0.0) for each in looks]))
+    row, part = divmod(int(looks[c].argmax()), FEW)
+    width = history.steps[row, layout.LENGTH] / FEW
+    time = history.steps[row, layout.START] + part * width
     for _ in range(ZOOMS):
-        looks = np.clip(time + width * LOOKS, 0.0, history.end_time)
-        force, rate = history.force_at(looks, c)
-        k = min(max(int(force.argmax()), 1), len(looks) - 2)
+        times = np.clip(time + width * ABOUT, 0.0, history.end_time)
+        force, rate = history.force_at(times, c)
+        k = min(max(int(force.argmax()), 1), len(times) - 2)
         k -= rate[k] < 0.0
-        time, width = looks[k], looks[k + 1] - looks[k]
+        time, width = times[k], times[k + 1] - times[k]
     if rate[k] > 0.0 >= rate[k + 1]:
         time += width * rate[k] / (rate[k] - rate[k + 1])
-    return time, float(history.force_at(np.array([time]), c)[0][0])
+    return float(time), float(history.force_at(np.array([time]), c)[0][0])
+
+
+def _apart(history: History) -> float:
+    """By how much the largest force exceeds the next of the maxima [-]."""
+    maxima = []
+    for c in range(history.n_contacts):
+        force = np.pad(_looks(history, c, MANY), 1)
+        maxima.append(force[1:-1][(force[1:-1] > force[:-2]) & (force[1:-1] >= force[2:])])
+    rival, top = np.sort(np.concatenate([[0.0, 0.0], *maxima]))[-2:]
+    return float((top - rival) / top) if top > 0.0 else np.inf
 
 
 def _impulses(history: History) -> tuple[np.ndarray, np.ndarray]:
@@ -310,16 +324,6 @@ def _impulses(history: History) -> tuple[np.ndarray, np.ndarray]:
     time, impulse = np.concatenate(times), np.concatenate(impulses)
     order = np.argsort(time, kind="stable")
     return time[order], impulse[order]
-
-
-def _apart(history: History) -> float:
-    """By how much the largest force exceeds the next of the maxima [-]."""
-    found = [
-        record.largest_force(history.steps, history.now, history.law, history.n_coefficients, np.int64(c))
-        for c in range(history.n_contacts)
-    ]
-    _, top, rival = found.pop(max(range(len(found)), key=lambda c: found[c][1]))
-    return (top - max([rival, *(other for _, other, _ in found)])) / top if top > 0.0 else np.inf
 
 
 def section_changes(sections: Any) -> dict[str, tuple[float, SectionChange]]:

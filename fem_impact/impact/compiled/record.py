@@ -9,17 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from .build import ONE, ZERO, inner, outer
+from .build import ZERO, inner, outer
 from .events import hermite_root, letting_go, lowest
 from .law import FELT, LAYERS, PLASTIC, dent, spring_with, stored
 from .layout import APPROACH, CLOSED, HEAD, KIND, LENGTH, LOSS, PUSH, RATE, REMEMBERED, SPEED, START, WIDTH
 from .misfit import force_on, misfit
 from .rounding import NEAR
 
-FEW, CLOSER = 3, 16  # [-] parts into which the search for a largest force cuts all steps, and what is left, thrice
 HIGH = 0.9  # [-] of the largest mean force of a step: only steps with so much are searched for the peak
 RELEASED = 0.01  # [-] of the force at the start of the last step: felt that carries less at its end has let go
-HIGH_ENOUGH = 0.95  # [-] of the largest force: only steps with so much are looked at more closely
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = range(6)  # why a run ended
 FULL = -1  # it did not: its record is full
 
@@ -178,85 +176,6 @@ def force_missed(steps, now, law, n_coefficients, peak):
             worst = max(worst, min(miss, before) if corner else miss)
             before = miss
     return worst / peak
-
-
-@inner()
-def rate_at(steps, now, law, n_coefficients, i, first, time):
-    """Rate of the force of contact i [N/s] at a time that a step from the first on holds; zero where none acts."""
-    row = first
-    while row + 1 < steps.shape[0] and steps[row + 1, START] <= time:
-        row += 1
-    if steps[row, HEAD + (PUSH + n_coefficients) * i + CLOSED] == 0.0:
-        return 0.0
-    part = min((time - steps[row, START]) / steps[row, LENGTH], 1.0)
-    return force_and_rate(steps, now, law, n_coefficients, row, i, part)[1]
-
-
-@inner()
-def largest_in(steps, now, law, n_coefficients, i, row):
-    """Largest of a few forces of contact i in a step, zero where it is open."""
-    best = 0.0
-    if steps[row, HEAD + (PUSH + n_coefficients) * i + CLOSED] > 0.0:
-        for look in range(FEW + 1):
-            best = max(best, force_within(steps, now, law, n_coefficients, row, i, look / FEW))
-    return best
-
-
-@outer()
-def largest_force(steps, now, law, n_coefficients, i):
-    """When the force of contact i is largest [s], and the two largest of its maxima [N]; a negative time for none.
-
-    The time is where the rate, looked at ever more closely, falls through zero, and not beyond one look where it jumps.
-    """
-    most = 0.0
-    for row in range(steps.shape[0]):
-        most = max(most, largest_in(steps, now, law, n_coefficients, i, row))
-    best = 0.0
-    time = -1.0
-    near = 0.0
-    first: Any = ZERO
-    top = 0.0
-    rival = 0.0
-    older = 0.0
-    old = 0.0
-    for row in range(steps.shape[0] + 1):
-        looks: Any = ONE
-        if row < steps.shape[0] and largest_in(steps, now, law, n_coefficients, i, row) > HIGH_ENOUGH * most:
-            looks = CLOSER
-        for look in range(looks):
-            f = force_within(steps, now, law, n_coefficients, row, i, look / CLOSER) if looks > 1 else 0.0
-            if old > older and old >= f:
-                rival = max(rival, min(top, old))
-                top = max(top, old)
-            older = old
-            old = f
-            if f > best:
-                best = f
-                time = steps[row, START] + steps[row, LENGTH] * look / CLOSER
-                near = steps[row, LENGTH] / CLOSER
-                first = row
-    if time < 0.0:
-        return time, top, rival
-    if first > 0:
-        near = max(near, steps[first - 1, LENGTH] / CLOSER)
-    while first > 0 and steps[first, START] > time - near:
-        first -= 1
-    low, high = time - near, time + near
-    for _ in range(3):
-        start, width = low, (high - low) / CLOSER
-        rate = rate_at(steps, now, law, n_coefficients, i, first, start)
-        found = False
-        for look in range(1, CLOSER + 1):
-            after = rate_at(steps, now, law, n_coefficients, i, first, start + look * width)
-            if rate > 0.0 >= after:
-                low, high = start + (look - 1) * width, start + look * width
-                time = low + width * rate / (rate - after)
-                found = True
-                break
-            rate = after
-        if not found:
-            break
-    return time, top, rival
 
 
 @inner()
