@@ -115,6 +115,7 @@ def valley(x):
 @pytest.mark.filterwarnings("error::fem_impact.ToleranceWarning")
 def test_following_the_advice_gives_a_design(name):
     wrong, words, right = DESIGNS[name]
-    with pytest.raises((fi.SimulationError, fi.ToleranceWarning, ValueError), match=words):
+    pointer = r"( \(notes.md#[a-z-]+\))?$" if words.endswith("$") else ""
+    with pytest.raises((fi.SimulationError, fi.ToleranceWarning, ValueError), match=words.removesuffix("$") + pointer):
         wrong(None)
     right(None)
