@@ -15,7 +15,7 @@ import numpy as np
 from numba.core.runtime import rtsys
 
 import fem_impact as fi
-from fem_impact.live.controllers import Score, Stroke, spread
+from fem_impact.live.controllers import PlayedStroke, Score, spread
 from fem_impact.live.devices import perform
 from fem_impact.live.player import Player
 
@@ -47,7 +47,7 @@ def force_error() -> float:
     worst = 0.0
     for i, speed in enumerate(np.linspace(0.1, FASTEST, 10)):
         game = player(n_trace=20_000)
-        game.play([Stroke(0, i, float(speed))], 0.02)
+        game.play([PlayedStroke(0, i, float(speed))], 0.02)
         hit = fi.strike(
             game.modes, game.striker, game.contact, at=game.points[i], speed=float(speed), tolerance=1e-6, duration=0.02
         )
@@ -62,7 +62,7 @@ def allocations() -> tuple[int, int]:
     for n_blocks in (1, 1, 1000):
         out = np.zeros(n_blocks * BLOCK, np.float32)
         before = rtsys.get_allocation_stats().alloc
-        game.fill([Stroke(len(out) // 64 * i, i % 10, 1.0) for i in range(60)], out)
+        game.fill([PlayedStroke(len(out) // 64 * i, i % 10, 1.0) for i in range(60)], out)
         found.append(rtsys.get_allocation_stats().alloc - before)
     return found[1], found[2]
 
@@ -96,7 +96,7 @@ def main(minutes: float) -> None:
     count = round(60.0 * minutes * PER_SECOND)
     frames = np.sort(rng.integers(0, round(60.0 * minutes * RATE), count))
     strokes = [
-        Stroke(int(frame), int(point), float(speed))
+        PlayedStroke(int(frame), int(point), float(speed))
         for frame, point, speed in zip(frames, rng.integers(0, 10, count), rng.uniform(0.05, FASTEST, count))
     ]
     game.reset()

@@ -691,7 +691,7 @@ PLAIN = """
 import json
 import numpy as np
 from warming import locked
-from fem_impact.impact.compiled.bundles import Limits, KernelSystem
+from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 from fem_impact.impact.compiled.collocation import run_collocation
 from fem_impact.impact.compiled.energy import run_energy
 from fem_impact.impact.compiled.propagation import replay

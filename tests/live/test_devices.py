@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fem_impact.live import devices
-from fem_impact.live.controllers import Score, Stroke
+from fem_impact.live.controllers import PlayedStroke, Score
 from fem_impact.live.devices import Clock, Feed, Speaker, perform
 
 
@@ -29,7 +29,7 @@ class Beeps:
         self.n_done += 1
 
 
-SCORE = [Stroke(10, 0, 0.25), Stroke(500, 0, 0.5)]
+SCORE = [PlayedStroke(10, 0, 0.25), PlayedStroke(500, 0, 0.5)]
 
 
 def test_blocks_are_copied_in_order_and_missed_ones_are_silent():
