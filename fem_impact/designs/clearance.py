@@ -53,9 +53,7 @@ def slopes(hit: Response, names: tuple[str, ...], sections: Mapping[str, tuple[f
     """Derivatives (n,) of the clearance in numbers of the blow."""
     if nearest(hit)[1] is None:
         return np.zeros(len(names))
-    parameters = Parameters(hit, {name: change for name, (_, change) in sections.items()})
-    numbers = np.array([sections[name][0] if name in sections else parameters.values[name] for name in names])
-    return differences(hit, parameters, names, numbers, lambda blow: [nearest(blow)[0]])[0][0]
+    return differences(Parameters(hit, sections), names, lambda blow: [nearest(blow)[0]])[0][0]
 
 
 def _released(hit: Response) -> History:

@@ -17,7 +17,7 @@ from . import accuracy, engine, force_spectrum, promise
 from .compiled import layout, record
 from .compiled.law import FELT
 from .contact import Contact
-from .engine import TOLERANCE
+from .engine import STEP_SHARE, TOLERANCE
 from .history import History, ModalSystem
 from .quantities import BAND_POINTS, asked_for
 from .response import Ends, Error, Response
@@ -31,8 +31,6 @@ REACHED = 20.0
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
 # [-] fraction of the usual steps that averages over the blow need: errors of single instants cancel in them
 AVERAGED = 0.5
-# [-] of the tolerance, what steps may err: two coarse runs agree by chance, and a single blow gains little by them
-STEP_SHARE = 0.1
 # [-] step halvings to decide whether bodies touch or part where the margin is less than its error, which each divides
 # by eight or more
 GRAZES = 6
@@ -591,7 +589,7 @@ def _scheme_for(tolerance: float, exponent: float) -> str:
 
 def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float | None]) -> float:
     """Steps per contact in the first run."""
-    count = engine.FIRST_STEPS * (TOLERANCE / tolerance) ** (0.5 if scheme == "A" else 0.25)
+    count = engine.steps_per_contact(tolerance, 0.5 if scheme == "A" else 0.25)
     return max(6.0, count * (AVERAGED if set(quantities) <= AVERAGES else 1.0))
 
 

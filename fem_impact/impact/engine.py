@@ -17,6 +17,8 @@ from .contact import acting_stiffness, wall_time
 from .history import History, ModalSystem
 
 TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
+# [-] of the tolerance, what steps may err: two coarse runs agree by chance, and a single blow gains little by them
+STEP_SHARE = 0.1
 MAX_STEPS = 500_000  # [-] of one run: a time limit of about one second
 # [-] modes, or entries of the forms of stretching, times steps of one run: a time limit of some seconds
 MAX_WORK = 1_000_000_000
@@ -37,9 +39,9 @@ def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.append(nodes, 1.0), np.ascontiguousarray(powers)
 
 
-def steps_per_contact(tolerance: float) -> float:
-    """Steps per contact with which scheme A4 meets a tolerance in most blows."""
-    return float(FIRST_STEPS * (TOLERANCE / tolerance) ** 0.25)
+def steps_per_contact(tolerance: float, power: float = 0.25) -> float:
+    """Steps per contact with which a scheme meets a tolerance in most blows; ``power`` is 1 / order, 1/4 of A4."""
+    return float(FIRST_STEPS * (TOLERANCE / tolerance) ** power)
 
 
 def follow(

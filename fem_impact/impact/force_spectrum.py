@@ -137,6 +137,12 @@ def _interpolated(
     return (weight * quarter * value).sum(axis=1) * np.exp(-2j * np.pi * middle * frequencies)
 
 
+def centroid(frequencies: np.ndarray, spectrum: np.ndarray) -> float:
+    """Mean frequency [Hz] of a spectrum's magnitude at some frequencies."""
+    size = np.abs(spectrum)
+    return float(np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies))
+
+
 def magnitude(time: np.ndarray, force: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
     """Magnitude of the spectrum [N s] of one force (n_times,) [N]."""
     return np.abs(of_pieces(pieces(time, force[:, None]), frequencies))

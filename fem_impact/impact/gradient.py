@@ -133,14 +133,14 @@ def gradients(
     several = (quantity,) if isinstance(quantity, str) else check.several("quantity", quantity, str)
     wanted = [_asked(item) for item in several]
     _check_possible(hit, wanted, bool(sections))
-    parameters = Parameters(hit, {name: change for name, (_, change) in sections.items()})
+    parameters = Parameters(hit, sections)
     names = parameters.checked(wrt)
-    numbers = np.array([sections[name][0] if name in sections else parameters.values[name] for name in names])
+    numbers = parameters.numbers(names)
     values = [_value(hit, name, band) for name, band in wanted]
     frequencies = {band: hit._band(band) for name, band in wanted if band is not None and name == "spectral_centroid"}
     told = partial(_told, wanted=wanted, frequencies=frequencies)
     found = {}
-    for (name, band), value, (slopes, error) in zip(wanted, values, differences(hit, parameters, names, numbers, told)):
+    for (name, band), value, (slopes, error) in zip(wanted, values, differences(parameters, names, told)):
         label = name if band is None else f"{name}={band:g}"
         doubt = UNSURE * error if name == "peak_time" else error
         found[label] = Gradient(label, value, names, numbers, slopes, doubt)
@@ -148,10 +148,10 @@ def gradients(
 
 
 def differences(
-    hit: "Response", parameters: Parameters, names: tuple[str, ...], numbers: np.ndarray,
-    told: Callable[["Response"], list[Any]],
-) -> list[tuple[np.ndarray, np.ndarray]]:  # fmt: skip
+    parameters: Parameters, names: tuple[str, ...], told: Callable[["Response"], list[Any]]
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """Slopes in numbers (n,) of each quantity that ``told`` reads from a blow, and their errors: (n,), (n, m)."""
+    hit, numbers = parameters.hit, parameters.numbers(names)
     again = Again(hit, parameters.change(names), parameters.faster(names), step_of(hit), told)
     sizes = np.array([abs(number) or parameters.size(name) for name, number in zip(names, numbers)])
     one_sided = np.array([number == 0.0 and name.endswith(ONE_SIDED) for name, number in zip(names, numbers)])
@@ -253,7 +253,7 @@ def step_of(hit: "Response") -> float:
     """Step [s] of a blow in contact; of one by collocation, that with which scheme A4 would tell as much."""
     h = hit.history
     if hit.scheme == "collocation":
-        return engine.pace_of(h)[0] / engine.steps_per_contact(0.1 * hit.tolerance)
+        return engine.pace_of(h)[0] / engine.steps_per_contact(engine.STEP_SHARE * hit.tolerance)
     return float(h.steps[h.pressed.any(axis=1), layout.LENGTH].max())
 
 
@@ -269,7 +269,9 @@ def _told(
         elif band is not None:
             asked = frequencies[band] if name == "spectral_centroid" else np.array([0.0, band])
             spectrum = force_spectrum.of_impulses(*_impulses(blow.history), asked)
-            found.append(centroid(asked, spectrum) if name == "spectral_centroid" else level_of(spectrum))
+            found.append(
+                force_spectrum.centroid(asked, spectrum) if name == "spectral_centroid" else level_of(spectrum)
+            )
         elif name.startswith("peak"):
             found.append(largest(blow.history)[name == "peak_force"])
         else:
@@ -290,8 +292,9 @@ def largest(history: History) -> tuple[float, float]:
     looks = [_looks(history, c, FEW) for c in range(history.n_contacts)]
     c = int(np.argmax([each.max(initial=0.0) for each in looks]))
     row, part = divmod(int(looks[c].argmax()), FEW)
-    width = history.steps[row, layout.LENGTH] / FEW
-    time = history.steps[row, layout.START] + part * width
+    length = history.steps[:, layout.LENGTH]
+    time = history.steps[row, layout.START] + part * length[row] / FEW
+    width = length[max(row - 1, 0) : row + 1].max() / FEW  # a short step may begin just after the peak in a long one
     for _ in range(ZOOMS):
         times = np.clip(time + width * ABOUT, 0.0, history.end_time)
         force, rate = history.force_at(times, c)
@@ -361,9 +364,3 @@ def level_of(spectrum: np.ndarray) -> float:
     """Level [dB] of the second of two values of a force spectrum re the first."""
     size = np.abs(spectrum)
     return 20.0 * float(np.log10(size[1] / size[0]))
-
-
-def centroid(frequencies: np.ndarray, spectrum: np.ndarray) -> float:
-    """Mean frequency [Hz] of a spectrum's magnitude at some frequencies."""
-    size = np.abs(spectrum)
-    return float(np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies))

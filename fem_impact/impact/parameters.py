@@ -74,7 +74,8 @@ class Parameters:
     """
 
     hit: "Response"
-    sections: Mapping[str, SectionChange] = field(default_factory=dict)  # how numbers of the user's change the section
+    # further numbers of the user's: their values, and how each changes the section
+    sections: Mapping[str, tuple[float, SectionChange]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return check.brief(self)
@@ -259,7 +260,7 @@ class Parameters:
         axes = {}
         for i, name in enumerate(names):
             if name in self.sections:
-                self._vary(found, i, self.sections[name])
+                self._vary(found, i, self.sections[name][1])
             elif name in ("strike.x", "strike.y"):
                 axes[i] = "xy".index(name[-1])
             else:
@@ -267,6 +268,10 @@ class Parameters:
         if axes:
             self._shift(found, axes)
         return found
+
+    def numbers(self, names: tuple[str, ...]) -> np.ndarray:
+        """The numbers of these names, (n,)."""
+        return np.array([self.sections[name][0] if name in self.sections else self.values[name] for name in names])
 
     def faster(self, names: tuple[str, ...]) -> np.ndarray:
         """What a unit of each number adds to the speed of arrival, (n,) [m/s]."""

@@ -344,9 +344,7 @@ class Response(Totals):
 
     def spectral_centroid(self, max_frequency: float) -> float:
         """Mean frequency [Hz] of the force spectrum's magnitude from zero to ``max_frequency`` [Hz]."""
-        frequencies, spectrum = self.band_spectrum(max_frequency)
-        size = np.abs(spectrum)
-        return float(np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies))
+        return force_spectrum.centroid(*self.band_spectrum(max_frequency))
 
     def band_spectrum(self, max_frequency: float) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies [Hz] from zero, dense enough for the spectrum of this blow, and the spectrum there [N s]."""

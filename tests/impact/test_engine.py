@@ -436,3 +436,9 @@ def test_contacts_that_barely_open_are_told_from_those_that_do_not(mass, frequen
     assert fine.n_impacts == n_impacts
     assert hit.n_impacts == n_impacts
     assert_allclose(hit.contact_time, fine.contact_time, rtol=tolerance)
+
+
+def test_gauss_polynomials_are_one_at_their_node():
+    nodes, powers = gauss(4)
+    assert nodes[-1] == 1.0
+    assert_allclose(powers @ np.vander(nodes[:-1], increasing=True).T, np.eye(4), atol=1e-12)  # rounding

@@ -1,11 +1,14 @@
 """`hit.gradient` against central differences and closed forms, and where it refuses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from test_studies import study
 
 import fem_impact as fi
+from fem_impact.impact import gradient
 
 grazing = study("gradient_grazing")
 claims = study("gradient_claims")  # random blows and what is told of them, on which both are judged
@@ -261,6 +264,61 @@ def test_ball_on_a_wall_has_the_powers_of_its_closed_form(exponent):
     assert_allclose(slopes["peak_force"].relative, [exponent * q, q, 2.0 * exponent * q], rtol=0, atol=1e-7)
     assert_allclose(slopes["impulse"].relative, [1.0, 0.0, 1.0], rtol=0, atol=1e-7)
     assert_allclose(slopes["restitution"].relative, 0.0, rtol=0, atol=1e-7)
+
+
+def test_the_impulse_of_a_smooth_law_grows_with_the_mass_alone():
+    """A ball on a wall has the impulse 2 m v, although its force rises with a power whose slopes are singular."""
+    slopes = ball(fi.Contact.power(1e6, 1.2), mass=0.1, speed=1.0, tolerance=1e-9).gradient(
+        "impulse", ("striker.mass", "contact.stiffness", "strike.speed")
+    )
+    assert_allclose(slopes.relative, [1.0, 0.0, 1.0], atol=5e-9)
+
+
+def test_slopes_of_a_half_sine():
+    mass, stiffness, speed = 0.2, 1e5, 1.3
+    hit = ball(fi.Contact.linear(stiffness, gap=1e-4), mass=mass, speed=speed, tolerance=1e-9)
+    found = hit.gradient(("contact_time", "impulse", "peak_force", "peak_time"), ("striker.mass", "contact.stiffness"))
+    time, peak = np.pi * np.sqrt(mass / stiffness), speed * np.sqrt(stiffness * mass)
+    own, sides = np.array([0.5 / mass, 0.5 / stiffness]), np.array([1.0, -1.0])
+    assert_allclose(found["contact_time"].slopes, sides * time * own, rtol=1e-8)
+    assert_allclose(found["impulse"].slopes, [2.0 * speed, 0.0], atol=1e-8)
+    assert_allclose(found["peak_force"].slopes, peak * own, rtol=1e-8)
+    assert_allclose(found["peak_time"].slopes, 0.5 * sides * time * own, rtol=1e-6)  # the peak is flat
+
+
+def test_smaller_steps_make_slopes_exact():
+    errors = []
+    for tolerance in (1e-3, 1e-6):
+        found = ball(fi.Contact.linear(1e5), tolerance=tolerance).gradient("contact_time", "striker.mass")
+        errors.append(abs(found.relative[0] / 0.5 - 1.0))
+    assert errors[1] < 1e-6 and errors[1] < 0.1 * errors[0]
+
+
+@pytest.mark.parametrize("loss, tolerance", [(0.0, 1e-4), (0.3, 1e-4), (0.0, 1e-8)])
+def test_the_largest_force_is_the_largest_of_many_samples(loss, tolerance):
+    """Its time is that of the largest of 200 000 samples, with loss, where the force rings, as without."""
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=10)
+    law = fi.Contact.hertz(695e3, loss=loss)
+    blow = {"at": (0.45, 0.3), "speed": 1.0, "tolerance": tolerance, "max_impacts": 2, "residual": False}
+    history = fi.strike(plate, fi.Striker.rigid(0.1), law, **blow).history
+    time, force = gradient.largest(history)
+    times = np.linspace(0.0, history.end_time, 200_001)
+    forces = history.force_at(times, 0)[0]
+    assert_allclose(time, times[forces.argmax()], atol=2.0 * times[1])
+    assert_allclose(force, forces.max(), rtol=1e-9)  # at a flat top, 200 000 samples miss no more
+
+
+@pytest.mark.parametrize("before", [0.01, 0.7])  # [s] of the step before the longest
+def test_a_peak_just_before_the_end_of_a_long_step_is_found(before):
+    """Of a half sine of pi seconds, whose look nearest to the peak is the start of the short step after it."""
+    ends = np.array([0.0, 0.8 - before, 0.8, 0.5 * np.pi + 0.01, 0.5 * np.pi + 0.02, np.pi])
+    steps, now, law = np.zeros((5, 8)), np.zeros((6, 1)), np.array([[1e3, 1.0, 0.0, 0.0]])
+    steps[:, 0], steps[:, 1], steps[:, 5] = ends[:-1], np.diff(ends), 1.0
+    steps[:, 3], steps[:, 4] = np.sin(ends[:-1]), np.cos(ends[:-1])
+    now[4] = -1.0
+    run = ball(fi.Contact.linear(1e3)).history
+    found = gradient.largest(replace(run, steps=steps, now=now, law=law, end_time=np.pi))
+    assert_allclose(found, [0.5 * np.pi, 1e3], rtol=1e-3)  # of the cubics
 
 
 def test_restitution_falls_with_loss_as_hunt_and_crossley_have_it():

@@ -302,9 +302,8 @@ def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
             for near in range(max(begin, peak_row - 1), min(row - 1, peak_row + 1) + 1):
                 peak = max(peak, peak_in(steps, now, law, n_coefficients, near, i, looks))
             left = -rate_within(steps, now, law, n_coefficients, row - 1, i, part)
-            low = dent(law, i, memory_of(steps, law, n_coefficients, row - 1, i))
-            pressed = still_pressed(steps, now, law, n_coefficients, i, now[APPROACH, i] - low)
-            if row == n_steps and part >= 1.0 and pressed:
+            deep = now[APPROACH, i] - dent(law, i, memory_of(steps, law, n_coefficients, row - 1, i))
+            if row == n_steps and part >= 1.0 and still_pressed(steps, now, law, n_coefficients, i, deep):
                 left = np.nan
             result[count, 0] = start
             result[count, 1] = end
