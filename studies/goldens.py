@@ -6,9 +6,10 @@
 
 Shipped and everyday scenes give every number of `fem-impact strike --json`, and every number of every cell where they
 hold a map; the first 500 random scenes of `effectivity.py` give those of the blow and its errors. A number holds if it
-differs by at most 1e-10 of its size. After more than three impacts motions are chaotic: there it holds if it differs by
-at most the stated error. Prints every number that does not hold, a line for each scene, and how many hold; numbers that
-are new or gone are named once. The exit status says whether all hold.
+differs by at most 1e-9 of its size: Ritz vectors round in another way in every process, which shows at 3e-10. Stated
+errors are differences of blows themselves and hold to 1 %. After more than three impacts motions are chaotic: there a
+number holds if it differs by at most the stated error. Prints every number that does not hold, a line for each scene,
+and how many hold; numbers that are new or gone are named once. The exit status says whether all hold.
 """
 
 import argparse
@@ -37,7 +38,9 @@ from fem_impact import cli
 HERE = Path(__file__).parent
 KEPT = HERE / "goldens.jsonl"
 RANDOM = 500  # [-] scenes of effectivity
-SAME = 1e-10  # [-] rounding that a change of the order of sums may leave
+SAME = 1e-9  # [-] rounding that a change of the order of sums may leave
+SAME_ERROR = 1e-2  # [-] of stated errors
+ERRORS = re.compile(r"error|trust|effect")
 TINY = 1e-15  # [-] numbers this small are rounding themselves, as balances of energy and momentum are
 # numbers of a random scene; the shipped ones give all
 OF_A_BLOW = (
@@ -114,7 +117,7 @@ def numbers(only: str, most: int) -> Iterator[tuple[str, dict[str, float]]]:
 def apart(before: Mapping[str, float], after: Mapping[str, float]) -> dict[str, float]:
     """Relative differences of the numbers that do not hold."""
     chaotic = next((x for name, x in before.items() if name.endswith("n_impacts")), 0.0) > effectivity.CHAOTIC
-    stated = next((x for name, x in before.items() if name.endswith("error.total")), 0.0)
+    stated = next((x for name, x in before.items() if name.endswith(("error.total", "sequence.error"))), 0.0)
     allowed = max(SAME, stated) if chaotic else SAME
     found = {}
     for name in before.keys() & after.keys():
@@ -122,7 +125,7 @@ def apart(before: Mapping[str, float], after: Mapping[str, float]) -> dict[str, 
         if one == other or (math.isnan(one) and math.isnan(other)) or max(abs(one), abs(other)) < TINY:
             continue
         change = abs(one - other) / max(abs(one), abs(other))
-        if not change <= allowed:
+        if not change <= (max(allowed, SAME_ERROR) if ERRORS.search(name) else allowed):
             found[name] = change
     return found
 

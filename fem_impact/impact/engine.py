@@ -140,9 +140,3 @@ def most_steps(system: ModalSystem) -> int:
     if system.stretched is not None:
         return min(MAX_STEPS, max(1000, MAX_WORK // system.stretched.forms.size))
     return min(MAX_STEPS, max(1000, MAX_WORK // len(system.omega)))
-
-
-def totals(history: History) -> tuple[float, float, float]:
-    """Impulse [N s], contact time [s] and peak force [N] of a run with impacts."""
-    rows = history.contacts.tolist()
-    return sum(row[3] for row in rows), sum(row[1] - row[0] for row in rows), max(row[2] for row in rows)

@@ -15,7 +15,7 @@ from .._base.rounding import SAME
 from ..fe import plausible
 from ..modes.modal import Modes, SampledShapes, at_rest
 from ..modes.stretching import stretch
-from . import assumption, datasets, force_spectrum, gradient, promise, trust
+from . import assumption, datasets, distance, force_spectrum, gradient, promise, trust
 from .assumption import Assumption
 from .compiled import law, layout, record
 from .contact import Contact
@@ -45,6 +45,21 @@ class Error:
     idealisation: float = 0.0  # [-] of treating the target as rigid or infinite
     sensitivity: float = 1.0  # [-] growth of a small difference from first to last impact
     inherited: float = 0.0  # [-] of the motion at the start, from the blow before
+    # [-] by cause, named as above, and quantity; a cause that is not here errs as much in every quantity
+    table: Mapping[str, Mapping[str, float]] = field(default_factory=dict, repr=False, compare=False)
+
+    @classmethod
+    def of(cls, table: Mapping[str, Mapping[str, float]], resolvable: bool, sensitivity: float) -> "Error":
+        """The errors of a table by cause and quantity: of each cause the largest."""
+        sizes = {cause: distance.worst(errors) for cause, errors in table.items()}
+        whole = {"step": 0.0, "truncation": 0.0, "mesh": 0.0} | sizes
+        return cls(**whole, resolvable=resolvable, sensitivity=sensitivity, table=table)
+
+    def in_quantity(self, quantity: str) -> float:
+        """The estimated error of one quantity [-]; infinite if the modes cannot resolve the contact."""
+        causes = "step", "truncation", "mesh", "idealisation", "inherited"
+        found = sum(self.table.get(cause, {}).get(quantity, getattr(self, cause)) for cause in causes)
+        return float(found) if self.resolvable else float("inf")
 
     @property
     def total(self) -> float:

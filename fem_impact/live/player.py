@@ -7,7 +7,7 @@ import numpy as np
 
 from .._base import check
 from .._base.rounding import EPSILON, ROUNDING
-from ..impact import collision
+from ..impact import collision, stepping
 from ..impact.collision import Touch
 from ..impact.compiled import live
 from ..impact.compiled.layout import WIDTH
@@ -117,8 +117,8 @@ class Player:
         motion, push = np.zeros(n_own), np.zeros(n_own)
         motion[:n_stick], push[:n_stick] = self.striker.motion, self.striker.push
         period = 1.0 / self.rate
-        ringing = omega[zeta < collision.RINGING].max(initial=0.0)
-        finer = max(period * CONTACT_STEPS / duration, period * ringing / collision.RESOLVED)
+        ringing = omega[zeta < stepping.RINGING].max(initial=0.0)
+        finer = max(period * CONTACT_STEPS / duration, period * ringing / stepping.RESOLVED)
         level = max(0, int(np.ceil(np.log2(finer))))
         if level > SHORTEST:
             raise ValueError(

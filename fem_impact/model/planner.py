@@ -15,7 +15,7 @@ from .._base.explained import below, noted, pointed
 from ..fe import plausible, refinement
 from ..fe.assembly import System
 from ..fe.section import Plate
-from ..impact import accuracy, assumption, collision, promise
+from ..impact import accuracy, assumption, collision, promise, stepping
 from ..impact.assumption import Assumption
 from ..impact.compiled import build
 from ..impact.contact import Contact
@@ -254,7 +254,7 @@ class _Asked:
                 if name not in ARGUMENTS:
                     raise ValueError(f"{name} is not an argument of a blow{check.nearest(name, [*ARGUMENTS, *PIECES])}")
             wanted = (values.get(name) for name in ("duration", "max_impacts", "scheme", "dt", "quantity"))
-            options = collision.Options.checked(values.get("tolerance", collision.TOLERANCE), *wanted)
+            options = stepping.Options.checked(values.get("tolerance", collision.TOLERANCE), *wanted)
             values |= {"dt": options.dt, "duration": options.horizon if np.isfinite(options.horizon) else None}
             speed = check.positive("speed", values["speed"], "m/s")
             values["stretching"] = check.flag("stretching", values.get("stretching", False)) or blow.target.stretching
@@ -1059,7 +1059,7 @@ def _plan(
         reasons = (*reasons, f"the striker {stiff}")
     scheme = asked.values.get("scheme") or ("A4" if asked.values["stretching"] else None)
     fixed = scheme, asked.values.get("dt")
-    scheme, dt = collision.steps_for(
+    scheme, dt = stepping.steps_for(
         asked.blow.contact, asked.duration, steps * asked.tolerance, asked.quantities, *fixed
     )
     until = "fixed by dt" if fixed[1] else f"halved until two runs agree to {steps * asked.tolerance:.1e}"

@@ -9,11 +9,10 @@ import numpy as np
 
 from .._base.check import SimulationError
 from .._base.rounding import SAME
-from ..impact import accuracy
+from ..impact import accuracy, distance
 from ..impact.compiled import layout
 from ..impact.engine import again
 from ..impact.history import History
-from ..impact.quantities import BAND_POINTS, apart
 from ..impact.response import Response
 from ..modes.modal import Modes
 from .bending import Bending, Known, bending, known
@@ -84,9 +83,9 @@ class Struck:
         return replace(self.hit, history=again(self.hit.history), audit=None)
 
     def changes(self, **changed: Any) -> dict[str, float | None]:
-        """Change of each quantity: absolute for the restitution, relative for the others, None if that blow fails.
+        """Change of each quantity, as `distance.of_blows`; None if that blow fails. Of the sound see `heard`, too.
 
-        ``changed`` are fields of the history; the sound is not here, see `heard`.
+        ``changed`` are fields of the history.
         """
         return self.between({}, changed)
 
@@ -103,7 +102,7 @@ class Struck:
             after = replace(self.before, history=again(h, **end))
         except SimulationError:
             return dict.fromkeys(self.quantities)
-        return {name: _change(name, band, before, after) for name, band in self.hit.quantities.items()}
+        return {**distance.of_blows(after, before, self.hit.quantities)}
 
     def of_target(self, values: np.ndarray, name: str = "omega") -> np.ndarray:
         """A field of the history with the target's part replaced."""
@@ -133,23 +132,6 @@ class Struck:
         moved = shift(modes, integrals)
         result["sound"] = None if moved is None else float(energy @ np.abs(moved) / (energy.sum() or 1.0))
         return result
-
-
-def _change(name: str, band: float | None, one: Response, two: Response) -> float:
-    if name == "restitution":
-        return apart(one.restitution, two.restitution)
-    if name == "n_impacts":
-        return abs(one.n_impacts - two.n_impacts) / max(1, one.n_impacts)
-    if name == "spectrum":
-        assert band is not None
-        frequencies = np.linspace(0.0, band, BAND_POINTS)
-        first, second = one.spectrum(frequencies), two.spectrum(frequencies)
-        return float(np.abs(first - second).max() / (np.abs(first).max() or 1.0))
-    if name == "sound":
-        return 0.0
-    key = {"force": "peak_force"}.get(name, name)
-    size = getattr(one, key)
-    return abs(getattr(two, key) - size) / size if size else float(getattr(two, key) != 0.0)
 
 
 def softer(history: History, compliance: float) -> dict[str, np.ndarray]:

@@ -3,9 +3,9 @@
 from typing import Any
 
 from ..fe.assembly import THEORIES
-from ..impact.collision import SCHEMES
 from ..impact.contact import HIGHEST_EXPONENT, LOWEST_EXPONENT
 from ..impact.quantities import BANDED, QUANTITIES
+from ..impact.stepping import SCHEMES
 from ..mesh.loops import UNITS
 from ..model.target import AIR, MODELS
 from .schema import LOWEST_NU, MOST_LISTENERS, SOURCES

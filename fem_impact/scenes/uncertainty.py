@@ -16,6 +16,7 @@ from ..fe import plausible
 from ..fe.assembly import System, reassemble
 from ..fe.section import Beam, Elastic, Plate
 from ..impact.contact import Contact
+from ..impact.distance import distance
 from ..impact.striker import Striker
 from ..model.planner import Blow
 from ..model.target import CLOSE, FIRST_FLEXIBLE, Target
@@ -482,14 +483,11 @@ def _checked(exact: Cloud, numbers: np.ndarray, workers: int | None) -> Checks:
 
 
 def _differences(one: np.ndarray, two: np.ndarray) -> dict[str, float]:
-    """Differences of two blows: of the restitution absolute, of the others relative to the first."""
-    found = {}
-    for i, name in enumerate(solving.LAYERS):
-        if name in ("n_impacts", "error") or i >= len(one):
-            continue
-        whole = 1.0 if name == "restitution" else abs(one[i])
-        found[name] = float(abs(two[i] - one[i]) / whole) if whole else 0.0
-    return found
+    """Differences of two blows, relative to the first where they are relative."""
+    first, second = (
+        {name: x for name, x in zip(solving.LAYERS, row) if name not in ("n_impacts", "error")} for row in (one, two)
+    )
+    return distance(second, first)
 
 
 def _table(

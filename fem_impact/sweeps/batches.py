@@ -9,9 +9,11 @@ from functools import partial
 
 import numpy as np
 
-from ..impact.collision import RESOLVED, rest_mode
 from ..impact.compiled import bundles, convolution, many_blows, propagation
 from ..impact.contact import wall_time
+from ..impact.distance import distance
+from ..impact.part import rest_mode
+from ..impact.stepping import RESOLVED
 from ..impact.striker import Striker
 from ..modes.modal import Modes
 
@@ -411,15 +413,17 @@ class _Engine:
         ``ratio`` is that of their steps. The error in the time of contact is that of the approach divided by its rate
         there.
         """
-        with np.errstate(divide="ignore", invalid="ignore"):
-            held = [FOUND_TIME, FOUND_IMPULSE, FOUND_PEAK]
-            relative = np.abs(coarse[held] / fine[held] - 1.0)
-            change = relative.max(axis=0)
-            change = np.maximum(change, fine[FOUND_SWING] * relative[1:].max(axis=0))
-            if self.band:
-                change = np.maximum(change, np.abs(coarse[FOUND_CENTROID] / fine[FOUND_CENTROID] - 1.0))
-        absolute = np.abs(coarse[FOUND_IMPULSE] - fine[FOUND_IMPULSE]) * self.own_rigid[cells]
+        one, two = (
+            {
+                "restitution": run[FOUND_IMPULSE] * self.own_rigid[cells], "contact_time": run[FOUND_TIME],
+                "impulse": run[FOUND_IMPULSE], "force": run[FOUND_PEAK],
+            } | ({"centroid": run[FOUND_CENTROID]} if self.band else {})
+            for run in (coarse, fine)
+        )  # fmt: skip
+        apart = distance(one, two)
+        swung = fine[FOUND_SWING] * np.maximum(apart["impulse"], apart["force"])
+        change = np.fmax.reduce([swung, *apart.values()])
         same = coarse[FOUND_IMPACTS] == fine[FOUND_IMPACTS]
         same &= (coarse[FOUND_STATUS] <= many_blows.DOUBTFUL) & (fine[FOUND_STATUS] == many_blows.DONE)
-        found = np.maximum(np.fmax(change, absolute) / (ratio**ORDER - 1.0), fine[FOUND_MISFIT])
+        found = np.maximum(change / (ratio**ORDER - 1.0), fine[FOUND_MISFIT])
         return np.where(same, found, np.inf)

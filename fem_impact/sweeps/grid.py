@@ -20,10 +20,12 @@ from .._base.rounding import ROUNDING
 from ..fe import plausible
 from ..fe.assembly import System
 from ..impact import accuracy
-from ..impact.collision import RESOLVABLE, strike
+from ..impact.collision import strike
 from ..impact.contact import Contact, wall_time
+from ..impact.distance import distance
 from ..impact.response import Response
 from ..impact.striker import Striker
+from ..impact.variation import RESOLVABLE
 from ..model.planner import COSTLY
 from ..model.target import Target
 from ..modes.modal import Damping, Modes
@@ -505,11 +507,9 @@ def described(grid: Grid, numbers: np.ndarray, workers: int | None = None) -> np
 def _largest_difference(names: list[str], one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Largest difference of two maps in the quantities under tolerance; 1 if their impacts differ in number."""
     mine, its = dict(zip(names, one)), dict(zip(names, other))
-    apart = np.abs(mine["restitution"] - its["restitution"])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        for name in ("impulse", "contact_time", "peak_force"):
-            apart = np.fmax(apart, np.abs(its[name] / mine[name] - 1.0))
-    return np.where(mine["n_impacts"] == its["n_impacts"], apart, 1.0)
+    judged = ("restitution", "impulse", "contact_time", "peak_force")
+    apart = distance({name: its[name] for name in judged}, {name: mine[name] for name in judged})
+    return np.where(mine["n_impacts"] == its["n_impacts"], np.fmax.reduce(list(apart.values())), 1.0)
 
 
 def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, tell: Tell | None = None) -> None:

@@ -12,12 +12,12 @@ import numpy as np
 from .._base import check
 from .._base.check import SimulationError
 from .._base.rounding import EPSILON, ROUNDING
-from ..impact.collision import rest_mode
 from ..impact.compiled import layout, record
 from ..impact.compiled.bundles import KernelSystem, Limits
 from ..impact.compiled.energy import run_energy
 from ..impact.contact import Contact
 from ..impact.history import History
+from ..impact.part import rest_mode
 from ..impact.striker import Striker
 from ..modes.modal import Modes
 from . import rig as rigs

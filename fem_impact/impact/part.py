@@ -1,0 +1,211 @@
+"""The bodies of a blow, each reduced to its modes and contacts, and the modal system that they make together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .._base.rounding import ROUNDING
+from ..modes.modal import Modes, left_out
+from ..modes.stretching import Stretching, stretch
+from .compiled import layout
+from .compiled.law import FELT
+from .contact import Contact
+from .history import ModalSystem
+from .response import Ends
+from .stretched import Stretched
+
+# [-] by dimension: frequency of the replacement mode over the last, fact: sqrt(sum u**2/w**2 / sum u**2/w**4) of those
+# above is sqrt(7/3) on a beam, whose n-th frequency goes as n**2, and sqrt(3) on a plate, where it goes as n
+REST_ABOVE = {1: 1.53, 2: 1.73}
+# [-] frequency of the replacement mode under a lossy contact over the last mode's: so far above that it follows as a
+# spring; it is critically damped
+LOSSY_ABOVE = 30.0
+SLOW = 1e-4  # [-] frequency of a rigid motion that may be missing over that of the first mode: it acts as a mass
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One body of a blow, reduced to its modes and contacts."""
+
+    omega: np.ndarray  # (n_modes,) [rad/s]
+    zeta: np.ndarray  # (n_modes,) [-]
+    rows: np.ndarray  # (n_ends, n_modes) [kg**-0.5] shapes at its contacts
+    touched: tuple[tuple[int, float], ...]  # contact, and sign: 1 for its first body, -1 for its second
+    rest: np.ndarray  # (n_ends, n_ends) [m/N] residual compliance of the left-out modes
+    doubt: np.ndarray  # (n_ends,) [m/N] estimated error of its diagonal
+    q: np.ndarray  # (n_modes,) [m kg**0.5]
+    p: np.ndarray  # (n_modes,) [m kg**0.5/s]
+    bias: np.ndarray  # (n_modes,) [N kg**-0.5]
+    force: float  # [N] constant force at its first contact
+    points: np.ndarray  # (n_ends, dimension) [m] contact points
+    pressed: np.ndarray  # (2, n_ends) [N], [N/s] contact forces at the start and their rates
+    loose: np.ndarray  # (n_ends, n) shapes of rigid motions that it may have besides
+    stretching: Stretching | None = None
+    speed: float = 0.0  # [m/s] with which it arrives in rigid motion, at its first contact
+    held: int = 0  # [-] first modes that only a hand makes swing: within a contact they move like a mass
+
+    def moving(self, q: np.ndarray, p: np.ndarray) -> "Part":
+        """The same body in another state."""
+        return replace(self, q=q, p=p)
+
+    def faster(self, factor: float) -> "Part":
+        """The same body with all motion larger by a factor, its rigid position as it is."""
+        return self.moving(np.where(self.omega == 0.0, 1.0, factor) * self.q, factor * self.p)
+
+    def lower(self, error: np.ndarray) -> "Part":
+        """The body with frequencies lower and compliances higher by their errors, those of frequencies relative."""
+        return replace(self, omega=self.omega / (1.0 + error), rest=self.rest + np.diag(self.doubt))
+
+    def forms(self, rated: np.ndarray) -> np.ndarray:
+        """Forms (n_ends, n_forms) of unit stiffness that stand for the modes left out; none where a spring does."""
+        if not self.rest.any() or (len(self.touched) == 1 and not rated[self.touched[0][0]]):
+            return np.zeros((len(self.touched), 0))
+        size, vectors = np.linalg.eigh(self.rest)
+        kept = size > ROUNDING * size[-1]
+        return np.asarray(vectors[:, kept] * np.sqrt(size[kept]))
+
+    def thinned(self, wanted: float) -> "tuple[Part, float]":
+        """The body with its upper modes replaced by their compliance, and the ratio of old to new highest frequency."""
+        flexible = self.omega[self.omega > 0.0]
+        if not self.rest.any() or len(flexible) < 2:
+            return self, np.inf
+        limit = max(flexible[-1] / wanted, flexible[0])
+        n = int(np.searchsorted(self.omega, limit, side="right"))
+        gone = self.rows[:, n:] / self.omega[n:]
+        thin = replace(
+            self, omega=self.omega[:n], zeta=self.zeta[:n], rows=self.rows[:, :n], rest=self.rest + gone @ gone.T,
+            q=self.q[:n], p=self.p[:n], bias=self.bias[:n],
+            stretching=None if self.stretching is None else self.stretching.truncated(n),
+        )  # fmt: skip
+        return thin, float(flexible[-1] / self.omega[n - 1])
+
+    def loosened(self) -> "Part":
+        """The body with the rigid motions that it may have besides, as its first modes."""
+        n = self.loose.shape[1]
+        still, slow = np.zeros(n), np.full(n, SLOW * self.omega[0])
+        bias = self.force * self.loose[0] if self.force else still
+        return replace(
+            self, omega=np.append(slow, self.omega), zeta=np.append(still, self.zeta),
+            rows=np.hstack([self.loose, self.rows]), q=np.append(still, self.q), p=np.append(still, self.p),
+            bias=np.append(bias, self.bias),
+        )  # fmt: skip
+
+    def described_by(self, modes: Modes) -> "Part":
+        """The same body in the same motion, described by other modes."""
+        rows, still = modes.shapes.at(self.points), np.zeros(modes.n_modes)
+        moving = self.omega == 0.0
+        if self.q.any() or self.p[~moving].any():
+            raise ValueError("a body of Ritz vectors must start at rest; find its modes with find_modes")
+        velocity = still
+        if self.p.any():
+            velocity = float(self.rows[0] @ self.p) * modes.rigid_motion(self.points[:1])
+        rest, rigid = left_out(modes, self.points, rows), modes.omega == 0.0
+        # rigid motions are known up to a rotation among them, which would look like a difference of speeds
+        here, there = np.vstack([rows, velocity])[:, rigid], np.vstack([self.rows, self.p])[:, moving]
+        left, _, right = np.linalg.svd(here.T @ there)
+        turned = here @ left @ right
+        rows, velocity = rows.copy(), velocity.copy()
+        rows[:, rigid], velocity[rigid] = turned[:-1], turned[-1]
+        other = part_of(modes, self.touched, self.points, rows, rest, self.force, velocity)
+        return replace(other, stretching=None if self.stretching is None else stretch(modes))
+
+
+def part_of(
+    modes: Modes,
+    touched: tuple,
+    points: np.ndarray,
+    rows: np.ndarray,
+    left_out: tuple[np.ndarray, np.ndarray] | None,
+    force: float,
+    motion: np.ndarray | None = None,
+) -> Part:
+    """One undeformed body, at rest or moving, with its shapes and residual compliance at its contacts."""
+    n_ends = len(touched)
+    rest, doubt = (np.zeros((n_ends, n_ends)), np.zeros(n_ends)) if left_out is None else left_out
+    rest = 0.5 * (rest + rest.T)
+    carried = np.square(rows / np.where(modes.omega > 0.0, modes.omega, np.inf)).sum()
+    largest = rest[0, 0] if n_ends == 1 else np.linalg.eigvalsh(rest)[-1] if n_ends else 0.0
+    if largest <= ROUNDING * (np.trace(rest) + carried):
+        rest = np.zeros_like(rest)
+    still = np.zeros(modes.n_modes)
+    bias = force * rows[0] if force else still
+    velocity = still if motion is None else motion
+    pressed = np.zeros((2, n_ends))
+    return Part(
+        modes.omega, modes.damping_ratio, rows, touched, rest, doubt, still, velocity, bias, force, points, pressed,
+        np.zeros((n_ends, 0)) if left_out is None else modes.shapes.loose(points),
+    )  # fmt: skip
+
+
+def joined(parts: Sequence[Part], laws: Sequence[Contact]) -> ModalSystem:
+    """Join the modes of all bodies; series springs or replacement modes stand in for the left-out modes.
+
+    A series spring is exact only for a body with one lossless contact. Otherwise each eigenvector of the residual
+    compliance becomes a mode above the last kept one, so that loss and other contacts act on it too.
+    """
+    law = np.array([each.numbers for each in laws])
+    rated = rated_contacts(law)
+    offset = np.array([-each.gap for each in laws])
+    n_modes = sum(len(part.omega) for part in parts)
+    shape = np.zeros((len(laws), n_modes))
+    # frequency, damping ratio, signed shape (n_contacts,), constant force, static deflection and its rate
+    extra: list[tuple[float, float, np.ndarray, float, float, float]] = []
+    start, stretched = 0, None
+    for part in parts:
+        if part.stretching is not None:
+            stretched = Stretched(part.stretching.forms, start)
+        for (i, sign), row in zip(part.touched, part.rows):
+            shape[i, start : start + len(row)] += sign * row
+        start += len(part.omega)
+        if not part.rest.any():
+            continue
+        first, sign = part.touched[0]
+        if len(part.touched) == 1 and not rated[first]:
+            law[first, layout.COMPLIANCE] += part.rest[0, 0]
+            offset[first] += sign * part.rest[0, 0] * part.force
+            continue
+        above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], bool(rated.any()))
+        for form in part.forms(rated).T:
+            column = np.zeros(len(law))
+            for (i, sign), share in zip(part.touched, form):
+                column[i] += sign * share * above
+            held = -(part.pressed @ column[[i for i, _ in part.touched]]) / above**2
+            extra.append((above, damping, column, 0.0, float(held[0]), float(held[1])))
+    lists = [[getattr(part, name) for part in parts] for name in ("omega", "zeta", "bias", "q", "p")]
+    if extra:
+        shape = np.ascontiguousarray(np.hstack([shape, *(mode[2][:, None] for mode in extra)]))
+        lists = [[*one, np.array([mode[k] for mode in extra])] for one, k in zip(lists, (0, 1, 3, 4, 5))]
+    omega, zeta, bias, q, p = (np.concatenate(one) for one in lists)
+    return ModalSystem(omega, zeta, shape, offset, bias, law, q, p, stretched=stretched)
+
+
+def rated_contacts(law: np.ndarray) -> np.ndarray:
+    """Whether the force of each contact depends on more than the approach itself, (n_contacts,)."""
+    return (law[:, layout.LOSS] > 0.0) | (law[:, layout.KIND] == FELT)
+
+
+def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[float, float]:
+    """Frequency [rad/s] and damping ratio [-] of the mode that replaces those above the last kept one.
+
+    A lossy force depends on the approach rate, in which an undamped mode just above the last one would ring. A
+    critically damped mode far above behaves like a series spring and takes almost no energy.
+    """
+    if lossy:
+        return LOSSY_ABOVE * omega, 1.0
+    return REST_ABOVE[min(dimension, 2)] * omega, float(zeta)
+
+
+def ends_of(parts: Sequence[Part], law: np.ndarray) -> tuple[Ends, ...]:
+    """Where every body is touched; a constant force makes left-out modes dip only if a series spring replaces them."""
+    found, rated = [], rated_contacts(law)
+    last = sum(len(part.omega) for part in parts)
+    for part in parts:
+        forms = slice(last, last + part.forms(rated).shape[1])
+        last = forms.stop
+        dips = part.rest.any() and forms.start == forms.stop
+        doubtful, dip_force = bool(part.doubt.any() or part.loose.size), part.force if dips else 0.0
+        found.append(
+            Ends(part.points, part.touched, part.force, part.rest, forms, dip_force, part.speed, doubtful=doubtful)
+        )
+    return tuple(found)

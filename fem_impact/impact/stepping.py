@@ -1,0 +1,250 @@
+"""Time steps short enough: runs of ever shorter steps until two agree to the tolerance."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from .._base.check import SimulationError
+from . import distance, engine
+from .compiled import layout
+from .compiled.law import FELT
+from .contact import Contact
+from .distance import MARGIN, Distances
+from .engine import STEP_SHARE, TOLERANCE
+from .history import History, ModalSystem
+from .quantities import asked_for
+
+SCHEMES = ("A", "A4", "collocation")
+# [-] tolerance advised over the error reached: steps twice as long, to which it may lead, err 16 times more
+REACHED = 20.0
+AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
+# [-] fraction of the usual steps that averages over the blow need: errors of single instants cancel in them
+AVERAGED = 0.5
+# [-] step halvings to decide whether bodies touch or part where the margin is less than its error, which each divides
+# by eight or more
+GRAZES = 6
+# [-] error of a margin over the difference of two runs: beside a graze A4 converges at first order only, and a run of
+# half the steps may show a seventh of the difference to the truth
+SURELY = 4.0
+DOUBLINGS = 7  # [-] step halvings before the run gives up: A4 then errs 2**28 times less
+# [-] Difference of two runs over the error of the finer one: first for speeds and impulse, then for contact time and
+# peak force. These two depend on one instant, and modes faster than the step lower the order of A4 there.
+RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 4.0), "collocation": (1.0, 1.0)}
+RINGING = 0.5  # [-] modes with a damping ratio above this do not ring: a swing is down to 3 % of the one before
+# [rad] largest phase of a ringing mode in a step of the coarser run: a third of a period, seen before it comes again
+RESOLVED = 2.0
+COLLOCATION_BELOW = 1e-7  # [-] below this tolerance, collocation needs less work than A4
+
+
+@dataclass(frozen=True)
+class Options:
+    """When to stop, how accurate to be, and which scheme to use."""
+
+    tolerance: float
+    horizon: float
+    n_max: int
+    scheme: str | None
+    dt: float | None
+    quantities: Mapping[str, float | None]  # that must meet the tolerance, each with its band [Hz]
+
+    @classmethod
+    def checked(
+        cls, tolerance: float, duration: float | None, max_impacts: int | None, scheme: str | None, dt: float | None,
+        quantity: Any,
+    ) -> "Options":  # fmt: skip
+        """The options, each of them checked."""
+        return cls(
+            check.tolerance(tolerance),
+            np.inf if duration is None else check.positive("duration", duration, "s"),
+            0 if max_impacts is None else check.count("max_impacts", max_impacts),
+            None if scheme is None else check.one_of("scheme", scheme, SCHEMES),
+            None if dt is None else check.positive("dt", dt, "s"),
+            asked_for(quantity),
+        )
+
+
+def scheme_for(tolerance: float, exponent: float) -> str:
+    """The scheme that meets a tolerance with the least work."""
+    return "collocation" if tolerance < COLLOCATION_BELOW and exponent >= 1.0 else "A4"
+
+
+def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float | None]) -> float:
+    """Steps per contact in the first run."""
+    count = engine.steps_per_contact(tolerance, 0.5 if scheme == "A" else 0.25)
+    return max(6.0, count * (AVERAGED if set(quantities) <= AVERAGES else 1.0))
+
+
+def steps_for(
+    contact: Contact,
+    duration: float,
+    tolerance: float,
+    quantities: Mapping[str, float | None],
+    scheme: str | None = None,
+    dt: float | None = None,
+) -> tuple[str, float]:
+    """Scheme and first time step [s] of `strike`; ``duration`` is the contact time on a rigid wall [s]."""
+    scheme = scheme or scheme_for(tolerance, contact.exponent)
+    if scheme in ("A", "A4"):
+        return scheme, dt or duration / _first_count(scheme, tolerance, quantities)
+    return scheme, dt or duration / (2.0 if scheme == "collocation" else 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """Two runs that agree, the finer one with its estimated errors."""
+
+    scheme: str
+    steps: tuple[float, float]  # of the finer and the coarser run, as `engine.follow` takes them
+    fine: History
+    coarse: History
+    error: Distances  # of the finer run
+
+
+def refine_steps(system: ModalSystem, options: Options, pace: tuple[float, float]) -> Refined:
+    """Refine until two successive runs agree to the tolerance; ``pace`` as of `engine.pace_of`."""
+    scheme, least = options.scheme, float(system.law[:, layout.EXPONENT].min())
+    if system.stretched is not None:
+        if scheme == "collocation":
+            raise ValueError("scheme collocation knows no stretching; use A4")
+        scheme = scheme or "A4"
+    scheme = scheme or scheme_for(options.tolerance, least)
+    if scheme == "collocation" and least < 1.0:
+        raise ValueError(f"scheme collocation needs exponents of at least 1, got {least:g}; use A4")
+    free = options.scheme is None and options.dt is None
+    try:
+        return _Control(system, options, pace, scheme, free).refined()
+    except _NotMet:
+        if not free or scheme != "A4" or least < 1.0 or system.stretched is not None:
+            raise
+    return _Control(system, options, pace, "collocation", free).refined()
+
+
+class _NotMet(SimulationError):
+    """No two runs agreed."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Control:
+    """What a blow is followed with while its steps are refined."""
+
+    system: ModalSystem
+    options: Options
+    pace: tuple[float, float]
+    scheme: str
+    free: bool  # whether scheme and steps are our choice
+
+    def run(self, size: float, chosen_by: str = "tolerance") -> History:
+        """One run, see `engine.follow`."""
+        last = self.options.horizon, self.options.n_max
+        return engine.follow(self.system, self.scheme, size, self.pace, *last, chosen_by)
+
+    def judged(self, sizes: tuple[float, float], coarse: History, fine: History) -> Refined:
+        """Two runs of a finer and a coarser size, and the errors of the finer one."""
+        over = RICHARDSON[self.scheme]
+        if self.scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
+            over = over[0], over[1] / (1.0 + 2.0 * self.pace[1] * self.system.law[:, layout.LOSS].max())
+        error = distance.of_runs(coarse, fine, self.options.quantities, over)
+        if "force" in error:
+            error["force"] = max(error["force"], fine.force_missed)
+        error[MARGIN] = min(1.0, SURELY * error[MARGIN])
+        return Refined(self.scheme, sizes, fine, coarse, error)
+
+    def refined(self) -> Refined:
+        """The first pair of runs that agrees."""
+        options, tolerance = self.options, self.options.tolerance
+        if options.dt is not None:
+            size = min(options.dt, 0.5 * options.horizon)
+            fine, coarse = (self.run(each, "dt") for each in (size, 2.0 * size))
+            return self.judged((size, 2.0 * size), coarse, fine)
+        sizes, aim = self.sizes()
+        try:
+            runs = [self.run(size) for size in sizes[:2]]
+        except SimulationError as exhausted:  # so many steps are out of reach: longer ones may do
+            sizes = [4.0 * sizes[0], 2.0 * sizes[0], *sizes]
+            try:
+                runs = [self.run(size) for size in sizes[:2]]
+            except SimulationError:
+                raise exhausted from None
+        best, met = np.inf, None
+        grazes = 0 if options.quantities.keys() & {"n_impacts", "contact_time"} else GRAZES
+        for i, (before, size) in enumerate(pairwise(sizes)):
+            if i:
+                runs = [runs[1], self.run(size)]
+            found = self.judged((size, before), *runs)
+            error = distance.worst(found.error)
+            best = min(best, error)
+            if error <= tolerance:
+                met = found
+            if error <= aim:
+                if grazes == GRAZES or found.fine.margin > found.error[MARGIN]:
+                    break
+                grazes += 1
+            if 2 * len(found.fine.steps) > engine.most_steps(self.system):
+                break  # the next run would exceed the step limit
+        if met is None:
+            raise _NotMet(self.told(best, *runs))
+        return met
+
+    def sizes(self) -> tuple[list[float], float]:
+        """Steps, or misfits of collocation, to try in turn, and the error [-] aimed at."""
+        options, law = self.options, self.system.law
+        if self.scheme == "collocation":
+            return [max(1e-15, options.tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)], (
+                options.tolerance
+            )
+        # felt lets go between steps, which no margin sees: a thousandth of the tolerance there
+        share = STEP_SHARE ** (1 + 2 * int((law[:, layout.KIND] == FELT).any()))
+        # or the horizon could cut both runs to one step, and they would always agree
+        shortest = min(self.pace[0], options.horizon)
+        count = _first_count(self.scheme, min(share * options.tolerance, TOLERANCE), options.quantities)
+        first = min(2.0 * shortest / count, _longest_lossy(self.system, self.pace, options.tolerance))
+        return [first * 0.5**n for n in range(DOUBLINGS + 1)], share * options.tolerance
+
+    def told(self, best: float, coarse: History, fine: History) -> str:
+        """Why no two runs agreed, of which the best erred by ``best``, and what helps."""
+        tolerance, hint, enough = self.options.tolerance, "", min(REACHED * best, 1.0)
+        advice = f"raise tolerance to {float(f'{enough:.1e}'):g}" if self.free else "leave out scheme"
+        if len(fine.contacts) > 1:
+            growth = distance.growth(coarse, fine)
+            hint = f"; small errors grow {growth:.1g}-fold over {len(fine.contacts)} impacts"
+            if self.free and growth == np.inf:  # the last runs were different blows, to which no tolerance applies
+                agreed = _agreed(coarse, fine, tolerance * self.pace[0])
+                advice = f"give max_impacts of at most {max(1, agreed)}"
+        return (
+            f"the step error stays at {best:.1e}, above the tolerance {tolerance:.1e}, with {len(fine.steps)} "
+            f"steps{hint}; {advice}"
+        )
+
+
+def _agreed(coarse: History, fine: History, apart: float) -> int:
+    """How many impacts end in two runs, one after another, at times no more than ``apart`` [s] from each other."""
+    one, two = (np.sort(history.contacts[:, 1]) for history in (coarse, fine))
+    n = min(len(one), len(two))
+    same = np.abs(one[:n] - two[:n]) <= apart
+    return n if same.all() else int(same.argmin())
+
+
+def _longest_lossy(system: ModalSystem, pace: tuple[float, float], tolerance: float) -> float:
+    """Longest step [s] that resolves the modes whose ringing shows in a lossy contact force; infinite without loss.
+
+    A lossy force depends on the approach rate. A force that rises like a spring's makes each mode ring in that rate,
+    with stiffness times u**2 / omega**2 of the approach speed.
+    """
+    longest = np.inf
+    slow = system.omega <= np.pi / pace[0]
+    fastest = np.argsort(-system.omega, kind="stable")[: np.count_nonzero(system.omega)]
+    order = fastest[system.zeta[fastest] < RINGING]
+    omega = system.omega[order]
+    for shape, loss in zip(system.shape, system.law[:, layout.LOSS]):
+        number = loss * pace[1]
+        if number > 0.0 and len(omega):
+            stiffness = (1.0 + number) * (np.pi / pace[0]) ** 2 / max(float(shape[slow] @ shape[slow]), 1e-300)
+            ringing = number / (1.0 + number) * stiffness * np.cumsum((shape[order] / omega) ** 2)
+            heard = np.searchsorted(ringing, tolerance)
+            if heard < len(omega):
+                longest = min(longest, RESOLVED / float(omega[heard]))
+    return longest

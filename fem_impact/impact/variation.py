@@ -1,0 +1,198 @@
+"""What if: a blow struck again with something changed tells what an error of that size does to it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .._base.check import SimulationError
+from ..modes.modal import Modes
+from . import accuracy, distance, engine
+from .compiled import record
+from .contact import Contact
+from .distance import Distances
+from .history import History, ModalSystem
+from .part import Part, joined
+from .stepping import RINGING, Options, Refined
+
+RESOLVABLE = 0.3  # [-] largest contact stiffness times residual compliance for which the error estimate holds
+# [-] An error estimate below 30 % of the predicted one is replaced by that 30 %, because two runs can agree by chance;
+# 30 % is the median over many blows.
+AT_LEAST = 0.3
+# [-] two extra runs divide the highest kept frequency by these: near enough to foretell, far enough to differ
+THINNED = 1.4, 2.0
+FALLING = 2.0, 1.0  # [-] the truncation error falls at least with this power of the highest kept frequency; overdamped
+NEGLIGIBLE = 1e-4  # [-] mesh errors below this fraction of the tolerance need no extra run; the blow errs by as little
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """A blow whose steps were refined, ready to be followed again with something changed."""
+
+    parts: Sequence[Part]
+    laws: Sequence[Contact]
+    system: ModalSystem
+    options: Options
+    pace: tuple[float, float]  # as of `engine.pace_of`
+    runs: Refined
+
+    def again(self, parts: Sequence[Part], *, finely: bool = False) -> History:
+        """The blow with these bodies, in the steps of the coarser run or, on request, of the finer."""
+        system, size = joined(parts, self.laws), self.runs.steps[0 if finely else 1]
+        return engine.follow(system, self.runs.scheme, size, self.pace, self.options.horizon, self.options.n_max)
+
+    def apart(self, one: History, two: History) -> Distances:
+        """The distance between two of its runs."""
+        return distance.of_runs(one, two, self.options.quantities)
+
+    def changed(self, body: int, part: Part) -> list[Part]:
+        """The bodies, with one of them changed."""
+        return [*self.parts[:body], part, *self.parts[body + 1 :]]
+
+    @property
+    def mobility(self) -> np.ndarray:
+        """Sum of the squared shapes of the modes slower than the contact [1/kg], (n_contacts,)."""
+        slow = self.system.omega <= np.pi / self.pace[0]
+        return np.asarray(np.maximum((self.system.shape**2) @ slow, 1e-300))
+
+
+@dataclass(frozen=True)
+class Variation:
+    """Changes of the bodies whose effect on the blow tells an error."""
+
+    cause: str  # a field of `Error`
+    # the bodies as changed, and the error over the effect: of ways to make one change the worst counts, and all add up
+    changes: Sequence[Sequence[tuple[Sequence[Part], float]]]
+    least: float = 0.0  # [-] error at least, because two runs can agree by chance
+
+
+def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, Distances]:
+    """Estimated errors of a blow by cause and quantity: what each variation does to it."""
+    errors: dict[str, Distances] = {}
+    for each in variations:
+        for ways in each.changes:
+            effects = [
+                distance.scaled(blow.apart(blow.again(parts), blow.runs.coarse), weight) for parts, weight in ways
+            ]
+            errors[each.cause] = distance.added(errors.get(each.cause, {}), distance.largest(effects))
+        if each.least:
+            least = dict.fromkeys((*blow.options.quantities, distance.MARGIN), each.least)
+            errors[each.cause] = distance.largest([least, errors.get(each.cause, {})])
+    return errors
+
+
+def modes_left_out(blow: Followed, told: Sequence[bool]) -> tuple[Variation, bool]:
+    """Upper modes replaced by their compliance, and whether what that does tells the error.
+
+    The error falls at least with the power FALLING of the highest kept frequency, so the change bounds the error of the
+    modes already left out. Two such runs and a minimum, AT_LEAST of the predicted error, guard against a change that is
+    small by chance. The bodies ``told`` (n_bodies,) have a poorer description with modes above those of their own,
+    whose blow tells the error.
+    """
+    if not any(part.rest.any() for part in blow.parts):
+        return Variation("truncation", ()), True
+    omega_0 = np.pi / blow.pace[0]
+    softness, expected = np.zeros(len(blow.laws)), 0.0
+    changes: list[list[tuple[Sequence[Part], float]]] = [[] for _ in blow.parts]
+    for i, (part, known) in enumerate(zip(blow.parts, told)):
+        above = omega_0 / max(omega_0, part.omega[-1])
+        for (k, _), rest in zip(part.touched, np.diag(part.rest)):
+            soft = omega_0**2 / blow.mobility[k] * rest
+            softness[k] += soft
+            expected += float(accuracy.left_out_error(soft, above, blow.laws[k].exponent, part.points.shape[1]))
+        for wanted in () if known else THINNED:
+            thin, ratio = part.thinned(wanted)
+            if 1.0 < ratio < np.inf:
+                weight = 1.0 / (ratio ** FALLING[int(part.zeta[-1] > RINGING)] - 1.0)
+                changes[i].append((blow.changed(i, thin), weight))
+    return Variation("truncation", changes, AT_LEAST * expected), bool((softness <= RESOLVABLE).all())
+
+
+def unstated(blow: Followed, bodies: Sequence[Modes]) -> Variation:
+    """What nobody said of the bodies, see `Modes.unstated`.
+
+    That is the most and the least that the modes left out of a body may yield, and the rigid motions that it may have,
+    on springs too soft to matter.
+    """
+    changes = []
+    for i, (modes, part) in enumerate(zip(bodies, blow.parts)):
+        if not modes.unstated or not len(part.touched):
+            continue
+        if part.doubt.any():
+            own = np.diag(part.rest)
+            kept = np.sqrt(np.maximum(0.0, 1.0 - part.doubt / np.where(own > 0.0, own, np.inf)))
+            most, fewest = part.rest + np.diag(part.doubt), part.rest * np.outer(kept, kept)
+            changes.append([(blow.changed(i, replace(part, rest=rest)), 1.0) for rest in (most, fewest)])
+        if part.loose.size:
+            changes.append([(blow.changed(i, part.loosened()), 1.0)])
+    return Variation("truncation", changes)
+
+
+def mesh(blow: Followed, bodies: Sequence[Modes]) -> Variation:
+    """Every frequency lowered and every compliance raised by its error due to the mesh, if any of them matters.
+
+    Being struck again, the estimate grows over several impacts as the true error does.
+    """
+    softer, matters = [], False
+    for modes, part in zip(bodies, blow.parts):
+        if modes.unstated:  # no finite elements
+            softer.append(part)
+            continue
+        soft = [
+            (np.pi / blow.pace[0]) ** 2 / blow.mobility[i] * doubt for (i, _), doubt in zip(part.touched, part.doubt)
+        ]
+        error = np.zeros(modes.n_modes) if modes.frequency_error is None else modes.frequency_error
+        matters |= max(error.max(), *soft, 0.0) > NEGLIGIBLE * blow.options.tolerance
+        softer.append(part.lower(error))
+    return Variation("mesh", [[(softer, 1.0)]] if matters else ())
+
+
+def poorer_descriptions(blow: Followed, bodies: Sequence[Modes]) -> dict[str, Distances]:
+    """Errors by cause and quantity that ever poorer descriptions of a body tell, each compared with the one before.
+
+    They run in fine steps, because the fastest modes of two descriptions differ, and so do their step errors.
+    """
+    errors: dict[str, Distances] = {}
+    for i, body in enumerate(bodies):
+        before = blow.runs.fine
+        for cause, other in body.poorer.items():
+            one_more = dict.fromkeys((*blow.options.quantities, distance.MARGIN), 1.0)
+            try:
+                less = blow.again(blow.changed(i, blow.parts[i].described_by(other)), finely=True)
+                found = blow.apart(less, before)
+                if _may_touch(before, less, blow.pace[0]):
+                    found = distance.added(found, one_more)
+                before = less
+            except SimulationError:  # the poorer body cannot be followed, so it tells nothing
+                found = one_more
+            errors[cause] = distance.added(errors.get(cause, {}), found)
+    return errors
+
+
+def _may_touch(history: History, other: History, duration: float) -> bool:
+    """Whether two descriptions of a blow differ so much in some flight that one more impact cannot be ruled out.
+
+    Wherever the open contacts of the first come nearest, the gap must exceed the largest difference of the two motions
+    since both ended the first impact. Looks ahead until all modes together cannot bridge the gap. ``duration`` [s] is
+    that of one contact.
+    """
+    if history.bias.any() or history.status != other.status or not len(history.contacts) or not len(other.contacts):
+        return False
+    rigid, shape = history.omega == 0.0, history.shape
+    size = np.hypot(history.end_q, history.end_p / np.where(rigid, 1.0, history.omega))
+    gap = -history.offset - shape[:, rigid] @ history.end_q[rigid]
+    apart = -shape[:, rigid] @ history.end_p[rigid]  # [m/s]
+    ahead = (np.abs(shape[:, ~rigid]) @ size[~rigid] - gap)[apart > 0.0] / apart[apart > 0.0]
+    end = history.end_time
+    if history.status == record.FINISHED:
+        end += max(0.0, float(ahead.max(initial=0.0)))
+    start = max(float(found.contacts[:, 1].min()) for found in (history, other))
+    end = max(start, end)
+    times = np.linspace(start, end, int(min(engine.LOOKS[1], engine.LOOKS[0] * (end - start) / duration)) + 2)
+    surface, opened = history.surfaces(times)
+    approach, doubt = history.motion(times) - surface, np.zeros((len(times), 1))
+    doubt[:, 0] = np.maximum.accumulate(np.abs(approach - other.motion(times) + other.surfaces(times)[0]).max(axis=1))
+    nearest = np.zeros(approach.shape, bool)
+    nearest[1:-1] = (approach[1:-1] >= approach[:-2]) & (approach[1:-1] >= approach[2:])
+    nearest &= opened
+    return bool((nearest & (approach > -doubt)).any())

@@ -1,0 +1,73 @@
+"""The distance between two blows: one definition for runs, single blows and many."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.impact import distance
+
+PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=60)
+
+
+def blow(stiffness=3e5, **options):
+    law = fi.Contact.linear(stiffness)
+    return fi.strike(PLATE, fi.Striker.rigid(0.02), law, at=(0.45, 0.3), speed=1.0, tolerance=1e-4, **options)
+
+
+def test_it_is_absolute_for_restitution_and_count_and_relative_to_the_second_for_the_others():
+    one = {"restitution": 0.5, "n_impacts": 3, "impulse": 1.5, "force": 0.0, "contact_time": 1e-3}
+    two = {"restitution": 0.25, "n_impacts": 1, "impulse": -2.0, "force": 0.0, "contact_time": 0.0}
+    found = distance.distance(one, two)
+    assert found == {"restitution": 0.25, "n_impacts": 2, "impulse": 1.75, "force": 0.0, "contact_time": 1e-3}
+
+
+def test_a_spectrum_counts_by_its_largest_value():
+    one, two = np.array([1.0, 2j, 0.0]), np.array([1.0, 4j, 1.0])
+    assert distance.distance({"spectrum": one}, {"spectrum": two}) == {"spectrum": 0.5}
+    assert distance.distance({"spectrum": 0.0 * one}, {"spectrum": 0.0 * two}) == {"spectrum": 0.0}
+
+
+@pytest.mark.parametrize(("one", "two", "apart"), [(None, None, 0.0), (0.3, None, 1.0), (None, 0.3, 1.0)])
+def test_blows_of_which_only_one_has_a_restitution_are_one_apart(one, two, apart):
+    assert distance.distance({"restitution": one}, {"restitution": two}) == {"restitution": apart}
+
+
+def test_many_blows_are_as_far_apart_as_each():
+    rng = np.random.default_rng(1)
+    one, two = ({name: rng.normal(size=20) for name in ("restitution", "impulse")} for _ in range(2))
+    two["impulse"][3] = 0.0
+    together = distance.distance(one, two)
+    for i in range(20):
+        single = distance.distance(*({name: float(x[i]) for name, x in blows.items()} for blows in (one, two)))
+        assert_allclose([together[name][i] for name in single], list(single.values()), rtol=1e-15)
+
+
+def test_runs_are_as_far_apart_as_the_blows_that_they_tell():
+    """A rigid mass on a plate that cannot move rigidly: its speed is all the momentum there is."""
+    one, two = blow(quantity={"restitution": None, "force": None, "spectrum": 5e3}), blow(stiffness=3.1e5)
+    asked = {"restitution": None, "impulse": None, "contact_time": None, "force": None, "spectrum": 5e3}
+    runs = distance.of_runs(one.history, two.history, asked)
+    blows = distance.of_blows(one, two, asked)
+    assert_allclose([runs[name] for name in blows], list(blows.values()), rtol=1e-3)  # samples of a spectrum differ
+    assert runs[distance.MARGIN] == abs(one.margin - two.margin)
+    halved = distance.of_runs(one.history, two.history, asked, (2.0, 4.0))
+    assert_allclose(halved["impulse"], runs["impulse"] / 2.0, rtol=1e-15)
+    assert_allclose(halved["force"], runs["force"] / 4.0, rtol=1e-15)
+
+
+def test_runs_that_end_differently_are_one_apart_in_everything():
+    one = blow()
+    other = blow(duration=0.5 * one.impacts[0].end)
+    found = distance.of_runs(one.history, other.history, one.quantities)
+    assert set(found) == {*one.quantities, distance.MARGIN} and set(found.values()) == {1.0}
+    assert distance.growth(one.history, blow(stiffness=3e8).history) in (1.0, np.inf)
+
+
+def test_distances_add_up_and_the_largest_counts():
+    one, two = {"impulse": 1.0, "margin": 0.5}, {"impulse": 3.0, "margin": 0.1}
+    assert distance.added(one, two) == {"impulse": 4.0, "margin": 0.6}
+    assert distance.added({}, two) == two and distance.added(one, {}) == one
+    assert distance.largest([one, {}, two]) == {"impulse": 3.0, "margin": 0.5} and distance.largest([]) == {}
+    assert distance.scaled(two, 2.0)["impulse"] == 6.0
+    assert distance.worst(two | {"margin": 9.0}) == 3.0 and distance.worst({}) == 0.0

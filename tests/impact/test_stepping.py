@@ -1,0 +1,116 @@
+"""Time steps: short enough for the tolerance, few enough, and who says what helps where none are."""
+
+import re
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from test_collision import grazing_blow, measured, target_of, thinned_blow, worst
+
+import fem_impact as fi
+from fem_impact.impact.collision import Touch, collide
+
+
+@pytest.mark.parametrize("n_modes", [12, 2500])
+@pytest.mark.parametrize(("law", "slope"), [(fi.Contact.linear(1e6), 3.8), (fi.Contact.hertz(1e8), 3.3)])
+def test_order_of_scheme_a4(n_modes, law, slope):
+    """Four while the force is smooth; a Hertz onset, t**1.5, leaves somewhat less. Fit over five steps."""
+    target, striker = target_of(n_modes), fi.Striker.rigid(0.01)
+    truth = fi.strike(target, striker, law, at=[0.0], speed=1.0, tolerance=1e-11, scheme="collocation")
+    counts = np.array([12, 17, 25, 35, 50])
+    errors = [
+        abs(
+            fi.strike(
+                target, striker, law, at=[0.0], speed=1.0, scheme="A4", dt=truth.impacts[0].duration / n, max_impacts=1
+            ).impulse
+            - truth.impacts[0].impulse
+        )
+        for n in counts
+    ]
+    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] > slope
+
+
+def test_a_run_without_end_says_what_to_do():
+    """Two clamped bodies set swinging against each other never part for good."""
+    bodies = [measured(3, 1), measured(3, 2)]
+    touches = [Touch(fi.Contact.linear(1e5), 0, 1, [0.0], [0.0])]
+    with pytest.raises(fi.SimulationError, match="duration of at most"):
+        collide(bodies, touches, states=[(np.zeros(3), np.full(3, 0.1)), (np.zeros(3), np.zeros(3))])
+
+
+def test_a_short_duration_is_still_judged_by_two_runs_of_different_steps():
+    """Two runs of one step each, cut to one length, would agree on anything."""
+    hit = fi.strike(
+        fi.Modes.rigid(1.0), fi.Striker.rigid(1.0), fi.Contact.linear(1e5), at=None, speed=1.0, duration=1e-5,
+        tolerance=1e-2,
+    )  # fmt: skip
+    assert len(hit.history.steps) >= 4  # a contact lasts 7 ms; the plan's first step is longer than the duration
+
+
+def test_a_lossy_force_hears_strongly_damped_modes():
+    plate = fi.analytic.rectangle(1.3, 1.0, mass=0.708, first_frequency=94.3, n_modes=60, damping_ratio=0.45)
+    law = fi.Contact.power(1.81e5, 1.0, loss=1.87)
+    blow, where = (plate, fi.Striker.rigid(0.0174), law), {"at": (0.657, 0.248), "speed": 1.0}
+    hit, truth = (fi.strike(*blow, **where, tolerance=tolerance) for tolerance in (1e-3, 1e-7))
+    assert hit.error.step < hit.tolerance
+    assert worst(hit, truth) < hit.tolerance  # twice as long steps miss it 1.6-fold and state 0.86 of it
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 5, 11])
+def test_a_blow_at_the_usual_tolerance_is_told_by_few_steps(seed):
+    """Its first two runs suffice; averages over the blow, as the restitution, take half as many."""
+    plate, kept, how, where = thinned_blow(seed)
+    body = plate.truncated(n_modes=kept)
+    hit, averaged = (fi.strike(body, *how, **where, residual=False, quantity=asked) for asked in (None, "restitution"))
+    assert hit.tolerance_met
+    assert averaged.tolerance_met
+    assert len(hit.history.steps) < 60  # 44 were measured
+    assert len(averaged.history.steps) < 30  # 22 were measured
+    truth = fi.strike(body, *how, **where, residual=False, tolerance=1e-8)
+    assert worst(hit, truth) < hit.error.total < 0.1 * hit.tolerance
+    assert abs(averaged.restitution - truth.restitution) < averaged.error.total
+
+
+@pytest.mark.parametrize(
+    ("seed", "mass"), [(1, 0.08040367666), (1, 0.31088011), (2, 0.0933117233), (3, 0.02846306), (6, 0.135557784)]
+)
+def test_a_touch_that_barely_happens_is_decided_by_finer_steps(seed, mass):
+    hit, truth = (grazing_blow(seed, mass)(tolerance=tolerance) for tolerance in (1e-2, 1e-8))
+    others = {grazing_blow(seed, factor * mass)(tolerance=1e-6).n_impacts for factor in (0.99, 1.0, 1.01)}
+    assert len(others) > 1  # the number does depend on the mass
+    assert hit.n_impacts == truth.n_impacts
+    assert_allclose(hit.contact_time, truth.contact_time, rtol=1e-2)  # the tolerance
+
+
+@pytest.mark.parametrize(
+    ("seed", "mass"),
+    [(1, 0.0716013), (1, 0.0715942250), (8, 0.0478841312), (27, 0.139124020), (34, 0.0220161), (6, 0.135559001)],
+)
+def test_a_touch_barely_missed_in_flight_is_decided_by_finer_steps(seed, mass):
+    """Rough steps make the bodies turn back just before they touch once more, and nothing of it is in the force."""
+    hit, truth = (grazing_blow(seed, mass)(tolerance=tolerance) for tolerance in (1e-2, 1e-8))
+    assert hit.n_impacts == truth.n_impacts
+    assert_allclose(hit.contact_time, truth.contact_time, rtol=1e-2)  # the tolerance
+
+
+def test_the_tolerance_advised_is_met_and_hardly_looser_than_what_was_reached():
+    blow = grazing_blow(2, 0.0933117233)
+    with pytest.raises(fi.SimulationError, match="the step error stays at") as caught:
+        blow(tolerance=1e-12)  # the smallest there is
+    reached, advised = (
+        float(re.search(rf"{words} (\S+?),? ", f"{caught.value} ")[1]) for words in ("stays at", "raise tolerance to")
+    )
+    assert advised < 30.0 * reached  # steps twice as long, which may meet it, err 16 times more
+    assert blow(tolerance=advised).error.step < advised
+
+
+@pytest.mark.parametrize("given", ["duration", "max_impacts"])
+def test_the_end_advised_to_a_run_without_end_leaves_room_for_finer_steps(monkeypatch, given):
+    monkeypatch.setattr("fem_impact.impact.engine.MAX_STEPS", 4000)
+    bodies, touches = [measured(3, 1), measured(3, 2)], [Touch(fi.Contact.linear(1e5), 0, 1, [0.0], [0.0])]
+    swing = {"states": [(np.zeros(3), np.full(3, 0.1)), (np.zeros(3), np.zeros(3))], "tolerance": 1e-6}
+    with pytest.raises(fi.SimulationError, match="no final separation") as caught:
+        collide(bodies, touches, **swing)
+    most = float(re.search(rf"{given} of at most (\S+)", str(caught.value))[1])
+    hit = collide(bodies, touches, **swing, **{given: type(2.0 if given == "duration" else 2)(most)})
+    assert hit.tolerance_met  # a run twice as long would need more steps than there may be
