@@ -238,7 +238,7 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
     if "n_impacts" in options.quantities and sum(doubts.values()) >= found.fine.margin:
         doubtful = max(doubts, key=lambda cause: doubts[cause])
         table[doubtful] = distance.added(table[doubtful], {"n_impacts": 1.0})
-    error = Error.of(table, resolvable, distance.growth(found.coarse, found.fine))
+    error = Error.from_table(table, resolvable, distance.growth(found.coarse, found.fine))
     return Response(
         tuple(bodies), laws, found.fine, speed, options.tolerance, found.scheme, error, striker, at,
         ends_of(parts, system.law), options.quantities,

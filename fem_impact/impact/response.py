@@ -34,6 +34,12 @@ LASTS = 2.0  # [-] and no longer than this many times the run, as later echoes m
 LOOKED_AT = 200  # [-] times at which this error is estimated, evenly among those asked for; more only cost time
 
 
+CAUSES = {
+    "step": "time steps", "truncation": "modes left out", "mesh": "the finite elements",
+    "idealisation": "the simplified target", "inherited": "the blow before",
+}  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Error:
     """Estimated errors: absolute for the restitution, relative for impulse, contact time and peak force."""
@@ -49,39 +55,32 @@ class Error:
     table: Mapping[str, Mapping[str, float]] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
-    def of(cls, table: Mapping[str, Mapping[str, float]], resolvable: bool, sensitivity: float) -> "Error":
+    def from_table(cls, table: Mapping[str, Mapping[str, float]], resolvable: bool, sensitivity: float) -> "Error":
         """The errors of a table by cause and quantity: of each cause the largest."""
         sizes = {cause: distance.worst(errors) for cause, errors in table.items()}
         whole = {"step": 0.0, "truncation": 0.0, "mesh": 0.0} | sizes
         return cls(**whole, resolvable=resolvable, sensitivity=sensitivity, table=table)
 
-    def in_quantity(self, quantity: str) -> float:
-        """The estimated error of one quantity [-]; infinite if the modes cannot resolve the contact."""
-        causes = "step", "truncation", "mesh", "idealisation", "inherited"
-        found = sum(self.table.get(cause, {}).get(quantity, getattr(self, cause)) for cause in causes)
-        return float(found) if self.resolvable else float("inf")
-
     @property
     def total(self) -> float:
         """The sum [-]; infinite if the modes cannot resolve the contact."""
-        found = self.step + self.truncation + self.mesh + self.idealisation + self.inherited
-        return found if self.resolvable else float("inf")
+        return sum(self.parts().values()) if self.resolvable else float("inf")
 
     @property
     def dominant(self) -> tuple[str, float]:
         """The largest part, in words, and its size [-]."""
-        return max(self._parts.items(), key=lambda part: part[1])
+        return max(self.parts().items(), key=lambda part: part[1])
 
-    @property
-    def _parts(self) -> dict[str, float]:
-        """Size [-] of each part by its name in words."""
+    def parts(self, quantity: str | None = None) -> dict[str, float]:
+        """Size [-] of each part by its name in words; of one quantity, or the largest of all that were asked for."""
         return {
-            "time steps": self.step,
-            "modes left out": self.truncation,
-            "the finite elements": self.mesh,
-            "the simplified target": self.idealisation,
-            "the blow before": self.inherited,
+            words: self.table.get(cause, {}).get(quantity, getattr(self, cause)) if quantity else getattr(self, cause)
+            for cause, words in CAUSES.items()
         }
+
+    def of_quantity(self, quantity: str) -> float:
+        """The estimated error of one quantity [-]; infinite if the modes cannot resolve the contact."""
+        return float(sum(self.parts(quantity).values())) if self.resolvable else float("inf")
 
     def __float__(self) -> float:
         return float(self.total)
@@ -818,7 +817,7 @@ class Response(Totals):
             f"restitution {rebound(self, 5)} at {self.speed:g} m/s",
             f"energy {total:.5g} J: {shares}",
             f"estimated error {error.total:.1e} of {words(self.quantities)}: "
-            + ", ".join(f"{name} {size:.1e}" for name, size in error._parts.items() if size or name == "time steps")
+            + ", ".join(f"{name} {size:.1e}" for name, size in error.parts().items() if size or name == "time steps")
             + f"; energy error {self.energy_error:.1e}",
         ]
         if self.moving:

@@ -125,7 +125,7 @@ def promised(hit: "Response") -> str:
     clause = assumption.head(hit.assumptions, hit.tolerance)
     holds = all(each.holds for each in hit.trust)
     if hit.tolerance_met:
-        computed = f", computed to {hit.error.total:.1g} ({promise.met(hit)})"
+        computed = f", computed to {hit.trust.judged[0].computation:.1g} ({promise.met(hit)})"
         return f"{computed}{'; ' if holds else ', but '}{clause}"
     return f": {promise.sentence(hit)}" + ("" if holds else f"; besides, {clause}")
 
@@ -141,7 +141,8 @@ def _judged(hit: "Response", name: str, band: float | None, cure: str) -> Judged
     known = assumption.of_quantity(found, name)
     limit = assumption.allowed(hit.tolerance)
     worst = max(found, key=lambda each: each.effect.get(name) or 0.0)
-    cause, size = error.dominant if error.resolvable else ("modes left out", np.inf)
+    parts, own = error.parts(name), error.of_quantity(name)
+    cause, size = max(parts.items(), key=lambda part: part[1]) if error.resolvable else ("modes left out", np.inf)
     dominant = worst.name if (worst.effect.get(name) or 0.0) >= size else cause
     remedies = [cure] if cure else []
     if known > limit:
@@ -150,7 +151,7 @@ def _judged(hit: "Response", name: str, band: float | None, cure: str) -> Judged
         dominant = unsure[0].name if hit.tolerance_met else dominant
         remedies.append(unsure[0].remedy)
     return Judged(
-        name, band, _value(hit, name, band), error.total if error.resolvable else None, None if unsure else known,
+        name, band, _value(hit, name, band), own if error.resolvable else None, None if unsure else known,
         known, tuple(each.name for each in unsure), dominant, "; ".join(remedies), limit, hit.tolerance,
     )  # fmt: skip
 

@@ -2,10 +2,11 @@
 
 import json
 
+import numpy as np
 import pytest
 
 import fem_impact as fi
-from fem_impact.impact import assumption
+from fem_impact.impact import assumption, distance
 
 ALLOY = fi.Material(E=70e9, nu=0.33, rho=2700.0)
 
@@ -19,9 +20,14 @@ def blow(thickness=1e-3, speed=0.5, n_modes=200, law=fi.Contact.hertz(1e6), **ho
 def test_a_clean_answer_says_how_far_both_errors_reach():
     hit = blow(thickness=4e-3)
     assert hit.trusted and hit.trust.trusted and all(each.remedy == "" for each in hit.trust)
-    assert hit.verdict == (
-        f"restitution {hit.restitution:.5f}, computed to {hit.error.total:.1g} (tolerance 0.001 met); "
-        f"the model holds to {hit.model_error:.1g}, with the contact as stated"
+    own = hit.error.of_quantity("restitution")
+    answer, rest = hit.verdict.split(", ", 1)
+    assert abs(float(answer.removeprefix("restitution ")) - hit.restitution) <= 0.5 * 10.0 ** -(
+        len(answer.split(".")[1]) - 1e-6
+    )
+    assert rest == (
+        f"computed to {own:.1g} (tolerance 0.001 met); the model holds to {hit.model_error:.1g}, "
+        "with the contact as stated"
     )
     assert hit.model_verdict[0] in hit.verdict and hit.summary().splitlines()[0] == hit.verdict
 
@@ -30,12 +36,27 @@ def test_a_wrong_model_is_said_beside_a_tolerance_that_is_met():
     hit = blow()
     told = hit.trust["restitution"]
     assert hit.tolerance_met and not hit.trusted and not told.trusted
-    assert told.value == hit.restitution and told.computation == hit.error.total <= hit.tolerance
+    assert told.value == hit.restitution and told.computation == hit.error.of_quantity("restitution") <= hit.tolerance
     assert told.dominant == "small deflections" and told.remedy.startswith("let it stretch, stretching = true")
     effects = [each.effect["restitution"] or 0.0 for each in hit.assumptions]
     assert told.model == told.known == pytest.approx(sum(effects)) and told.model > told.allowed == assumption.ENOUGH
     assert "(tolerance 0.001 met), but the model is wrong here" in hit.verdict
     assert "times the thickness, which changes the restitution by about 0.0" in hit.verdict
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_every_quantity_has_an_error_of_its_own(seed):
+    """Of 300 such blows 2 % of the errors of peak forces and 1 % of contact times were below the truth, by 1.6 at most."""
+    rng = np.random.default_rng(seed)
+    sheet = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=400)
+    law, mass = fi.Contact.hertz(10 ** rng.uniform(5, 7)), fi.Striker.rigid(10 ** rng.uniform(-2.5, -1.0))
+    hit, true = (fi.strike(sheet, mass, law, at=(0.45, 0.3), speed=1.0, tolerance=x) for x in (1e-3, 1e-6))
+    apart = distance.of_blows(hit, true, hit.quantities)
+    for name, error in apart.items():
+        assert error <= 2.0 * hit.error.of_quantity(name) <= 2.0 * hit.error.total
+    assert len({hit.error.of_quantity(name) for name in apart}) > 1 and set(hit.error.parts("force")) == {
+        "time steps", "modes left out", "the finite elements", "the simplified target", "the blow before"
+    }  # fmt: skip
 
 
 @pytest.mark.slow
