@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("NUMBA_DISABLE_JIT", "0")  # a first blow in plain Python rounds otherwise
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # another number rounds in another way, and so may an error by two
 
 import effectivity
 import xarray as xr

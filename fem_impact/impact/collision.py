@@ -85,7 +85,6 @@ def strike(
         struck = replace(struck, stretching=stretch(modes))
 
     def blow(striker: Striker, speed: float, own: tuple[np.ndarray, np.ndarray] | None = None) -> Response:
-        touch = Touch(contact, 0, 1, striker.at[None], point)
         rest = striker.left_out if residual and striker.modes.dimension else None
         arriving = part_of(striker.body, ((0, 1.0),), striker.at[None], striker.shape[None], rest, forces[0])
         arriving = replace(arriving, bias=arriving.bias + striker.push, held=int(striker.hand is not None))
@@ -100,7 +99,7 @@ def strike(
 
         doubt = 0.0 if before is None else 1.0 + before.error
         others = [start(*factors) for factors in ((doubt, 1.0), (1.0, doubt))[own is None :] if doubt]
-        return _follow((striker.body, modes), [touch], start(), speed, options, striker, point[0], others)
+        return _follow((striker.body, modes), (contact,), start(), speed, options, striker, point[0], others)
 
     if speed is None:
         assert before is not None
@@ -200,7 +199,7 @@ def met(
         parts = [replace(part, pressed=before.force[rows].T) for part, rows in zip(parts, ends)]
         doubt = 1.0 + before.error
         others = [[*parts[:i], part.faster(doubt), *parts[i + 1 :]] for i, part in enumerate(parts)]
-    return _follow(bodies, contacts, parts, arriving, options, others=others)
+    return _follow(bodies, [touch.law for touch in contacts], parts, arriving, options, others=others)
 
 
 def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[ModalSystem, float]:
@@ -210,12 +209,11 @@ def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool
     return system, engine.pace_of(system)[0]
 
 
-def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, others=()) -> Response:
+def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=()) -> Response:
     """Run the blow to the required tolerance and estimate the remaining errors.
 
     ``others`` are the parts as they would move at the start if the blow before erred as estimated.
     """
-    laws = tuple(touch.law for touch in contacts)
     system = joined(parts, laws)
     endless = not np.isfinite(options.horizon) and not options.n_max
     if endless and (system.bias @ system.shape.T > 0.0).any():
@@ -240,7 +238,7 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
         table[doubtful] = distance.added(table[doubtful], {"n_impacts": 1.0})
     error = Error.from_table(table, resolvable, distance.growth(found.coarse, found.fine))
     return Response(
-        tuple(bodies), laws, found.fine, speed, options.tolerance, found.scheme, error, striker, at,
+        tuple(bodies), tuple(laws), found.fine, speed, options.tolerance, found.scheme, error, striker, at,
         ends_of(parts, system.law), options.quantities,
     )  # fmt: skip
 

@@ -203,8 +203,8 @@ def ends_of(parts: Sequence[Part], law: np.ndarray) -> tuple[Ends, ...]:
     for part in parts:
         forms = slice(last, last + part.forms(rated).shape[1])
         last = forms.stop
-        dips = part.rest.any() and forms.start == forms.stop
-        doubtful, dip_force = bool(part.doubt.any() or part.loose.size), part.force if dips else 0.0
+        dips = part.force and forms.start == forms.stop and part.rest.any()
+        doubtful, dip_force = bool(part.loose.size or part.doubt.any()), part.force if dips else 0.0
         found.append(
             Ends(part.points, part.touched, part.force, part.rest, forms, dip_force, part.speed, doubtful=doubtful)
         )

@@ -134,6 +134,8 @@ def mesh(blow: Followed, bodies: Sequence[Modes]) -> Variation:
     Being struck again, the estimate grows over several impacts as the true error does.
     """
     softer, matters = [], False
+    if not any(modes.frequency_error is not None or part.doubt.any() for modes, part in zip(bodies, blow.parts)):
+        return Variation("mesh", ())
     for modes, part in zip(bodies, blow.parts):
         if modes.unstated:  # no finite elements
             softer.append(part)
