@@ -337,6 +337,19 @@ def brief(instance: Any) -> str:
     return f"{type(instance).__name__}({', '.join(parts):.900})"
 
 
+class Brief:
+    """A dataclass whose ``repr`` is at most 1000 characters, see `brief`."""
+
+    __repr__ = brief
+
+
+class Locked(Brief):
+    """A frozen dataclass whose arrays are read-only, too: ``frozen=True`` alone does not protect their contents."""
+
+    def __post_init__(self) -> None:
+        lock_arrays(self)
+
+
 def settle(instance: Any, **values: Any) -> None:
     """Set fields of a frozen dataclass to their checked values, which are floats whatever number the user passed."""
     for name, value in values.items():

@@ -31,8 +31,8 @@ BODY_TABLES = "mesh", "material", "section", "supports", "target"  # of a scene
 Build = Callable[[dict[str, float]], Any]
 
 
-@dataclass(frozen=True, eq=False)
-class Piece:
+@dataclass(frozen=True, eq=False, repr=False)
+class Piece(check.Brief):
     """A body and, if there is one, the blow on it."""
 
     target: Target
@@ -40,9 +40,6 @@ class Piece:
     contact: Contact | None = None
     arguments: Mapping[str, Any] = field(default_factory=dict)  # of `strike`
     key: Any = None  # bodies of the same key are the same
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def blow(self) -> Blow:
@@ -88,16 +85,13 @@ def _of_modes(body: str, modes: Modes) -> dict[str, float]:
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class Maker:
+@dataclass(frozen=True, eq=False, repr=False)
+class Maker(check.Brief):
     """Makes the pieces of a design from the values of its free numbers."""
 
     build: Build
     names: tuple[str, ...]
     scene: Scene | None = None
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @classmethod
     def of(cls, objects: Any, names: tuple[str, ...]) -> "Maker":
@@ -140,15 +134,12 @@ class Maker:
         raise ValueError(f"free[{name!r}]: nothing can be made on either side of {values[name]:g}; change its range")
 
 
-@dataclass(frozen=True, eq=False)
-class Rate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Rate(check.Brief):
     """How a piece changes per unit of a free number."""
 
     numbers: Mapping[str, float]  # those that change
     section: SectionChange | None  # how the section does; None if it stays
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @classmethod
     def of(cls, name: str, now: Piece, sides: list[Piece], weights: np.ndarray) -> "Rate":

@@ -50,20 +50,17 @@ class Reached:
         return self.goal.miss(self.value)
 
 
-@dataclass(frozen=True, eq=False)
-class Checked:
+@dataclass(frozen=True, eq=False, repr=False)
+class Checked(check.Brief):
     """A design struck again as a blow of its own, with a finer model."""
 
     values: Mapping[str, float]  # by the label of each goal
     hits: Mapping[str, Response]  # by name of the blow
     differences: Mapping[str, Mapping[str, float]]  # of each from the finer blow, see `planner.differences`
 
-    def __repr__(self) -> str:
-        return check.brief(self)
 
-
-@dataclass(frozen=True, eq=False)
-class Design:
+@dataclass(frozen=True, eq=False, repr=False)
+class Design(check.Brief):
     """What `design` found."""
 
     values: Mapping[str, float]  # of the free numbers
@@ -73,9 +70,6 @@ class Design:
     n_evaluations: int
     maker: Maker = field(repr=False)
     hits: Mapping[str, Response] = field(default_factory=dict, repr=False)  # by name of the blow
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def met(self) -> bool:

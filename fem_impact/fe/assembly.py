@@ -80,8 +80,8 @@ def curvatures(hessian: np.ndarray) -> np.ndarray:
     return hessian[:, [0, 2, 1]].transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]
 
 
-@dataclass(frozen=True, eq=False)
-class Strain:
+@dataclass(frozen=True, eq=False, repr=False)
+class Strain(check.Brief):
     """Data to compute the strain energy of a plate from curvatures, where triangles are so small that K loses digits.
 
     The stiffness of a triangle grows with its size to the power -2, so the rounding of K in the smallest triangles
@@ -91,9 +91,6 @@ class Strain:
     x: np.ndarray  # (n_cells, n_q, 2) quadrature points
     stiffness: np.ndarray  # (n_cells, n_q, 3, 3) times the quadrature weights
     springs: Sparse  # (n_all, n_all) stiffness of elastic supports and tension
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def energy(self, system: "System", vectors: np.ndarray) -> np.ndarray:
         """Twice the strain energy (n_modes,) of vectors (n_dofs, n_modes)."""
@@ -114,8 +111,8 @@ class Strain:
         return total
 
 
-@dataclass(frozen=True, eq=False)
-class System:
+@dataclass(frozen=True, eq=False, repr=False)
+class System(check.Brief):
     """Stiffness and mass of a supported body in the units of its frame, and the shape functions."""
 
     mesh: Mesh
@@ -147,9 +144,6 @@ class System:
     coarseness: float = 1.0  # [-] size of the triangles there, over the usual one
     layer: float = 1.0  # [-] size of triangles along free edges of a thick plate, over the usual one
     unresolved: float = 0.0  # [-] approximate relative error that singular corners leave on any mesh
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def _repr_html_(self) -> str:
         """Notebook view: the body with its supports, and a table of its size."""

@@ -216,15 +216,12 @@ def _blocks(n: int) -> list[np.ndarray]:
     return np.array_split(np.arange(n), max(1, -(-n // CHUNK)))
 
 
-@dataclass(frozen=True, eq=False)
-class ThickStrain:
+@dataclass(frozen=True, eq=False, repr=False)
+class ThickStrain(check.Brief):
     """What `assembly.Strain` is for a thin plate: the strain energy from curvatures and shear strains."""
 
     fields: Fields
     springs: Sparse  # (n_all, n_all) stiffness of elastic supports and tension
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def energy(self, system: Any, vectors: np.ndarray) -> np.ndarray:
         """Twice the strain energy (n_modes,) of vectors (n_dofs, n_modes)."""

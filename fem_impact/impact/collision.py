@@ -23,8 +23,8 @@ LOSSY_STRIKER = 30.0  # [-] a lossy contact multiplies the truncation error of a
 STRIKER_SHARE = 0.05  # [-] fraction of the tolerance for the striker's left-out modes: keeping them is cheap
 
 
-@dataclass(frozen=True)
-class Touch:
+@dataclass(frozen=True, repr=False)
+class Touch(check.Brief):
     """A possible contact between two bodies of `collide`, and its contact law."""
 
     law: Contact
@@ -32,9 +32,6 @@ class Touch:
     second: int | None  # index of the second body; None for a rigid wall
     first_at: Any = None  # point on the first body [m]
     second_at: Any = None  # point on the second body [m]
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.instance("law", self.law, Contact)

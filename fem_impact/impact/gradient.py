@@ -49,8 +49,8 @@ ZOOMS, ABOUT = 3, np.linspace(-1.0, 1.0, 17)  # how often and where about the la
 INSTEAD = "take differences of runs with the number changed, told to a smaller tolerance"
 
 
-@dataclass(frozen=True, eq=False)
-class Gradient:
+@dataclass(frozen=True, eq=False, repr=False)
+class Gradient(check.Locked):
     """Derivatives of one quantity of a blow in n of its numbers.
 
     `gradient["striker.mass"]` is one of them, in units of the quantity over units of the number.
@@ -62,12 +62,6 @@ class Gradient:
     numbers: np.ndarray  # (n,) their values
     slopes: np.ndarray  # (n,), or (n, n_modes), quantity over number
     error: np.ndarray  # like slopes, their estimated error from the time steps
-
-    def __repr__(self) -> str:
-        return check.brief(self)
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
 
     def __getitem__(self, name: str) -> Any:
         return self.slopes[self.names.index(check.one_of("name", name, self.names))]

@@ -55,7 +55,7 @@ class Impact:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ModalSystem:
+class ModalSystem(check.Locked):
     """The modes of all bodies in one list, and their contacts: what a run follows."""
 
     omega: np.ndarray  # (n_modes,) [rad/s] modes of all bodies
@@ -67,12 +67,6 @@ class ModalSystem:
     start_q: np.ndarray  # (n_modes,) [m kg**0.5]
     start_p: np.ndarray  # (n_modes,) [m kg**0.5/s]
     stretched: Stretched | None = field(default=None, kw_only=True)  # if one of the bodies stretches
-
-    def __repr__(self) -> str:
-        return check.brief(self)
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)  # always: numba would compile the kernels again for writable arrays
 
     @property
     def n_contacts(self) -> int:

@@ -66,8 +66,8 @@ def unit(name: str) -> str:
     return UNITS["strike.speed"] if home == "speeds" else UNITS.get(f"{INDEXED.get(group, home)}.{part}", "")
 
 
-@dataclass(frozen=True, eq=False)
-class Parameters:
+@dataclass(frozen=True, eq=False, repr=False)
+class Parameters(check.Brief):
     """The numbers of one blow: of `strike` by the names that scene files give them, of `collide` by its own.
 
     The latter are as "contacts.0.stiffness", "bodies.1.mass" and "speeds.0".
@@ -76,9 +76,6 @@ class Parameters:
     hit: "Response"
     # further numbers of the user's: their values, and how each changes the section
     sections: Mapping[str, tuple[float, SectionChange]] = field(default_factory=dict)
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def struck(self) -> bool:

@@ -86,8 +86,8 @@ class Error:
         return float(self.total)
 
 
-@dataclass(frozen=True, eq=False)
-class Ends:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ends(check.Locked):
     """Where the contacts of a blow act on a body, and what its kept modes lack of its static compliance there."""
 
     points: np.ndarray  # (n_ends, dimension) [m]
@@ -98,12 +98,6 @@ class Ends:
     dip_force: float = 0.0  # [N] that constant force if it makes a spring that stands for them deflect
     speed: float = 0.0  # [m/s] with which the body arrives in rigid motion, at its first point
     doubtful: bool = False  # whether more than rounding is estimated of what is left out there
-
-    def __repr__(self) -> str:
-        return check.brief(self)
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
 
 
 class Totals:
@@ -132,8 +126,8 @@ class Totals:
         return max((impact.peak_force for impact in self.impacts), default=0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Response(Totals):
+@dataclass(frozen=True, eq=False, repr=False)
+class Response(Totals, check.Locked):
     """The result of `strike` or `collide`. Histories are exact between steps and after the end."""
 
     bodies: tuple[Modes, ...]
@@ -152,12 +146,6 @@ class Response(Totals):
     # examines whether the model itself is right, when that is asked for
     audit: Callable[["Response"], tuple[Assumption, ...]] | None = field(default=None, repr=False)
     vectors: Modes | None = field(default=None, repr=False)  # all Ritz pairs of the target, if it is described by them
-
-    def __repr__(self) -> str:
-        return check.brief(self)
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
 
     @check.typed
     def on(self, modes: Modes) -> "Response":

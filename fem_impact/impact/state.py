@@ -13,8 +13,8 @@ from .contact import Contact
 from .striker import Striker
 
 
-@dataclass(frozen=True, eq=False)
-class State:
+@dataclass(frozen=True, eq=False, repr=False)
+class State(check.Brief):
     """The motion of all bodies of a blow at one time; `Response.state` makes it."""
 
     time: float  # [s] since the start of that blow
@@ -27,9 +27,6 @@ class State:
     contacts: tuple[Contact, ...] = ()
     at: np.ndarray | None = None  # (dimension,) [m] strike point
     remembers: bool = False  # whether a contact may have yielded or be felt that has not recovered
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)

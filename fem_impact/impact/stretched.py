@@ -11,20 +11,14 @@ from .compiled.bundles import KernelSystem
 from .compiled.stretched import Stretch, energies_of_stretching, replay_stretched
 
 
-@dataclass(frozen=True, eq=False)
-class Stretched:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stretched(check.Locked):
     """The forms of `Stretching`, which modes they belong to, and the steps in which the run took them."""
 
     forms: np.ndarray  # (n_forms, n_modes, n_modes) [kg**-0.5 m**-1 s**-1]
     first: int  # index of the first of these modes among those of all bodies
     base: float = 0.0  # [s] longest step; the motion after the run takes the same
     ramp: bool = True  # whether the forces are linear over a step (scheme A4), not constant (A)
-
-    def __repr__(self) -> str:
-        return check.brief(self)
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
 
     def energy(self, q: np.ndarray, modes: slice = slice(None)) -> float:
         """Energy [J] of stretching at a state (n_all,); zero if these modes are not among ``modes``."""

@@ -49,15 +49,12 @@ class Hand:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class HeldShapes(Shapes):
+@dataclass(frozen=True, eq=False, repr=False)
+class HeldShapes(Shapes, check.Brief):
     """The shapes of a body whose rigid motion is held by a spring."""
 
     base: Shapes
     omega: float  # [rad/s] of that motion
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def dimension(self) -> int:
@@ -83,8 +80,8 @@ class HeldShapes(Shapes):
         return self.base.grid()
 
 
-@dataclass(frozen=True, eq=False)
-class Striker:
+@dataclass(frozen=True, eq=False, repr=False)
+class Striker(check.Brief):
     """A body and the point it strikes with; it arrives in rigid motion, undeformed.
 
     Its speed is the speed of its contact point: a body hinged at its far end turns about the hinge, a free body moves
@@ -97,9 +94,6 @@ class Striker:
     radius: float | None = None  # [m] of a sphere
     fixed: bool = True  # True: a blow keeps all modes; False: only those its tolerance needs
     hand: Hand | None = None  # what holds it, see `held`
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def __post_init__(self) -> None:
         check.instance("modes", self.modes, Modes)

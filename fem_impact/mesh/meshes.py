@@ -27,8 +27,8 @@ BEAM_DIVISIONS = 4  # [-] default elements along a beam: few, because their degr
 MOST_BEAM_CELLS = 5000  # [-] most beam elements allowed: more are never needed at that degree
 
 
-@dataclass(frozen=True, eq=False)
-class Mesh:
+@dataclass(frozen=True, eq=False, repr=False)
+class Mesh(check.Locked):
     """Triangles in the plane or elements on a line, with named edges.
 
     Boundary facets run with the body on their left; normals point outward. Each facet is a curve through its ends and
@@ -48,12 +48,6 @@ class Mesh:
     notes: tuple[str, ...] = ()  # what was repaired or assumed
     # ("rectangle", length, width), ("disk", radius) or ("line", length) [m]; empty for any other body
     form: tuple[Any, ...] = ()
-
-    def __repr__(self) -> str:
-        return check.brief(self)
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
 
     @property
     def dimension(self) -> int:

@@ -86,8 +86,8 @@ class Blow:
         return carry_out(make(self, changes, stages) if plan is None else plan, stages, keep)
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, repr=False)
+class Plan(check.Brief):
     """The model of a blow, its reasons and its cost; `print` it, `run` it, or override pieces with `but`.
 
     The plan depends only on the blow, the tolerance and the quantities: the same blow gives the same plan.
@@ -115,9 +115,6 @@ class Plan:
     mobility: float = 0.0  # [m/(N s)] of an infinite plate
     notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
     first: Modes | None = field(default=None, repr=False, compare=False)  # first modes of the target, if needed
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def error(self) -> float:
@@ -201,8 +198,8 @@ class Plan:
         return "\n".join(lines)
 
 
-@dataclass(frozen=True)
-class Run:
+@dataclass(frozen=True, repr=False)
+class Run(check.Brief):
     """The result of running a plan, with its run times."""
 
     response: Response
@@ -211,9 +208,6 @@ class Run:
     notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
     verified: Mapping[str, float] | None = None  # [-] differences from a finer run, see `verify`
     finer: Plan | None = None  # plan of the finer run
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def rings(self) -> bool:

@@ -42,8 +42,8 @@ class Stroke(NamedTuple):
     lasts: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Strokes(Totals):
+@dataclass(frozen=True, eq=False, repr=False)
+class Strokes(Totals, check.Locked):
     """Blows one after another on one body: what `fi.strokes` found."""
 
     target: Modes
@@ -53,12 +53,6 @@ class Strokes(Totals):
     strikers: tuple[tuple[int, ...], ...]  # the strokes that make up each of `hits`, in the order of its contacts
     tolerance: float  # [-] requested
     notes: tuple[str, ...] = field(default=(), repr=False)
-
-    def __repr__(self) -> str:
-        return check.brief(self)
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
 
     @property
     def at(self) -> np.ndarray:

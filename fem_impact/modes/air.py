@@ -54,15 +54,12 @@ FINER = 4
 MOST_SAMPLES = 1e9  # [-] limit of memory: values of all shapes on the grid of points
 
 
-@dataclass(frozen=True, eq=False)
-class MixedShapes(Shapes):
+@dataclass(frozen=True, eq=False, repr=False)
+class MixedShapes(Shapes, check.Brief):
     """Linear combinations of the shapes of a body; its static deflections stay."""
 
     base: Shapes
     mix: np.ndarray  # (n_base, n_modes) [-]
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def dimension(self) -> int:

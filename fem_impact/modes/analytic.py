@@ -146,17 +146,14 @@ def _enough(
     return check.MOST, frequency / check.positive("first_frequency", first_frequency, "Hz") * first
 
 
-@dataclass(frozen=True, eq=False)
-class RectangleShapes(Shapes):
+@dataclass(frozen=True, eq=False, repr=False)
+class RectangleShapes(Shapes, check.Brief):
     """Sine shapes of a hinged rectangle of unit mass and rigidity with one corner at the origin."""
 
     length: float  # [m]
     width: float  # [m]
     numbers: np.ndarray  # (n_modes, 2) half waves along length and width
     dimension: int = 2
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         phase = np.pi * points / (self.length, self.width)  # (n_points, 2)
@@ -351,8 +348,8 @@ def _beam_roots(ends: tuple[str, str], n: int) -> np.ndarray:
     return root
 
 
-@dataclass(frozen=True, eq=False)
-class BeamShapes(BeamlikeShapes):
+@dataclass(frozen=True, eq=False, repr=False)
+class BeamShapes(BeamlikeShapes, check.Brief):
     """Shapes of a uniform Euler-Bernoulli beam of unit mass, length and rigidity over x / length in 0 ... 1.
 
     A flexible shape is A cos kx + B sin kx + C exp(-kx) + D exp(k (x - 1)): bounded terms, so that mode 1000 keeps
@@ -361,9 +358,6 @@ class BeamShapes(BeamlikeShapes):
 
     k: np.ndarray  # (n_modes,) wavenumber times length; 0 for rigid motions
     weights: np.ndarray  # (n_modes, 4)
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         x = points[:, :1] / self.length  # (n_points, 1)
@@ -621,8 +615,8 @@ def _disk_count(z: np.ndarray, order: np.ndarray, reach: float = np.inf) -> int:
     return int(np.sum(np.where(order == 0, 1, 2)[z <= reach]))
 
 
-@dataclass(frozen=True, eq=False)
-class DiskShapes(Shapes):
+@dataclass(frozen=True, eq=False, repr=False)
+class DiskShapes(Shapes, check.Brief):
     """Bessel shapes of a disk of unit mass and rigidity centred at the origin, computed on the unit disk."""
 
     radius: float  # [m]
@@ -634,9 +628,6 @@ class DiskShapes(Shapes):
     phase: np.ndarray  # (n_modes,) 0 for cos, pi/2 for sin
     scale: np.ndarray  # (n_modes,)
     dimension: int = 2
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         r = np.hypot(points[:, 0], points[:, 1])[:, None] / self.radius

@@ -105,16 +105,13 @@ class BeamlikeShapes(Shapes):
         return self.length * node[:, None] / 128.0, np.column_stack([node[:-1], node[1:]])
 
 
-@dataclass(frozen=True, eq=False)
-class ScaledShapes(Shapes):
+@dataclass(frozen=True, eq=False, repr=False)
+class ScaledShapes(Shapes, check.Brief):
     """The shapes of the same body with another mass and stiffness, see `Modes.scaled`."""
 
     base: Shapes
     amplitude: float  # [-] new shape divided by old
     frequency: float  # [-] new frequency divided by old
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def dimension(self) -> int:
@@ -169,8 +166,8 @@ class RigidShapes(Shapes):
         return np.zeros((1, 0)), np.zeros((1, 1), int)
 
 
-@dataclass(frozen=True, eq=False)
-class SampledShapes(Shapes):
+@dataclass(frozen=True, eq=False, repr=False)
+class SampledShapes(Shapes, check.Locked):
     """Shapes known only at points, as from a modal test; the striker must hit one of these points."""
 
     points: np.ndarray  # (n_points, dimension) [m]
@@ -180,12 +177,6 @@ class SampledShapes(Shapes):
     # (n_points, 2) [m/N] what the modes left out yield if that is estimated, with its error; nothing between the points
     rest: np.ndarray | None = None
     rigid: np.ndarray | None = None  # (n_points, n) [kg**-0.5] see `loose`
-
-    def __repr__(self) -> str:
-        return check.brief(self)
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
 
     @property
     def dimension(self) -> int:
@@ -258,8 +249,8 @@ def _connected(cells: Any, points: np.ndarray) -> np.ndarray | None:
 Damping = float | np.ndarray | Callable[[np.ndarray], Any]
 
 
-@dataclass(frozen=True, eq=False)
-class Modes:
+@dataclass(frozen=True, eq=False, repr=False)
+class Modes(check.Brief):
     """Undamped, mass-normalised eigenmodes of one body in ascending order, each with its damping ratio.
 
     They describe the whole body: `shapes.compliance` includes the static response of the modes left out.
@@ -281,9 +272,6 @@ class Modes:
     air: bool = field(default=False, repr=False)  # whether the air around the body is in them
     stretches: bool = field(default=False, repr=False)  # whether a blow lets them stretch the body, see `stretching`
     unstated: tuple[str, ...] = field(default=(), repr=False)  # of "compliance" and "free": what nobody said of it
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def __post_init__(self) -> None:
         omega = check.ascending("omega", self.omega, "rad/s")
@@ -657,8 +645,8 @@ def rayleigh(mass_factor: float, stiffness_factor: float) -> Callable[[np.ndarra
     return ratio
 
 
-@dataclass(frozen=True, eq=False)
-class FieldShapes(Shapes):
+@dataclass(frozen=True, eq=False, repr=False)
+class FieldShapes(Shapes, check.Locked):
     """Shapes of an FE solution, evaluated anywhere on the body with the shape functions of its elements."""
 
     system: System
@@ -666,12 +654,6 @@ class FieldShapes(Shapes):
     flexibility: Flexibility
     _under: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), repr=False)  # deflections, by loads
     _at: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), init=False, repr=False)  # shapes, by point
-
-    def __repr__(self) -> str:
-        return check.brief(self)
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
 
     @property
     def dimension(self) -> int:

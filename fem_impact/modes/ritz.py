@@ -278,8 +278,8 @@ class Krylov:
         return Modes(omega, damping, shapes, self.system.mass, no_error, notes=notes, section=self.system.section)
 
 
-@dataclass(frozen=True, eq=False)
-class RitzShapes(Shapes):
+@dataclass(frozen=True, eq=False, repr=False)
+class RitzShapes(Shapes, check.Brief):
     """Shapes of Ritz vectors: complete at the loads they started from, approximate elsewhere."""
 
     system: System
@@ -289,9 +289,6 @@ class RitzShapes(Shapes):
     basis: np.ndarray  # (n_vectors, n_dofs) [-] mass-orthonormal in the frame
     turn: np.ndarray  # (n_vectors, n_vectors) [-] from the basis to the flexible shapes
     kept: int | None = None  # number of shapes that count as modes; the others are left out
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def dimension(self) -> int:

@@ -149,16 +149,13 @@ def rigid(ends: tuple[str, str], stoutness: Stoutness) -> np.ndarray:
     return np.array([[turn, -turn]]) if ends == ("free", "hinged") else np.zeros((0, 2))
 
 
-@dataclass(frozen=True, eq=False)
-class TimoshenkoShapes(BeamlikeShapes):
+@dataclass(frozen=True, eq=False, repr=False)
+class TimoshenkoShapes(BeamlikeShapes, check.Brief):
     """Shapes of a uniform Timoshenko beam of unit mass and rigidity over x / length in 0 ... 1."""
 
     stoutness: Stoutness
     p: np.ndarray  # (n_modes,) omega squared; 0 for rigid motions
     weights: np.ndarray  # (n_modes, 4)
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         x, flexible = points[:, 0] / self.length, self.p > 0.0

@@ -14,19 +14,13 @@ from .modal import FieldShapes, Modes
 TERMS = 10
 
 
-@dataclass(frozen=True, eq=False)
-class ModesChange:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModesChange(check.Locked):
     """Changes per unit of a number, of modes as seen from one point."""
 
     omega: np.ndarray  # (n_modes,) [rad/s]
     shape: np.ndarray  # (n_modes,) [kg**-0.5] at the point
     compliance: float  # [m/N] of the whole body at the point
-
-    def __repr__(self) -> str:
-        return check.brief(self)
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
 
 
 def solution(modes: Modes) -> FieldShapes:

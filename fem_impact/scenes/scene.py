@@ -48,8 +48,8 @@ RIGID = 3  # [-] most rigid motions of a body: a plate lifts and turns about two
 NOTHING = Part()  # stands for a missing table
 
 
-@dataclass(frozen=True)
-class Scene:
+@dataclass(frozen=True, repr=False)
+class Scene(check.Brief):
     """A complete description of a strike; `load_scene` reads one from TOML. Missing tables are empty parts."""
 
     path: Path
@@ -65,9 +65,6 @@ class Scene:
     observe: Part | None = None
     map: Part | None = None
     stroke: tuple[Part, ...] = ()  # blows one after another, for `sequence.play`; [strike] says what they share
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def strike(self, *, strict: bool = False, **changes: Any) -> Response:
         """Build everything and strike.

@@ -26,17 +26,14 @@ SCALARS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class SequencePlan:
+@dataclass(frozen=True, eq=False, repr=False)
+class SequencePlan(check.Brief):
     """How a sequence will be modelled, why and at what cost; `print` it. `Scene.plan_strokes` makes it."""
 
     tolerance: float  # [-] for every stroke with what it inherits from those before
     strokes: tuple[Mapping[str, Any], ...]  # in order of time: when [s], at [m], speed [m/s]
     # of every stroke as if it struck the body at rest, to EACH of the tolerance; strokes alike share one
     plans: tuple[Plan, ...]
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def needed(self) -> int:

@@ -33,20 +33,14 @@ COMPACT = 0.5  # [-] half the width of a bar times the wavenumber, up to which a
 SQUARE = 1.51  # [-] mass of air that a square section drags, over that of a flat strip of its width
 
 
-@dataclass(frozen=True, eq=False)
-class Sound:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sound(check.Locked):
     """Samples, ready to write or play."""
 
     samples: np.ndarray  # (n_times,) or, for several channels, (n_times, n_channels) [-] value over full_scale
     rate: int  # [Hz]
     full_scale: float  # [m/s] or [Pa], value of a sample of 1.0
     unit: str = "m/s"
-
-    def __repr__(self) -> str:
-        return check.brief(self)
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
 
     @property
     def peak_level(self) -> float:

@@ -55,8 +55,8 @@ class Checks:
     unknown: tuple[str, ...]  # what of the model's error is not known
 
 
-@dataclass(frozen=True, eq=False)
-class Spread:
+@dataclass(frozen=True, eq=False, repr=False)
+class Spread(check.Brief):
     """Many blows with uncertain inputs; from `fem_impact.spread`.
 
     Intervals hold the truth with a probability of `confidence` as if the blows were drawn at random; their points fill
@@ -75,9 +75,6 @@ class Spread:
     title: str = ""
     notes: tuple[str, ...] = ()
     why_no_shares: str = ""  # why there are no Sobol indices
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def names(self) -> tuple[str, ...]:

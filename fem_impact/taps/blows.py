@@ -30,8 +30,8 @@ MOST_STEPS = 50_000  # [-] of one blow
 SEEN = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class Body:
+@dataclass(frozen=True, eq=False, repr=False)
+class Body(check.Brief):
     """A body as its contact point knows it."""
 
     omega: np.ndarray  # (n_modes,) [rad/s]
@@ -42,9 +42,6 @@ class Body:
     rest: float = 0.0  # [m/N] residual compliance at the contact point
     dimension: int = 0
     mass: float = np.inf  # [kg]
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def felt_mass(self) -> float:
@@ -109,8 +106,8 @@ def _body(modes: Modes, row: np.ndarray, motion: np.ndarray, rows: np.ndarray, r
     return Body(modes.omega, modes.damping_ratio, row, motion, rows, rest, modes.dimension, modes.mass)
 
 
-@dataclass(frozen=True, eq=False)
-class StruckPair:
+@dataclass(frozen=True, eq=False, repr=False)
+class StruckPair(check.Brief):
     """Striker and struck body in the lists of the engine."""
 
     omega: np.ndarray
@@ -122,9 +119,6 @@ class StruckPair:
     target: slice
     rows: np.ndarray
     rated: bool  # whether the force depends on how fast the contact is pressed
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
 
 def pair(striker: Body, target: Body, contact: Contact) -> StruckPair:

@@ -30,8 +30,8 @@ REPEATS = 3  # [-] times that profiles may find a better fit and begin again; a 
 Watch = Callable[[int, int], Any]
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
+@dataclass(frozen=True, eq=False, repr=False)
+class Found(check.Brief):
     """What `fit` found. Values that the data do not tell are in `unidentifiable` and not in `values`."""
 
     taps: Taps  # those compared, cut to the window
@@ -44,9 +44,6 @@ class Found:
     notes: tuple[str, ...]
     compared: Mapping[str, float]  # contact law -> root mean square of its errors at left-out taps [-]; if several
     watch: Watch | None = None
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @cached_property
     def _noise(self) -> tuple[float, int, float]:

@@ -12,8 +12,8 @@ from .solver import HALF_LOST, Problem
 from .unknowns import TIME
 
 
-@dataclass(frozen=True, eq=False)
-class Prediction:
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction(check.Brief):
     """A tap as the model has it, with speed, onset and the unknowns that each tap has of its own fitted to it."""
 
     time: np.ndarray  # (n_times,) [s] of the record
@@ -22,9 +22,6 @@ class Prediction:
     speed: float  # [m/s]
     onset: float  # [s]
     own: Mapping[str, float]  # unknown freed for each tap -> its value here
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def residual(self) -> np.ndarray:

@@ -34,8 +34,8 @@ DOUBTED = 0.01
 MOVES = 0.05
 
 
-@dataclass(frozen=True, eq=False)
-class Profile:
+@dataclass(frozen=True, eq=False, repr=False)
+class Profile(check.Brief):
     """One value moved over its range, the others readjusted."""
 
     name: str
@@ -49,9 +49,6 @@ class Profile:
     low: float
     high: float
     log: bool
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def _coordinate(self, value: Any) -> Any:
         return np.log(value) if self.log else np.asarray(value, float)

@@ -38,8 +38,8 @@ UFF_TYPES = {  # function types of data set 58 -> what it holds
 }  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(check.Brief):
     """All channels of a file as they stand there."""
 
     segments: tuple[np.ndarray, ...]  # each (n_samples, n_channels), in the units of the file
@@ -47,9 +47,6 @@ class Recording:
     units: tuple[str, ...]  # as written in the file; "" if it states none
     rate: float | None  # [Hz] None: the file does not state it
     notes: tuple[str, ...] = ()
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def __post_init__(self) -> None:
         for segment in self.segments:

@@ -12,8 +12,8 @@ from .solver import Problem, directions
 NEAR_ZERO = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class RidgePath:
+@dataclass(frozen=True, eq=False, repr=False)
+class RidgePath(check.Brief):
     """A straight way through the coordinates, from a point where all but coordinate ``j`` fit best.
 
     Along a ridge values go by factors: then coordinates that are parts of a range from zero, such as the loss, go by
@@ -28,9 +28,6 @@ class RidgePath:
     bounds: tuple[np.ndarray, np.ndarray]  # (n_coordinates,) each
     spread: float  # growth of coordinate j for which the sum of squares rises by one, by curvature
     jacobian: np.ndarray  # (n_residuals, n_coordinates less j and the needless) near by
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def _gone(self, last: float) -> float:
         here = self.x[self.j]

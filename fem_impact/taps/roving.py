@@ -43,8 +43,8 @@ MOST_BLOWS = 20_000  # [-] points times tips: some minutes
 WORKS, NO_BAND, DOUBLE, UNKNOWN = "works", "no tip reaches the band", "double hit", "too hard for the modes"
 
 
-@dataclass(frozen=True, eq=False)
-class Roving:
+@dataclass(frozen=True, eq=False, repr=False)
+class Roving(check.Locked):
     """What every tip does at every point of a test, and which to take."""
 
     modes: Modes  # of the structure, up to beyond the band
@@ -64,12 +64,6 @@ class Roving:
     at_modes: np.ndarray  # (n_points, n_blows) [-] mean at the natural frequencies in the band
     duration: float  # [s] of a record
     notes: tuple[str, ...] = ()
-
-    def __repr__(self) -> str:
-        return check.brief(self)
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
 
     @property
     def resolution(self) -> float:

@@ -10,8 +10,8 @@ from .._base.rounding import ROUNDING
 from .solver import Problem
 
 
-@dataclass(frozen=True, eq=False)
-class Scatter:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scatter(check.Brief):
     """One unknown over the taps."""
 
     name: str
@@ -21,9 +21,6 @@ class Scatter:
     by_noise: float  # the same, as noise alone would make it
     relative: bool  # whether the range is positive, so that ratios count
     freedom: int  # degrees of freedom of the noise variance
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def chance(self) -> float:

@@ -48,17 +48,14 @@ LATEST = 60.0
 SHIFT = 3.0
 
 
-@dataclass(frozen=True, eq=False)
-class Data:
+@dataclass(frozen=True, eq=False, repr=False)
+class Data(check.Brief):
     """The records to be explained, each scaled to a peak of one."""
 
     values: np.ndarray  # (n_taps, 1 + n_points, n_times) over their scale
     scale: np.ndarray  # (n_taps, 1 + n_points): peak force [N], peaks of the responses, over the channel's weight
     impulse: np.ndarray  # (n_taps,) [N s], measured
     lead: int  # [samples] of every record before the blow begins in the simulation
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def n_taps(self) -> int:
@@ -73,8 +70,8 @@ class Data:
         return replace(self, values=self.values[index], scale=self.scale[index], impulse=self.impulse[index])
 
 
-@dataclass(frozen=True, eq=False)
-class Problem:
+@dataclass(frozen=True, eq=False, repr=False)
+class Problem(check.Brief):
     """Residuals over coordinates: those of the unknowns, then of all taps the logarithm of the momentum, the onset
     [samples] and, for each name in `own`, how far the tap is from the unknown, which is the mean of all taps."""
 
@@ -86,9 +83,6 @@ class Problem:
     centre: int | None = None  # the tap whose own values the unknowns are, in place of the mean of all
     momentum: bool = True  # False: the coordinate of a tap is the logarithm of its speed itself
     _last: dict[bytes, np.ndarray] = field(default_factory=dict, repr=False)
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def n_shared(self) -> int:
@@ -284,17 +278,14 @@ def thinned(spectra: np.ndarray, n: int) -> np.ndarray:
     return np.fft.irfft(folded, n) / FINE
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(check.Brief):
     """The end of a search."""
 
     x: np.ndarray
     cost: float  # [-] sum of squares of the residuals
     jacobian: np.ndarray  # (n_residuals, n_coordinates less those held)
     ended: bool = True  # False: the iterations were used up
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
 
 def solve(

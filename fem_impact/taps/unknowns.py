@@ -159,8 +159,8 @@ def _products(rows: np.ndarray) -> np.ndarray:
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class Setting:
+@dataclass(frozen=True, eq=False, repr=False)
+class Setting(check.Brief):
     """What is known of a blow, and what is not."""
 
     target: Modes | None  # None: a wall, or a target of unknown modes only
@@ -172,9 +172,6 @@ class Setting:
     points: Any  # (n_points, dimension) [m] where the response is measured; None without a known target
     n_points: int
     impulse: float  # [N s] of a typical tap: sets the speed at which the contact time is stated
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     def blow(self, values: Mapping[str, float]) -> tuple[blows.StruckPair, float, float]:
         """Both bodies and the contact that the values make, the mass of the tip [kg], and `duration`."""

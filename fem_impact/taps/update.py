@@ -32,8 +32,8 @@ LOOKS, STEPS = 16, 4  # [-] starts over the ranges, and steps of each, where fre
 POOR = 0.1  # [-] half width of an interval, in logarithms: a constant known to no better than 10 % is called not told
 
 
-@dataclass(frozen=True, eq=False)
-class Updated:
+@dataclass(frozen=True, eq=False, repr=False)
+class Updated(check.Brief):
     """What `update` found."""
 
     values: Mapping[str, float]
@@ -42,9 +42,6 @@ class Updated:
     modes: Modes
     n_solves: int
     unpaired: tuple[float, ...] = ()  # [Hz] measured frequencies that belong to no mode of the body
-
-    def __repr__(self) -> str:
-        return check.brief(self)
 
     @property
     def error(self) -> float:
