@@ -160,7 +160,7 @@ def strike(
 ) -> Response:
     """Strike a body with known modes; see `fi.strike`."""
     if speed is None and start is None:
-        raise ValueError("speed must be given in m/s, or start, which tells how the striker moves")
+        raise ValueError("speed must be given in m/s, or start, which says how the striker moves")
     speed = speed if speed is None else check.non_negative("speed", speed, "m/s")
     before = start.state() if isinstance(start, Response) else start
     forces = [
@@ -661,7 +661,7 @@ def _controlled(
     free = scheme is None and dt is None if free is None else free
     if system.stretched is not None:
         if scheme == "collocation":
-            raise ValueError("scheme collocation knows no stretching; use A4")
+            raise ValueError("scheme collocation does not support stretching; use A4")
         scheme = scheme or "A4"
     scheme = scheme or _scheme_for(tolerance, float(system.law[:, layout.EXPONENT].min()))
     if scheme == "collocation" and (system.law[:, layout.EXPONENT] < 1.0).any():

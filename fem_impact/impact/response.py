@@ -521,7 +521,7 @@ class Response(Totals):
     def displacement(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
         """Displacement [m] of the target, (n_times, n_points); positive in the direction of the blow.
 
-        After a blow by Ritz vectors these tell the motion as long as they can (`motion_error`); otherwise modes do.
+        After a blow by Ritz vectors these give the motion as long as they can (`motion_error`); otherwise modes do.
 
         Parameters
         ----------
