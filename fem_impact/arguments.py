@@ -76,7 +76,7 @@ def parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
     made = Parser(
         prog="fem-impact", description="Strike anything thin with anything, and know how far to trust the answer.",
-        epilog="fem-impact COMMAND --help has examples and the exit statuses of a command",
+        epilog="fem-impact COMMAND --help shows examples and exit statuses",
     )  # fmt: skip
     made.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     verbs = made.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -232,7 +232,7 @@ def parser() -> argparse.ArgumentParser:
     _add_out(add, "KIND.toml", "here", "scene")
 
     add = verb(
-        commands.mesh, "mesh", "list edges, sizes and units of a mesh, drawing or scene, to write its supports",
+        commands.mesh, "mesh", "list the edges, sizes and units of a mesh, drawing or scene, to state its supports",
         scene="a mesh file, an .svg or .dxf drawing, or a scene, a .toml file", called="FILE",
     )  # fmt: skip
     add("--unit", metavar="U", help="unit of the numbers in the file: m, cm, mm, um, in or km (default: the file's)")
@@ -322,7 +322,7 @@ def completion(parser: argparse.ArgumentParser, shell: str) -> str:
 def _add_taps(verb: Any) -> None:
     """Add the commands for measured taps."""
     files = "measured taps: .lvm, .csv, .npz, .wav, .mat or .uff"
-    add = verb(commands.frf, "frf", "frequency responses of taps, or of a scene as a rig would measure it",
+    add = verb(commands.frf, "frf", "compute frequency responses of taps, or of a scene as a rig would measure it",
                scene=f"{files} or frequency responses; or a scene, a TOML file", called="TAPS|SCENE")  # fmt: skip
     _add_channels(add)
     add("--method", choices=("H1", "H2"), default="H1", help="H1 for noise in the response, H2 in the force")

@@ -192,7 +192,7 @@ def _check_possible(hit: "Response", wanted: list[tuple[str, float | None]], sec
         )
     if any(name.startswith("peak") for name in asked) and (apart := _apart(h)) < TIE:
         raise SimulationError(
-            f"no gradient of the largest force: two maxima differ by {apart:.1e} of it, and a small change may make "
+            f"no gradient of the peak force: two maxima differ by {apart:.1e} of it, and a small change may make "
             "the other the largest"
         )
 

@@ -104,7 +104,7 @@ class Totals:
 
     @property
     def contact_time(self) -> float:
-        """Total time in contact [s]."""
+        """Total contact time [s]."""
         return float(sum(impact.duration for impact in self.impacts))
 
     @property
@@ -793,7 +793,7 @@ class Response(Totals):
         if self.n_impacts > 20:
             lines.append(f"  ... and {self.n_impacts - 20} more")
         if self.margin < CLEAR:
-            lines.append(f"margin {self.margin:.1g} of the deepest approach: so near is another number of impacts")
+            lines.append(f"margin {self.margin:.1g} of the deepest approach: that close to another number of impacts")
         total = self._balance["start"]
         shares = ", ".join(f"{name} {value / total:.2%}" for name, value in self.energies.items()) if total else "none"
         error = self.error

@@ -1163,7 +1163,8 @@ def strike(
         "n_impacts". Others: "spectrum=5000", the force spectrum up to 5 kHz relative to its largest value, and
         "sound=5000".
     residual : bool
-        Whether the residual compliance acts; False takes the modes alone for the body, and no error tells of others.
+        Whether the residual compliance acts; False takes the modes alone for the body, and no error covers the
+        others.
     duration : float [s], optional
         Time at which the run stops at the latest.
     max_impacts : int, optional
