@@ -119,10 +119,15 @@ def compile_kernels() -> int:
         hit.summary()
     finally:
         mark.unlink(missing_ok=True)
+    compile_map()
+    return 0
+
+
+def compile_map() -> None:
+    """Make a map of two blows."""
     body = analytic.rectangle(1.0, 0.7, mass=1.0, first_frequency=100.0, n_modes=20)
     how: dict[str, Any] = {"at": (0.3, 0.3), "speed": 1.0, "tolerance": 1e-2, "over": {"mass": [0.02, 0.03]}}
     sweep(body, Striker.rigid(0.02), Contact.linear(1e5), **how)
-    return 0
 
 
 def _picture() -> bool:

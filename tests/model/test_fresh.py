@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -114,6 +116,15 @@ def test_what_takes_many_steps_or_misses_the_tolerance_is_compiled(compiler):
         return "compiled"
 
     assert fresh.answer(endless, False) == "compiled"
+
+
+def test_only_plans_that_take_long_are_compiled_at_once(monkeypatch):
+    stretches: list[bool] = []
+    monkeypatch.setattr(fresh, "answer", lambda compute, stretched: stretches.append(stretched) or compute())
+    plan = fi.plan(Path(__file__).parents[2] / "studies" / "scenes" / "heavy_plate.toml")
+    for seconds in (plan.seconds, 1e3):
+        replace(plan, seconds=seconds).strike()
+    assert stretches == [False]
 
 
 @pytest.mark.parametrize("value", ["0", "1"])
