@@ -55,7 +55,7 @@ KEYS: dict[str, Keys] = {
         "strokes": ("array?", "of a scene with strokes: each, with the number of its plan"),
         "plans": ("array?", "of a scene with strokes: their plans"),
     } | _alike(
-        "as the argument of this name of `fi.strike`, `fi.find_modes` or `fi.assemble`",
+        "see `Plan.data` of `fi.plan`",
         "quantities element size n_dofs n_modes max_frequency n_striker_modes scheme dt duration mass mobility meets "
         "needed",
     ),

@@ -76,7 +76,7 @@ def parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
     made = Parser(
         prog="fem-impact", description="Strike anything thin with anything, and know how far to trust the answer.",
-        epilog="fem-impact COMMAND --help has examples and the exit statuses of a command",
+        epilog="fem-impact COMMAND --help shows examples and exit statuses",
     )  # fmt: skip
     made.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     verbs = made.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -101,7 +101,7 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     _add_out(add, "response.json and .npz, force, modes and sounds", "out/NAME")
     _add_choices(add)
-    add("--strict", action="store_true", help="write nothing if the tolerance is missed, and end with 1 instead of 3")
+    add("--strict", action="store_true", help="write nothing if the tolerance is missed, and exit with 1 instead of 3")
     add("--verify", action="store_true", help="strike again with a finer model and print the differences")
     add("--pictures", action="store_true", help="write 3-D pictures of the mode shapes and the wave, as PNG and GIF")
     add("--vtk", action="store_true", help="write motion.pvd, the motion for ParaView and pyvista")
@@ -111,7 +111,7 @@ def parser() -> argparse.ArgumentParser:
         "repeatable; of two also stereo.wav",
     )  # fmt: skip
     _add_format(add)
-    add("--duration", metavar="S", type=float, help="length of the sounds [s] (default: by their decay)")
+    add("--duration", metavar="S", type=float, help="length of the sounds [s] (default: until they decay)")
     add("--normalise", action="store_true", help="scale each sound to a peak of 1.0")
 
     add = verb(commands.plan, "plan", "show the model, its reasons, expected errors and cost, without striking")
@@ -143,7 +143,7 @@ def parser() -> argparse.ArgumentParser:
     add(
         "--borders",
         action="store_true",
-        help="locate where the number of impacts changes, also if all counts are given",
+        help="locate where the number of impacts changes, even if all counts are given",
     )
     add(
         "--every-cell", action="store_true",
@@ -152,7 +152,9 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
 
     add = verb(
-        commands.spread, "spread", "strike a scene with uncertain inputs; tell how the answer is distributed, and why"
+        commands.spread,
+        "spread",
+        "strike a scene with uncertain inputs: how much the answers scatter, and which input causes it",
     )
     add("--vary", metavar="INPUT=LAW", action="append", default=[], required=True,
         help='an uncertain number, such as "contact.stiffness=lognormal(695e3, 0.1)"; repeatable; also normal(mean, '
@@ -201,15 +203,27 @@ def parser() -> argparse.ArgumentParser:
         commands.play, "play", "strike a scene from the keyboard, a MIDI file or a MIDI port, and hear it at once"
     )
     add("--midi", metavar="FILE", type=_place, help="play the notes of a MIDI file: middle C is the first point")
-    add("--midi-port", metavar="NAME", nargs="?", const="", help="play from the MIDI input whose name begins so")
+    add("--midi-port", metavar="NAME", nargs="?", const="", help="play from the MIDI input whose name begins with NAME")
     _also(add, "--port", "midi_port", nargs="?", const="")
     add("--at", metavar="X", nargs="+", type=float, action="append", help="a point to strike [m]; repeatable "
         "(default: ten points, the scene's and others over the whole body)")  # fmt: skip
     add("--n-modes", metavar="N", type=int, default=300, help="number of modes (default: 300)")
     _also(add, "--modes", "n_modes", type=int)
     add("--fastest", metavar="V", type=float, help="speed of the loudest stroke [m/s] (default: twice the scene's)")
-    add("--duration", metavar="S", type=float, default=600.0, help="when to end at the latest [s] (default: 600)")
-    add("--block", metavar="N", type=int, default=64, help="frames computed at a time, of 48000 a second (default: 64)")
+    add(
+        "--duration",
+        metavar="S",
+        type=float,
+        default=600.0,
+        help="stop after this time at the latest [s] (default: 600)",
+    )
+    add(
+        "--block",
+        metavar="N",
+        type=int,
+        default=64,
+        help="frames computed at a time, at 48000 per second (default: 64)",
+    )
     add("--silent", action="store_true", help="play into the file only, and count the deadlines that would be missed")
     _add_out(add, "play.wav", "out/NAME", "sound")
 
@@ -218,19 +232,19 @@ def parser() -> argparse.ArgumentParser:
     _add_out(add, "KIND.toml", "here", "scene")
 
     add = verb(
-        commands.mesh, "mesh", "list edges, sizes and units of a mesh, drawing or scene, to write its supports",
+        commands.mesh, "mesh", "list the edges, sizes and units of a mesh, drawing or scene, to state its supports",
         scene="a mesh file, an .svg or .dxf drawing, or a scene, a .toml file", called="FILE",
     )  # fmt: skip
     add("--unit", metavar="U", help="unit of the numbers in the file: m, cm, mm, um, in or km (default: the file's)")
     _add_out(add, "elements and named edges, mesh.png", "none", "picture")
     _add_format(add, None)
 
-    verb(commands.show, "show", "say what is in a folder of results, or how far a store is",
+    verb(commands.show, "show", "show what a folder of results holds, or how much of a store is finished",
          scene="a folder that --out or --store named", called="FOLDER")  # fmt: skip
 
     add = verb(
         commands.schema, "schema",
-        "print a JSON schema of scenes, by which editors check them, or of what a command prints with --json", scene="",
+        "print a JSON schema: of scenes, for editors to check them, or of what a command prints with --json", scene="",
     )  # fmt: skip
     add("of", metavar="COMMAND", nargs="?", choices=tuple(answers.KEYS), help="a command (default: scenes)")
 
@@ -252,7 +266,7 @@ def _also(add: Any, old: str, dest: str, **how: Any) -> None:
 
 def _add_out(add: Any, files: str, default: str, single: str = "") -> None:
     """Add --out, which is a folder everywhere; where one file is written, a name with an ending is that file."""
-    named = f", or the {single} itself by a name with an ending" if single else ""
+    named = f"; a name with an ending names the {single} itself" if single else ""
     add("--out", metavar="DIR", type=_place, help=f"folder for {files}{named} (default: {default})")
 
 
@@ -272,11 +286,11 @@ def _add_choices(add: Any) -> None:
     add(
         "--target",
         metavar="KIND",
-        help="treat the struck body as rigid, infinite, by vectors, mixed or modal, whatever the plan chooses",
+        help="model the struck body as rigid, infinite, vectors, mixed or modal, whatever the plan would choose",
     )
     add(
         "--model", metavar="MODEL",
-        help="auto takes a thick theory, air and stretching where the tolerance needs them; stated as the scene says",
+        help="auto adds thick theory, air and stretching where the tolerance needs them; stated follows the scene",
     )  # fmt: skip
     add("--n-modes", metavar="N", type=int, help="number of modes to keep for the struck body")
     add("--size", metavar="H", type=float, help="element size [m]")
@@ -308,11 +322,11 @@ def completion(parser: argparse.ArgumentParser, shell: str) -> str:
 def _add_taps(verb: Any) -> None:
     """Add the commands for measured taps."""
     files = "measured taps: .lvm, .csv, .npz, .wav, .mat or .uff"
-    add = verb(commands.frf, "frf", "frequency responses of taps, or of a scene as a rig would measure it",
+    add = verb(commands.frf, "frf", "compute frequency responses of taps, or of a scene as a rig would measure it",
                scene=f"{files} or frequency responses; or a scene, a TOML file", called="TAPS|SCENE")  # fmt: skip
     _add_channels(add)
     add("--method", choices=("H1", "H2"), default="H1", help="H1 for noise in the response, H2 in the force")
-    add("--force-window", metavar="S", type=float, help="the force counts for this time after the onset only")
+    add("--force-window", metavar="S", type=float, help="ignore the force later than this after its onset")
     add("--response-window", metavar="S", type=float, help="time constant of an exponential window")
     _add_out(add, "frf.csv", "none", ".csv or .uff file")
 
@@ -323,7 +337,7 @@ def _add_taps(verb: Any) -> None:
     _add_channels(add)
     add("--unknown", metavar="NAME=LOW:HIGH", action="append", default=[],
         help="a number to find in a range; repeatable (default: stiffness, exponent, loss of the contact)")  # fmt: skip
-    add("--known", metavar="NAME=VALUE", action="append", default=[], help="a number to hold; repeatable")
+    add("--known", metavar="NAME=VALUE", action="append", default=[], help="a number to hold fixed; repeatable")
     add("--per-tap", metavar="NAME", action="append", default=[],
         help="fit this unknown separately for each tap; repeatable")  # fmt: skip
     add("--mass", metavar="KG", type=float, help="mass of the hammer (default: the scene's, or 0.1)")

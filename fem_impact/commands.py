@@ -257,7 +257,7 @@ def map_of(options: argparse.Namespace) -> Answer:
         low, high = float(table.model_error.min()), float(table.model_error.max())
         data["model_error"] = {"low": low, "high": high, "not_known": unknown}
         not_known = f"; not known: {unknown}" if unknown else ""
-        said.append(f"Model: it errs by {low:.1g} to {high:.1g}{not_known}")
+        said.append(f"Model error: {low:.1g} to {high:.1g}{not_known}")
     data |= {"notes": table.attrs["notes"].splitlines(), "seconds": {"total": time.perf_counter() - began}}
     said += [*noted(data["notes"]), f"Time: {data['seconds']['total']:.2f} s"]
     return answer(data, *said, folder=folder, files=names)

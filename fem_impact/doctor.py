@@ -1,10 +1,15 @@
 """Checks the installation with small problems of known answer; each failed check comes with a remedy."""
 
 import importlib.util
+import pickle
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +23,10 @@ from .impact.contact import Contact
 from .impact.response import Response
 from .impact.striker import Striker
 from .model import cost
+from .modes import analytic
 from .modes.modal import Modes, find_modes
 from .show import export, figures, pictures
+from .sweeps.grid import sweep
 
 SQUARE = 2.0 * np.pi**2  # [-] fact: omega of a hinged unit square of unit stiffness and mass
 
@@ -96,6 +103,31 @@ def _kernels() -> bool:
     hit = _blow()
     speed = hit.speeds[0]  # [m/s] equal masses exchange their speeds
     return abs(speed) < 1e-9 and hit.n_impacts == 1
+
+
+def compile_kernels() -> int:
+    """Compile what the first blow of a kind lacks and what is asked of it, and then what a map needs, as a process.
+
+    Its argument is the mark of `model.fresh`.
+    """
+    mark = Path(sys.argv[1])
+    try:
+        module, name, types = pickle.loads(mark.read_bytes())
+        getattr(import_module(module), name).compile(types)
+        hit = _blow()
+        hit.modal_state(np.zeros(1))
+        hit.summary()
+    finally:
+        mark.unlink(missing_ok=True)
+    compile_map()
+    return 0
+
+
+def compile_map() -> None:
+    """Make a map of two blows."""
+    body = analytic.rectangle(1.0, 0.7, mass=1.0, first_frequency=100.0, n_modes=20)
+    how: dict[str, Any] = {"at": (0.3, 0.3), "speed": 1.0, "tolerance": 1e-2, "over": {"mass": [0.02, 0.03]}}
+    sweep(body, Striker.rigid(0.02), Contact.linear(1e5), **how)
 
 
 def _picture() -> bool:

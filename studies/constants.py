@@ -288,7 +288,7 @@ def first_failure(tests: list[str], change: Changing | None, share: float = 1.0)
         os.dup2(quiet, 1)
         os.dup2(quiet, 2)
         resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-        warming.compile_all = lambda: None  # kernels are on disk, or compiled as needed
+        warming.compile_all = lambda _: None  # kernels are on disk, or compiled as needed
         if change:
             sys.meta_path.insert(0, change)
         if change and change.plain:

@@ -228,7 +228,7 @@ def quick() -> dict[str, tuple[float, list[str]]]:
 
     failed: set[str] = set()
     if not (child := os.fork()):
-        warming.compile_all = lambda: None
+        warming.compile_all = lambda _: None
         os.environ["NUMBA_DISABLE_JIT"], numba.config.DISABLE_JIT = "1", 1
         pytest.main(["-n", "0", "-q", "-p", "no:cacheprovider", "--tb=no", *files], plugins=[Watch()])
         REACH.parent.mkdir(exist_ok=True)

@@ -8,20 +8,20 @@ from zlib import crc32
 
 import pytest
 from hypothesis import settings
-from warming import compile_all
+from warming import SMOKING, TASKS, compile_all
 
 os.environ.setdefault("NUMBA_DISABLE_JIT", "0")  # or a first blow would be plain Python, see `model.fresh`
 settings.register_profile("same", derandomize=True)  # the same cases in every run
 settings.load_profile("same")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-# What `pytest -m smoke` runs, without their slow cases: quick files of every package, physics in each. They compile the
-# kernels of A4 and of maps, but neither collocation nor changes.
+# What `pytest -m smoke` runs, without their slow cases: quick files of every package, physics in each. They need the
+# kernels of A4 and of maps, but neither collocation nor stretching.
 SMOKE = (
-    "designs/test_goals", "fe/test_beam_elements", "fe/test_membrane", "fe/test_plausible", "impact/test_response",
+    "designs/test_goals", "fe/test_eigenvalues", "fe/test_membrane", "fe/test_plausible", "impact/test_response",
     "impact/test_contact", "impact/test_force_spectrum", "impact/test_threshold", "mesh/test_meshes",
-    "mesh/test_triangulation", "model/test_thinness", "modes/test_analytic",
-    "modes/test_timoshenko", "scenes/test_templates", "show/test_sound", "sweeps/test_cells", "taps/test_found",
-    "taps/test_rig", "test_end_to_end", "test_figures_of_the_source",
+    "mesh/test_triangulation", "model/test_deflection", "modes/test_analytic", "modes/test_unstated",
+    "scenes/test_templates", "show/test_sound", "sweeps/test_cells", "taps/test_found", "taps/test_rig",
+    "test_end_to_end", "test_figures_of_the_source",
 )  # fmt: skip
 FLAGS = (
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
@@ -103,12 +103,18 @@ def all_cases(request):
 
 
 def pytest_configure(config):
-    """Compile the inner loops once, before workers start, so that no test waits for the compiler; smoke needs few."""
+    """Compile the inner loops once, before workers start, so that no test waits for the compiler."""
     from fem_impact._base import isolated
 
     isolated.PATIENCE = 120.0  # [s] a busy machine must not refuse a file; tests of the limit set their own
-    if not hasattr(config, "workerinput") and config.option.markexpr != "smoke":
-        compile_all()
+    if not hasattr(config, "workerinput"):
+        compile_all(SMOKING if config.option.markexpr == "smoke" else TASKS)
+
+
+def pytest_ignore_collect(collection_path, config):
+    """A quick look reads no other files: reading all takes as long as its tests."""
+    place = collection_path.relative_to(config.rootpath / "tests").with_suffix("").as_posix()
+    return (config.option.markexpr == "smoke" and collection_path.is_file() and place not in SMOKE) or None
 
 
 @pytest.fixture

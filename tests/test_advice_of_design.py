@@ -81,7 +81,7 @@ DESIGNS = {  # what fails, the message, and what it advises
     ),
     "a thick plate": (
         lambda _: tuned(lambda x: plate(x, theory="mindlin"), low=5e-3, high=0.05, wanted=800.0),
-        "that of a thick plate is not known; take a thin one$",
+        "it is not available for a thick plate; take a thin one$",
         lambda _: tuned(plate, low=5e-3, high=0.05, wanted=800.0),
     ),
     "nothing made beside a value": (
@@ -91,7 +91,7 @@ DESIGNS = {  # what fails, the message, and what it advises
     ),
     "a range that ends too early": (
         lambda _: tuned(bar, wanted=2000.0),
-        "stopped at the end of the range: widen that$",
+        "stopped at the end of the range; widen it$",
         lambda _: tuned(bar, wanted=2000.0, high=0.1),
     ),
     "a start in the wrong place": (

@@ -67,12 +67,12 @@ def held(speed=1.0):
 GRADIENTS = {  # what fails, the message, and what it advises
     "energy of vectors": (
         lambda _: energy(body=system(), target="vectors"),
-        "the modes that ring did not tell the blow; strike modes, of find_modes$",
+        "the modes that ring did not carry the blow; strike modes of find_modes$",
         lambda _: energy(body=fi.find_modes(system(), n_modes=20)),
     ),
     "energy of other modes": (
         lambda _: struck().on(PLATE).gradient("modal_energy"),
-        "the modes that ring did not tell the blow; strike modes, of find_modes$",
+        "the modes that ring did not carry the blow; strike modes of find_modes$",
         lambda _: energy(),
     ),
     "grazing": (
@@ -82,7 +82,7 @@ GRADIENTS = {  # what fails, the message, and what it advises
     ),
     "no gap": (
         lambda _: slopes("peak_time", "contact.gap"),
-        "the bodies touch at the start, and no gap is unlike a small one; give a gap$",
+        "the bodies touch at the start, and even a small gap would change how they meet; give a gap$",
         lambda _: slopes("peak_time", "contact.gap", law=fi.Contact.linear(1e4, gap=1e-4)),
     ),
     "no loss": (
@@ -107,7 +107,7 @@ GRADIENTS = {  # what fails, the message, and what it advises
     ),
     "a hand": (
         lambda _: held().gradient("impulse"),
-        "take differences of runs with the number changed, told to a smaller tolerance$",
+        "take differences of runs with the number changed, at a smaller tolerance$",
         lambda _: differ(lambda step: held(1.0 + step)),
     ),
     "a speed of a body at rest against another": (

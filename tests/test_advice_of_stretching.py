@@ -90,7 +90,7 @@ STRETCHING = {
     ),
     "elements without slopes": (
         lambda: blow(elements(element="morley")),
-        "is unknown for element 'morley'; take 'argyris', or leave stretching out$",
+        "does not work with element 'morley'; take 'argyris', or leave stretching out$",
         [lambda: blow(elements(element="argyris")), lambda: linear(elements(element="morley"))],
     ),
     "a cantilever": (
@@ -118,7 +118,7 @@ STRETCHING = {
     ),
     "collocation": (
         lambda: blow(plate(), scheme="collocation"),
-        "knows no stretching; use A4$",
+        "does not support stretching; use A4$",
         [lambda: blow(plate(), scheme="A4")],
     ),
 }

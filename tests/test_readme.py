@@ -76,7 +76,7 @@ def test_python_example_of_uncertain_inputs_runs(monkeypatch, tmp_path, capsys):
     example = blocks(GUIDE, "python")[2].replace("spread.png", str(tmp_path / "spread.png"))
     names = {"fi": fi}
     exec(compile(example, "guide.md", "exec"), names)
-    assert "What should be measured better" in capsys.readouterr().out
+    assert "What to measure better" in capsys.readouterr().out
     assert names["found"].n_failed == 0 and (tmp_path / "spread.png").is_file()
 
 

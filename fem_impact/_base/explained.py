@@ -7,7 +7,7 @@ from collections.abc import Iterable
 HEADINGS: dict[str, tuple[str, ...]] = {
     "tolerance-missed": ("MISSED",),
     "not-resolvable": ("not resolvable",),
-    "number-of-impacts-in-doubt": ("how often the bodies touch cannot be told", "number in doubt"),
+    "number-of-impacts-in-doubt": ("the number of impacts cannot be determined", "number in doubt"),
     "no-final-separation": ("no final separation was reached",),
     "step-error-stays": ("the step error stays at",),
     "thin-target": ("thin target: ",),

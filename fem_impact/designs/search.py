@@ -92,7 +92,7 @@ class Design(check.Brief):
         if self.met:
             return f"design found: every goal within {self.tolerance:g}"
         worst = max(self.reached, key=lambda each: abs(each.miss))
-        held = f"; {', '.join(self.at_end)} stopped at the end of the range: widen that" if self.at_end else ""
+        held = f"; {', '.join(self.at_end)} stopped at the end of the range; widen it" if self.at_end else ""
         return (
             f"design MISSED: {worst.goal.label} is {worst.value:.6g}, wanted {worst.goal.words}"
             f"{held or '; free more numbers, or begin elsewhere, with start or tries'}"

@@ -189,7 +189,7 @@ def head(assumptions: Sequence[Assumption], tolerance: float) -> str:
 
 def _foreseen(assumptions: Sequence[Assumption], unsure: Sequence[Assumption]) -> str:
     doubtful = ", ".join(each.name for each in assumptions if each.doubtful)
-    first = f"the model is doubtful here: {doubtful}" if doubtful else "nothing is foreseen to fail in the model"
+    first = f"the model is doubtful here: {doubtful}" if doubtful else "no assumption of the model is expected to fail"
     return first + (f"; not known before the blow: {', '.join(each.name for each in unsure)}" if unsure else "")
 
 

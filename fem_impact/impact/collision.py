@@ -65,7 +65,7 @@ def strike(
 ) -> Response:
     """Strike a body with known modes; see `fi.strike`."""
     if speed is None and start is None:
-        raise ValueError("speed must be given in m/s, or start, which tells how the striker moves")
+        raise ValueError("speed must be given in m/s, or start, which says how the striker moves")
     speed = speed if speed is None else check.non_negative("speed", speed, "m/s")
     before = start.state() if isinstance(start, Response) else start
     forces = [

@@ -46,7 +46,7 @@ UNSURE = 5.0  # [-] times the error of when the force is largest: its top is fla
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 FEW, MANY = 2, 16  # [-] looks per step for the largest force, and for others nearly as large
 ZOOMS, ABOUT = 3, np.linspace(-1.0, 1.0, 17)  # how often and where about the largest of these looks it is looked for
-INSTEAD = "take differences of runs with the number changed, told to a smaller tolerance"
+INSTEAD = "take differences of runs with the number changed, at a smaller tolerance"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -177,7 +177,7 @@ def _check_possible(hit: "Response", wanted: list[tuple[str, float | None]], sec
         )
     if "modal_energy" in asked and (hit.rings is not None or hit.ringing is not None):
         raise SimulationError(
-            "no gradient of modal_energy: the modes that ring did not tell the blow; strike modes, of find_modes"
+            "no gradient of modal_energy: the modes that ring did not carry the blow; strike modes of find_modes"
         )
     if h.nearest_turn < GRAZE:
         raise SimulationError(
@@ -186,7 +186,7 @@ def _check_possible(hit: "Response", wanted: list[tuple[str, float | None]], sec
         )
     if any(name.startswith("peak") for name in asked) and (apart := _apart(h)) < TIE:
         raise SimulationError(
-            f"no gradient of the largest force: two maxima differ by {apart:.1e} of it, and a small change may make "
+            f"no gradient of the peak force: two maxima differ by {apart:.1e} of it, and a small change may make "
             "the other the largest"
         )
 

@@ -143,7 +143,9 @@ class Parameters(check.Brief):
         barred, hit = {}, self.hit
         for name, c in self.laws.items():
             if hit.contacts[c].gap == 0.0:
-                barred[f"{name}.gap"] = "the bodies touch at the start, and no gap is unlike a small one; give a gap"
+                barred[f"{name}.gap"] = (
+                    "the bodies touch at the start, and even a small gap would change how they meet; give a gap"
+                )
             sprung = hit.history.law[c, layout.COMPLIANCE] > 0.0 or self._ringing_alone
             if hit.contacts[c].loss == 0.0 and sprung:
                 barred[f"{name}.loss"] = (
@@ -206,10 +208,10 @@ class Parameters(check.Brief):
         if target.thick or target.air:
             return "a thick target, or one in air, does not scale by powers of its numbers"
         if isinstance(section, Plate) and (section.tension or section.material.E_across is not None):
-            return "tension and materials with a grain are not told from E; rescale modes instead"
+            return "the effect of E cannot be separated from that of tension or grain; rescale modes instead"
         held = () if system is None else system.supports.values()
         if any(isinstance(each, Elastic) for each in held) or (system is not None and system.point_masses):
-            return "springs and point masses on the target do not grow with it"
+            return "springs and point masses on the target do not scale with it"
         return ""
 
     @property

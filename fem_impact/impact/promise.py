@@ -79,7 +79,7 @@ def remedy(hit: "Response") -> str:
     if error.step > allowed:
         advice.append("leave dt and scheme to the program, or give a smaller dt")
     if not advice and error.total >= UNSURE:
-        return "how often the bodies touch cannot be told: give max_impacts = 1 for the first impact alone"
+        return "the number of impacts cannot be determined: give max_impacts = 1 for the first impact alone"
     return "; ".join(advice) or f"take a tolerance of {_above(error.total):g}"
 
 

@@ -112,7 +112,7 @@ class Totals:
 
     @property
     def contact_time(self) -> float:
-        """Total time in contact [s]."""
+        """Total contact time [s]."""
         return float(sum(impact.duration for impact in self.impacts))
 
     @property
@@ -523,7 +523,7 @@ class Response(Totals, check.Locked):
     def displacement(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
         """Displacement [m] of the target, (n_times, n_points); positive in the direction of the blow.
 
-        After a blow by Ritz vectors these tell the motion as long as they can (`motion_error`); otherwise modes do.
+        After a blow by Ritz vectors these give the motion as long as they can (`motion_error`); otherwise modes do.
 
         Parameters
         ----------
@@ -795,7 +795,7 @@ class Response(Totals, check.Locked):
         if self.n_impacts > 20:
             lines.append(f"  ... and {self.n_impacts - 20} more")
         if self.margin < CLEAR:
-            lines.append(f"margin {self.margin:.1g} of the deepest approach: so near is another number of impacts")
+            lines.append(f"margin {self.margin:.1g} of the deepest approach: that close to another number of impacts")
         total = self._balance["start"]
         shares = ", ".join(f"{name} {value / total:.2%}" for name, value in self.energies.items()) if total else "none"
         error = self.error

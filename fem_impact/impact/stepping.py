@@ -112,7 +112,7 @@ def refine_steps(system: ModalSystem, options: Options, pace: tuple[float, float
     scheme, least = options.scheme, float(system.law[:, layout.EXPONENT].min())
     if system.stretched is not None:
         if scheme == "collocation":
-            raise ValueError("scheme collocation knows no stretching; use A4")
+            raise ValueError("scheme collocation does not support stretching; use A4")
         scheme = scheme or "A4"
     scheme = scheme or scheme_for(options.tolerance, least)
     if scheme == "collocation" and least < 1.0:

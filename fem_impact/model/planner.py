@@ -162,7 +162,10 @@ class Plan(check.Brief):
 
     def strike(self, strict: bool = False) -> Response:
         """Run the plan and return the response only; ``strict`` as in `fi.strike`."""
-        return promise.kept(self.run().response, strict)
+        if self.seconds > progress.LONG:
+            return promise.kept(self.run().response, strict)
+        stretches = _Asked.checked(self.blow, self.changes).values["stretching"]
+        return promise.kept(fresh.answer(lambda: self.run().response, stretches), strict)
 
     @property
     def cost(self) -> str:
@@ -650,7 +653,7 @@ def _idealised(asked: _Asked, target: str | None, stages: Stages) -> Plan | None
     if blow.target.thick or blow.target.air or values["stretching"]:
         if target is not None:
             raise ValueError(
-                f"{blow.name}target = {target!r} is known for thin bodies in a vacuum that do not stretch; "
+                f"{blow.name}target = {target!r} is only for thin bodies in a vacuum that do not stretch; "
                 "use target = 'modal'"
             )
         return None
@@ -724,7 +727,7 @@ def _mixed(asked: _Asked, target: str | None, stages: Stages, heavy: bool = Fals
     if not resolved or seen is None or not np.isfinite(seen.mobility) or not seen.echo:
         if target is None:
             return None
-        why = _unfit(asked) if fits else "is known for thin plates in a vacuum, of which only the blow is asked for"
+        why = _unfit(asked) if fits else "is only for thin plates in a vacuum, and for the blow alone"
         raise ValueError(f"{blow.name}target = 'mixed' {why}; use target = 'modal'")
     highest = _highest(asked, seen.mobility)
     if target is None and mixed.LASTING * asked.mass * seen.mobility > mixed.LONGEST * asked.duration:
@@ -813,10 +816,10 @@ def _unfit(asked: _Asked) -> str:
     """Why a target cannot be treated as rigid or infinite without its modes."""
     target = asked.blow.target
     if target.mesh is None or target.mesh.dimension == 1:
-        return "is not known for this body"
+        return "is not available for this body"
     if "first_frequency" in target.scale:
         return "needs E, nu, rho and thickness: first_frequency gives the rigidity only once the modes are known"
-    return "is known for plates of constant thickness only, without tension, point masses and point supports"
+    return "is only for plates of constant thickness, without tension, point masses and point supports"
 
 
 def _fewer(asked: _Asked, first: Modes, banded: bool) -> str:
@@ -895,10 +898,7 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
     reason = f"argyris elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"
     if asked.moving:
-        reason += (
-            "; the vectors give the motion as long as they can, modes driven by the force found give later motion "
-        )
-        reason += "and the sound"
+        reason += "; the vectors give the early motion, modes driven by the computed force the rest and the sound"
     work = cost.by_vectors([blow.target.unknowns(at, each, stages) for each in meshes], count, lasts)
     if asked.moving:
         rings = _ringing_count(asked)
@@ -1157,7 +1157,8 @@ def strike(
         "n_impacts". Others: "spectrum=5000", the force spectrum up to 5 kHz relative to its largest value, and
         "sound=5000".
     residual : bool
-        Whether the residual compliance acts; False takes the modes alone for the body, and no error tells of others.
+        Whether the residual compliance acts; False takes the modes alone for the body, and no error covers the
+        others.
     duration : float [s], optional
         Time at which the run stops at the latest.
     max_impacts : int, optional
@@ -1198,7 +1199,6 @@ def strike(
     >>> hit.n_impacts, round(hit.restitution, 2), hit.error.total < 1e-3
     (1, 0.55, True)
     """
-    short = not (options.get("stretching") or getattr(modes, "stretches", False))  # as plain Python, too
     if isinstance(modes, Modes) and damping_ratio is None and not set(options) & set(PIECES):
         run = partial(collision.strike, modes, striker, contact, at=at, speed=speed)
 
@@ -1206,7 +1206,8 @@ def strike(
             first = run(**options)
             return audit.audited(within(first.tolerance, first, run, options))
 
-        return promise.kept(fresh.answer(told, short), strict)
+        stretches = bool(options.get("stretching")) or modes.stretches
+        return promise.kept(fresh.answer(told, stretches), strict)
     if options.pop("start", None) is not None or speed is None:
         raise ValueError(
             "start needs modes, taken as they are: give those of the blow before, hit.target, and no part of a plan"
@@ -1214,4 +1215,4 @@ def strike(
     plan = plan_of(modes, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options)
     if plan.seconds > progress.LONG:
         progress.SLOW.info("striking takes %s", plan.cost)
-    return promise.kept(fresh.answer(lambda: plan.run().response, short and plan.seconds < progress.LONG), strict)
+    return plan.strike(strict)

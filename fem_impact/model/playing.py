@@ -220,10 +220,10 @@ class Strokes(Totals, check.Locked):
             lines.append(f"  ... and {self.n_impacts - LISTED} more")
         told = ", ".join(f"{name} {value:.4g} J" for name, value in self.energies.items())
         lines += [
-            f"contact time {self.contact_time * 1e3:.5g} ms, largest force {self.peak_force:.5g} N, impulse "
+            f"contact time {self.contact_time * 1e3:.5g} ms, peak force {self.peak_force:.5g} N, impulse "
             f"{self.impulse:.5g} N s",
             f"energy {told}",
-            f"the last blow: {self.hits[-1].outcome}",
+            f"after the last blow: {self.hits[-1].outcome}",
         ]
         return "\n".join([*lines, *noted(self.notes)])
 

@@ -228,7 +228,7 @@ def _loose(points: np.ndarray, cells: np.ndarray | None, values: np.ndarray, mas
             )
         if rigid is None:
             raise ValueError(
-                "free needs points that span the body, to tell its rigid motions; give these as modes of 0 Hz instead"
+                "free needs points that span the body, to find its rigid motions; give these as modes of 0 Hz instead"
             )
         return rigid
     if share >= unstated.HELD:

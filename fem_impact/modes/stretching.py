@@ -37,7 +37,7 @@ HELD = "clamped", "hinged", SOFT  # supports that hold an edge in the plane, too
 MOST = 40
 COARSEST = 0.25  # [-] triangles of a plate known by formulas over its shorter side: 1e-4 too stiff in its first mode
 NODES = 40  # [-] Gauss points along a radius or a beam, and one more for each radian of the highest mode: six per wave
-CANNOT = "stretching=True is known for plates, held or free along their edges, and beams held at both ends"
+CANNOT = "stretching=True works for plates, held or free along their edges, and for beams held at both ends"
 ELASTIC = "its edge is elastic, which does not say how its plane is held"
 
 
@@ -97,7 +97,7 @@ def _checked(system: System) -> None:
     if system.mesh.dimension == 1 and not set(kinds) <= set(HELD):
         raise ValueError(f"{CANNOT}, but an end is free; hold it, or leave stretching out")
     if system.element == "morley":
-        raise ValueError("stretching=True is unknown for element 'morley'; take 'argyris', or leave stretching out")
+        raise ValueError("stretching=True does not work with element 'morley'; take 'argyris', or leave stretching out")
 
 
 def _sheet(shapes: Shapes, section: Plate) -> tuple[membrane.Sheet, membrane.Steep]:

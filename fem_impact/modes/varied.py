@@ -28,7 +28,7 @@ def solution(modes: Modes) -> FieldShapes:
     if not isinstance(modes.shapes, FieldShapes):
         raise SimulationError("no derivative in the section: it needs modes of finite elements, of find_modes")
     if modes.thick and modes.dimension == 2:
-        raise SimulationError("no derivative in the section: that of a thick plate is not known; take a thin one")
+        raise SimulationError("no derivative in the section: it is not available for a thick plate; take a thin one")
     return modes.shapes
 
 

@@ -130,7 +130,7 @@ class Explorer:
         case = self.setup.case(settings)
         for point in (settings.at, where)[: 1 if height > 0.0 else 2]:
             if self.setup.at_rest(point):
-                return {"uri": "", "note": f"Nothing is heard: the body does not move at {place(point)}."}
+                return {"uri": "", "note": f"Silent: the body does not move at {place(point)}."}
         try:
             rung = blow(case, self.setup.tolerance) if rate is None else rolled(case, rate)
             if height > 0.0:

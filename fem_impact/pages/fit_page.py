@@ -70,7 +70,7 @@ def profiles(found: Found) -> Any:
             axes.set_ylim(0.0, SHOWN)
             unit = unit_of(name)
             axes.set_title(f"{name}{f' [{unit}]' if unit else ''}")
-            said = {"open": "not told", "limited": "one limit only"}.get(profile.told)
+            said = {"open": "not determined", "limited": "one limit only"}.get(profile.told)
             if said:
                 axes.text(0.5, 0.85, said, transform=axes.transAxes, ha="center", color=VERMILION)
         for axes in all_axes[len(names) :]:
@@ -145,7 +145,7 @@ def write(
         tiles=[
             ("taps used", str(len(found.used))), ("rms residual", f"{100 * found.error:.2g} %"),
             ("left-out taps, worst", max(left_out, key=lambda text: float(text[:-2])) if left_out else "one tap only"),
-            ("whiteness", f"{found.whiteness:.2g}"), ("not told", str(len(found.unidentifiable))),
+            ("whiteness", f"{found.whiteness:.2g}"), ("not determined", str(len(found.unidentifiable))),
             ("taps that disagree", ", ".join(found.outliers) or "none"),
         ],
         pictures={name: _uri(draw(found)) for name, draw in

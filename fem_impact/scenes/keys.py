@@ -124,7 +124,7 @@ KEYS: dict[str, tuple[str, Form]] = {
     "E_across": ("Pa, of wood: Young's modulus across the grain", POSITIVE),
     "G": ("Pa, of wood: shear modulus", POSITIVE),
     "angle": ("rad, of wood: direction of the grain from the x axis", NUMBER),
-    "yield_strength": ("Pa, in tension; tells whether the contact dents", POSITIVE),
+    "yield_strength": ("Pa, in tension; above it the contact leaves a dent", POSITIVE),
     "contact.between.yield_strength": ("Pa, of the softer body; with it the contact may yield", POSITIVE),
     "G_xz": ("Pa, of wood: shear modulus through the thickness along the grain, for thick plates", POSITIVE),
     "G_yz": ("Pa, of wood: shear modulus through the thickness across the grain, for thick plates", POSITIVE),

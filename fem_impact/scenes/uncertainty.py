@@ -175,7 +175,7 @@ def _grouped(sobol: bool | None, mixer: Any, n: int, n_inputs: int) -> tuple[boo
     if sobol is False:
         return False, ""
     if mixer is not None:
-        why = "the inputs are correlated, so that no share of the variance belongs to one input alone"
+        why = "the inputs are correlated, so no share of the variance belongs to one input alone"
     elif n < 2 * (n_inputs + 2):
         why = f"n must be at least {2 * (n_inputs + 2)} for {n_inputs} inputs"
     else:

@@ -20,7 +20,7 @@ from .store import LARGEST_BLOCK, Texts, Watch, block_size, by_cluster, by_store
 LOG = logging.getLogger(__name__)
 LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
     "n_impacts": ("", "number of separate contacts"),
-    "contact_time": ("s", "total time in contact"),
+    "contact_time": ("s", "total contact time"),
     "restitution": ("", "minus the speed after the blow over the speed before, at the contact point; NaN in contact"),
     "impulse": ("N s", "total impulse of the contact force"),
     "peak_force": ("N", "largest contact force"),

@@ -221,8 +221,7 @@ class Spread(check.Brief):
             counts = self.values("n_impacts")
             lines.append(
                 f"The number of impacts varies from {counts.min():.0f} to {counts.max():.0f}: such blows are chaotic. "
-                "What a single one will do cannot be told from inputs that are known this well; "
-                "their statistics, as above, can."
+                "With inputs known only this well, no single one can be predicted; their statistics, as above, can."
             )
         return "\n".join([*lines, "", *self._advice(), *self._honest()])
 
@@ -243,7 +242,7 @@ class Spread(check.Brief):
         if not self.varying:
             return ["Nothing varies: no input matters here."]
         kind = "total Sobol index" if self.shares else "square of the rank correlation"
-        lines = [f"What should be measured better ({kind}: share of the variance that an input takes part in):"]
+        lines = [f"What to measure better ({kind}: share of the variance in which an input is involved):"]
         twice = not self.chaotic or self.values("n_impacts").max() <= 2
         for quantity in self.varying:
             if quantity == DOUBLE and twice:  # the number of impacts says the same
@@ -275,7 +274,7 @@ class Spread(check.Brief):
                 f"{self.checks.model:.1g}{unknown}"
             )
         for name, error in self.rescaled.items():
-            lines.append(f"{name}: modes were rescaled; a body made anew differs by at most {error:.1e}")
+            lines.append(f"{name}: modes were rescaled; a rebuilt body differs by at most {error:.1e}")
         return lines + noted(self.notes)
 
     def data(self) -> dict[str, Any]:
@@ -312,5 +311,5 @@ def double_hits(found: Spread) -> str:
     """The chance of a double hit and its interval in words."""
     share = found.chance()
     if share.value == 0.0:
-        return f"none seen, at most {100 * share.high:.2g} %"
+        return f"none observed, at most {100 * share.high:.2g} %"
     return f"{100 * share.value:.3g} % ({100 * share.low:.3g} to {100 * share.high:.3g} %)"

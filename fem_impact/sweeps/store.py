@@ -192,8 +192,8 @@ def fingerprint(grid: Any) -> Mark:
             functions[name] = identity.of(function)
         except ValueError as error:
             raise ValueError(
-                f"layers: {name!r} cannot be told from other functions ({error}), so that a store may mix them up; "
-                "leave out store, or pass a function that does not use it"
+                f"layers: {name!r} cannot be distinguished from other functions ({error}), so a store may mix "
+                "them up; leave out store, or pass a function that does not use it"
             ) from None
     return {"map": body.hexdigest(), "functions": identity.of(functions), "program": identity.program()}
 

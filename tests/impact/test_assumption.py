@@ -63,7 +63,7 @@ def test_before_the_blow_only_numbers_are_known():
     assert head == "the model is doubtful here: thin target"
     assert line.startswith("thin target: thickness over wave 0.5; above 0.2 it matters")
     assert foreseen[0].state == "foreseen"
-    assert assumption.lines(foreseen[1:], 1e-4) == ["nothing is foreseen to fail in the model"]
+    assert assumption.lines(foreseen[1:], 1e-4) == ["no assumption of the model is expected to fail"]
 
 
 @pytest.mark.parametrize(

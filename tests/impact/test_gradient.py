@@ -542,7 +542,7 @@ def test_gradients_are_right_on_both_sides_until_they_are_refused(family):
         found = grazing.look(family, value, distance)
         if abs(distance) < 1e-4:
             assert found.why.startswith("no gradient next to a grazing contact" if family.seed == 3 else
-                                        "no gradient of the largest force: two maxima")  # fmt: skip
+                                        "no gradient of the peak force: two maxima")  # fmt: skip
         else:
             # differences of fourth order over a twentieth of the distance: 1e-5 of a slope that goes as its root
             assert found.off < 1e-5, distance

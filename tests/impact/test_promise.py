@@ -120,7 +120,7 @@ def test_impacts_that_cannot_be_told_leave_the_first_one():
     hit = fi.strike(system, HAMMER, SOFT, **blow)
     unsure = replace(hit, error=replace(hit.error, truncation=1.0))
     assert unsure.promise.endswith(
-        "; how often the bodies touch cannot be told: give max_impacts = 1 for the first impact alone"
+        "; the number of impacts cannot be determined: give max_impacts = 1 for the first impact alone"
     )
     assert fi.strike(system, HAMMER, SOFT, max_impacts=1, strict=True, **blow).tolerance_met
 

@@ -215,7 +215,7 @@ def test_error_estimates_hold():
 
 
 def test_collocation_and_bodies_that_cannot_are_refused():
-    with pytest.raises(ValueError, match="collocation knows no stretching; use A4"):
+    with pytest.raises(ValueError, match="collocation does not support stretching; use A4"):
         blow(plate(4), fi.Contact.linear(1e5), scheme="collocation")
     with pytest.raises(ValueError, match="its section is not known"):
         scaled = fi.analytic.rectangle(0.2, 0.2, mass=1.0, first_frequency=100.0, n_modes=4)

@@ -25,7 +25,7 @@ def test_a_number_of_impacts_that_the_modes_left_out_may_change_is_doubted_aloud
     few, many = (fi.strike(plate(n), *how, **blow, tolerance=1e-2) for n in (40, 3000))
     assert few.n_impacts == 1 and many.n_impacts == 2
     assert many.tolerance_met and not few.tolerance_met
-    assert "how often the bodies touch" in few.verdict or "modes" in few.verdict
+    assert "number of impacts cannot be determined" in few.verdict or "modes" in few.verdict
     averaged = fi.strike(plate(40), *how, **blow, tolerance=1e-2, quantity="impulse")
     assert averaged.error.total < few.error.total  # what does not ask for the number is not told to doubt it
 

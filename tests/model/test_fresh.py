@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -32,9 +34,9 @@ class Compiler:
         self.begun += 1
         return [sys.executable, "-c", "import time; time.sleep(60)"], dict(os.environ)
 
-    def stop(self):
+    def stop(self, name="follow"):
         """Kill it, and wait until its mark is gone."""
-        process = fresh._begun(self.mark)
+        process = fresh._begun(self.mark, ("energy", name, ()))
         process.kill()
         until = time.monotonic() + 60.0
         while self.mark.exists() and time.monotonic() < until:
@@ -44,11 +46,9 @@ class Compiler:
 
 @pytest.fixture
 def compiler(monkeypatch, tmp_path):
-    """As after an installation: no kernel known, none on disk."""
+    """As after an installation, for what asks `lacking`."""
     one = Compiler(tmp_path / "kernels" / fresh.MARK)
     monkeypatch.delenv(fresh.SWITCH, raising=False)
-    monkeypatch.setattr(fresh, "energy", SimpleNamespace(follow=SimpleNamespace(overloads={})))
-    monkeypatch.setattr(build, "kept", lambda _: False)
     monkeypatch.setattr(build, "folder", lambda _: one.mark.parent)
     monkeypatch.setattr(fresh, "child", one)
     fresh._begun.cache_clear()
@@ -58,16 +58,23 @@ def compiler(monkeypatch, tmp_path):
     fresh._begun.cache_clear()
 
 
-def limited(**outcome):
+def lacking(name="follow"):
+    """Do as a kernel that is not on disk; whether it runs as plain Python."""
+    if build.QUICK.get() == build.REFUSED:
+        raise build.Uncompiled("energy", name, ())
+    return build.limited()
+
+
+def limited(name="follow", **outcome):
     """What `fresh.answer` returns of a function that tells whether it runs as plain Python."""
     said = {"tolerance_met": True, **outcome}
-    return fresh.answer(lambda: SimpleNamespace(plain=build.limited(), **said), True).plain
+    return fresh.answer(lambda: SimpleNamespace(plain=lacking(name), **said), False).plain
 
 
 def test_the_first_blow_is_plain_and_meets_its_tolerance(compiler, monkeypatch):
     plain: list[bool] = []
     run_energy = engine.run_energy
-    monkeypatch.setattr(engine, "run_energy", lambda *them: plain.append(build.limited()) or run_energy(*them))
+    monkeypatch.setattr(engine, "run_energy", lambda *them: plain.append(lacking()) or run_energy(*them))
     known, n_runs = half_sine(), len(plain)
     assert all(plain) and n_runs and compiler.begun == 1
     compiler.stop()
@@ -83,6 +90,8 @@ def test_one_process_compiles_however_many_blows_wait(compiler):
     assert compiler.begun == 1
     compiler.stop()
     assert not limited() and compiler.begun == 1  # one that failed is not begun again
+    assert limited("another") and compiler.begun == 2
+    compiler.stop("another")
 
 
 def test_a_process_of_others_that_compiles_is_enough(compiler):
@@ -94,17 +103,28 @@ def test_a_process_of_others_that_compiles_is_enough(compiler):
     assert limited() and compiler.begun == 1
 
 
-def test_what_takes_long_or_misses_the_tolerance_is_compiled(compiler):
-    assert not fresh.answer(lambda: SimpleNamespace(plain=build.limited(), tolerance_met=True), False).plain
-    assert compiler.begun == 0
+def test_what_is_compiled_already_is_used(compiler):
+    assert not fresh.answer(lambda: SimpleNamespace(plain=build.limited()), False).plain and compiler.begun == 0
+
+
+def test_what_takes_many_steps_or_misses_the_tolerance_is_compiled(compiler):
     assert not limited(tolerance_met=False)
 
     def endless():
-        if build.limited():
+        if lacking():
             raise fi.SimulationError("no final separation")
         return "compiled"
 
-    assert fresh.answer(endless, True) == "compiled"
+    assert fresh.answer(endless, False) == "compiled"
+
+
+def test_only_plans_that_take_long_are_compiled_at_once(monkeypatch):
+    stretches: list[bool] = []
+    monkeypatch.setattr(fresh, "answer", lambda compute, stretched: stretches.append(stretched) or compute())
+    plan = fi.plan(Path(__file__).parents[2] / "studies" / "scenes" / "heavy_plate.toml")
+    for seconds in (plan.seconds, 1e3):
+        replace(plan, seconds=seconds).strike()
+    assert stretches == [False]
 
 
 @pytest.mark.parametrize("value", ["0", "1"])
@@ -130,23 +150,33 @@ def test_runs_of_a_first_blow_give_up_early():
     assert not build.limited() and build.most_steps(100) == 100
 
 
+KINDS = {"energy": "", "collocation": ", scheme='collocation'", "stretching": ", stretching=True"}
+
+
 @pytest.mark.slow
-def test_after_the_first_blow_everything_is_on_disk(tmp_path):
+def test_after_the_first_blow_of_a_kind_it_is_on_disk(tmp_path):
     """The process goes on when the one that began it has ended; the next process only reads."""
     code = (
-        "import fem_impact as fi; from fem_impact.impact.compiled import energy\n"
-        "hit = fi.strike(fi.Modes.rigid(1.0), fi.Striker.rigid(1.0), fi.Contact.linear(1e5), at=None, speed=1.0)\n"
-        "print(len(energy.follow.overloads), sum(energy.follow.stats.cache_hits.values()))"
+        "import fem_impact as fi; from fem_impact.impact.compiled import collocation, energy\n"
+        "section = fi.Plate(fi.Material(E=210e9, nu=0.3, rho=7850.0), 1e-3)\n"
+        "plate = fi.analytic.rectangle(0.2, 0.3, section=section, n_modes=20)\n"
+        "how = dict(at=(0.09, 0.13), speed=1.0, tolerance=1e-2)\n"
+        "hit = fi.strike(plate, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), **how{})\n"
+        "print([sum(each.follow.stats.cache_hits.values()) for each in (energy, collocation)])"
     )
     environment = {name: value for name, value in os.environ.items() if name != fresh.SWITCH}
     environment["NUMBA_CACHE_DIR"] = str(tmp_path)
 
-    def strike():
-        run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-        return run.stdout.split()
+    def strike(kind):
+        run = [sys.executable, "-W", "error", "-c", code.format(KINDS[kind])]
+        return subprocess.run(run, env=environment, capture_output=True, text=True, check=True).stdout
 
-    assert strike() == ["0", "0"]
-    until = time.monotonic() + 400.0
-    while list(tmp_path.rglob(fresh.MARK)) and time.monotonic() < until:
+    for kind, found in ("energy", [1, 0]), ("collocation", [0, 1]), ("stretching", [1, 0]):
+        assert strike(kind) == "[0, 0]\n"  # as plain Python
+        until = time.monotonic() + 400.0
+        while list(tmp_path.rglob(fresh.MARK)) and time.monotonic() < until:
+            time.sleep(0.2)
+        assert strike(kind) == f"{found}\n"  # read from disk
+    while not list(tmp_path.rglob("many_blows.run*.nbc")) and time.monotonic() < until:
         time.sleep(0.2)
-    assert strike() == ["1", "1"]  # read from disk
+    assert list(tmp_path.rglob("many_blows.run*.nbc"))  # what maps need comes next

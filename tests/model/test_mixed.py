@@ -103,8 +103,8 @@ def test_ball_on_a_thin_sheet_is_planned_in_both_ways():
 @pytest.mark.parametrize(
     "asked, words",
     [
-        ({"quantity": "sound=1000"}, "is known for thin plates in a vacuum, of which only the blow is asked for"),
-        ({"stretching": True}, "is known for thin plates in a vacuum, of which only the blow is asked for"),
+        ({"quantity": "sound=1000"}, "is only for thin plates in a vacuum, and for the blow alone"),
+        ({"stretching": True}, "is only for thin plates in a vacuum, and for the blow alone"),
     ],
 )
 def test_what_it_does_not_know_is_refused(asked, words):
@@ -116,7 +116,7 @@ def test_beam_is_refused():
     beam = fi.assemble(
         fi.mesh.line(0.4), fi.Beam(STEEL, width=0.02, height=1e-3), {"left": "hinged", "right": "hinged"}
     )
-    with pytest.raises(ValueError, match=r"target = 'mixed' is not known for this body; use target = 'modal'$"):
+    with pytest.raises(ValueError, match=r"target = 'mixed' is not available for this body; use target = 'modal'$"):
         fi.plan(beam, BALL, HARD, at=0.13, speed=1.0, target="mixed")
 
 

@@ -179,7 +179,7 @@ def test_where_the_body_does_not_move_nothing_is_heard(explorer, monkeypatch):
     silent = [(settings, middle.at, 0.0), (settings, middle.at, 1.0), (middle, (0.0, 0.0), 0.0)]
     for struck, where, height in silent:
         sound = explorer.listen(struck, where, height, None)
-        assert sound["uri"] == "" and sound["note"].startswith("Nothing is heard: the body does not move at (0, 0)")
+        assert sound["uri"] == "" and sound["note"].startswith("Silent: the body does not move at (0, 0)")
 
 
 def test_one_page_that_asks_for_much_does_not_make_another_wait(explorer, monkeypatch):

@@ -158,7 +158,7 @@ def test_a_body_whose_modes_do_not_just_scale_says_the_error(scene):
     text = RIGID.replace("thickness = 3e-3", "thickness = 3e-3\ntension = 2e4")
     found = fi.spread(scene(text), {"section.thickness": ("normal", 3e-3, 3e-4)}, n=8, sobol=False, tolerance=1e-2)
     assert found.rescaled["section.thickness"] > 1e-2
-    assert "section.thickness: modes were rescaled; a body made anew differs" in found.summary()
+    assert "section.thickness: modes were rescaled; a rebuilt body differs" in found.summary()
 
 
 def test_a_contact_between_bodies_follows_its_materials(scene):
@@ -309,7 +309,7 @@ def test_the_prompt_writes_numbers_and_a_picture_and_says_what_to_measure(scene,
              "--out", str(out)]  # fmt: skip
     assert cli.main(words) == 0
     text = capsys.readouterr().out
-    assert "What should be measured better" in text and "A ball on a plate" in text
+    assert "What to measure better" in text and "A ball on a plate" in text
     assert sorted(p.name for p in out.glob("[!.]*")) == ["spread.csv", "spread.json", "spread.nc", "spread.png"]
     data = json.loads((out / "spread.json").read_text())
     assert data["inputs"]["contact.stiffness"] == "lognormal(100000, 0.2)" and data["correlation"][0][1] == 0.3

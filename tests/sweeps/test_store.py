@@ -119,7 +119,7 @@ def test_a_store_keeps_the_results_of_its_functions_only(tmp_path):
     with pytest.raises(ValueError, match=r"store holds another map \(other functions in layers\)"):
         sweep(**made(2.0))
     lines, wanted = (line for line in "ab"), {"over": {"mass": [0.1]}}
-    told = r"layers: 'q' cannot be told from other functions \(it uses an object of type builtins.generator\)"
+    told = r"layers: 'q' cannot be distinguished from other functions \(it uses an object of type builtins.generator\)"
     with pytest.raises(ValueError, match=told):
         sweep(layers={"q": lambda hit: len(next(lines))}, store=tmp_path / "other", **wanted)
     assert not (tmp_path / "other").exists()

@@ -32,7 +32,9 @@ SPOILT = (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError
 PLAIN = "plain"  # name of the copy in which nothing is compiled
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"  # else as plain Python, without the import of numba
 COMPILED &= not __name__.endswith(f".{PLAIN}.build")
-QUICK: ContextVar[float] = ContextVar("QUICK", default=0.0)  # [-] most steps of a run; 0: it may compile
+# [-] most steps of a run as plain Python; 0 where kernels may be compiled, REFUSED where none may that takes LONG
+QUICK: ContextVar[float] = ContextVar("QUICK", default=0.0)
+REFUSED = -1.0
 if COMPILED:
     READ_BEFORE = "numba" in sys.modules
     from numba import config, njit
@@ -70,9 +72,13 @@ def _stamp() -> str:
 STAMP = _stamp()
 
 
+class Uncompiled(Exception):
+    """A kernel would have to be compiled: its module, its name and the types of its arguments."""
+
+
 @contextmanager
 def uncompiled(most: float = np.inf) -> Iterator[None]:
-    """Compile nothing meanwhile, and let runs give up after ``most`` steps."""
+    """Compile nothing meanwhile, and let runs give up after ``most`` steps; if REFUSED, raise `Uncompiled`."""
     token = QUICK.set(most)
     try:
         yield
@@ -106,16 +112,15 @@ def plain(kernel: Any) -> Any:
 
 if COMPILED:
 
-    class _Uncompiled(Exception):
-        """A kernel would have to be compiled."""
-
     class _Kernel(CPUDispatcher):
         """A kernel that runs as plain Python where nothing is to be compiled."""
 
         def __call__(self, *arguments: Any) -> Any:
             try:
                 return super().__call__(*arguments)
-            except _Uncompiled:
+            except Uncompiled:
+                if QUICK.get() == REFUSED:
+                    raise
                 return plain(self)(*arguments)
 
     class _Flags(compiler.Flags):
@@ -267,8 +272,8 @@ def outer(allocates: bool = True, seconds: float = 0.0, **options: Any) -> Any:
         compile_it = kernel._compiler.compile
 
         def compile_unless_quick(*signature: Any) -> Any:
-            if QUICK.get():
-                raise _Uncompiled
+            if QUICK.get() > 0.0 or (QUICK.get() == REFUSED and seconds > LONG):
+                raise Uncompiled(function.__module__, function.__name__, signature[0])
             if seconds > LONG:
                 LOG.info("compiling the inner loops of this kind of blow, once: about %g s of computing", seconds)
             with _hastened():
@@ -308,11 +313,3 @@ def inner(allocates: bool = False, arrays: Any = None, part: bool = False, **opt
 def folder(kernel: Any) -> Path | None:
     """Where a kernel from `outer` is kept on disk; None if it is not compiled."""
     return Path(kernel.stats.cache_path) if COMPILED else None
-
-
-def kept(kernel: Any) -> bool:
-    """Whether a kernel from `outer` that is still good lies on disk."""
-    try:
-        return COMPILED and bool(kernel._cache._cache_file._load_index())
-    except SPOILT:
-        return False
