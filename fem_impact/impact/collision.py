@@ -13,7 +13,7 @@ from . import accuracy, distance, engine, promise, variation
 from .contact import Contact
 from .engine import TOLERANCE
 from .history import ModalSystem
-from .part import Part, ends_of, joined, part_of
+from .reduced_body import ReducedBody, ends_of, joined, part_of
 from .response import Error, Response
 from .state import State
 from .stepping import Options, refine_steps
@@ -86,7 +86,7 @@ def strike(
         arriving = part_of(striker.body, ((0, 1.0),), striker.at[None], striker.shape[None], rest, forces[0])
         arriving = replace(arriving, bias=arriving.bias + striker.push, held=int(striker.hand is not None))
 
-        def start(one: float = 1.0, other: float = 1.0) -> list[Part]:
+        def start(one: float = 1.0, other: float = 1.0) -> list[ReducedBody]:
             """Both bodies at the start, each as fast as it is known times a factor."""
             target = struck.faster(other)
             if own is None:  # the striker arrives at the surface, wherever that is
@@ -250,8 +250,8 @@ def _check_way(system: ModalSystem, depth: float, tolerance: float) -> None:
         )
 
 
-def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[Part], float]:
-    """Every body as a `Part`, and the speed of the first body that moves."""
+def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[ReducedBody], float]:
+    """Every body as a `ReducedBody`, and the speed of the first body that moves."""
     if states is not None:
         wrong = not isinstance(states, (list, tuple)) or len(states) != len(bodies)
         if wrong or any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in states):

@@ -97,7 +97,7 @@ def steps_for(
 
 
 @dataclass(frozen=True, eq=False)
-class Refined:
+class Converged:
     """Two runs that agree, the finer one with its estimated errors."""
 
     scheme: str
@@ -107,7 +107,7 @@ class Refined:
     error: Distances  # of the finer run
 
 
-def refine_steps(system: ModalSystem, options: Options, pace: tuple[float, float]) -> Refined:
+def refine_steps(system: ModalSystem, options: Options, pace: tuple[float, float]) -> Converged:
     """Refine until two successive runs agree to the tolerance; ``pace`` as of `engine.pace_of`."""
     scheme, least = options.scheme, float(system.law[:, layout.EXPONENT].min())
     if system.stretched is not None:
@@ -145,7 +145,7 @@ class _Control:
         last = self.options.horizon, self.options.n_max
         return engine.follow(self.system, self.scheme, size, self.pace, *last, chosen_by)
 
-    def judged(self, sizes: tuple[float, float], coarse: History, fine: History) -> Refined:
+    def judged(self, sizes: tuple[float, float], coarse: History, fine: History) -> Converged:
         """Two runs of a finer and a coarser size, and the errors of the finer one."""
         over = RICHARDSON[self.scheme]
         if self.scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
@@ -155,9 +155,9 @@ class _Control:
             error["force"] = max(error["force"], fine.force_missed)
         margin, least = min(1.0, SURELY * error.pop(MARGIN)), CHANCE * distance.worst(error)
         error = {name: max(least, float(x)) for name, x in error.items()} | {MARGIN: margin}
-        return Refined(self.scheme, sizes, fine, coarse, error)
+        return Converged(self.scheme, sizes, fine, coarse, error)
 
-    def refined(self) -> Refined:
+    def refined(self) -> Converged:
         """The first pair of runs that agrees."""
         options, tolerance = self.options, self.options.tolerance
         if options.dt is not None:

@@ -12,8 +12,8 @@ from .compiled import record
 from .contact import Contact
 from .distance import Distances
 from .history import History, ModalSystem
-from .part import Part, joined
-from .stepping import RINGING, Options, Refined
+from .reduced_body import ReducedBody, joined
+from .stepping import RINGING, Converged, Options
 
 RESOLVABLE = 0.3  # [-] largest contact stiffness times residual compliance for which the error estimate holds
 # [-] An error estimate below 30 % of the predicted one is replaced by that 30 %, because two runs can agree by chance;
@@ -29,14 +29,14 @@ NEGLIGIBLE = 1e-4  # [-] mesh errors below this fraction of the tolerance need n
 class Followed:
     """A blow whose steps were refined, ready to be followed again with something changed."""
 
-    parts: Sequence[Part]
+    parts: Sequence[ReducedBody]
     laws: Sequence[Contact]
     system: ModalSystem
     options: Options
     pace: tuple[float, float]  # as of `engine.pace_of`
-    runs: Refined
+    runs: Converged
 
-    def again(self, parts: Sequence[Part], *, finely: bool = False) -> History:
+    def again(self, parts: Sequence[ReducedBody], *, finely: bool = False) -> History:
         """The blow with these bodies, in the steps of the coarser run or, on request, of the finer."""
         system, size = joined(parts, self.laws), self.runs.steps[0 if finely else 1]
         return engine.follow(system, self.runs.scheme, size, self.pace, self.options.horizon, self.options.n_max)
@@ -45,7 +45,7 @@ class Followed:
         """The distance between two of its runs."""
         return distance.of_runs(one, two, self.options.quantities)
 
-    def changed(self, body: int, part: Part) -> list[Part]:
+    def changed(self, body: int, part: ReducedBody) -> list[ReducedBody]:
         """The bodies, with one of them changed."""
         return [*self.parts[:body], part, *self.parts[body + 1 :]]
 
@@ -62,7 +62,7 @@ class Variation:
 
     cause: str  # a field of `Error`
     # the bodies as changed, and the error over the effect: of ways to make one change the worst counts, and all add up
-    changes: Sequence[Sequence[tuple[Sequence[Part], float]]]
+    changes: Sequence[Sequence[tuple[Sequence[ReducedBody], float]]]
     least: float = 0.0  # [-] error at least, because two runs can agree by chance
 
 
@@ -93,7 +93,7 @@ def modes_left_out(blow: Followed, told: Sequence[bool]) -> tuple[Variation, boo
         return Variation("truncation", ()), True
     omega_0 = np.pi / blow.pace[0]
     softness, expected = np.zeros(len(blow.laws)), 0.0
-    changes: list[list[tuple[Sequence[Part], float]]] = [[] for _ in blow.parts]
+    changes: list[list[tuple[Sequence[ReducedBody], float]]] = [[] for _ in blow.parts]
     for i, (part, known) in enumerate(zip(blow.parts, told)):
         above = omega_0 / max(omega_0, part.omega[-1])
         for (k, _), rest in zip(part.touched, np.diag(part.rest)):

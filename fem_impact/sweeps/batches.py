@@ -12,7 +12,7 @@ import numpy as np
 from ..impact.compiled import bundles, convolution, many_blows, propagation
 from ..impact.contact import wall_time
 from ..impact.distance import distance
-from ..impact.part import rest_mode
+from ..impact.reduced_body import rest_mode
 from ..impact.stepping import RESOLVED
 from ..impact.striker import Striker
 from ..modes.modal import Modes

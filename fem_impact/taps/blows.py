@@ -17,7 +17,7 @@ from ..impact.compiled.bundles import KernelSystem, Limits
 from ..impact.compiled.energy import run_energy
 from ..impact.contact import Contact
 from ..impact.history import History
-from ..impact.part import rest_mode
+from ..impact.reduced_body import rest_mode
 from ..impact.striker import Striker
 from ..modes.modal import Modes
 from . import rig as rigs

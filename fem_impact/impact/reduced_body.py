@@ -25,7 +25,7 @@ SLOW = 1e-4  # [-] frequency of a rigid motion that may be missing over that of 
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class ReducedBody:
     """One body of a blow, reduced to its modes and contacts."""
 
     omega: np.ndarray  # (n_modes,) [rad/s]
@@ -45,15 +45,15 @@ class Part:
     speed: float = 0.0  # [m/s] with which it arrives in rigid motion, at its first contact
     held: int = 0  # [-] first modes that only a hand makes swing: within a contact they move like a mass
 
-    def moving(self, q: np.ndarray, p: np.ndarray) -> "Part":
+    def moving(self, q: np.ndarray, p: np.ndarray) -> "ReducedBody":
         """The same body in another state."""
         return replace(self, q=q, p=p)
 
-    def faster(self, factor: float) -> "Part":
+    def faster(self, factor: float) -> "ReducedBody":
         """The same body with all motion larger by a factor, its rigid position as it is."""
         return self.moving(np.where(self.omega == 0.0, 1.0, factor) * self.q, factor * self.p)
 
-    def lower(self, error: np.ndarray) -> "Part":
+    def lower(self, error: np.ndarray) -> "ReducedBody":
         """The body with frequencies lower and compliances higher by their errors, those of frequencies relative."""
         return replace(self, omega=self.omega / (1.0 + error), rest=self.rest + np.diag(self.doubt))
 
@@ -65,7 +65,7 @@ class Part:
         kept = size > ROUNDING * size[-1]
         return np.asarray(vectors[:, kept] * np.sqrt(size[kept]))
 
-    def thinned(self, wanted: float) -> "tuple[Part, float]":
+    def thinned(self, wanted: float) -> "tuple[ReducedBody, float]":
         """The body with its upper modes replaced by their compliance, and the ratio of old to new highest frequency."""
         flexible = self.omega[self.omega > 0.0]
         if not self.rest.any() or len(flexible) < 2:
@@ -80,7 +80,7 @@ class Part:
         )  # fmt: skip
         return thin, float(flexible[-1] / self.omega[n - 1])
 
-    def loosened(self) -> "Part":
+    def loosened(self) -> "ReducedBody":
         """The body with the rigid motions that it may have besides, as its first modes."""
         n = self.loose.shape[1]
         still, slow = np.zeros(n), np.full(n, SLOW * self.omega[0])
@@ -91,7 +91,7 @@ class Part:
             bias=np.append(bias, self.bias),
         )  # fmt: skip
 
-    def described_by(self, modes: Modes) -> "Part":
+    def described_by(self, modes: Modes) -> "ReducedBody":
         """The same body in the same motion, described by other modes."""
         rows, still = modes.shapes.at(self.points), np.zeros(modes.n_modes)
         moving = self.omega == 0.0
@@ -119,7 +119,7 @@ def part_of(
     left_out: tuple[np.ndarray, np.ndarray] | None,
     force: float,
     motion: np.ndarray | None = None,
-) -> Part:
+) -> ReducedBody:
     """One undeformed body, at rest or moving, with its shapes and residual compliance at its contacts."""
     n_ends = len(touched)
     rest, doubt = (np.zeros((n_ends, n_ends)), np.zeros(n_ends)) if left_out is None else left_out
@@ -132,13 +132,13 @@ def part_of(
     bias = force * rows[0] if force else still
     velocity = still if motion is None else motion
     pressed = np.zeros((2, n_ends))
-    return Part(
+    return ReducedBody(
         modes.omega, modes.damping_ratio, rows, touched, rest, doubt, still, velocity, bias, force, points, pressed,
         np.zeros((n_ends, 0)) if left_out is None else modes.shapes.loose(points),
     )  # fmt: skip
 
 
-def joined(parts: Sequence[Part], laws: Sequence[Contact]) -> ModalSystem:
+def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> ModalSystem:
     """Join the modes of all bodies; series springs or replacement modes stand in for the left-out modes.
 
     A series spring is exact only for a body with one lossless contact. Otherwise each eigenvector of the residual
@@ -196,7 +196,7 @@ def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[f
     return REST_ABOVE[min(dimension, 2)] * omega, float(zeta)
 
 
-def ends_of(parts: Sequence[Part], law: np.ndarray) -> tuple[Ends, ...]:
+def ends_of(parts: Sequence[ReducedBody], law: np.ndarray) -> tuple[Ends, ...]:
     """Where every body is touched; a constant force makes left-out modes dip only if a series spring replaces them."""
     found, rated = [], rated_contacts(law)
     last = sum(len(part.omega) for part in parts)
