@@ -9,8 +9,10 @@ lines: how many misses were silent, how many numbers of impacts were wrong and t
 claims, and every such blow with all its numbers. Without --count it only does this.
 
 The truth of a blow is an integrator that shares no code with the package, `tests/independent/modal_motion.py`: it
-states its own error, and where that is above a tenth of the tolerance the blow is not judged. With a folder for truths
-they are kept there, so that the same blows can be struck again after a change for the cost of the blows alone.
+states its own error. Where that is above a tenth of the tolerance the blow is not judged; where it is above half the
+difference found, the blow is left out of claim over truth, of which the table tells how many blows are in it. With a
+folder for truths they are kept there, so that the same blows can be struck again after a change for the cost of the
+blows alone.
 """
 
 import argparse

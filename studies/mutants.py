@@ -42,7 +42,7 @@ NUMERICS = ("fe", "modes", "impact", "model", "sweeps", "taps", "designs")
 SEED = 27
 FILES = 9  # [-] test files run for a mutant at most, to limit the work
 # for any kernel
-BLOWS = "kernels", "schemes", "contact_cases", "collision", "impacts", "lossy_contacts", "sensitivity", "gradient"
+BLOWS = "kernels", "schemes", "contact_cases", "collision", "history", "lossy_contacts", "flight", "gradient"
 QUICK = 0.7  # [s] of CPU for a test of kernels as plain Python: the compiler takes twenty times as long
 MOST = 150  # [-] such tests run for a mutant, the quickest first, to limit the work
 REACH = ROOT / "out" / "kernel_tests.json"  # what `quick` found; remove it where tests have changed
@@ -177,7 +177,8 @@ def tests(module: str) -> list[str]:
     imported = rf"import (\([^)]*|[^\n]*)\b{name}\b|\.{name} import"
     naming = [path for path, text in texts.items() if re.search(imported, text)]
     if package == KERNELS:
-        blows = [ROOT / "tests" / "impact" / f"test_{each}.py" for each in BLOWS]
+        known = {path.stem: path for path in texts}
+        blows = [known[f"test_{each}"] for each in BLOWS]
         near = [path for path in [*naming, *blows] if path.stem not in ("test_build", "test_environment")]
     else:
         users = [path.stem for path in sorted(PACKAGE.rglob("*.py")) if re.search(imported, path.read_text("utf-8"))]

@@ -221,10 +221,13 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
     pace = engine.pace_of(system, np.append(held, np.zeros(len(system.omega) - len(held), bool)))
     _check_way(system, pace[0] * pace[1], options.tolerance)
     found = refine_steps(system, options, pace)
+    growth = distance.growth(found.coarse, found.fine)
+    if len(found.coarse.contacts) != len(found.fine.contacts):  # a given step was too long
+        found = replace(found, coarse=found.fine, steps=(found.steps[0],) * 2)
     blow = variation.Followed(parts, laws, system, options, pace, found)
     told = [any(other.omega[-1] > body.omega[-1] for other in body.poorer.values()) for body in bodies]
     left_out, resolvable = variation.modes_left_out(blow, told)
-    inherited = variation.Variation("inherited", [[(other, 1.0)] for other in others])
+    inherited = variation.Variation("inherited", [[(other, 1.0, 1.0)] for other in others])
     variations = left_out, variation.unstated(blow, bodies), variation.mesh(blow, bodies), inherited
     table = {"step": found.error, **variation.what_if(blow, variations)}
     for cause, more in variation.poorer_descriptions(blow, bodies).items():
@@ -233,10 +236,12 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
     if "n_impacts" in options.quantities and sum(doubts.values()) >= found.fine.margin:
         doubtful = max(doubts, key=lambda cause: doubts[cause])
         table[doubtful] = distance.added(table[doubtful], {"n_impacts": 1.0})
-    error = Error.from_table(table, resolvable, distance.growth(found.coarse, found.fine))
+    order = np.lexsort(found.fine.contacts[:, (4, 0)].T)  # as `History.impacts`
+    rebounds = np.array([sum(error[f"{distance.REBOUND}{i}"] for error in table.values()) for i in order])
+    error = Error.from_table(table, resolvable, growth)
     return Response(
         tuple(bodies), tuple(laws), found.fine, speed, options.tolerance, found.scheme, error, striker, at,
-        ends_of(parts, system.law), options.quantities,
+        ends_of(parts, system.law), options.quantities, rebounds=rebounds,
     )  # fmt: skip
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 ABSOLUTE = ("restitution", "n_impacts")
 INSTANTS = ("contact_time", "force")  # quantities that depend on single instants
 MARGIN = "margin"  # the name under which distances of runs hold that of their margins
+REBOUND = "rebound "  # and with the index of an impact that of its restitution
 Distances = dict[str, float]  # [-] by quantity
 
 
@@ -41,7 +42,7 @@ def _apart(name: str, one: Any, two: Any) -> Any:
     if one is None or two is None:
         return float((one is None) != (two is None))
     apart = abs(one - two)
-    if name in ABSOLUTE:
+    if name in ABSOLUTE or name.startswith(REBOUND):
         return apart
     if name in BANDED:
         return float(apart.max() / (abs(two).max() or 1.0))
@@ -64,14 +65,15 @@ def _value(hit: "Response", name: str, band: float | None) -> Any:
 def of_runs(
     one: History, two: History, quantities: Mapping[str, float | None], over: tuple[float, float] = (1.0, 1.0)
 ) -> Distances:
-    """How far one run is from another in each quantity asked for, and in its margin.
+    """How far one run is from another in each quantity asked for, in its margin and in the restitution of each impact.
 
     All are 1 if the runs ended differently. The restitution counts by the speed of every body that moves rigidly, over
     the momentum of all. ``over`` divides the distances in quantities that depend on the whole blow, and those in
-    contact time and peak force, which depend on an instant.
+    contact time and peak force, which depend on an instant; not those of impacts, as points part as fast as the bodies
+    ring there, also in modes faster than the step.
     """
     if len(one.contacts) != len(two.contacts) or one.status != two.status:
-        return dict.fromkeys((*quantities, MARGIN), 1.0)
+        return dict.fromkeys((*quantities, MARGIN, *_rebounds(two)), 1.0)
     rigid = two.omega == 0.0  # a swinging body has much momentum, of which the striker's error is no share
     momentum = max(float(np.linalg.norm(p[rigid])) for p in (two.start_p, two.end_p))
     momentum = momentum or float(np.linalg.norm(two.start_p) or np.linalg.norm(two.end_p)) or 1.0
@@ -84,7 +86,15 @@ def of_runs(
         if band is not None:
             found |= distance({name: _spectrum(one, band)}, {name: _spectrum(two, band)})
     error = {name: max(ROUNDING, found[name] / over[name in INSTANTS]) for name in quantities}
-    return error | {MARGIN: abs(one.margin - two.margin)}
+    before, after = _rebounds(one), _rebounds(two)
+    return error | {MARGIN: abs(one.margin - two.margin)} | distance(before, after)
+
+
+def _rebounds(history: History) -> dict[str, float | None]:
+    """Restitution of every impact, in the order of `History.contacts`; None where there is none."""
+    rows = history.contacts[:, 5:7].tolist()
+    found = [left / met if met and left == left else None for met, left in rows]
+    return {f"{REBOUND}{i}": each for i, each in enumerate(found)}
 
 
 def _totals(history: History) -> dict[str, float]:
@@ -126,11 +136,16 @@ def added(one: Distances, two: Distances) -> Distances:
     return one | {name: one.get(name, 0.0) + value for name, value in two.items()}
 
 
-def scaled(distances: Distances, factor: float) -> Distances:
-    """Distances times a factor."""
-    return {name: factor * value for name, value in distances.items()}
+def scaled(distances: Distances, factor: float, parting: float = 1.0) -> Distances:
+    """Distances times a factor; those in the restitutions of impacts times another."""
+    return {name: (parting if name.startswith(REBOUND) else factor) * x for name, x in distances.items()}
+
+
+def judged(name: str) -> bool:
+    """Whether a distance is one in a quantity that a tolerance is about."""
+    return name != MARGIN and not name.startswith(REBOUND)
 
 
 def worst(distances: Mapping[str, float]) -> float:
-    """The largest distance in any quantity, without the margin's [-]."""
-    return max((value for name, value in distances.items() if name != MARGIN), default=0.0)
+    """The largest distance in any quantity [-]."""
+    return max((value for name, value in distances.items() if judged(name)), default=0.0)

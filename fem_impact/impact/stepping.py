@@ -11,7 +11,6 @@ from .._base import check
 from .._base.check import SimulationError
 from . import distance, engine
 from .compiled import layout
-from .compiled.law import FELT
 from .contact import Contact
 from .distance import MARGIN, Distances
 from .engine import STEP_SHARE, TOLERANCE
@@ -153,8 +152,9 @@ class _Control:
         error = distance.of_runs(coarse, fine, self.options.quantities, over)
         if "force" in error:
             error["force"] = max(error["force"], fine.force_missed)
-        margin, least = min(1.0, SURELY * error.pop(MARGIN)), CHANCE * distance.worst(error)
-        error = {name: max(least, float(x)) for name, x in error.items()} | {MARGIN: margin}
+        least = CHANCE * distance.worst(error)
+        error = {name: max(least, float(x)) if distance.judged(name) else x for name, x in error.items()}
+        error[MARGIN] = min(1.0, SURELY * error[MARGIN])
         return Converged(self.scheme, sizes, fine, coarse, error)
 
     def refined(self) -> Converged:
@@ -195,18 +195,16 @@ class _Control:
 
     def sizes(self) -> tuple[list[float], float]:
         """Steps, or misfits of collocation, to try in turn, and the error [-] aimed at."""
-        options, law = self.options, self.system.law
+        options = self.options
         if self.scheme == "collocation":
             return [max(1e-15, options.tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)], (
                 options.tolerance
             )
-        # felt lets go between steps, which no margin sees: a thousandth of the tolerance there
-        share = STEP_SHARE ** (1 + 2 * int((law[:, layout.KIND] == FELT).any()))
         # or the horizon could cut both runs to one step, and they would always agree
         shortest = min(self.pace[0], options.horizon)
-        count = _first_count(self.scheme, min(share * options.tolerance, TOLERANCE), options.quantities)
+        count = _first_count(self.scheme, min(STEP_SHARE * options.tolerance, TOLERANCE), options.quantities)
         first = min(2.0 * shortest / count, _longest_lossy(self.system, self.pace, options.tolerance))
-        return [first * 0.5**n for n in range(DOUBLINGS + 1)], share * options.tolerance
+        return [first * 0.5**n for n in range(DOUBLINGS + 1)], STEP_SHARE * options.tolerance
 
     def told(self, best: float, coarse: History, fine: History) -> str:
         """Why no two runs agreed, of which the best erred by ``best``, and what helps."""

@@ -60,7 +60,7 @@ def test_runs_that_end_differently_are_one_apart_in_everything():
     one = blow()
     other = blow(duration=0.5 * one.impacts[0].end)
     found = distance.of_runs(one.history, other.history, one.quantities)
-    assert set(found) == {*one.quantities, distance.MARGIN} and set(found.values()) == {1.0}
+    assert set(found) == {*one.quantities, distance.MARGIN, f"{distance.REBOUND}0"} and set(found.values()) == {1.0}
     assert distance.growth(one.history, blow(stiffness=3e8).history) in (1.0, np.inf)
 
 

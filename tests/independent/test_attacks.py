@@ -1,6 +1,7 @@
 """Random attacks on the promise of a blow, against an integrator of their own; `studies/attack.py` runs thousands."""
 
 import attack_blows
+import numpy as np
 import pytest
 
 
@@ -17,11 +18,21 @@ def check(area, numbers):
     judged = [each for each in verdicts if each.judged]
     assert len(judged) >= 0.7 * len(verdicts)
     assert not bad, attack_blows.table(verdicts)
-    claims = [each.claim / max(each.truth, each.floor) for each in judged if each.met]
+    claims = [each.caution for each in judged if each.met and np.isfinite(each.caution)]
     # of thousands one in twenty claims more than 30 times the truth; complete bodies bound what they leave out
     assert sum(claim > 30.0 for claim in claims) <= 0.25 * len(claims), attack_blows.table(verdicts)
     loud = sum(each.kind == "loud" for each in judged)
     assert loud <= 0.2 * len(judged), attack_blows.table(verdicts)  # silence is not bought by doubting everything
+
+
+def test_a_truth_not_sharper_than_the_answer_tells_nothing_of_the_claim():
+    """Where the reference errs by as much as the difference found, the true error may be nothing at all."""
+    one = {"area": "complete bodies", "number": 0, "place": "", "kind": "kept", "tolerance": 1e-2, "met": True}
+    sharp = attack_blows.Verdict(**one, truth=2e-5, claim=1e-4, floor=1e-6)
+    blunt = attack_blows.Verdict(**one, truth=1e-6, claim=1e-4, floor=0.999e-6)
+    assert sharp.caution == pytest.approx(5.0) and np.isnan(blunt.caution)
+    row = attack_blows.table([sharp, blunt]).splitlines()[2]
+    assert row == "| complete bodies | 2 | 0 | 0 | 0.19 | 0 | 0 | 0 | 5 5 5 | 1 |"
 
 
 @pytest.mark.parametrize("area, count", [("everyday", 12), ("layers and steep laws", 6)])
