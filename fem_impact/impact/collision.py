@@ -237,7 +237,7 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
         doubtful = max(doubts, key=lambda cause: doubts[cause])
         table[doubtful] = distance.added(table[doubtful], {"n_impacts": 1.0})
     order = np.lexsort(found.fine.contacts[:, (4, 0)].T)  # as `History.impacts`
-    rebounds = np.array([sum(error[f"{distance.REBOUND}{i}"] for error in table.values()) for i in order])
+    rebounds = np.array([sum(error.get(f"{distance.REBOUND}{i}", 1.0) for error in table.values()) for i in order])
     error = Error.from_table(table, resolvable, growth)
     return Response(
         tuple(bodies), tuple(laws), found.fine, speed, options.tolerance, found.scheme, error, striker, at,
