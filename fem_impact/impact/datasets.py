@@ -35,6 +35,8 @@ def dataset(hit: "Response") -> Any:
     for name, unit in PARTS.items():
         values = np.array([getattr(impact, name) for impact in hit.impacts], int if name == "contact" else float)
         data[f"impact_{name}"] = (("impact",), values, {"units": unit})
+    errors = np.array(hit.restitution_errors, float)
+    data["impact_restitution_error"] = (("impact",), errors, {"units": "1"})
     for part in ("step", "truncation", "mesh", "idealisation", "total"):
         data[f"error_{part}"] = ((), getattr(hit.error, part), {"units": "1"})
     data |= {f"energy_{name}": ((), value, {"units": "J"}) for name, value in hit.energies.items()}

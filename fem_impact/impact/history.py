@@ -47,7 +47,7 @@ class Impact:
         """Speed with which the points of the contact parted over that with which they met [-].
 
         Both are relative speeds, so what the struck surface does counts. None while the bodies still press each other,
-        and where they touched already when the force began.
+        and where they touched already when the force began. `Response.restitution_errors` tells how exact it is.
         """
         if self.separation_speed is None or not self.approach_speed:
             return None

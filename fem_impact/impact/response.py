@@ -138,6 +138,7 @@ class Response(Totals):
     # examines whether the model itself is right, when that is asked for
     audit: Callable[["Response"], tuple[Assumption, ...]] | None = field(default=None, repr=False)
     vectors: Modes | None = field(default=None, repr=False)  # all Ritz pairs of the target, if it is described by them
+    rebounds: np.ndarray | None = None  # (n_impacts,) [-] estimated errors of the restitutions of the impacts
 
     def __repr__(self) -> str:
         return check.brief(self)
@@ -301,6 +302,19 @@ class Response(Totals):
     def impacts(self) -> tuple[Impact, ...]:
         """All impacts in order of their start."""
         return self.history.impacts
+
+    @property
+    def restitution_errors(self) -> tuple[float | None, ...]:
+        """Estimated error of `Impact.restitution` of each impact, absolute [-]; None where there is no restitution.
+
+        The tolerance does not count these: points part as fast as the bodies ring there, which is known less well than
+        the restitution of the blow. None, too, of a simplified target, which does not ring, and where the modes left
+        out govern the contact.
+        """
+        if self.rebounds is None or not self.error.resolvable or self.error.idealisation:
+            return (None,) * self.n_impacts
+        pairs = zip(self.impacts, self.rebounds.tolist())
+        return tuple(None if impact.restitution is None else error for impact, error in pairs)
 
     @property
     def contact_times(self) -> tuple[float, ...]:

@@ -38,3 +38,5 @@ def test_several_contacts_have_a_column_each():
     found = hit.to_xarray()
     assert found.force.dims == ("time", "contact") and found.sizes["contact"] == 2
     assert found.sizes["impact"] == hit.n_impacts
+    assert hit.restitution_errors[0] > 0.0
+    np.testing.assert_array_equal(found.impact_restitution_error, np.array(hit.restitution_errors, float))
