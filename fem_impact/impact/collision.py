@@ -680,8 +680,6 @@ def _controlled(
     over = RICHARDSON[scheme]
     if scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
         over = over[0], over[1] / (1.0 + 2.0 * pace[1] * system.law[:, layout.LOSS].max())
-    # felt lets go between steps, which no margin sees: a thousandth of the tolerance there
-    share = STEP_SHARE ** (1 + 2 * int((system.law[:, layout.KIND] == FELT).any()))
     shortest = min(pace[0], horizon)  # or the horizon could cut both runs to one step, and they would always agree
     if dt is not None:
         dt = min(dt, 0.5 * horizon)
@@ -691,10 +689,10 @@ def _controlled(
     if scheme == "collocation":
         sizes = [max(1e-15, tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)]
     else:
-        first = 2.0 * shortest / _first_count(scheme, min(share * tolerance, TOLERANCE), quantities)
+        first = 2.0 * shortest / _first_count(scheme, min(STEP_SHARE * tolerance, TOLERANCE), quantities)
         first = min(first, _longest_lossy(system, pace, tolerance))
         sizes = [first * 0.5**n for n in range(DOUBLINGS + 1)]
-    aim = tolerance if scheme == "collocation" else share * tolerance
+    aim = tolerance if scheme == "collocation" else STEP_SHARE * tolerance
     try:
         runs = [engine.follow(system, scheme, size, pace, horizon, n_max) for size in sizes[:2]]
     except SimulationError as exhausted:  # so many steps are out of reach: longer ones may do

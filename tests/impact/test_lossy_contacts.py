@@ -223,3 +223,39 @@ def test_felt_is_left_within_a_step_where_it_comes_back_too_slowly(depth, left):
         law=law, now=now, end=np.array([pressed]), rate=np.array([rate]), after=np.array([memory])
     )
     assert build.plain(events.dipped_felt)(contacts, h, 0) == left
+
+
+def felt_blow(stiffness, tolerance):
+    """A mass rests twice on felt that lets go for a moment in between, if it is just stiff enough."""
+    plate = fi.analytic.rectangle(1.03, 1.0, mass=0.2, first_frequency=100.0, n_modes=40, damping_ratio=0.01)
+    felt = fi.Contact.felt(stiffness, 2.13, hysteresis=0.7, relaxation=1.1e-4)
+    options = {"at": (0.3, 0.4), "speed": 1.0, "residual": False}
+    return fi.strike(plate, fi.Striker.rigid(0.052), felt, tolerance=tolerance, **options)
+
+
+def lets_go(stiffness):
+    return felt_blow(stiffness, 1e-4).n_impacts > 1
+
+
+def test_margin_tells_how_nearly_felt_lets_go_or_holds():
+    low, high = 2.1e8, 2.5e8
+    assert lets_go(high) and not lets_go(low)
+    for _ in range(18):  # to 6e-7 of the stiffness
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if lets_go(middle) else (middle, high)
+    for tolerance in (1e-1, 1e-2, 1e-4):
+        for side, count in ((-1.0, 1), (1.0, 2)):
+            near, far = (felt_blow(high * (1.0 + side * offset), tolerance) for offset in (1e-3, 1e-2))
+            assert near.n_impacts == far.n_impacts == count
+            assert 0.0 < near.margin < 1e-4 < far.margin < 1e-3
+            assert far.margin / near.margin == pytest.approx(10.0, rel=0.3)  # in a straight line at first
+
+
+@pytest.mark.parametrize("steps", [{"tolerance": 0.1}, {"tolerance": 1e-3}, {"dt": 2.5e-5}, {"dt": 1e-5}])
+def test_felt_that_lets_go_for_less_than_a_step_is_two_impacts(steps):
+    """It is met again seven microseconds later, within the step that began when it let go."""
+    law = fi.Contact.felt(8.65e12, 2.675, hysteresis=0.518, relaxation=1.286e-4)
+    plate = fi.analytic.rectangle(0.75, 1.0, mass=0.2, first_frequency=100.0, n_modes=40, damping_ratio=0.01)
+    how = {"at": (0.3, 0.4), "speed": 1.336, "residual": False, "tolerance": 0.1, **steps}
+    first, second = fi.strike(plate, fi.Striker.rigid(0.1707), law, **how).impacts
+    assert_allclose([first.end, second.start], [396.77e-6, 403.94e-6], rtol=1e-3)  # at a tolerance of 1e-5

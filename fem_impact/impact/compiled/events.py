@@ -12,11 +12,11 @@ ever before. These corners of the force are located by secants. Events that pile
 import numpy as np
 
 from .build import inner
-from .law import FELT, LAYERS, PLASTIC, POWER, corner_approach, parting, spring_of
+from .law import FELT, LAYERS, PLASTIC, POWER, corner_approach, parting, parting_rate, spring_of
 from .rounding import NEAR, REPEATED
 
 from .layout import (  # isort: skip
-    APPROACH, EXPONENT, HIGH, KIND, LOSS, LOW, MEMORY, MISSED, RATE, RELAXATION, SHARE, SIZE, SLOPE, TRIED, WIDTH,
+    APPROACH, HIGH, KIND, LOSS, LOW, MEMORY, MISSED, RATE, SHARE, SIZE, SLOPE, TRIED, WIDTH,
 )  # fmt: skip
 
 LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
@@ -221,6 +221,9 @@ def first_corner(contacts, h, lossy, out_bracket):
             if least > 0.0 and (end > least if apart else end < -least):
                 start = min(start, -least) if apart else max(start, least)
                 root = h * start / (start - end)
+                leaves = parting_rate(law, i, d0, v0, law[i, MEMORY]) if apart and d0 > 0.0 else 0.0
+                if leaves < 0.0:  # and comes back: no straight line
+                    root = hermite_root(start, leaves, end, parting_rate(law, i, d1, v1, after[i]), h)
                 if root < AT_ONCE * h:
                     if apart:
                         return i, AGAIN, h
@@ -269,15 +272,12 @@ def first_corner(contacts, h, lossy, out_bracket):
 def dipped_felt(contacts, h, i):
     """Whether a body left its felt and met it again within a step, by the cubic of what makes it push."""
     law, now, y, rate, after = contacts.law, contacts.now, contacts.end, contacts.rate, contacts.after
-    share, time, z0, z1 = law[i, SHARE], law[i, RELAXATION], law[i, MEMORY], after[i]
+    z0, z1 = law[i, MEMORY], after[i]
     if z0 < 0.0 or y[i] <= 0.0 or now[APPROACH, i] <= 0.0:
         return False
     g0, g1 = parting(law, i, now[APPROACH, i], z0), parting(law, i, y[i], z1)
-    r0 = (
-        law[i, EXPONENT] * (g0 + share * z0) / now[APPROACH, i] * now[RATE, i]
-        - share * (g0 + (share - 1.0) * z0) / time
-    )
-    r1 = law[i, EXPONENT] * (g1 + share * z1) / y[i] * rate[i] - share * (g1 + (share - 1.0) * z1) / time
+    r0 = parting_rate(law, i, now[APPROACH, i], now[RATE, i], z0)
+    r1 = parting_rate(law, i, y[i], rate[i], z1)
     return r0 < 0.0 < r1 and g0 > 0.0 and g1 > 0.0 and lowest(g0, r0, g1, r1, h) < -DIPPED * max(g0, g1)
 
 

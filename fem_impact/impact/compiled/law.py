@@ -416,6 +416,14 @@ def parting(law, i, approach, memory):
 
 
 @inner()
+def parting_rate(law, i, approach, rate, memory):
+    """How fast that changes at an approach > 0 [m**a/s]; a minus before the memory is of a body that has parted."""
+    share, g = law[i, SHARE], power(approach, law[i, EXPONENT])
+    grows = (share - 1.0) * -memory if memory < 0.0 else g - memory
+    return law[i, EXPONENT] * g / approach * rate - share * grows / law[i, RELAXATION]
+
+
+@inner()
 def meet(law, i, approach, rate):
     """Decide whether a body pushes felt i at the start of a step or has parted from it."""
     if law.shape[1] < WIDTH or law[i, KIND] != FELT:

@@ -11,10 +11,14 @@ import numpy as np
 
 from .build import ZERO, inner, outer
 from .events import hermite_root, letting_go, lowest
-from .law import FELT, LAYERS, PLASTIC, dent, spring_with, stored
-from .layout import APPROACH, CLOSED, HEAD, KIND, LENGTH, LOSS, PUSH, RATE, REMEMBERED, SPEED, START, WIDTH
+from .law import FELT, LAYERS, PLASTIC, dent, power, spring_with, stored
 from .misfit import force_on, misfit
 from .rounding import NEAR
+
+from .layout import (  # isort: skip
+    APPROACH, CLOSED, EXPONENT, HEAD, KIND, LENGTH, LOSS, PUSH, RATE, RELAXATION, REMEMBERED, SHARE, SPEED, START,
+    WIDTH,
+)  # fmt: skip
 
 HIGH = 0.9  # [-] of the largest mean force of a step: only steps with so much are searched for the peak
 RELEASED = 0.01  # [-] of the force at the start of the last step: felt that carries less at its end has let go
@@ -127,22 +131,51 @@ def pushing(steps, now, law, n_coefficients, row, i):
     return lower, upper
 
 
+@inner()
+def turn_within(d0, v0, d1, v1, h):
+    """Where the cubic through both ends of a step turns back; infinity if it does not."""
+    if (v0 < 0.0 < v1) or (v1 < 0.0 < v0):
+        side = 1.0 if v0 < 0.0 else -1.0
+        return side * lowest(side * d0, side * v0, side * d1, side * v1, h)
+    return np.inf
+
+
+@inner()
+def above_felt(law, i, d, v, memory, parted):
+    """Approach over that at which felt i lets go or is met, and its rate; the body may have ``parted`` from it."""
+    z = abs(memory)
+    if z == 0.0:
+        return d, v
+    a, share = law[i, EXPONENT], law[i, SHARE]
+    surface = (share * z) ** (1.0 / a)
+    grows = -(1.0 - share) * z if parted else (power(d, a) if d > 0.0 else 0.0) - z
+    return d - surface, v - surface * grows / (a * z * law[i, RELAXATION])
+
+
 @outer()
 def nearest_turn(steps, now, law, n_coefficients, miss):
     """How near to zero an approach turns back, over the farthest it ever turns; infinity where none does.
 
-    ``miss`` is the approach where it did so in flight, -infinity if it did not.
+    Of felt it counts from where its force ends. ``miss`` is the approach where it turned in flight, -infinity if it did
+    not.
     """
     nearest = -miss
     farthest = 0.0
     for i in range(now.shape[1]):
+        felt = law.shape[1] == WIDTH and law[i, KIND] == FELT
         for row in range(steps.shape[0]):
             d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
-            if (v0 < 0.0 < v1) or (v1 < 0.0 < v0):
-                side = 1.0 if v0 < 0.0 else -1.0
-                turn = side * lowest(side * d0, side * v0, side * d1, side * v1, steps[row, LENGTH])
-                nearest = min(nearest, abs(turn))
+            turn = turn_within(d0, v0, d1, v1, steps[row, LENGTH])
+            if turn < np.inf:
                 farthest = max(farthest, turn)
+            if felt:
+                z0 = memory_of(steps, law, n_coefficients, row, i)
+                last = row + 1 == steps.shape[0]
+                z1 = now[REMEMBERED, i] if last else memory_of(steps, law, n_coefficients, row + 1, i)
+                d0, v0 = above_felt(law, i, d0, v0, z0, z0 < 0.0)
+                d1, v1 = above_felt(law, i, d1, v1, z1, z0 < 0.0)
+                turn = turn_within(d0, v0, d1, v1, steps[row, LENGTH])
+            nearest = min(nearest, abs(turn))
     return nearest / farthest if farthest > 0.0 else np.inf
 
 
