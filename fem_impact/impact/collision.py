@@ -870,7 +870,7 @@ def _mesh_error(
             continue
         soft = [(np.pi / pace[0]) ** 2 / mobility[i] * doubt for (i, _), doubt in zip(part.touched, part.doubt)]
         error = np.zeros(modes.n_modes) if modes.frequency_error is None else modes.frequency_error
-        matters |= max(error.max(), *soft, 0.0) > NEGLIGIBLE * tolerance
+        matters |= max([error.max(), *soft]) > NEGLIGIBLE * tolerance
         lower = part.omega / (1.0 + error)
         softer.append(replace(part, omega=lower, rest=part.rest + np.diag(part.doubt)))
     if not matters:

@@ -260,7 +260,7 @@ def endless_error(
         return float("inf")
     restitution = np.exp(-np.pi * ratio / np.sqrt(1.0 - ratio**2))
     first = 15.5 * (slowest or rate) / view.area  # [rad/s] hinged disk of this area; other supported plates are higher
-    lift = mobility * (1.0 + 8.0 / np.pi * np.log(max(1.0, 3.0 * np.pi / (duration * first))))
+    lift = mobility * (1.0 + 8.0 / np.pi * np.log(3.0 * np.pi / (duration * first)))
     echo = view.clearance**2 / rate
     if restitution * (echo - contact) < (1.0 + restitution) * mass * lift:
         return float("inf")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fem_impact as fi
-from fem_impact.fe import refinement
+from fem_impact.fe import refinement, residual
 from fem_impact.modes import analytic
 
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
@@ -72,3 +72,14 @@ def test_a_beam_too_coarse_for_its_modes_says_so():
     truth = np.abs(found.omega / exact.omega - 1.0)
     assert truth[-1] > 1e-6  # one element for twenty half waves
     assert (found.error > truth / 3.0).all() and np.median(found.error / np.maximum(truth, 1e-15)) < 30.0
+
+
+def test_looks_into_a_triangle_are_the_centres_of_its_equal_parts():
+    looks = residual._looks() + 1.0 / 3.0  # from the corner
+    assert len(looks) == 4**residual.HALVED
+    assert (looks > 0.0).all() and (looks.sum(axis=1) < 1.0).all()
+    np.testing.assert_allclose(looks.mean(axis=0), 1.0 / 3.0, rtol=1e-12)
+    parts = np.floor(looks * 2**residual.HALVED).astype(int)  # squares of two triangles, but those at the long side
+    assert (np.unique(parts, axis=0, return_counts=True)[1] <= 2).all()
+    apart = np.linalg.norm(looks[:, None] - looks, axis=2) + 9.0 * np.eye(len(looks))
+    assert apart.min() == pytest.approx(np.sqrt(2.0) / 3.0 / 2**residual.HALVED, rel=1e-12)

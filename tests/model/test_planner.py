@@ -408,3 +408,17 @@ def test_motion_costs_the_modes_it_is_told_by(scene, monkeypatch):
     )
     look = cost.by_modes(cost.PER_MODE * planner.FIRST_LOOK, planner.FIRST_LOOK)
     assert moving.seconds - still.seconds == pytest.approx(2.0 * look.seconds, rel=1e-6)
+
+
+def test_a_blow_whose_modes_turn_out_too_few_is_struck_again_with_more(monkeypatch):
+    kept, truly = [], collision.strike
+
+    def strike(modes, *given, **options):
+        kept.append(modes.n_modes)
+        hit = truly(modes, *given, **options)
+        return replace(hit, error=replace(hit.error, truncation=1.0)) if len(set(kept)) == 1 else hit
+
+    scene = fi.load_scene(SCENES / "drumstick.toml")
+    monkeypatch.setattr(collision, "strike", strike)
+    hit = scene.strike(target="modal")
+    assert hit.tolerance_met and len(set(kept)) == 2 and kept[-1] > kept[0]

@@ -213,3 +213,13 @@ def test_point_off_the_body_is_refused():
     modes = analytic.disk(0.2, mass=1.0, first_frequency=1.0, n_modes=3)
     with pytest.raises(ValueError, match=r"points must lie on the body, got \(0.3, 0\) m"):
         modes.shape_at([[0.3, 0.0]])
+
+
+def test_rigid_motions_of_a_free_disk_are_those_of_its_mass_and_inertia():
+    """One at unit mass, and turns about two diameters with the inertia ``m R**2 / 4``."""
+    disk = analytic.disk(0.3, edge="free", mass=0.7, first_frequency=100.0, n_modes=5)
+    at = np.array([[0.0, 0.0], [0.12, -0.2]])
+    r = np.hypot(*at[1])
+    squared = disk.shape_at(at)[:, :3] ** 2 * 0.7
+    assert_allclose(squared[:, 0], 1.0, rtol=1e-12)
+    assert_allclose(squared[:, 1:].sum(axis=1), [0.0, 4.0 * (r / 0.3) ** 2], rtol=1e-12, atol=1e-12)

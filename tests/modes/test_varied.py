@@ -1,5 +1,7 @@
 """What a changed section changes in modes: powers of uniform bodies, and differences of modes found again."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -114,3 +116,13 @@ def test_other_modes_say_why_they_have_none():
         varied.solution(fi.find_modes(thick, n_modes=4))
     thin = fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.2), fi.Plate(WOOD, 0.02))
     assert varied.solution(fi.find_modes(thin, n_modes=4)).vectors.shape[1] == 4
+
+
+@pytest.mark.parametrize("square", [0.0, 0.2])
+def test_terms_beyond_the_last_add_up_as_a_geometric_series(square):
+    """Each is a third of the one before; those of no size add nothing."""
+    shapes = SimpleNamespace(system=SimpleNamespace(M=np.diag([1.0, 2.0])))
+    term = np.array([0.3, 0.4])
+    last = varied._tail(shapes, [9.0 * term, 3.0 * term, term], np.array([square]))
+    assert_allclose(last, 1.0 / (1.0 - square / 3.0), rtol=1e-12)
+    assert_allclose(varied._tail(shapes, [0.0 * term, 0.0 * term], np.array([square])), 1.0)

@@ -91,7 +91,9 @@ def test_a_rigid_body_is_hit_once_by_any_tip(mass):
     (hammer,) = hammers.choose(fi.Modes.rigid(body), None, bandwidth, [mass])
     exact = mass * body / (mass + body) * (2.0 * np.pi * bandwidth / hammers.half_sine_reach(10.0)) ** 2
     assert_allclose(hammer.softest, exact, rtol=2.0 * hammers.WIDTH)  # and 1e-4 of the blow
+    centre = mass * (2.0 * np.pi * bandwidth / hammers.half_sine_reach(10.0)) ** 2  # [N/m] on a body that never yields
     assert hammer.unlimited and len(hammer.single) == 1
+    assert_allclose(hammer.single[0], [hammers.SOFTEST * centre, hammers.STIFFEST * centre], rtol=1e-9)  # all tried
 
 
 # Euphonics 2.2.6: frequencies over the contact frequency where the spectrum of a half sine has fallen, to four digits

@@ -52,6 +52,15 @@ def test_the_cell_behind_a_rigid_tip_misses_its_share_of_the_force():
     assert np.allclose(behind.force, 0.8 * whole.force, atol=1e-9)
 
 
+def test_a_force_sensor_enlarges_what_is_near_its_resonance():
+    """A tone at half the resonance by 1 / (1 - 1/4), and only in the force."""
+    n, tone = 512, 40  # samples, and periods in them: 2 kHz
+    chain = rig.Rig(rate=RATE, resonance=2.0 * tone * RATE / n, resonance_damping=1e-3)
+    fine = np.sin(2.0 * np.pi * tone / n * np.arange(n * rig.FINE) / rig.FINE)
+    force, other = (np.abs(np.fft.rfft(rig.sample(fine, chain, force=is_force)))[tone] for is_force in (True, False))
+    assert force / other == pytest.approx(4.0 / 3.0, rel=1e-5)  # its damping counts by a square of 1e-3
+
+
 def test_the_mode_of_a_hammer_shows_behind_its_tip():
     hammer = fi.Modes.from_arrays([0.0, 3000.0], [[10.0**0.5, 10.0**0.5]], points=[[0.0]], mass=0.1, complete=True)
     law = fi.Touch(fi.Contact.linear(4e6), 0, None, first_at=[0.0])

@@ -74,6 +74,16 @@ def test_speed_and_onset_are_found_alone(found):
     assert np.abs(found.problem.aligned(x)[n:] - found.best.x[n:]).max() < 0.1  # a good start, found in three steps
 
 
+@pytest.mark.parametrize("ridge, ended", [(1e-6, True), (4e-5, False)])
+def test_a_chord_ends_where_nothing_is_to_be_gained_along_a_ridge(ridge, ended):
+    """Two coordinates do nearly the same; along their difference the residual falls by ``ridge`` of what is left."""
+    matrix = np.array([[1.0, 1.0], [0.0, ridge], [0.0, 0.0]])
+    left = np.array([0.0, 1e-3, 0.0])
+    box = np.full(2, 1e-2 if ended else 1e3)  # how far the ridge may lead
+    problem = SimpleNamespace(residual=lambda x: matrix @ x - left, bounds=(-box, box), needless=[])
+    assert solver.chord(problem, np.zeros(2), matrix)[1] == ended
+
+
 def test_too_few_samples_are_refused():
     taps = fi.Taps.from_arrays(np.array([0, 0, 0, 0, 50, 90, 50, 0, 0, 0.0]), rate=25600.0)
     with pytest.raises(ValueError, match=r"window must leave samples|too few"):

@@ -92,6 +92,13 @@ def cut(force, *, rate=1000.0, **options):
     return triggers.cut([(force, np.zeros((len(force), 0)))], rate, "here", **given)
 
 
+def test_taps_may_be_as_near_as_one_sample_below_the_trigger():
+    force = np.zeros(4000)
+    force[[2000, 2002]] = 10.0
+    assert len(cut(force, together=1e-9, length=0.005)[0]) == 2  # together counts for one sample at least
+    assert len(cut(force, together=0.002, length=0.005)[0]) == 1
+
+
 @pytest.mark.parametrize(("share", "told"), [(0.15, False), (0.3, True)])
 def test_drift_is_told_from_a_fifth_of_the_trigger_on(share, told):
     force = np.zeros(4000)
