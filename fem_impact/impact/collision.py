@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -330,13 +329,17 @@ def _follow(bodies, contacts, parts, speed, options, striker=None, at=None, othe
     pace = engine.pace_of(system, np.append(held, np.zeros(len(system.omega) - len(held), bool)))
     _check_way(system, pace[0] * pace[1], options.tolerance)
     last = options.horizon, options.n_max
-    differ = partial(_difference, options.quantities)
     history, step_error, ran, coarse, (step, size) = _controlled(
         system, options.scheme, options.dt, options.tolerance, options.quantities, pace, *last
     )
     growth, none = _sensitivity(coarse, history), np.zeros(len(step_error))
     if len(coarse.contacts) != len(history.contacts):  # a given step was too long
         coarse, size = history, step
+
+    def differ(one: History, other: History) -> np.ndarray:
+        found = _difference(options.quantities, one, other)  # of descriptions with another number of impacts, perhaps
+        return found if len(found) == len(none) else np.append(found[:2], np.ones(len(none) - 2))
+
     told = [any(other.omega[-1] > body.omega[-1] for other in body.poorer.values()) for body in bodies]
     truncation, resolvable = _truncation(parts, told, contacts, system, coarse, ran, size, differ, pace, *last)
     truncation = truncation + _unstated(bodies, parts, contacts, coarse, ran, size, differ, pace, last)
