@@ -14,8 +14,8 @@ are compiled only if none of these fails. `mutants.csv` keeps
 holder   the first test that failed when the mutant was first examined: it fails with the mutant, and not without. A
          test that does not end is a failure, too, if without the mutant it ends in a quarter of the time. "none of the
          quick": a kernel that was not compiled, as a test was written for it at once, or as nothing can notice it
-since    the test, written since, that notices what no test noticed at first; or that the line is gone, as nothing
-         needed it
+since    the test, written since, that notices what no test noticed at first; or that the line is gone, as
+         nothing needed it or another has its place
 reason   why a mutant that no test can notice changes no result: written by hand
 """
 
@@ -321,13 +321,13 @@ def main() -> None:
     for row in rows:
         if alive(row):
             print(f"survives: {row['module']}.{row['function']}: {row['line']}: {row['change']}")
-    at_once = sum(not row["holder"].startswith(NONE) for row in rows)
+    at_once = sum(not row["holder"].startswith(NONE) and row["since"] != GONE for row in rows)
     gone = sum(row["since"] == GONE for row in rows)
     since = sum(bool(row["since"]) for row in rows) - gone
     equal = sum(bool(row["reason"]) for row in rows)
     left = sum(alive(row) for row in rows)
     print(f"{len(rows)} wrong lines were examined; {FOUND.name} tells each.")
-    print(f"Tests noticed {at_once} at once and {since} since. {gone} lines are gone, as nothing needed them.")
+    print(f"Tests noticed {at_once} at once and {since} since. {gone} lines are gone since.")
     print(f"{equal} change no result; {left} survive.")
 
 
