@@ -198,6 +198,8 @@ class Plan:
         lines.append(f"Cost: {self.cost}")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")
+        if self.memory > cost.installed():
+            lines.append(f"  the {cost.installed() / 1e9:.2g} GB of memory of this machine do not suffice")
         return "\n".join(lines)
 
 
@@ -397,6 +399,7 @@ def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:
     ``keep`` is a file that stores the modes of a costly plan.
     """
     blow, asked, margin = plan.blow, _Asked.checked(plan.blow, plan.changes), 1.0
+    _check_memory(plan)
     if plan.target == "vectors":
         return _carry_out_by_vectors(plan, asked, stages, keep)
     if plan.target == "mixed":
@@ -431,6 +434,20 @@ def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:
     response = audit.audited(replace(response, tolerance=asked.tolerance, error=error), simplified)
     plan = replace(plan, n_modes=modes.n_modes if plan.target == "modal" else 0)
     return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
+
+
+def _check_memory(plan: Plan) -> None:
+    """Raise SimulationError if this machine has not the memory that a plan needs."""
+    here = cost.installed()
+    if plan.memory <= here:
+        return
+    advice = "take a larger tolerance or a softer contact"
+    if plan.blow.target.thick:
+        advice += ", or the thin theory, which tells what shear changes of the blow (`thin target`)"
+    raise check.SimulationError(
+        f"{plan.blow.name}this blow needs about {plan.memory / 1e9:.2g} GB of memory for {plan.n_modes} modes or "
+        f"vectors of {plan.n_dofs} unknowns, more than the {here / 1e9:.2g} GB of this machine; {advice}"
+    )
 
 
 def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) -> Run:
@@ -1026,11 +1043,12 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
     if plan.n_modes > first.n_modes:
         thick = system.element == "argyris and shear"  # its errors come from a second mesh
         coarser = [n_dofs / refinement.COARSER**2] if thick else []
-        work = sum((cost.by_modes(n, plan.n_modes) for n in [n_dofs, *coarser]), cost.NOTHING)
+        each = [cost.by_modes(n, plan.n_modes) for n in [n_dofs, *coarser]]
         if mesh.dimension == 2:
             finer = [n_dofs * refinement.COARSER**2] if thick else []
             at_blow = cost.AT_BLOW[system.element]
-            work = sum((cost.compliance(n + at_blow) for n in [n_dofs, *finer]), work)
+            each += [cost.compliance(n + at_blow) for n in [n_dofs, *finer]]
+        work = replace(sum(each, cost.NOTHING), memory=max(part.memory for part in each))  # one mesh after another
     return replace(
         plan, element=system.element, size=size, n_dofs=n_dofs, errors={**plan.errors, "mesh": error},
         reasons=(*plan.reasons, reason), seconds=plan.seconds + work.seconds, memory=plan.memory + work.memory,

@@ -291,6 +291,19 @@ def test_costly_plan_says_so():
 
 
 @pytest.mark.slow
+def test_a_blow_that_needs_more_memory_than_there_is_is_refused_before_it_is_computed(monkeypatch):
+    """A thick pane, whose 27 GB numpy refused after half a minute; the plan tells before."""
+    law, ball = fi.Contact.hertz(5e8), fi.Striker.rigid(0.004)
+    glass = fi.Plate(fi.Material(E=70e9, nu=0.2, rho=2500.0), thickness=4e-3)
+    pane = fi.assemble(fi.mesh.rectangle(0.3, 0.2), glass, {"boundary": "hinged"}, theory="mindlin")
+    plan = fi.plan(pane, ball, law, at=(0.11, 0.07), speed=1.4, tolerance=1e-2)
+    assert plan.memory > 4e8 and "do not suffice" not in str(plan)
+    monkeypatch.setattr(cost, "installed", lambda: 3e8)
+    assert "the 0.3 GB of memory of this machine do not suffice" in str(plan)
+    with pytest.raises(fi.SimulationError, match=r"GB of memory for .* more than the 0.3 GB .* or the thin theory"):
+        plan.run()
+
+
 def test_modes_of_a_costly_plan_are_kept_and_taken_up_again(tmp_path, monkeypatch):
     """Broken off after the modes were found, the next run starts with them; other modes are found anew."""
     monkeypatch.setattr(planner, "COSTLY", (0.0, 0.0))
