@@ -13,7 +13,7 @@ from .._base import kept as keeping
 from .._base.rounding import EPSILON, SAME
 from ..mesh import mesh_files
 from ..mesh.meshes import MOST_CELLS, Mesh
-from . import residual, thick
+from . import plausible, residual, thick
 from .assembly import THICK, System, assemble, reassemble
 from .beam_elements import DEGREE
 from .corners import SAY
@@ -62,6 +62,9 @@ ORDERS = 7.5, 5.0, 1.0
 LEAST_STEP = 1.05
 # [-] meshes tried to meet a tolerance, each finer: where eight do not suffice, rounding or corners hold the error
 MOST_MESHES = 8
+# [-] unknowns foretold from the rate at which errors fell, over those allowed, from which on nobody waits for more
+# meshes: rates grow as meshes resolve, and a rate half as large asks for the square of that
+BEYOND = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,13 +315,16 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
             "tolerance needs a mesh that can be refined; make it with fi.mesh or load it with fi.mesh.load"
         )
     found, size = solve(_start(system, n_modes, max_frequency, tolerance), n_modes, max_frequency), np.inf
+    seen: list[tuple[float, float]] = []
     for left in reversed(range(MOST_MESHES + 1)):
         if float(found.error.max()) <= tolerance:
             return found
         mesh = found.system.mesh
         step = _needed(found.parts, MARGIN * tolerance)
+        seen.append((mesh.size, float(found.error.max())))
         if (
             not left
+            or found.system.n_dofs * _foreseen(seen, tolerance) ** mesh.dimension > BEYOND * MOST_UNKNOWNS
             or not step < np.inf
             or found.system.n_dofs * step**mesh.dimension > MOST_UNKNOWNS
             or mesh.size >= size
@@ -329,7 +335,9 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         found = solve(finer, n_modes, max_frequency)
     mode = int(found.error.argmax())
     least = float(f"{2.0 * found.error[mode]:.1e}")  # where corners hold the error, it differs from mesh to mesh
-    advice = f"a tolerance of {least:g} is met" if least <= LOOSEST else "no tolerance is: check the units"
+    slips = plausible.body(np.ptp(found.system.mesh.points, axis=0), found.system.section)
+    none = f"no tolerance is: check the units, as {slips[0]}" if slips else f"no tolerance up to {LOOSEST:g} is"
+    advice = f"a tolerance of {least:g} is met" if least <= LOOSEST else none
     advice += ", or ask for fewer modes"
     if least > LOOSEST and found.system.unresolved > SAY:
         advice = "no tolerance is, as corners hold that error on any mesh"
@@ -337,6 +345,20 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         f"tolerance = {tolerance:g} is not met: mode {mode + 1} is uncertain by {found.error[mode]:.1e} with "
         f"{found.system.n_dofs} unknowns; {advice}"
     )
+
+
+def _foreseen(seen: list[tuple[float, float]], goal: float) -> float:
+    """Factor [-] to divide the last size by, as errors fell on meshes of sizes and errors ``seen``; 1 if on one only.
+
+    The faster of the rates since the first mesh and since the last but one counts; infinity if neither fell.
+    """
+    if len(seen) < 2:
+        return 1.0
+    sizes, errors = np.log(seen).T
+    falls, shrinks = errors[[0, -2]] - errors[-1], sizes[[0, -2]] - sizes[-1]
+    rate = float(np.max(np.divide(falls, shrinks, out=np.zeros(2), where=shrinks > 0.0)))
+    with np.errstate(over="ignore"):
+        return float(np.exp((errors[-1] - np.log(goal)) / rate)) if rate > 0.0 else np.inf
 
 
 def _needed(parts: np.ndarray, goal: float) -> float:
