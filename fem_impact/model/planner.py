@@ -115,6 +115,7 @@ class Plan:
     mobility: float = 0.0  # [m/(N s)] of an infinite plate
     notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
     first: Modes | None = field(default=None, repr=False, compare=False)  # first modes of the target, if needed
+    ringing: float = 0.0  # [s] predicted besides, of the modes that tell motion and sound, once these are asked for
 
     def __repr__(self) -> str:
         return check.brief(self)
@@ -196,6 +197,8 @@ class Plan:
         lines += [f"  {line}" for line in markup.columns([(name, f"{error:.1e}") for name, error in errors])]
         lines += [f"Model: {pointed(line)}" for line in doubts]
         lines.append(f"Cost: {self.cost}")
+        if self.ringing > progress.LONG:
+            lines.append(f"  motion, sound and pictures take about {self.ringing:.0f} s more once they are asked for")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")
         if self.memory > cost.installed():
@@ -923,14 +926,16 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
         )
         reason += "and the sound"
     work = cost.by_vectors([blow.target.unknowns(at, each, stages) for each in meshes], count, lasts)
+    rings = _ringing_count(asked)
+    ringing = cost.by_modes(cost.PER_MODE * FIRST_LOOK, FIRST_LOOK) + cost.by_modes(cost.PER_MODE * rings, rings)
     if asked.moving:
-        rings = _ringing_count(asked)
-        work += cost.by_modes(cost.PER_MODE * FIRST_LOOK, FIRST_LOOK) + cost.by_modes(cost.PER_MODE * rings, rings)
+        work, ringing = work + ringing, cost.NOTHING
     shares = dict.fromkeys(("Ritz vectors", "mesh"), SHARE * (1.0 - CHEAP) * asked.tolerance)
     why = f"the contact lasts about {asked.duration:.3g} s"
     return _plan(
         asked, target="vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
         element="argyris", steps=CHEAP, mass=blow.target.mass, notes=blow.target.notes, work=work,
+        ringing=ringing.seconds,
     )  # fmt: skip
 
 

@@ -421,3 +421,14 @@ def test_motion_costs_the_modes_it_is_told_by(scene, monkeypatch):
     )
     look = cost.by_modes(cost.PER_MODE * planner.FIRST_LOOK, planner.FIRST_LOOK)
     assert moving.seconds - still.seconds == pytest.approx(2.0 * look.seconds, rel=1e-6)
+
+
+def test_the_modes_that_only_files_take_are_told_besides():
+    """The command says 5 s of this guitar and then takes a minute, most of it for the sound at the point struck."""
+    scene = fi.load_scene(SCENES / "everyday" / "guitar_fingernail.toml")
+    plan = scene.plan()
+    moving = planner.make(replace(plan.blow, moving=True), {}, planner.Stages())
+    assert_allclose(plan.seconds + plan.ringing, moving.seconds, rtol=1e-12)
+    assert moving.ringing == 0.0 < plan.ringing and "once they are asked for" in str(plan)
+    heavy = fi.plan(SCENES / "heavy_plate.toml", tolerance=1e-2)
+    assert heavy.target in ("rigid", "infinite") and heavy.ringing == 0.0
