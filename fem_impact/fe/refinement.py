@@ -14,9 +14,9 @@ from .._base.rounding import EPSILON, SAME
 from ..mesh import mesh_files
 from ..mesh.meshes import MOST_CELLS, Mesh
 from . import plausible, residual, thick
-from .assembly import THICK, System, assemble, reassemble
+from .assembly import THICK, Strain, System, _kinds, assemble, reassemble, support_of_facets
 from .beam_elements import DEGREE
-from .corners import SAY
+from .corners import SAY, singular
 from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, lowest
 from .section import Plate, directional
 
@@ -65,6 +65,9 @@ MOST_MESHES = 8
 # [-] unknowns foretold from the rate at which errors fell, over those allowed, from which on nobody waits for more
 # meshes: rates grow as meshes resolve, and a rate half as large asks for the square of that
 BEYOND = 4.0
+LARGEST_MISSED = (
+    0.99  # [-] of a frequency, by corners: a hundredth of it could be left, and a stated error of 200 is none
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,9 +190,28 @@ def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarr
         parts[:3, flexible] = CLAIMED * 0.5 * residual.energy_errors(system, vectors, vectors * values) / values
     vectors, squares = Flexibility.of(system).bent(vectors)[0], system.K.multiply(system.K)
     rounding = 0.5 * np.finfo(float).eps * np.sqrt(np.einsum("ij,ij->j", vectors**2, squares @ vectors**2)) / values
-    corners = system.unresolved if system.unresolved > SAY else 0.0
+    corners = _missed_at_corners(system, vectors, values)
     parts[3, flexible] = ROUNDED * rounding + RESIDUAL**2 + corners  # the second is what the eigensolver leaves
     return parts
+
+
+def _missed_at_corners(system: System, vectors: np.ndarray, values: np.ndarray) -> np.ndarray | float:
+    """Estimated relative errors (n_modes,) of frequencies by what the triangles at singular corners cannot follow.
+
+    The energy within a distance r grows as a power of r that the corner's exponent tells. So the energy in the second
+    ring tells what the innermost triangles, half as far, would hold, and that they hold little of. Frequencies are too
+    high by it, so that an error near one over the frequency found is more over the true one.
+    """
+    if not isinstance(system.strain, Strain) or not system.graded:
+        return system.unresolved if system.unresolved > SAY else 0.0
+    kinds = _kinds(support_of_facets(system.mesh, system.supports))
+    missed = np.zeros(len(values))
+    for vertex, corner in singular(system.mesh, kinds, system.section.material).items():
+        own = 0.5 * system.strain.around(system, vectors, vertex) / values / (2.0**corner.power - 1.0)
+        if corner.free:
+            own = np.minimum(own, corner.left / CLAIMED) if corner.left > SAY else 0.0
+        missed += own
+    return CLAIMED * missed / (1.0 - np.minimum(missed, LARGEST_MISSED))
 
 
 def _compared(system: System, omega: np.ndarray) -> np.ndarray:
