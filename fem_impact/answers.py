@@ -48,6 +48,7 @@ KEYS: dict[str, Keys] = {
         "tolerance": ("number", "largest error accepted [-]"),
         "seconds": ("number", "predicted time [s]"),
         "memory": ("number", "predicted memory [byte]"),
+        "ringing": ("number?", "predicted besides, of the modes for motion and sound once they are asked for [s]"),
         "target": ("string?", "how the struck body is treated"),
         "errors": ("object?", "predicted errors [-] by cause"),
         "reasons": ("array?", "why, as sentences"),

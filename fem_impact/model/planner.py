@@ -115,6 +115,7 @@ class Plan(check.Brief):
     mobility: float = 0.0  # [m/(N s)] of an infinite plate
     notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
     first: Modes | None = field(default=None, repr=False, compare=False)  # first modes of the target, if needed
+    ringing: float = 0.0  # [s] predicted besides, of the modes that tell motion and sound, once these are asked for
 
     @property
     def error(self) -> float:
@@ -196,8 +197,12 @@ class Plan(check.Brief):
         lines += [f"  {line}" for line in markup.columns([(name, f"{error:.1e}") for name, error in errors])]
         lines += [f"Model: {pointed(line)}" for line in doubts]
         lines.append(f"Cost: {self.cost}")
+        if self.ringing > progress.LONG:
+            lines.append(f"  motion, sound and pictures take about {self.ringing:.0f} s more once they are asked for")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")
+        if self.memory > cost.installed():
+            lines.append(f"  the {cost.installed() / 1e9:.2g} GB of memory of this machine do not suffice")
         return "\n".join(lines)
 
 
@@ -394,6 +399,7 @@ def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:
     ``keep`` is a file that stores the modes of a costly plan.
     """
     blow, asked, margin = plan.blow, _Asked.checked(plan.blow, plan.changes), 1.0
+    _check_memory(plan)
     if plan.target == "vectors":
         return _carry_out_by_vectors(plan, asked, stages, keep)
     if plan.target == "mixed":
@@ -428,6 +434,20 @@ def _carry_out(plan: Plan, stages: Stages, keep: Any) -> Run:
     response = audit.audited(replace(response, tolerance=asked.tolerance, error=error), simplified)
     plan = replace(plan, n_modes=modes.n_modes if plan.target == "modal" else 0)
     return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
+
+
+def _check_memory(plan: Plan) -> None:
+    """Raise SimulationError if this machine has not the memory that a plan needs."""
+    here = cost.installed()
+    if plan.memory <= here:
+        return
+    advice = "take a larger tolerance or a softer contact"
+    if plan.blow.target.thick:
+        advice += ", or the thin theory, which tells what shear changes of the blow (`thin target`)"
+    raise check.SimulationError(
+        f"{plan.blow.name}this blow needs about {plan.memory / 1e9:.2g} GB of memory for {plan.n_modes} modes or "
+        f"vectors of {plan.n_dofs} unknowns, more than the {here / 1e9:.2g} GB of this machine; {advice}"
+    )
 
 
 def _carry_out_by_vectors(plan: Plan, asked: _Asked, stages: Stages, keep: Any) -> Run:
@@ -900,14 +920,16 @@ def _by_vectors(asked: _Asked, target: str | None, stages: Stages) -> Plan | Non
     if asked.moving:
         reason += "; the vectors give the early motion, modes driven by the computed force the rest and the sound"
     work = cost.by_vectors([blow.target.unknowns(at, each, stages) for each in meshes], count, lasts)
+    rings = _ringing_count(asked)
+    ringing = cost.by_modes(cost.PER_MODE * FIRST_LOOK, FIRST_LOOK) + cost.by_modes(cost.PER_MODE * rings, rings)
     if asked.moving:
-        rings = _ringing_count(asked)
-        work += cost.by_modes(cost.PER_MODE * FIRST_LOOK, FIRST_LOOK) + cost.by_modes(cost.PER_MODE * rings, rings)
+        work, ringing = work + ringing, cost.NOTHING
     shares = dict.fromkeys(("Ritz vectors", "mesh"), SHARE * (1.0 - CHEAP) * asked.tolerance)
     why = f"the contact lasts about {asked.duration:.3g} s"
     return _plan(
         asked, target="vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
         element="argyris", steps=CHEAP, mass=blow.target.mass, notes=blow.target.notes, work=work,
+        ringing=ringing.seconds,
     )  # fmt: skip
 
 
@@ -1020,11 +1042,12 @@ def _with_mesh(plan: Plan, first: Modes, system: System, limit: float) -> Plan:
     if plan.n_modes > first.n_modes:
         thick = system.element == "argyris and shear"  # its errors come from a second mesh
         coarser = [n_dofs / refinement.COARSER**2] if thick else []
-        work = sum((cost.by_modes(n, plan.n_modes) for n in [n_dofs, *coarser]), cost.NOTHING)
+        each = [cost.by_modes(n, plan.n_modes) for n in [n_dofs, *coarser]]
         if mesh.dimension == 2:
             finer = [n_dofs * refinement.COARSER**2] if thick else []
             at_blow = cost.AT_BLOW[system.element]
-            work = sum((cost.compliance(n + at_blow) for n in [n_dofs, *finer]), work)
+            each += [cost.compliance(n + at_blow) for n in [n_dofs, *finer]]
+        work = replace(sum(each, cost.NOTHING), memory=max(part.memory for part in each))  # one mesh after another
     return replace(
         plan, element=system.element, size=size, n_dofs=n_dofs, errors={**plan.errors, "mesh": error},
         reasons=(*plan.reasons, reason), seconds=plan.seconds + work.seconds, memory=plan.memory + work.memory,
