@@ -12,9 +12,10 @@ from ..modes.stretching import stretch
 from . import accuracy, distance, engine, promise, variation
 from .contact import Contact
 from .engine import TOLERANCE
+from .error import Error
 from .history import ModalSystem
 from .reduced_body import ReducedBody, ends_of, joined, part_of
-from .response import Error, Response
+from .response import Response
 from .state import State
 from .stepping import Options, refine_steps
 from .striker import Striker

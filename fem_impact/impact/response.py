@@ -1,6 +1,5 @@
 """The result of a blow: the force history, the scalars derived from it, and the motion of all bodies at any time."""
 
-import html
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -9,22 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from .._base import check, markup
-from .._base.explained import below, noted, pointed
+from .._base import check
 from .._base.rounding import SAME
 from ..fe import plausible
 from ..modes.modal import Modes, SampledShapes, at_rest
 from ..modes.stretching import stretch
-from . import assumption, datasets, distance, force_spectrum, gradient, promise, trust
+from . import assumption, datasets, force_spectrum, gradient, in_words, promise, trust
 from .assumption import Assumption
-from .compiled import law, layout, record
+from .balance import Balance, momentum_error
+from .compiled import record
 from .contact import Contact
-from .history import CLEAR, History, Impact, mode_energy
-from .quantities import USUAL, rebound, words
+from .error import Error
+from .history import History, Impact, mode_energy
+from .quantities import USUAL
 from .state import State
 from .striker import Striker
 
-CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more than this factor: three digits are lost
 # [-] two descriptions of one body may differ by this in mass and compliance: meshes do by less, other bodies by more
 ONE_BODY = 1e-2
 # [-] largest difference of descriptions up to which Ritz vectors tell a motion: as much as modes err that are found
@@ -32,58 +31,6 @@ ONE_BODY = 1e-2
 MOVED = {"displacement": 1e-2, "velocity": 3e-2}
 LASTS = 2.0  # [-] and no longer than this many times the run, as later echoes may be missing from all of them
 LOOKED_AT = 200  # [-] times at which this error is estimated, evenly among those asked for; more only cost time
-
-
-CAUSES = {
-    "step": "time steps", "truncation": "modes left out", "mesh": "the finite elements",
-    "idealisation": "the simplified target", "inherited": "the blow before",
-}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Error:
-    """Estimated errors: absolute for the restitution, relative for impulse, contact time and peak force."""
-
-    step: float  # [-] of the time integration
-    truncation: float  # [-] of leaving out modes
-    mesh: float  # [-] of the finite elements
-    resolvable: bool = True  # False: the left-out modes govern the contact itself, and no estimate holds
-    idealisation: float = 0.0  # [-] of treating the target as rigid or infinite
-    sensitivity: float = 1.0  # [-] growth of a small difference from first to last impact
-    inherited: float = 0.0  # [-] of the motion at the start, from the blow before
-    # [-] by cause, named as above, and quantity; a cause that is not here errs as much in every quantity
-    table: Mapping[str, Mapping[str, float]] = field(default_factory=dict, repr=False, compare=False)
-
-    @classmethod
-    def from_table(cls, table: Mapping[str, Mapping[str, float]], resolvable: bool, sensitivity: float) -> "Error":
-        """The errors of a table by cause and quantity: of each cause the largest."""
-        sizes = {cause: distance.worst(errors) for cause, errors in table.items()}
-        whole = {"step": 0.0, "truncation": 0.0, "mesh": 0.0} | sizes
-        return cls(**whole, resolvable=resolvable, sensitivity=sensitivity, table=table)
-
-    @property
-    def total(self) -> float:
-        """The sum [-]; infinite if the modes cannot resolve the contact."""
-        return sum(self.parts().values()) if self.resolvable else float("inf")
-
-    @property
-    def dominant(self) -> tuple[str, float]:
-        """The largest part, in words, and its size [-]."""
-        return max(self.parts().items(), key=lambda part: part[1])
-
-    def parts(self, quantity: str | None = None) -> dict[str, float]:
-        """Size [-] of each part by its name in words; of one quantity, or the largest of all that were asked for."""
-        return {
-            words: self.table.get(cause, {}).get(quantity, getattr(self, cause)) if quantity else getattr(self, cause)
-            for cause, words in CAUSES.items()
-        }
-
-    def of_quantity(self, quantity: str) -> float:
-        """The estimated error of one quantity [-]; infinite if the modes cannot resolve the contact."""
-        return float(sum(self.parts(quantity).values())) if self.resolvable else float("inf")
-
-    def __float__(self) -> float:
-        return float(self.total)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -688,27 +635,8 @@ class Response(Totals, check.Locked):
         return -after / before if before else None
 
     @cached_property
-    def _balance(self) -> dict[str, float]:
-        h = self.history
-
-        start_contact = float(law.stored(h.offset + h.shape @ h.start_q, h.law))
-        end_contact = float(law.stored(h.now[layout.APPROACH] - law.dents(h.end_law), h.end_law))
-        start, end = h.energy(h.start_q, h.start_p), h.energy(h.end_q, h.end_p)
-        work = float(h.work.sum())
-        yielded = contact_loss = work - (end_contact - start_contact)
-        if not any(contact.rated for contact in self.contacts):
-            yielded = law.yielded(h.end_law) - law.yielded(h.law)
-        return {
-            "start": start + start_contact,
-            "end": end + end_contact,
-            "contact": end_contact,
-            "contact_loss": contact_loss,
-            "yielded": yielded,  # what the laws say is lost, if they can
-            "modal_loss": -(end - start) - work,
-            "scale": max(
-                0.5 * float(h.start_p @ h.start_p), 0.5 * float(h.end_p @ h.end_p), start_contact, abs(start), abs(end)
-            ),
-        }
+    def _balance(self) -> Balance:
+        return Balance.of(self.history, self.contacts)
 
     @property
     def energies(self) -> dict[str, float]:
@@ -716,22 +644,21 @@ class Response(Totals, check.Locked):
 
         They add up to the initial energy to within `energy_error`.
         """
-        h = self.history
-        names = ["striker", "target"] if len(self.bodies) == 2 else [f"body {i}" for i in range(len(self.bodies))]
-        result = {name: h.energy(h.end_q, h.end_p, self.body_slice(body)) for body, name in enumerate(names)}
+        found = self._of_bodies(self.history.end_q, self.history.end_p)
         rest = slice(self.body_slice(len(self.bodies) - 1).stop, None)  # modes that replace the left-out ones
-        result["contact"] = self._balance["contact"] + h.energy(h.end_q, h.end_p, rest)
-        result["dissipated"] = sum(self.dissipated.values())
-        return result
+        found["contact"] = self._balance.contact + self.history.energy(self.history.end_q, self.history.end_p, rest)
+        return found | {"dissipated": sum(self.dissipated.values())}
 
     @property
     def start_energies(self) -> dict[str, float]:
         """Energies [J] at the start, of the same parts: what the blow began with."""
-        h, last = self.history, len(self.bodies) - 1
-        names = list(self.energies)[: last + 1]
-        found = {name: h.energy(h.start_q, h.start_p, self.body_slice(body)) for body, name in enumerate(names)}
-        found["contact"] = self._balance["start"] - sum(found.values())
-        return {**found, "dissipated": 0.0}
+        found = self._of_bodies(self.history.start_q, self.history.start_p)
+        return found | {"contact": self._balance.start - sum(found.values()), "dissipated": 0.0}
+
+    def _of_bodies(self, q: np.ndarray, p: np.ndarray) -> dict[str, float]:
+        """Energy [J] of each body in a state."""
+        names = ["striker", "target"] if len(self.bodies) == 2 else [f"body {i}" for i in range(len(self.bodies))]
+        return {name: self.history.energy(q, p, self.body_slice(body)) for body, name in enumerate(names)}
 
     @property
     def energy_gains(self) -> dict[str, float]:
@@ -742,33 +669,17 @@ class Response(Totals, check.Locked):
     @property
     def dissipated(self) -> dict[str, float]:
         """Energy [J] lost to modal damping and to the contacts; exactly zero without damping or contact loss."""
-        lossy = any(contact.lossy for contact in self.contacts)
-        damped = bool(((self.history.zeta > 0.0) & (self.history.omega > 0.0)).any())
-        return {
-            "modes": self._balance["modal_loss"] if damped else 0.0,
-            "contact": self._balance["contact_loss"] if lossy else 0.0,
-        }
+        return self._balance.dissipated
 
     @property
     def energy_error(self) -> float:
         """Energy that numerical error created or destroyed, over the largest energy in the blow [-]."""
-        balance, lost = self._balance, self.dissipated
-        unexplained = [balance["modal_loss"] - lost["modes"], balance["contact_loss"] - lost["contact"]]
-        unexplained += [min(0.0, value) for value in lost.values()]
-        unexplained += [balance["contact_loss"] - balance["yielded"] if lost["contact"] else 0.0]
-        return float(sum(abs(value) for value in unexplained) / balance["scale"]) if balance["scale"] else 0.0
+        return self._balance.error
 
     @property
     def momentum_error(self) -> float:
         """Largest momentum change of a rigid motion that the forces do not explain, over the largest momentum [-]."""
-        h = self.history
-        rigid = h.omega == 0.0
-        if not rigid.any():
-            return 0.0
-        impulses = h.impulses.sum(axis=0)  # (n_contacts,)
-        wanted = h.start_p + h.bias * h.end_time - impulses @ h.shape
-        scale = max(np.abs(h.start_p[rigid]).max(), np.abs(impulses @ np.abs(h.shape[:, rigid])).max())
-        return float(np.abs(h.end_p - wanted)[rigid].max() / scale) if scale else 0.0
+        return momentum_error(self.history)
 
     @property
     def finished(self) -> bool:
@@ -777,69 +688,11 @@ class Response(Totals, check.Locked):
 
     def _repr_html_(self) -> str:
         """For notebooks: the force curve and a table of results."""
-        rows = [
-            ("impacts", f"{self.n_impacts}; {self.outcome}"),
-            ("peak force", f"{self.peak_force:.5g} N"),
-            ("contact time", f"{self.contact_time:.5g} s"),
-            ("impulse", f"{self.impulse:.5g} N s"),
-            ("restitution", rebound(self, 5)),
-            ("estimated error", f"{self.error.total:.1e} of {self.tolerance:g} accepted"),
-        ]
-        end = self.impacts[-1].end if self.impacts else np.inf
-        shown = self.time <= end
-        force = self.force if self.force.ndim == 1 else self.force.sum(axis=1)
-        said = f"Contact force over time: {self.n_impacts} impacts, peak {self.peak_force:.4g} N"
-        return (
-            f"<p>{html.escape(self.verdict)}</p>"
-            + markup.side_by_side(
-                markup.curve(self.time[shown], force[shown], label="force", unit="N", title=said), markup.table(rows)
-            )
-            + markup.notes(self.notes)
-        )
+        return in_words.page(self)
 
     def summary(self) -> str:
         """The blow in a few readable lines."""
-        several = self.history.n_contacts > 1
-        lines = [self.verdict, f"{self.n_impacts} impact{'s' if self.n_impacts != 1 else ''}; {self.outcome}"]
-        lines += [
-            f"  {impact.start * 1e3:9.4f} to {impact.end * 1e3:9.4f} ms: peak {impact.peak_force:.5g} N, "
-            f"impulse {impact.impulse:.5g} N s" + (f", contact {impact.contact}" if several else "")
-            for impact in self.impacts[:20]
-        ]
-        if self.n_impacts > 20:
-            lines.append(f"  ... and {self.n_impacts - 20} more")
-        if self.margin < CLEAR:
-            lines.append(f"margin {self.margin:.1g} of the deepest approach: that close to another number of impacts")
-        total = self._balance["start"]
-        shares = ", ".join(f"{name} {value / total:.2%}" for name, value in self.energies.items()) if total else "none"
-        error = self.error
-        lines += [
-            f"contact time {self.contact_time * 1e3:.5g} ms, peak force {self.peak_force:.5g} N, "
-            f"impulse {self.impulse:.5g} N s",
-            f"restitution {rebound(self, 5)} at {self.speed:g} m/s",
-            f"energy {total:.5g} J: {shares}",
-            f"estimated error {error.total:.1e} of {words(self.quantities)}: "
-            + ", ".join(f"{name} {size:.1e}" for name, size in error.parts().items() if size or name == "time steps")
-            + f"; energy error {self.energy_error:.1e}",
-        ]
-        if self.moving:
-            began, gained = (
-                ", ".join(f"{name} {x:.4g} J" for name, x in each.items() if name != "dissipated")
-                for each in (self.start_energies, self.energy_gains)
-            )
-            lines.insert(-1, f"the target moved at the start: {began}; gained in the blow: {gained}")
-        if several:
-            each = ", ".join(f"contact {i} {1e3 * time:.5g} ms" for i, time in enumerate(self.contact_times))
-            lines.append(f"contact time: {each}; any of them {1e3 * self.touching_time:.5g} ms")
-        if error.sensitivity > CHAOTIC:
-            lines.append(
-                f"chaotic: small differences grow {error.sensitivity:.0e}-fold from the first impact to the last; "
-                "trust the number of impacts and averages, not single values"
-            )
-        if self.audit is not None:
-            lines += [f"Model: {pointed(line)}" for line in self.model_verdict[1:]]
-        lines[1:1] = [*below(self.verdict), *noted(self.notes)]  # a slip of a unit makes all that follows wrong
-        return "\n".join(lines)
+        return in_words.lines(self)
 
     def to_xarray(self) -> Any:
         """The response as an `xarray.Dataset`: force [N] over time [s], impacts, scalars, errors and energies.

@@ -13,7 +13,7 @@ import numpy as np
 from ..fe import point_load, refinement
 from ..fe.section import Plate
 from ..fe.splitting import DEPTH
-from ..impact.response import Error
+from ..impact.error import Error
 from ..modes.modal import Modes
 from ..modes.ritz import Krylov
 from . import cost

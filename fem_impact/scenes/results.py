@@ -15,8 +15,9 @@ from ..fe.section import Material
 from ..impact.assumption import Assumption
 from ..impact.compiled import layout
 from ..impact.contact import Contact
+from ..impact.error import Error
 from ..impact.history import History
-from ..impact.response import Ends, Error, Response
+from ..impact.response import Ends, Response
 from ..impact.stretched import Stretched
 from ..impact.striker import Hand, Striker
 from ..model.playing import Stroke, Strokes

@@ -17,7 +17,7 @@ from ..fe import refinement
 from ..fe.eigenvalues import Flexibility
 from ..impact import accuracy, collision
 from ..impact.contact import Contact
-from ..impact.response import Error
+from ..impact.error import Error
 from ..impact.striker import Striker
 from ..model import planner, vectors
 from ..model.target import CLOSE, FIRST_FLEXIBLE, FIRST_LOOK, Elements, Stages, Target

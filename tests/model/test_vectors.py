@@ -9,7 +9,7 @@ import pytest
 
 import fem_impact as fi
 from fem_impact.impact import accuracy
-from fem_impact.impact.response import Error
+from fem_impact.impact.error import Error
 from fem_impact.model import planner, vectors
 from fem_impact.model.target import Elements, Stages, Target
 from fem_impact.modes import ritz

@@ -1,0 +1,71 @@
+"""What became of the energy and the momentum of a blow."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .compiled import law, layout
+from .contact import Contact
+from .history import History
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Energies [J] of a whole run."""
+
+    start: float
+    end: float
+    contact: float  # stored in the contacts at the end
+    modal_loss: float  # that the modes lost besides the work of the contacts
+    contact_loss: float  # that the contacts took and do not store
+    yielded: float  # what their laws say of it, if they can
+    largest: float
+    damped: bool  # whether modes may lose any
+    lossy: bool  # whether contacts may
+
+    @classmethod
+    def of(cls, h: History, contacts: Sequence[Contact]) -> "Balance":
+        """The balance of a run."""
+        start_contact = float(law.stored(h.offset + h.shape @ h.start_q, h.law))
+        end_contact = float(law.stored(h.now[layout.APPROACH] - law.dents(h.end_law), h.end_law))
+        start, end = h.energy(h.start_q, h.start_p), h.energy(h.end_q, h.end_p)
+        work = float(h.work.sum())
+        lost = work - (end_contact - start_contact)
+        rated = any(contact.rated for contact in contacts)
+        kinetic = max(0.5 * float(p @ p) for p in (h.start_p, h.end_p))
+        return cls(
+            start=start + start_contact, end=end + end_contact, contact=end_contact, modal_loss=-(end - start) - work,
+            contact_loss=lost, yielded=lost if rated else law.yielded(h.end_law) - law.yielded(h.law),
+            largest=max(kinetic, start_contact, abs(start), abs(end)),
+            damped=bool(((h.zeta > 0.0) & (h.omega > 0.0)).any()),
+            lossy=any(contact.lossy for contact in contacts),
+        )  # fmt: skip
+
+    @property
+    def dissipated(self) -> dict[str, float]:
+        """Energy [J] lost to modal damping and to the contacts."""
+        return {
+            "modes": self.modal_loss if self.damped else 0.0,
+            "contact": self.contact_loss if self.lossy else 0.0,
+        }
+
+    @property
+    def error(self) -> float:
+        """Energy that numerical error created or destroyed, over the largest energy in the blow [-]."""
+        lost = self.dissipated
+        unexplained = [self.modal_loss - lost["modes"], self.contact_loss - lost["contact"]]
+        unexplained += [min(0.0, value) for value in lost.values()]
+        unexplained += [self.contact_loss - self.yielded if lost["contact"] else 0.0]
+        return float(sum(abs(value) for value in unexplained) / self.largest) if self.largest else 0.0
+
+
+def momentum_error(h: History) -> float:
+    """Largest momentum change of a rigid motion that the forces do not explain, over the largest momentum [-]."""
+    rigid = h.omega == 0.0
+    if not rigid.any():
+        return 0.0
+    impulses = h.impulses.sum(axis=0)  # (n_contacts,)
+    wanted = h.start_p + h.bias * h.end_time - impulses @ h.shape
+    scale = max(np.abs(h.start_p[rigid]).max(), np.abs(impulses @ np.abs(h.shape[:, rigid])).max())
+    return float(np.abs(h.end_p - wanted)[rigid].max() / scale) if scale else 0.0

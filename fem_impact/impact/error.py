@@ -1,0 +1,57 @@
+"""The estimated errors of a blow, by cause and quantity."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from . import distance
+
+CAUSES = {
+    "step": "time steps", "truncation": "modes left out", "mesh": "the finite elements",
+    "idealisation": "the simplified target", "inherited": "the blow before",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Error:
+    """Estimated errors: absolute for the restitution, relative for impulse, contact time and peak force."""
+
+    step: float  # [-] of the time integration
+    truncation: float  # [-] of leaving out modes
+    mesh: float  # [-] of the finite elements
+    resolvable: bool = True  # False: the left-out modes govern the contact itself, and no estimate holds
+    idealisation: float = 0.0  # [-] of treating the target as rigid or infinite
+    sensitivity: float = 1.0  # [-] growth of a small difference from first to last impact
+    inherited: float = 0.0  # [-] of the motion at the start, from the blow before
+    # [-] by cause, named as above, and quantity; a cause that is not here errs as much in every quantity
+    table: Mapping[str, Mapping[str, float]] = field(default_factory=dict, repr=False, compare=False)
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Mapping[str, float]], resolvable: bool, sensitivity: float) -> "Error":
+        """The errors of a table by cause and quantity: of each cause the largest."""
+        sizes = {cause: distance.worst(errors) for cause, errors in table.items()}
+        whole = {"step": 0.0, "truncation": 0.0, "mesh": 0.0} | sizes
+        return cls(**whole, resolvable=resolvable, sensitivity=sensitivity, table=table)
+
+    @property
+    def total(self) -> float:
+        """The sum [-]; infinite if the modes cannot resolve the contact."""
+        return sum(self.parts().values()) if self.resolvable else float("inf")
+
+    @property
+    def dominant(self) -> tuple[str, float]:
+        """The largest part, in words, and its size [-]."""
+        return max(self.parts().items(), key=lambda part: part[1])
+
+    def parts(self, quantity: str | None = None) -> dict[str, float]:
+        """Size [-] of each part by its name in words; of one quantity, or the largest of all that were asked for."""
+        return {
+            words: self.table.get(cause, {}).get(quantity, getattr(self, cause)) if quantity else getattr(self, cause)
+            for cause, words in CAUSES.items()
+        }
+
+    def of_quantity(self, quantity: str) -> float:
+        """The estimated error of one quantity [-]; infinite if the modes cannot resolve the contact."""
+        return float(sum(self.parts(quantity).values())) if self.resolvable else float("inf")
+
+    def __float__(self) -> float:
+        return float(self.total)

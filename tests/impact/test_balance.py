@@ -1,0 +1,41 @@
+"""Energy and momentum of a blow: nothing is made, and what is lost is said by whom."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.impact.balance import Balance, momentum_error
+
+
+def blow(loss=0.0, damping_ratio=0.0):
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=80, damping_ratio=damping_ratio)
+    law = fi.Contact.power(1e6, 1.5, loss=loss)
+    return fi.strike(plate, fi.Striker.rigid(0.02), law, at=(0.45, 0.3), speed=2.0, tolerance=1e-4, residual=False)
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.3])
+@pytest.mark.parametrize("damping_ratio", [0.0, 0.02])
+def test_what_modes_and_contacts_lose_is_missing_at_the_end(loss, damping_ratio):
+    hit = blow(loss, damping_ratio)
+    found = Balance.of(hit.history, hit.contacts)
+    assert_allclose(found.start, 0.5 * 0.02 * 2.0**2, rtol=1e-14)  # the energy that arrives
+    lost = found.dissipated
+    assert (lost["modes"] > 0.0) == (damping_ratio > 0.0) and (lost["contact"] > 0.0) == (loss > 0.0)
+    assert_allclose(found.start - found.end, sum(lost.values()), atol=1e-13 * found.start)
+    assert found.error < 1e-12 and found.contact == 0.0  # rounding of some hundred steps
+
+
+def test_energy_that_nothing_explains_is_an_error():
+    hit = blow()
+    h = hit.history
+    faster = replace(h, end_p=1.01 * h.end_p)
+    gained = 0.5 * float(faster.end_p @ faster.end_p - h.end_p @ h.end_p)
+    found = Balance.of(faster, hit.contacts)
+    assert_allclose(found.error, gained / found.largest, rtol=1e-9)
+    assert_allclose(
+        momentum_error(faster), 0.01 * abs(h.end_p[0]) / np.abs(h.impulses.sum() * h.shape[0, 0]), rtol=1e-9
+    )
+    assert momentum_error(h) < 1e-14
