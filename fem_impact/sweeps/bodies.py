@@ -19,7 +19,9 @@ from ..impact import accuracy, collision
 from ..impact.contact import Contact
 from ..impact.response import Error
 from ..impact.striker import Striker
-from ..model import planner, vectors
+from ..model import vectors
+from ..model.budget import FINEST, Budget
+from ..model.by_modes import MOST_MODES
 from ..model.target import CLOSE, FIRST_FLEXIBLE, FIRST_LOOK, Elements, Stages, Target
 from ..model.views import TOGETHER, Views
 from ..modes.modal import FieldShapes, Modes, SampledShapes, damping_ratios
@@ -110,7 +112,7 @@ def _by_modes(target: Target, case: Case, axes: Axes, tolerance: float, keep: Pa
     modes, needed = case.modes, reach(tolerance)
     if needed <= modes.frequencies[-1]:
         return case
-    number, most = number_of_modes(modes, needed), planner.MOST_MODES[target.kind]
+    number, most = number_of_modes(modes, needed), MOST_MODES[target.kind]
     if number > most:
         enough = accuracy.least_tolerance(lambda tolerance: number_of_modes(modes, reach(tolerance)) <= most)
         stiffest = float(np.max(axes.get("stiffness", case.contact.stiffness)))
@@ -141,7 +143,7 @@ def needed_frequency(case: Case, tolerance: float) -> float:
     """Frequency [Hz] up to which a blow needs modes to meet the tolerance."""
     return accuracy.cutoff_frequency(
         case.modes, case.at, contact=case.contact, mass=case.striker.felt_mass, speed=case.speed,
-        tolerance=planner.SHARE * tolerance,
+        tolerance=Budget(tolerance).half,
     )  # fmt: skip
 
 
@@ -279,8 +281,7 @@ class Sized:
             needed = []
             for values in self.ends:
                 case = self.at(modes, point, values)
-                loss = accuracy.LOSSY if case.contact.rated else 1.0
-                allowed = planner.SHARE * self.tolerance / (planner.CAUTION * loss * margin)
+                allowed = Budget(self.tolerance, case.contact.rated, margin).left_out
                 law: dict[str, Any] = {"contact": case.contact, "mass": case.striker.felt_mass, "speed": case.speed}
                 limit = accuracy.tail_cutoff(case.modes, point[None], tolerance=allowed, **law)
                 needed.append(limit / self.raised(values))
@@ -293,7 +294,7 @@ class Sized:
         try:
             hit = collision.strike(
                 case.modes, case.striker, case.contact, at=case.at, speed=case.speed,
-                tolerance=max(planner.FINEST, planner.CHEAP * self.tolerance), max_impacts=self.max_impacts,
+                tolerance=max(FINEST, Budget(self.tolerance).cheap), max_impacts=self.max_impacts,
             )  # fmt: skip
         except check.SimulationError:
             return 0.0, 0.0

@@ -24,7 +24,7 @@ from ..impact.collision import RESOLVABLE, strike
 from ..impact.contact import Contact, wall_time
 from ..impact.response import Response
 from ..impact.striker import Striker
-from ..model.planner import COSTLY
+from ..model.asked import COSTLY
 from ..model.target import Target
 from ..modes.modal import Damping, Modes
 from . import batches, bodies, cloud, refined
