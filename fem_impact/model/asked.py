@@ -1,7 +1,7 @@
 """What is asked of a blow, checked, and what is foretold of it before anything is computed."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from inspect import signature
@@ -85,12 +85,10 @@ class Asked:
     @classmethod
     def checked(cls, blow: "Blow", changes: Mapping[str, Any]) -> "Asked":
         """What is asked of a blow; ``changes`` as in `fi.plan`."""
-        changes = {name: value for name, value in changes.items() if value is not None}
+        changes = MappingProxyType({name: value for name, value in changes.items() if value is not None})
         pieces = {name: changes[name] for name in PIECES if name in changes}
-        values: dict[str, Any] = {
-            **blow.arguments,
-            **{name: value for name, value in changes.items() if name not in PIECES},
-        }
+        arguments = {name: value for name, value in changes.items() if name not in PIECES}
+        values: dict[str, Any] = {**blow.arguments, **arguments}
         for name, value in pieces.items():
             if name in CHOICES:
                 check.one_of(name, value, CHOICES[name])
@@ -218,8 +216,7 @@ class Asked:
         return Forecast(
             self.budget.total, self.quantities, target, n_modes=n_modes, n_striker_modes=kept, scheme=scheme, dt=dt,
             duration=self.duration, errors=MappingProxyType({**errors, "steps": steps}), reasons=reasons,
-            seconds=work.seconds, memory=work.memory,
-            notes=plausible.together(notes, self.slips), **rest,
+            seconds=work.seconds, memory=work.memory, notes=plausible.together(notes, self.slips), **rest,
         )  # fmt: skip
 
 
@@ -250,6 +247,25 @@ class Description(ABC):
         told = self.forecast
         kind = "infinite" if told.mobility else "rigid"
         return audit.audited(hit, None if self.rings else self.asked.from_outside(kind, told.mass))
+
+
+def refine(description: Any, strike: Callable[..., tuple[Any, Any]], stages: Stages, keep: Any = None) -> Any:
+    """Strike one description after another until the errors require no better one.
+
+    ``strike`` takes a description, its modes and the stages, and returns what tells the errors, and more. Returns the
+    last description that could be struck, with both. What is too much for a better one has missed the tolerance.
+    """
+    struck = None
+    while description is not None:
+        try:
+            found, modes = description.found(stages, keep)
+            struck = found, *strike(found, modes, stages)
+            description = found.refined(struck[1], stages)
+        except check.SimulationError:
+            if struck is None:
+                raise
+            break
+    return struck
 
 
 def _struck_at(target: Target, at: Any, changes: Mapping[str, Any]) -> Any:

@@ -15,7 +15,7 @@ from . import cost, mixed, vectors
 from .asked import Asked, Description
 from .by_modes import MANY_MODES
 from .by_vectors import Vectors
-from .target import FIRST_LOOK, Elements, Stages, Target
+from .target import FIRST_LOOK, Elements, Stages
 
 # [-] modes times steps of one run of a plate that is infinite above a frequency: a time limit of ten seconds
 MOST_MIXED = 2e8
@@ -64,6 +64,7 @@ class Mixed(Description):
         )
         wall = asked.duration
         why = f"the contact lasts about {wall:.3g} s on a wall, and the striker slows down within {slow:.3g} s"
+        number = round(target.count_below(mixed.REACH * frequency / target.stretch))
         chosen: dict[str, Any] = {"element": "closed form"}
         if target.kind == "analytic":
             with stages("modes"):
@@ -78,7 +79,7 @@ class Mixed(Description):
             chosen = {"element": "argyris", "size": elements.size, "n_dofs": n_dofs, "work": work}
         forecast = asked.foretell(
             "mixed", errors={"echoes left out": asked.budget.half}, reasons=(why, kept), mass=seen.mass,
-            mobility=seen.mobility, n_modes=_count(target, frequency), max_frequency=frequency,
+            mobility=seen.mobility, n_modes=number, max_frequency=frequency,
             notes=plausible.together(target.notes, seen.notes), **chosen,
         )  # fmt: skip
         return cls(asked, forecast, frequency, highest)
@@ -147,11 +148,7 @@ def _by_elements(asked: Asked, frequency: float, stages: Stages) -> tuple[Elemen
     elements = vectors.elements_for(target, size, asked.mass, reach, tolerance)
     lasts = max(asked.duration, mixed.LASTING * asked.mass * asked.seen.mobility)
     phase = 2.0 * np.pi * mixed.REACH * frequency * lasts
-    count = vectors.FEWEST + min(_count(target, frequency), round(mixed.PER_RADIAN * phase))
+    number = target.count_below(mixed.REACH * frequency / target.stretch)
+    count = vectors.FEWEST + min(round(number), round(mixed.PER_RADIAN * phase))
     n_dofs = target.unknowns(asked.values["at"][None], elements, stages)
     return elements, count, n_dofs, cost.by_vectors([n_dofs, n_dofs / refinement.COARSER**2], count, 1.0)
-
-
-def _count(target: Target, frequency: float) -> int:
-    """About how many modes the target has up to where they fade, for the infinite plate above a frequency [Hz]."""
-    return round(target.count_below(mixed.REACH * frequency / target.stretch))

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from .._base import check
+from .._base import check, progress
 from ..fe import plausible, refinement
 from ..impact import accuracy
 from ..impact.response import Response
@@ -107,7 +107,9 @@ class Modal(Description):
         margin, fineness = (NOTCH if more_exact else 1.0 for more_exact in (short, coarse))
         budget = replace(budget, margin=budget.margin * margin, fineness=budget.fineness * fineness)
         first = None if coarse else self.forecast.first
-        return Modal.of(replace(asked, budget=budget), stages, first, self.more * more, self.attempt + 1)
+        better = Modal.of(replace(asked, budget=budget), stages, first, self.more * more, self.attempt + 1)
+        progress.foresee(better.forecast.seconds)
+        return better
 
 
 def _reach(asked: Asked, modes: Modes, limit: float, more: float) -> tuple[float, int]:

@@ -32,6 +32,7 @@ class Vectors(Description):
     """A plate by Ritz vectors."""
 
     rings = True
+    elements: Elements  # those to begin with
     otherwise: Description | None = None  # for a blow that these cannot describe; by default the infinite plate
     whole: Modes | None = None  # all Ritz pairs
 
@@ -64,9 +65,14 @@ class Vectors(Description):
                 f"{blow.name}this blow needs about {needs:.2g} unknowns, elements of {size:.2g} m, more than the limit "
                 f"of {refinement.MOST_UNKNOWNS}; take a contact with stiffness = {float(f'{0.9 * soft:.1e}'):g}"
             )
-        elements = _elements(asked, size)
-        work, count = _work(asked, elements, stages)
-        n_dofs = target.unknowns(asked.values["at"][None], elements, stages)
+        wanted, at = (0.5 / asked.duration, asked.budget.total), asked.values["at"][None]
+        elements = vectors.elements_for(target, size, asked.mass, *wanted)
+        n_dofs, count = target.unknowns(at, elements, stages), vectors.first_count(target, *wanted)
+        lasts, impacts = _foreseen(asked)
+        meshes = list(vectors.compared(target, elements, stages))
+        if impacts > cost.MANY and not asked.meshed:
+            meshes.append(vectors.finer(target, meshes[0], stages))
+        work = cost.by_vectors([target.unknowns(at, each, stages) for each in meshes], count, lasts)
         why = f"the contact lasts about {asked.duration:.3g} s"
         kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
         reason = f"argyris elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"
@@ -75,23 +81,21 @@ class Vectors(Description):
                 "; the vectors give the motion as long as they can, modes driven by the force found give later motion "
                 "and the sound"
             )
+            for number in (FIRST_LOOK, ringing_count(asked)):
+                work += cost.by_modes(cost.PER_MODE * number, number)
         shares = dict.fromkeys(("Ritz vectors", "mesh"), asked.budget.half * (1.0 - CHEAP))
         forecast = asked.foretell(
             "vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
             element="argyris", steps=asked.budget.cheap, mass=target.mass, notes=target.notes, work=work,
         )  # fmt: skip
-        return cls(asked, forecast)
+        return cls(asked, forecast, elements)
 
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Vectors | Modal, Modes]":
         """The same, and its vectors; modes, if the point struck is at rest, where no vector can start."""
         asked, seen = self.asked, self.seen
         if seen is None:
-            assert self.forecast.size is not None
-            elements = _elements(asked, self.forecast.size)
-            seen = vectors.Seen(
-                asked.blow.target, asked.values["at"], 0.5 / asked.duration, asked.budget.total, elements, asked.meshed,
-                stages,
-            )  # fmt: skip
+            wanted = 0.5 / asked.duration, asked.budget.total, self.elements, asked.meshed
+            seen = vectors.Seen(asked.blow.target, asked.values["at"], *wanted, stages)
         if seen.at_rest:
             return Modal.of(asked, stages).found(stages, keep)
 
@@ -100,9 +104,9 @@ class Vectors(Description):
             return accuracy.tail_cutoff(modes, seen.at, mass=asked.mass, tolerance=allowed, **asked.law)
 
         modes = seen.modes(cutoff)
-        size, n_dofs = seen.elements.size, seen.fine.system.n_dofs
-        forecast = replace(self.forecast, n_modes=seen.count, size=size, n_dofs=n_dofs)
-        return replace(self, forecast=forecast, seen=seen, whole=seen.whole), modes
+        elements, n_dofs = seen.elements, seen.fine.system.n_dofs
+        forecast = replace(self.forecast, n_modes=seen.count, size=elements.size, n_dofs=n_dofs)
+        return replace(self, forecast=forecast, elements=elements, seen=seen, whole=seen.whole), modes
 
     def refined(self, hit: Response, stages: Stages) -> Description | None:
         """More vectors or a finer mesh, whichever the errors demand; if neither helps, an infinite plate that may."""
@@ -128,26 +132,6 @@ class Vectors(Description):
             with stages("modes"):
                 hit = replace(hit, ringing=ringing(hit))
         return super().completed(hit, stages)
-
-
-def _elements(asked: Asked, size: float) -> Elements:
-    """Elements of a size [m]."""
-    return vectors.elements_for(asked.blow.target, size, asked.mass, 0.5 / asked.duration, asked.budget.total)
-
-
-def _work(asked: Asked, elements: Elements, stages: Stages) -> tuple[cost.Work, int]:
-    """Work for a blow that begins with some elements, and the number of vectors tried first."""
-    target, at = asked.blow.target, asked.values["at"][None]
-    lasts, impacts = _foreseen(asked)
-    meshes = list(vectors.compared(target, elements, stages))
-    if impacts > cost.MANY and not asked.meshed:
-        meshes.append(vectors.finer(target, meshes[0], stages))
-    count = vectors.first_count(target, 0.5 / asked.duration, asked.budget.total)
-    work = cost.by_vectors([target.unknowns(at, each, stages) for each in meshes], count, lasts)
-    if asked.moving:
-        for number in (FIRST_LOOK, ringing_count(asked)):
-            work += cost.by_modes(cost.PER_MODE * number, number)
-    return work, count
 
 
 def _foreseen(asked: Asked) -> tuple[float, int]:
@@ -185,10 +169,10 @@ def ringing_count(asked: Asked) -> int:
     target, band = asked.blow.target, asked.quantities.get("sound")
     mesh, section = target.mesh, target.section
     assert mesh is not None and isinstance(section, Plate)
-    wave = target.wave((band or min(AUDIBLE, cost.FAINTEST / asked.duration)) / target.stretch)
     stiffness = section.stiffness(mesh.points[mesh.cells].mean(axis=1))
-    ratio = float((stiffness[:, 0, 0] / stiffness[:, 1, 1]).mean())
-    number = mesh.area * wave**2 / (4.0 * np.pi) * min(ratio, 1.0 / ratio) ** 0.25  # waves across the grain are shorter
+    ratio = float((stiffness[:, 0, 0] / stiffness[:, 1, 1]).mean())  # waves across the grain are shorter
+    below = target.count_below((band or min(AUDIBLE, cost.FAINTEST / asked.duration)) / target.stretch)
+    number = below * min(ratio, 1.0 / ratio) ** 0.25
     return max(FIRST_LOOK, min(MOST_MODES["fe"] if band else MOST_RINGING, round(number)))
 
 

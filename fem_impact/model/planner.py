@@ -6,7 +6,7 @@ the modes that are struck (``found``) and says which other one the errors of a b
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from types import MappingProxyType
 from typing import Any
@@ -25,7 +25,7 @@ from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes.modal import Damping, Modes
 from . import audit, cost, fresh
-from .asked import PIECES, Asked, Description, Forecast, Unaffordable
+from .asked import PIECES, Asked, Description, Forecast, Unaffordable, refine
 from .budget import FINEST, VERIFYING
 from .by_idealisation import Idealised
 from .by_mixture import Mixed
@@ -71,20 +71,12 @@ class Plan(Forecast):
     The plan depends only on the blow, the tolerance and the quantities: the same blow gives the same plan.
     """
 
+    blow: Blow = field(kw_only=True, repr=False, compare=False)
+    changes: Mapping[str, Any] = field(kw_only=True, repr=False, compare=False)  # arguments and pieces overridden
     description: Description = field(kw_only=True, repr=False, compare=False)  # of the target
 
     def __repr__(self) -> str:
         return check.brief(self)
-
-    @property
-    def blow(self) -> Blow:
-        """The blow that is planned."""
-        return self.description.asked.blow
-
-    @property
-    def changes(self) -> Mapping[str, Any]:
-        """Overridden arguments of the blow and pieces of the plan."""
-        return self.description.asked.changes
 
     @property
     def meets(self) -> bool:
@@ -133,7 +125,7 @@ class Plan(Forecast):
 
     def data(self) -> dict[str, Any]:
         """All decisions and predictions by name, in SI units."""
-        hidden = ("description", "first")
+        hidden = ("blow", "changes", "description", "first")
         found = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in hidden}
         plain = {name: dict(value) if isinstance(value, Mapping) else value for name, value in found.items()}
         return plain | {"assumptions": assumption.table(self.assumptions)}
@@ -179,16 +171,9 @@ class Run:
 
 
 def plan_of(
-    body: System | Modes,
-    striker: Any,
-    contact: Any,
-    watch: Watch | None = None,
-    *,
-    at: Any,
-    speed: float,
-    damping_ratio: Damping | None = None,
-    **rest: Any,
-) -> Plan:
+    body: System | Modes, striker: Any, contact: Any, watch: Watch | None = None, *, at: Any, speed: float,
+    damping_ratio: Damping | None = None, **rest: Any,
+) -> Plan:  # fmt: skip
     """The plan of a blow that a user describes with objects; ``rest`` as in `fi.plan`."""
     check.instance("striker", striker, Striker)
     check.instance("contact", contact, Contact)
@@ -199,8 +184,8 @@ def plan_of(
 
 def _planned(description: Description) -> Plan:
     """The plan with a description of the target."""
-    told = description.forecast
-    return Plan(**{each.name: getattr(told, each.name) for each in fields(told)}, description=description)
+    asked = description.asked
+    return Plan(blow=asked.blow, changes=asked.changes, description=description, **vars(description.forecast))
 
 
 def make(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
@@ -267,22 +252,11 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
 
 
 def solve(plan: Plan, stages: Stages, keep: Any = None) -> Run:
-    """Strike one description of the target after another until the errors of the blow require no better one.
+    """Strike the target as planned, and better descriptions of it as long as the errors of the blow require one.
 
     ``keep`` is a file that stores the modes of a costly plan.
     """
-    description: Description | None = plan.description
-    struck: Any = None
-    while description is not None:
-        try:
-            found, modes = description.found(stages, keep)
-            struck = found, *_strike(found, modes, stages)
-            description = found.refined(struck[1], stages)
-        except check.SimulationError:  # too much for a better one: what there is has missed the tolerance
-            if struck is None:
-                raise
-            break
-    last, response, run = struck
+    last, response, run = refine(plan.description, _strike, stages, keep)
     response = last.completed(within(plan.tolerance, response, run, last.asked.values), stages, keep)
     told = last.forecast
     if response.ringing is not None:
