@@ -163,6 +163,11 @@ class Asked:
             return "needs E, nu, rho and thickness: first_frequency gives the rigidity only once the modes are known"
         return "is known for plates of constant thickness only, without tension, point masses and point supports"
 
+    def refuse(self, why: str) -> None:
+        """Raise a ValueError if the user names a description that does not apply."""
+        if "target" in self.pieces:
+            raise ValueError(f"{self.blow.name}target = {self.pieces['target']!r} {why}; use target = 'modal'")
+
     def find(self, n_modes: int, max_frequency: float | None = None, **how: Any) -> Modes:
         """Modes of the target, see `Target.find`."""
         size, limit = self.pieces.get("size"), self.budget.frequencies

@@ -27,11 +27,7 @@ class Idealised(Description):
         """
         blow, named = asked.blow, "target" in asked.pieces
         if not asked.plain:
-            if named:
-                raise ValueError(
-                    f"{blow.name}target = {kind!r} is known for thin bodies in a vacuum that do not stretch; "
-                    "use target = 'modal'"
-                )
+            asked.refuse("is known for thin bodies in a vacuum that do not stretch")
             return None
         pushed = asked.values["striker_force"] or asked.values["target_force"]
         exact = not anyway and (blow.contact.gap < 0.0 or not asked.values["residual"])
@@ -39,25 +35,25 @@ class Idealised(Description):
             return None
         with stages("modes"):
             seen = asked.seen
-        if seen is None or (kind == "infinite" and not np.isfinite(seen.mobility)):
-            if named:
-                raise ValueError(f"{blow.name}target = {kind!r} {asked.unfit}; use target = 'modal'")
-            return None
-        error = seen.rigid if kind == "rigid" else seen.endless
-        if not (named or error <= (np.finfo(float).max if anyway else asked.budget.half)):
+        if seen is None:
+            asked.refuse(asked.unfit)
             return None
         if kind == "rigid":
+            error, mobility, cause = seen.rigid, 0.0, "rigid target"
             kept = f"the target, {seen.mass:.3g} kg, is treated as rigid: that changes the blow by {error:.1e}"
         else:
+            error, mobility, cause = seen.endless, seen.mobility, "infinite plate"
             kept = (
-                f"the target is treated as an infinite plate of mobility {seen.mobility:.3g} m/(N s): the striker "
-                f"leaves before an echo returns from the edge; that changes the blow by {error:.1e}"
+                f"the target is treated as an infinite plate of mobility {mobility:.3g} m/(N s): the striker leaves "
+                f"before an echo returns from the edge; that changes the blow by {error:.1e}"
             )
+        if not np.isfinite(mobility):
+            asked.refuse(asked.unfit)
+        if not named and not error <= (np.finfo(float).max if anyway else asked.budget.half):
+            return None
         dropped = "no mesh and no modes are needed; the target's sound is not computed"
-        cause = {"rigid": "rigid target", "infinite": "infinite plate"}[kind]
         forecast = asked.foretell(
-            kind, errors={cause: error}, reasons=(kept, dropped), mass=seen.mass,
-            mobility=seen.mobility if kind == "infinite" else 0.0,
+            kind, errors={cause: error}, reasons=(kept, dropped), mass=seen.mass, mobility=mobility,
             notes=plausible.together(blow.target.notes, seen.notes),
         )  # fmt: skip
         return cls(asked, forecast, error)
@@ -65,9 +61,8 @@ class Idealised(Description):
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Idealised, Modes]":
         """The same, and its modes."""
         at, told = self.asked.values["at"], self.forecast
-        if told.target == "rigid":
-            modes = idealisation.unyielding(at, told.mass)
-        else:
+        modes = idealisation.unyielding(at, told.mass)
+        if told.mobility:
             modes = idealisation.endless(at, told.mass, told.mobility, told.duration)
         return self, replace(modes, notes=told.notes)
 

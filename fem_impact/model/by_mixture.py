@@ -45,10 +45,9 @@ class Mixed(Description):
             seen = asked.seen if fits else None
         resolved = target.kind == "analytic" or vectors.usable(target)
         if not resolved or seen is None or not np.isfinite(seen.mobility) or not seen.echo:
-            if not named:
-                return None
             why = asked.unfit if fits else "is known for thin plates in a vacuum, of which only the blow is asked for"
-            raise ValueError(f"{blow.name}target = 'mixed' {why}; use target = 'modal'")
+            asked.refuse(why)
+            return None
         allowed, slow = asked.budget.left_out, asked.mass * seen.mobility
         highest = accuracy.infinite_cutoff(seen.mobility, mass=asked.mass, tolerance=allowed, **asked.law)
         if not named and mixed.LASTING * slow > mixed.LONGEST * asked.duration:

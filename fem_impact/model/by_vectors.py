@@ -46,12 +46,10 @@ class Vectors(Description):
         """The plate by vectors, if these can describe it and its own modes are not asked for."""
         blow, target = asked.blow, asked.blow.target
         if not (vectors.usable(target) and asked.values["residual"] and asked.plain) or asked.counted:
-            if "target" in asked.pieces:
-                raise ValueError(
-                    f"{blow.name}target = 'vectors' needs a thin plate in a vacuum by elements that can be meshed "
-                    "again, its residual, no stretching, no n_modes or max_frequency, and no damping ratios mode by "
-                    "mode; use target = 'modal'"
-                )
+            asked.refuse(
+                "needs a thin plate in a vacuum by elements that can be meshed again, its residual, no stretching, no "
+                "n_modes or max_frequency, and no damping ratios mode by mode"
+            )
             return None
         _check_sound(asked)
         with stages("modes"):
