@@ -170,7 +170,7 @@ class Asked:
 
     def find(self, n_modes: int, max_frequency: float | None = None, **how: Any) -> Modes:
         """Modes of the target, see `Target.find`."""
-        size, limit = self.pieces.get("size"), self.budget.frequencies
+        size, limit = self.pieces.get("size"), 2.0 * self.budget.cheap / self.budget.fineness
         return self.blow.target.find(n_modes, max_frequency, tolerance=limit, size=size, **how)
 
     def striker_modes(self, margin: float) -> tuple[int, float]:

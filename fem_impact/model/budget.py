@@ -43,11 +43,6 @@ class Budget:
         """What left-out modes may err [-] by the estimate before the blow."""
         return SHARE * self.total / CAUTION / (accuracy.LOSSY if self.lossy else 1.0) / self.margin
 
-    @property
-    def frequencies(self) -> float:
-        """What frequencies of modes may err [-], relative."""
-        return 2.0 * CHEAP * self.total / self.fineness
-
     def missed(self, error: Error, steps_follow: bool = True) -> bool:
         """Whether a blow errs too much, however fine its time steps; ``steps_follow`` is whether these can be finer."""
         return error.total - (error.step if steps_follow else 0.0) > self.total

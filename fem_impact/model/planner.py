@@ -33,7 +33,7 @@ from .by_modes import MANY_MODES, Modal
 from .by_vectors import Vectors
 from .target import Stages, Target, Watch
 
-# those of a target, the cheapest first, and those that may serve where they are unaffordable
+# of a target, by name, the cheapest first; and which others may serve where one is unaffordable
 DESCRIPTIONS: Mapping[str, Callable[..., Any]] = {
     "rigid": partial(Idealised.of, "rigid"), "infinite": partial(Idealised.of, "infinite"), "mixed": Mixed.of,
     "vectors": Vectors.of, "modal": Modal.of,
@@ -226,7 +226,7 @@ def choose(asked: Asked, stages: Stages) -> Description:
                 raise check.SimulationError(str(error)) from None
         if found is not None:
             break
-    # modes by closed formulas cost little
+    # of all modes by closed formulas, which cost little, only many are worth leaving out
     if named is None and isinstance(found, Modal) and found.forecast.n_modes > MANY_MODES and not found.banded:
         return Mixed.of(asked, stages) or found
     return found
