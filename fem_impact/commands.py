@@ -16,7 +16,7 @@ import fem_impact as fi
 
 from . import answers
 from ._base.explained import noted
-from .display import Display, tell, width
+from .display import LONG, Display, tell, width
 from .show import FORMATS
 
 MOTION_TIMES = 100  # [-] instants in motion.pvd: four seconds at 25 per second
@@ -82,9 +82,13 @@ def strike(options: argparse.Namespace) -> Answer:
     with fi.export.staged(folder, "strike") as staging, Painter() if options.pictures else nullcontext() as painter:
         place = folder.resolve()  # "." has no name of its own
         keep = place.parent / f"{place.name}.modes.npz"  # not in the folder: an interrupted run leaves that alone
-        motion, before = options.pictures or options.vtk, partial(_announce, options, display, options.verify)
+        motion = options.pictures or options.vtk
+
+        def before(plan: Any) -> None:
+            _announce(options, display, options.verify, plan, plan.ringing)
+
         run = scene.run(display, before=before, verify=options.verify, motion=motion, keep=keep, **_choices(options))
-        display.predict(None)
+        display.predict(run.plan.ringing or None)
         if options.strict:
             promise.kept(run.response, strict=True)
         stages = Stages(display)
@@ -106,11 +110,15 @@ def strike(options: argparse.Namespace) -> Answer:
     return answer(data, *said, folder=folder, files=data["files"], missed=not run.response.tolerance_met)
 
 
-def _announce(options: argparse.Namespace, display: Display, verify: bool, plan: Any) -> None:
-    """Warn of a long run before it starts, and let its prediction tell the time left."""
+def _announce(options: argparse.Namespace, display: Display, verify: bool, plan: Any, ringing: float = 0.0) -> None:
+    """Warn of a long run before it starts, and let its prediction tell the time left.
+
+    ``ringing`` [s] is predicted for the modes that only its files take.
+    """
     display.predict(None if verify else plan.seconds)  # the plan of the second, finer run is not known yet
-    if plan.costly:
-        text = f"{plan.cost}; Ctrl-C stops it, and the same command later reuses the modes already found"
+    more = f", and {ringing:.0f} s for the modes of its files" if ringing > LONG else ""
+    if plan.costly or more:
+        text = f"{plan.cost}{more}; Ctrl-C stops it, and the same command later reuses the modes already found"
         _tell(options, f"{text} (`fem-impact plan` explains why)")
 
 

@@ -32,7 +32,7 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "rolling-shear": ("G_yz is not stated",),
     "modes-from-elsewhere": ("the static compliance is not given", "no rigid motion is given"),
     "air": ("with a rigid wall around",),
-    "too-many-modes-or-unknowns": ("more than the limit of",),
+    "too-many-modes-or-unknowns": ("more than the limit of", "GB of memory for"),
     "strike-points-beside-the-body": ("must lie on the body",),
     "outlines-that-cannot-be-meshed": ("the mesher could not fill the outline",),
     "extras": ("pip install 'fem-impact[",),

@@ -103,14 +103,29 @@ class Strain:
         """Twice the mutual strain energy (n, n) of all pairs of vectors (n_dofs, n)."""
         return self._sum(system, vectors, "nqik,nqil->kl")
 
+    def around(self, system: "System", vectors: np.ndarray, vertex: int) -> np.ndarray:
+        """Twice the strain energy (n_modes,) in the ring of triangles around those that touch a vertex of the mesh."""
+        space: Any = system.space
+        corners = space.vertices
+        touching = (corners == vertex).any(axis=1)
+        ring = np.isin(corners, corners[touching]).any(axis=1) & ~touching
+        far = np.linalg.norm(self.x.mean(axis=1) - self.x[touching].mean(axis=(0, 1)), axis=1)
+        ring &= far < 4.0 * far[touching].max()  # not the neighbours of its outer vertices, where one ring is all
+        moved = system.expand @ vectors
+        return np.einsum("nqik,nqik->k", *self._curved(system, moved, np.flatnonzero(ring)))
+
+    def _curved(self, system: "System", moved: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Moments and curvatures (n, n_q, 3, n_modes) in cells (n,)."""
+        bend = curvatures(*system.space.functions(cells, self.x[cells], (2,)))
+        curved = bend @ moved[system.element_dofs[:, cells].T][:, None]
+        return self.stiffness[cells] @ curved, curved
+
     def _sum(self, system: "System", vectors: np.ndarray, pairs: str) -> np.ndarray:
         moved = system.expand @ vectors
         total = np.einsum(pairs.replace("nqi", "n"), moved, self.springs @ moved)
         for start in range(0, len(self.x), CHUNK):
             cells = np.arange(start, min(start + CHUNK, len(self.x)))
-            bend = curvatures(*system.space.functions(cells, self.x[cells], (2,)))
-            curved = bend @ moved[system.element_dofs[:, cells].T][:, None]  # (n, n_q, 3, n_modes)
-            total += np.einsum(pairs, self.stiffness[cells] @ curved, curved)
+            total += np.einsum(pairs, *self._curved(system, moved, cells))
         return total
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from skfem import ElementLineHermite, MeshLine
 
-from .._base.rounding import EPSILON, SAME
+from .._base.rounding import EPSILON, HALVINGS, SAME
 from .._base.untyped import Cells
 from ..mesh.facets import powers
 
@@ -155,7 +155,7 @@ def divided(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes
     """Line elements between nodes, with more nodes until a polynomial fits the section between any two neighbours.
 
     Steps and kinks of stiffness and inertia are found by halving every interval that no polynomial fits. An interval
-    that still has a bad fit when it is as narrow as SAME contains a step or kink and gets a node.
+    that still has a bad fit when it is as narrow as SAME contains a step or kink and gets a node, a step at its place.
     """
     span = nodes[-1] - nodes[0]
     breaks = _breaks(fields, nodes)
@@ -171,7 +171,7 @@ def divided(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes
 
 
 def _breaks(fields: Callable, nodes: np.ndarray) -> np.ndarray:
-    """Places (n,) where the section jumps or kinks, each to within SAME times the length of the beam."""
+    """Places (n,) where the section jumps, to rounding, or kinks, to within SAME times the length of the beam."""
     span, low, high = nodes[-1] - nodes[0], nodes[:-1], nodes[1:]
     found: list[float] = []
     while low.size:
@@ -186,8 +186,23 @@ def _breaks(fields: Callable, nodes: np.ndarray) -> np.ndarray:
             raise ValueError(f"section must have at most {MOST_BREAKS} steps and kinks, got more; make it smoother")
         middle = 0.5 * (low + high)
         low, high = np.append(low, middle), np.append(middle, high)
-    places = np.array(sorted(found))
+    places = np.sort(_at_steps(fields, np.array(found), SAME * span)) if found else np.zeros(0)
     return places[np.append(True, np.diff(places) > 4.0 * SAME * span)[: len(places)]]  # drop doubles
+
+
+def _at_steps(fields: Callable, places: np.ndarray, near: float) -> np.ndarray:
+    """Places (n,) of steps that lie within ``near`` of given ones, halved to rounding: a frequency moves with a step.
+
+    A kink, at which nothing jumps, ends anywhere so near: that moves a frequency by the square of it.
+    """
+    low, high = places - near, places + near
+    before, after = np.stack(fields(low)), np.stack(fields(high))
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        now = np.stack(fields(middle))
+        beyond = (np.abs(now - before) > np.abs(now - after)).any(axis=0)
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    return 0.5 * (low + high)
 
 
 def _misfit(fields: Callable, low: np.ndarray, high: np.ndarray, span: float) -> np.ndarray:

@@ -13,10 +13,10 @@ from .._base import kept as keeping
 from .._base.rounding import EPSILON, SAME
 from ..mesh import mesh_files
 from ..mesh.meshes import MOST_CELLS, Mesh
-from . import residual, thick
-from .assembly import THICK, System, assemble, reassemble
+from . import plausible, residual, thick
+from .assembly import THICK, Strain, System, _kinds, assemble, reassemble, support_of_facets
 from .beam_elements import DEGREE
-from .corners import SAY
+from .corners import SAY, singular
 from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, lowest
 from .section import Plate, directional
 
@@ -62,6 +62,12 @@ ORDERS = 7.5, 5.0, 1.0
 LEAST_STEP = 1.05
 # [-] meshes tried to meet a tolerance, each finer: where eight do not suffice, rounding or corners hold the error
 MOST_MESHES = 8
+# [-] unknowns foretold from the rate at which errors fell, over those allowed, from which on nobody waits for more
+# meshes: rates grow as meshes resolve, and a rate half as large asks for the square of that
+BEYOND = 4.0
+LARGEST_MISSED = (
+    0.99  # [-] of a frequency, by corners: a hundredth of it could be left, and a stated error of 200 is none
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,9 +190,28 @@ def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarr
         parts[:3, flexible] = CLAIMED * 0.5 * residual.energy_errors(system, vectors, vectors * values) / values
     vectors, squares = Flexibility.of(system).bent(vectors)[0], system.K.multiply(system.K)
     rounding = 0.5 * np.finfo(float).eps * np.sqrt(np.einsum("ij,ij->j", vectors**2, squares @ vectors**2)) / values
-    corners = system.unresolved if system.unresolved > SAY else 0.0
+    corners = _missed_at_corners(system, vectors, values)
     parts[3, flexible] = ROUNDED * rounding + RESIDUAL**2 + corners  # the second is what the eigensolver leaves
     return parts
+
+
+def _missed_at_corners(system: System, vectors: np.ndarray, values: np.ndarray) -> np.ndarray | float:
+    """Estimated relative errors (n_modes,) of frequencies by what the triangles at singular corners cannot follow.
+
+    The energy within a distance r grows as a power of r that the corner's exponent tells. So the energy in the second
+    ring tells what the innermost triangles, half as far, would hold, and that they hold little of. Frequencies are too
+    high by it, so that an error near one over the frequency found is more over the true one.
+    """
+    if not isinstance(system.strain, Strain) or not system.graded:
+        return system.unresolved if system.unresolved > SAY else 0.0
+    kinds = _kinds(support_of_facets(system.mesh, system.supports))
+    missed = np.zeros(len(values))
+    for vertex, corner in singular(system.mesh, kinds, system.section.material).items():
+        own = 0.5 * system.strain.around(system, vectors, vertex) / values / (2.0**corner.power - 1.0)
+        if corner.free:
+            own = np.minimum(own, corner.left / CLAIMED) if corner.left > SAY else 0.0
+        missed += own
+    return CLAIMED * missed / (1.0 - np.minimum(missed, LARGEST_MISSED))
 
 
 def _compared(system: System, omega: np.ndarray) -> np.ndarray:
@@ -312,13 +337,16 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
             "tolerance needs a mesh that can be refined; make it with fi.mesh or load it with fi.mesh.load"
         )
     found, size = solve(_start(system, n_modes, max_frequency, tolerance), n_modes, max_frequency), np.inf
+    seen: list[tuple[float, float]] = []
     for left in reversed(range(MOST_MESHES + 1)):
         if float(found.error.max()) <= tolerance:
             return found
         mesh = found.system.mesh
         step = _needed(found.parts, MARGIN * tolerance)
+        seen.append((mesh.size, float(found.error.max())))
         if (
             not left
+            or found.system.n_dofs * _foreseen(seen, tolerance) ** mesh.dimension > BEYOND * MOST_UNKNOWNS
             or not step < np.inf
             or found.system.n_dofs * step**mesh.dimension > MOST_UNKNOWNS
             or mesh.size >= size
@@ -329,7 +357,9 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         found = solve(finer, n_modes, max_frequency)
     mode = int(found.error.argmax())
     least = float(f"{2.0 * found.error[mode]:.1e}")  # where corners hold the error, it differs from mesh to mesh
-    advice = f"a tolerance of {least:g} is met" if least <= LOOSEST else "no tolerance is: check the units"
+    slips = plausible.body(np.ptp(found.system.mesh.points, axis=0), found.system.section)
+    none = f"no tolerance is: check the units, as {slips[0]}" if slips else f"no tolerance up to {LOOSEST:g} is"
+    advice = f"a tolerance of {least:g} is met" if least <= LOOSEST else none
     advice += ", or ask for fewer modes"
     if least > LOOSEST and found.system.unresolved > SAY:
         advice = "no tolerance is, as corners hold that error on any mesh"
@@ -337,6 +367,20 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         f"tolerance = {tolerance:g} is not met: mode {mode + 1} is uncertain by {found.error[mode]:.1e} with "
         f"{found.system.n_dofs} unknowns; {advice}"
     )
+
+
+def _foreseen(seen: list[tuple[float, float]], goal: float) -> float:
+    """Factor [-] to divide the last size by, as errors fell on meshes of sizes and errors ``seen``; 1 if on one only.
+
+    The faster of the rates since the first mesh and since the last but one counts; infinity if neither fell.
+    """
+    if len(seen) < 2:
+        return 1.0
+    sizes, errors = np.log(seen).T
+    falls, shrinks = errors[[0, -2]] - errors[-1], sizes[[0, -2]] - sizes[-1]
+    rate = float(np.max(np.divide(falls, shrinks, out=np.zeros(2), where=shrinks > 0.0)))
+    with np.errstate(over="ignore"):
+        return float(np.exp((errors[-1] - np.log(goal)) / rate)) if rate > 0.0 else np.inf
 
 
 def _needed(parts: np.ndarray, goal: float) -> float:

@@ -58,6 +58,7 @@ class Forecast:
     mobility: float = 0.0  # [m/(N s)] of an infinite plate
     notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
     first: Modes | None = field(default=None, repr=False, compare=False)  # first modes of the target, if needed
+    ringing: float = 0.0  # [s] predicted besides, of the modes that tell motion and sound, once these are asked for
 
     @property
     def error(self) -> float:

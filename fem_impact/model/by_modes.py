@@ -143,11 +143,12 @@ def _with_mesh(asked: Asked, told: Forecast, shapes: FieldShapes, limit: float) 
     if told.n_modes > first.n_modes:
         thick = system.element == "argyris and shear"  # its errors come from a second mesh
         coarser = [n_dofs / refinement.COARSER**2] if thick else []
-        work = sum((cost.by_modes(n, told.n_modes) for n in [n_dofs, *coarser]), cost.NOTHING)
+        each = [cost.by_modes(n, told.n_modes) for n in [n_dofs, *coarser]]
         if mesh.dimension == 2:
             finer = [n_dofs * refinement.COARSER**2] if thick else []
             at_blow = cost.AT_BLOW[system.element]
-            work = sum((cost.compliance(n + at_blow) for n in [n_dofs, *finer]), work)
+            each += [cost.compliance(n + at_blow) for n in [n_dofs, *finer]]
+        work = replace(sum(each, cost.NOTHING), memory=max(part.memory for part in each))  # one mesh after another
     return replace(
         told, element=system.element, size=size, n_dofs=n_dofs, errors={**told.errors, "mesh": error},
         reasons=(*told.reasons, reason), seconds=told.seconds + work.seconds, memory=told.memory + work.memory,

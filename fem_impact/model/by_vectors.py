@@ -71,6 +71,8 @@ class Vectors(Description):
         if impacts > cost.MANY and not asked.meshed:
             meshes.append(vectors.finer(target, meshes[0], stages))
         work = cost.by_vectors([target.unknowns(at, each, stages) for each in meshes], count, lasts)
+        rings = (cost.by_modes(cost.PER_MODE * number, number) for number in (FIRST_LOOK, ringing_count(asked)))
+        ringing = sum(rings, cost.NOTHING)
         why = f"the contact lasts about {asked.duration:.3g} s"
         kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
         reason = f"argyris elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"
@@ -79,12 +81,12 @@ class Vectors(Description):
                 "; the vectors give the motion as long as they can, modes driven by the force found give later motion "
                 "and the sound"
             )
-            for number in (FIRST_LOOK, ringing_count(asked)):
-                work += cost.by_modes(cost.PER_MODE * number, number)
+            work, ringing = work + ringing, cost.NOTHING
         shares = dict.fromkeys(("Ritz vectors", "mesh"), asked.budget.half * (1.0 - CHEAP))
         forecast = asked.foretell(
             "vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
             element="argyris", steps=asked.budget.cheap, mass=target.mass, notes=target.notes, work=work,
+            ringing=ringing.seconds,
         )  # fmt: skip
         return cls(asked, forecast, elements)
 

@@ -16,6 +16,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, fields
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy
@@ -29,6 +30,12 @@ from ..impact.compiled.energy import follow
 from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..modes import analytic
+
+resource: Any
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None
 
 START = 0.01  # [s] of a strike, besides its time steps
 RUNS = 20.0  # [-] time steps of all runs of a strike, over those of one undisturbed contact
@@ -198,6 +205,17 @@ def known() -> Machine | None:
 def whose() -> str:
     """The machine that predicted seconds belong to, in words."""
     return "a typical machine (`fem-impact doctor` measures yours)" if known() is None else "this machine"
+
+
+def installed() -> float:
+    """Memory [byte] that this process can have: the machine's, or its own limit; infinite if not known."""
+    found = math.inf
+    with suppress(AttributeError, ValueError, OSError):  # Windows tells neither
+        found = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    if resource is not None:
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        found = found if limit == resource.RLIM_INFINITY else min(found, float(limit))
+    return found
 
 
 def calibrate() -> bool:

@@ -281,6 +281,8 @@ class Modes:
     air: bool = field(default=False, repr=False)  # whether the air around the body is in them
     stretches: bool = field(default=False, repr=False)  # whether a blow lets them stretch the body, see `stretching`
     unstated: tuple[str, ...] = field(default=(), repr=False)  # of "compliance" and "free": what nobody said of it
+    # (n_modes,) [-] estimated error of damping ratios that were computed, by the sound radiated; None if all are stated
+    damping_error: np.ndarray | None = None
 
     def __repr__(self) -> str:
         return check.brief(self)
@@ -552,7 +554,8 @@ class Modes:
             keep = min(keep, check.count("n_modes", n_modes))
         if keep == 0:
             raise ValueError(f"max_frequency must reach the first mode at {self.frequencies[0]:g} Hz")
-        fields = {name: getattr(self, name) for name in ("omega", "damping_ratio", "frequency_error", "bounds")}
+        each = ("omega", "damping_ratio", "frequency_error", "bounds", "damping_error")
+        fields = {name: getattr(self, name) for name in each}
         kept: dict[str, Any] = {name: x if x is None else x[:keep].copy() for name, x in fields.items()}
         poorer = dict(self.poorer)
         if max_frequency is not None:  # a poorer first mode may lie higher
@@ -567,7 +570,7 @@ class Modes:
         others = [note for note in self.notes if note not in before]
         notes = plausible.together(others, damping_notes(ratios, self.omega))
         poorer = {cause: modes.damped(damping_ratio) for cause, modes in self.poorer.items()}
-        return replace(self, damping_ratio=ratios, notes=notes, poorer=poorer)
+        return replace(self, damping_ratio=ratios, notes=notes, poorer=poorer, damping_error=None)
 
 
 def at_rest(modes: "Modes", point: np.ndarray) -> tuple[str, ...]:

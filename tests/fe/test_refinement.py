@@ -181,3 +181,35 @@ def test_errors_fall_as_the_step_of_refinement_assumes(mesh):
     finer = refinement.solve(refinement.reassemble(found.system, mesh.refined(step)), 12, None)
 
     assert 0.3 * goal < finer.error.max() < 3.0 * goal
+
+
+def test_what_is_to_come_is_foretold_by_the_faster_of_the_rates_seen():
+    assert refinement._foreseen([(1.0, 1e-3)], 1e-9) == 1.0  # one mesh tells nothing
+    assert_allclose(refinement._foreseen([(1.0, 1e-2), (0.5, 1e-2 / 16)], 1e-2 / 256), 2.0)  # fourth order
+    slow = [(1.0, 1e-2), (0.5, 5e-3), (0.25, 2.5e-3 / 8)]  # first order, then fourth
+    assert_allclose(refinement._foreseen(slow, slow[-1][1] / 16.0), 2.0)
+    assert refinement._foreseen([(1.0, 1e-6), (0.5, 2e-6)], 1e-7) == np.inf
+
+
+def test_a_tolerance_that_corners_do_not_allow_is_refused_after_few_meshes(monkeypatch):
+    """Errors at a free notch do not fall; five more meshes up to 125 000 unknowns took twenty seconds to say so."""
+    notched = fi.mesh.polygon([(0, 0), (1, 0), (1, 0.5), (0.5, 0.5), (0.5, 1), (0, 1)])
+    seen, solve = [], refinement.solve
+    monkeypatch.setattr(refinement, "solve", lambda system, *how: seen.append(system.n_dofs) or solve(system, *how))
+    with pytest.raises(fi.SimulationError, match=r"uncertain by .* a tolerance of .* is met, or ask for fewer modes$"):
+        fi.find_modes(fi.assemble(notched, PLATE), n_modes=8, tolerance=1e-7)
+    assert len(seen) <= 3 and seen[-1] < 0.1 * refinement.MOST_UNKNOWNS
+
+
+def test_units_are_doubted_only_where_one_looks_like_a_slip(monkeypatch):
+    monkeypatch.setattr(refinement, "MOST_UNKNOWNS", 100)
+    monkeypatch.setattr(refinement, "LOOSEST", 1e-9)  # whatever is uncertain is too uncertain
+    for thickness, words in (
+        (2e-3, r"no tolerance up to 1e-09 is, or ask"),
+        (2.0, r"check the units, as thickness 2 m "),
+    ):
+        plate = fi.Plate(PLATE.material, thickness)
+        with pytest.raises(fi.SimulationError, match=words):
+            fi.find_modes(
+                fi.assemble(fi.mesh.rectangle(0.3, 0.2), plate, {"left": "clamped"}), n_modes=4, tolerance=1e-9
+            )

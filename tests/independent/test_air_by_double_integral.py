@@ -12,7 +12,7 @@ HIGHEST = 60.0  # [-] wavenumber times diagonal at the highest mode: beyond it t
 
 
 def compared(length, width, thickness, material, n_modes, sides):
-    """Errors and claims of frequencies, and errors of damping; (n_modes,) each."""
+    """Errors and claims of frequencies, and of damping ratios over the true ones; (n_modes,) each."""
     E, rho = material
     plate = fi.Plate(fi.Material(E=E, nu=0.3, rho=rho), thickness)
     modes = fi.analytic.rectangle(length, width, section=plate, n_modes=n_modes)
@@ -23,7 +23,8 @@ def compared(length, width, thickness, material, n_modes, sides):
     of_air = {"density": air.DENSITY, "speed": air.SPEED, "sides": sides}
     true, damping = references.in_air(length, width, weight * length * width, numbers, omega, **of_air)
     loud = fi.in_air(modes, **of_air)
-    return np.abs(loud.omega / true - 1.0), loud.frequency_error, np.abs(loud.damping_ratio / damping - 1.0)
+    off = np.abs(loud.damping_ratio / damping - 1.0), loud.damping_error / damping
+    return np.abs(loud.omega / true - 1.0), loud.frequency_error, *off
 
 
 @pytest.mark.parametrize(
@@ -35,9 +36,9 @@ def compared(length, width, thickness, material, n_modes, sides):
     ],
 )
 def test_frequencies_err_by_less_than_they_claim(length, width, thickness, material):
-    error, claim, damping = compared(length, width, thickness, material, 24, 2)
+    error, claim, damping, told = compared(length, width, thickness, material, 24, 2)
     assert (error < claim).all() and error.max() < 5e-4
-    assert np.median(damping) < 0.02 and damping.max() < 0.1
+    assert (damping < told).all() and np.median(damping) < 0.01 and np.median(told) < 0.1
 
 
 @pytest.mark.slow
@@ -52,7 +53,7 @@ def test_random_plates_err_by_less_than_they_claim():
     for body in bodies:
         found = compared(*body)
         if found is not None:
-            error, claim, damping = found
-            worst = max(worst, float((error / claim).max()))
+            error, claim, damping, told = found
+            worst = max(worst, float((error / claim).max()), float((damping / told).max()))
             off.append(np.median(damping))
     assert len(off) > 25 and worst < 1.0 and max(off) < 0.03, (len(off), worst, max(off))

@@ -184,3 +184,11 @@ def test_predicted_time_is_of_the_right_size(name):
         assert run.response.target.n_modes
     taken = time.process_time() - start
     assert taken / 4.0 < plan.seconds < 4.0 * taken
+
+
+def test_the_memory_of_this_machine_is_no_more_than_the_limit_of_this_process(monkeypatch):
+    if cost.resource is None:
+        pytest.skip("Windows tells neither")
+    free = cost.installed()
+    monkeypatch.setattr(cost.resource, "getrlimit", lambda _: (2**30, 2**30))
+    assert cost.installed() == 2**30 < free

@@ -291,6 +291,19 @@ def test_costly_plan_says_so():
 
 
 @pytest.mark.slow
+def test_a_blow_that_needs_more_memory_than_there_is_is_refused_before_it_is_computed(monkeypatch):
+    """A thick pane, whose 27 GB numpy refused after half a minute; the plan tells before."""
+    law, ball = fi.Contact.hertz(5e8), fi.Striker.rigid(0.004)
+    glass = fi.Plate(fi.Material(E=70e9, nu=0.2, rho=2500.0), thickness=4e-3)
+    pane = fi.assemble(fi.mesh.rectangle(0.3, 0.2), glass, {"boundary": "hinged"}, theory="mindlin")
+    plan = fi.plan(pane, ball, law, at=(0.11, 0.07), speed=1.4, tolerance=1e-2)
+    assert plan.memory > 4e8 and "do not suffice" not in str(plan)
+    monkeypatch.setattr(cost, "installed", lambda: 3e8)
+    assert "the 0.3 GB of memory of this machine do not suffice" in str(plan)
+    with pytest.raises(fi.SimulationError, match=r"GB of memory for .* more than the 0.3 GB .* or the thin theory"):
+        plan.run()
+
+
 def test_modes_of_a_costly_plan_are_kept_and_taken_up_again(tmp_path, monkeypatch):
     """Broken off after the modes were found, the next run starts with them; other modes are found anew."""
     monkeypatch.setattr(asked, "COSTLY", (0.0, 0.0))
@@ -421,3 +434,14 @@ def test_a_better_description_that_fails_leaves_what_there_is(scene, monkeypatch
     assert run.plan.n_modes == run.response.target.n_modes and run.response.n_impacts > 0
     with pytest.raises(check.SimulationError, match="too many steps"):
         replace(plan, description=Broken(plan.description.asked, plan.description.forecast, False)).run()
+
+
+def test_the_modes_that_only_files_take_are_told_besides():
+    """The command says 5 s of this guitar and then takes a minute, most of it for the sound at the point struck."""
+    scene = fi.load_scene(SCENES / "everyday" / "guitar_fingernail.toml")
+    plan = scene.plan()
+    moving = planner.make(replace(plan.blow, moving=True), {}, planner.Stages())
+    assert_allclose(plan.seconds + plan.ringing, moving.seconds, rtol=1e-12)
+    assert moving.ringing == 0.0 < plan.ringing and "once they are asked for" in str(plan)
+    heavy = fi.plan(SCENES / "heavy_plate.toml", tolerance=1e-2)
+    assert heavy.target in ("rigid", "infinite") and heavy.ringing == 0.0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy import integrate, special
 
 import fem_impact as fi
@@ -170,3 +171,20 @@ def test_scene_in_air(tmp_path):
     assert heavy.modes(20).omega == pytest.approx(fi.in_air(light.modes(20)).omega, rel=1e-6)
     plan = heavy.plan()
     assert plan.target == "modal" and any("air" in note for note in heavy.strike().notes)
+
+
+def test_air_on_too_fine_a_grid_is_refused_by_the_name_of_its_speed_of_sound():
+    plate = fi.analytic.rectangle(0.5, 0.3, mass=0.2, first_frequency=100.0, n_modes=20)
+    with pytest.raises(ValueError, match=r"^speed of sound in the air must be higher or modes fewer, got 0\.01 m/s: "):
+        fi.in_air(plate, speed=0.01)
+
+
+def test_the_error_of_damping_is_that_of_air_alone_and_follows_the_modes():
+    plate = fi.analytic.rectangle(0.5, 0.3, mass=0.2, first_frequency=100.0, n_modes=20, damping_ratio=0.01)
+    loud, open_air = fi.in_air(plate), fi.in_air(plate, baffled=False)
+    assert plate.damping_error is None and loud.damped(0.01).damping_error is None
+    assert (loud.damping_error > 0.0).all() and loud.damping_error[0] < 0.1 * (loud.damping_ratio[0] - 0.01)
+    assert_allclose(loud.truncated(n_modes=5).damping_error, loud.damping_error[:5])
+    # without a wall no sound is counted, though with one it would be as much as the error says
+    assert_allclose(open_air.damping_ratio, 0.01)
+    assert (open_air.damping_error > 0.8 * (loud.damping_ratio - 0.01)).all()
