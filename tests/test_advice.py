@@ -14,7 +14,7 @@ import fem_impact as fi
 from fem_impact import cli
 from fem_impact._base import explained
 from fem_impact.impact import engine
-from fem_impact.model import planner
+from fem_impact.model import by_modes
 from fem_impact.model.target import Target
 from fem_impact.pages import report
 from fem_impact.scenes import maps, schema
@@ -78,7 +78,7 @@ def test_a_band_that_is_too_wide_gets_its_limit(tmp_path, quantity, target):
 
 @pytest.mark.slow
 def test_a_map_of_too_many_modes_proposes_a_tolerance(tmp_path, monkeypatch):
-    monkeypatch.setitem(planner.MOST_MODES, "fe", 150)
+    monkeypatch.setitem(by_modes.MOST_MODES, "fe", 150)
     text = QUICK.replace('source = "analytic"', 'source = "fe"').replace("[strike]", "[strike]\nresidual = false")
     found, over = loaded(tmp_path, text), {"contact.stiffness": [1e3, 1e5]}
     with pytest.raises(fi.SimulationError, match="leave out the contacts stiffer than") as caught:

@@ -19,6 +19,7 @@ from ..impact import gradient, promise
 from ..impact.quantities import rebound
 from ..impact.response import Response
 from ..model import planner, target
+from ..model.budget import VERIFYING
 from ..modes import varied
 from ..modes.modal import Modes
 from ..taps import arguments, solver
@@ -133,7 +134,7 @@ class Design(check.Brief):
         if some:
             piece = next(iter(self.maker.pieces(self.values).values()))
             count = max(goal.mode for goal in some) + target.RIGID_MOTIONS
-            modes = _modes_of(piece, count, target.CLOSE / planner.VERIFYING)
+            modes = _modes_of(piece, count, target.CLOSE / VERIFYING)
             found |= {goal.label: _of_modes(modes, goal) for goal in some}
         return Checked(MappingProxyType(found), MappingProxyType(hits), MappingProxyType(apart))
 
@@ -454,7 +455,7 @@ def _twice(piece: Piece, tolerance: float) -> tuple[Response, Mapping[str, float
         return run.response, run.verified
     modes = piece.target.surrounded(piece.target.modes)
     hit = piece.strike(modes, tolerance)
-    return hit, planner.differences(hit, piece.strike(modes, hit.tolerance / planner.VERIFYING), hit.quantities)
+    return hit, planner.differences(hit, piece.strike(modes, hit.tolerance / VERIFYING), hit.quantities)
 
 
 def _modes_of(piece: Piece, count: int, tolerance: float) -> Modes:

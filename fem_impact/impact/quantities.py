@@ -50,13 +50,6 @@ def asked_for(quantity: Any) -> Mapping[str, float | None]:
     return MappingProxyType(found)
 
 
-def apart(one: float | None, other: float | None) -> float:
-    """Difference of the restitutions of two blows [-]; 1 where only one of them is still in contact."""
-    if one is None or other is None:
-        return float((one is None) != (other is None))
-    return abs(one - other)
-
-
 def rebound(hit: Any, digits: int) -> str:
     """The restitution of a response with so many digits, or why there is none."""
     if hit.restitution is None:

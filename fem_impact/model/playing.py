@@ -23,6 +23,7 @@ from ..impact.state import State
 from ..impact.striker import Striker
 from ..modes.modal import Modes
 from . import audit, planner
+from .budget import Budget
 
 LOG = logging.getLogger(__name__)
 EACH = 0.5  # [-] of the tolerance for each blow by itself; as much is left for what it inherits from those before
@@ -435,7 +436,7 @@ class _Game:
         one = self.played[number]
         striker = one.striker
         if not striker.fixed and rule["residual"]:
-            tolerance = planner.CHEAP * rule["tolerance"]
+            tolerance = Budget(rule["tolerance"]).cheap
             needed = collision.striker_modes(striker, contact=one.contact, speed=one.speed, tolerance=tolerance)[0]
             striker = collision.shortened(striker, needed)
         surface = float(self.modes.shape_at(one.at[None])[0] @ self.q)

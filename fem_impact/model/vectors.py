@@ -17,6 +17,7 @@ from ..impact.error import Error
 from ..modes.modal import Modes
 from ..modes.ritz import Krylov
 from . import cost
+from .budget import NOTCH
 from .target import Elements, Stages, Target
 
 # the next five: value at a tolerance of 1e-2 or more, and power of 1e-2 / tolerance with which it grows
@@ -32,8 +33,6 @@ FEWEST = 30
 MORE = 1.4  # [-] factor on the number of vectors: less gains too little for a run, more may overshoot
 # [-] divides what those of poorer descriptions may err: so little that two blows differ by the error of the poorer
 LESS_FOLDED = 16.0
-# [-] each attempt divides by this what modes left out, highest pairs or the mesh may err: less may need one more
-NOTCH = 4.0
 # [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7, as one or two may fail by chance;
 # one blow is given twice as many while two descriptions do not agree on its impacts: that error is 1 until they do
 PATIENCE, LEAST_GAIN = 3, 0.7
@@ -136,29 +135,15 @@ def folded(found: Modes, cutoff: Callable[[Modes, float], float], margin: float)
 
 
 class Seen:
-    """A target as a blow at one point sees it.
+    """A target as a blow at one point sees it, whose contact has a resonance [Hz] on a rigid wall.
 
-    Parameters
-    ----------
-    target : Target
-    at : strike point, (2,) [m]
-    resonance : float [Hz]
-        One over twice the duration of the contact on a rigid wall.
-    tolerance : float [-]
-    elements : Elements
-        Those to begin with.
-    fixed : bool
-        Whether the user insists on their size.
-    shift : float, optional [rad/s]
-        By default, the resonance and the tolerance decide.
-    count : int, optional
-        Number of vectors tried first; the same.
+    The resonance and the tolerance decide on shift and first number of vectors, unless these are given.
     """
 
     target: Target
     at: np.ndarray  # (1, 2) [m], or of several points
-    elements: Elements
-    fixed: bool
+    elements: Elements  # those to begin with, and then ever smaller ones
+    fixed: bool  # whether the user insists on their size
     stages: Stages
     shift: float  # [rad/s] before scaling, see `Krylov`
     count: int  # vectors

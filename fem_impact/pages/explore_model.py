@@ -13,7 +13,7 @@ from ..impact import accuracy, collision, threshold
 from ..impact.contact import Contact, acting_stiffness, wall_time
 from ..impact.response import Response
 from ..mesh.meshes import Mesh
-from ..model import planner, vectors
+from ..model import vectors
 from ..model.audit import audited
 from ..model.target import Stages
 from ..modes.modal import Modes, SampledShapes
@@ -72,7 +72,7 @@ class Setup:
         new strike point are found.
         """
         plan = scene.plan(target="modal", n_modes=FIRST_LOOK)
-        first = planner.struck(plan, Stages())
+        _, first = plan.description.found(Stages())
         at = np.atleast_1d(np.asarray(scene.blow.values["at"], float))
         case = grid.Case(first, scene.make_striker(), scene.make_contact(), at, float(scene.blow.values["speed"]))
         setup = cls(scene, scene.body(), case)
@@ -82,7 +82,7 @@ class Setup:
         needed = bodies.number_of_modes(first, bodies.needed_frequency(setup.case(hard), setup.tolerance))
         if needed <= first.n_modes:
             return setup
-        more = planner.struck(plan.but(n_modes=min(needed, MOST_MODES)), Stages())
+        _, more = plan.but(n_modes=min(needed, MOST_MODES)).description.found(Stages())
         return replace(setup, base=replace(case, modes=more))
 
     @property

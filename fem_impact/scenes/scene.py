@@ -21,6 +21,7 @@ from ..impact.striker import Striker
 from ..mesh import sketch
 from ..mesh.meshes import Mesh, pierced
 from ..model import planner
+from ..model.by_modes import MOST_MODES
 from ..model.planner import Blow, Plan, Run
 from ..model.playing import Strokes
 from ..model.target import FIRST_LOOK, Stages, Target, Watch
@@ -136,9 +137,9 @@ class Scene(check.Brief):
         elements are saved, and found by the same call later.
         """
         if count is None:
-            return planner.struck(self.plan(target="modal"), Stages())
+            return self.plan(target="modal").description.found(Stages())[1]
         target = self.built.target
-        most = planner.MOST_MODES[target.kind]
+        most = MOST_MODES[target.kind]
         if check.count("count", count) > most:
             raise fault(self.path, f"count must be at most {most} modes for this scene, got {count}; ask for fewer")
         tolerance = self.blow.values.get("tolerance", collision.TOLERANCE)

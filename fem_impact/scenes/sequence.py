@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from .._base import check, markup
 from .._base.explained import below, noted, pointed
 from ..impact import assumption, collision, quantities
-from ..model import cost, planner, playing
+from ..model import cost, playing
 from ..model.planner import Plan
 from ..model.playing import Strokes
 from ..model.target import Stages, Watch
@@ -170,7 +170,7 @@ def _carried_out(
     scene: "Scene", planned: SequencePlan, stages: Stages, strict: bool, changes: Mapping[str, Any]
 ) -> Strokes:
     """Play the strokes of a scene as planned; ``changes`` are those of the plan."""
-    modes = planner.struck(planned.body, stages)
+    _, modes = planned.body.description.found(stages)
     told = {name: scene.blow.values[name] for name in OF_SEQUENCE if name in scene.blow.values}
     told |= {name: value for name, value in changes.items() if name in OF_SEQUENCE and value is not None}
     strokes: list[tuple[Any, ...]] = []

@@ -18,7 +18,8 @@ from .._base.files import replacing, staged
 from .._base.rounding import SAME
 from ..impact.assumption import table
 from ..impact.response import Response
-from ..model.planner import AUDIBLE, Run
+from ..model.by_vectors import AUDIBLE
+from ..model.planner import Run
 from ..model.playing import Strokes
 from ..modes import universal_files, viewing
 from ..modes.modal import Modes

@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,10 @@ from ..impact import accuracy, collision
 from ..impact.contact import Contact
 from ..impact.error import Error
 from ..impact.striker import Striker
-from ..model import planner, vectors
+from ..model import vectors
+from ..model.asked import refine
+from ..model.budget import FINEST, Budget
+from ..model.by_modes import MOST_MODES
 from ..model.target import CLOSE, FIRST_FLEXIBLE, FIRST_LOOK, Elements, Stages, Target
 from ..model.views import TOGETHER, Views
 from ..modes.modal import FieldShapes, Modes, SampledShapes, damping_ratios
@@ -110,7 +113,7 @@ def _by_modes(target: Target, case: Case, axes: Axes, tolerance: float, keep: Pa
     modes, needed = case.modes, reach(tolerance)
     if needed <= modes.frequencies[-1]:
         return case
-    number, most = number_of_modes(modes, needed), planner.MOST_MODES[target.kind]
+    number, most = number_of_modes(modes, needed), MOST_MODES[target.kind]
     if number > most:
         enough = accuracy.least_tolerance(lambda tolerance: number_of_modes(modes, reach(tolerance)) <= most)
         stiffest = float(np.max(axes.get("stiffness", case.contact.stiffness)))
@@ -141,7 +144,7 @@ def needed_frequency(case: Case, tolerance: float) -> float:
     """Frequency [Hz] up to which a blow needs modes to meet the tolerance."""
     return accuracy.cutoff_frequency(
         case.modes, case.at, contact=case.contact, mass=case.striker.felt_mass, speed=case.speed,
-        tolerance=planner.SHARE * tolerance,
+        tolerance=Budget(tolerance).half,
     )  # fmt: skip
 
 
@@ -205,6 +208,9 @@ class Sized:
     chance: Sequence[Mapping[str, float]]  # values of the axes of other blows by which the vectors are judged
     tolerance: float  # [-]
     max_impacts: int | None = None  # what follows does not matter
+    blows: Sequence[Mapping[str, float]] = ()  # values of the axes of those that are struck
+    seen: Views | None = None
+    tried: dict[tuple[int, int], list[float]] = field(default_factory=dict)  # truncation errors of each point and blow
 
     def at(self, modes: Modes, point: np.ndarray, values: Mapping[str, float]) -> Case:
         """One blow on a body of given modes."""
@@ -229,9 +235,9 @@ class Sized:
             seen = Views(self.target, some, max(resonance), self.tolerance, elements, fixed, stages)
             if seen.at_rest:
                 return None
-            tried: dict[tuple[int, int], list[float]] = {}
+            one = replace(self, seen=seen, tried={})
             for blows in (extreme, [*extreme, *self.chance]):
-                found = self._enough(seen, blows, tried, stages)
+                _, _, found = refine(replace(one, blows=blows), Sized._judged, stages)
             views |= {tuple(point.tolist()): sampled(modes, point[None]) for point, modes in zip(some, found)}
         return views
 
@@ -243,34 +249,34 @@ class Sized:
         allowed = target.size_stated or size >= refinement.smallest_size("argyris", target.mesh)
         return size if allowed else None
 
-    def _enough(
-        self,
-        seen: Views,
-        blows: Sequence[Mapping[str, float]],
-        tried: dict[tuple[int, int], list[float]],
-        stages: Stages,
-    ) -> list[Modes]:
-        """The target as seen from each point, with vectors and a mesh good enough for some blows.
+    def found(self, stages: Stages, keep: Any = None) -> "tuple[Sized, list[Modes]]":
+        """The same, and the target as seen from each point."""
+        assert self.seen is not None
+        return self, [self.seen.of(i, self._cutoff(point)) for i, point in enumerate(self.seen.at)]
 
-        ``tried`` collects the truncation errors of each point and blow. A blow that more vectors do not make any better
-        is given up, as it would be alone, and does not stop the others.
+    def refined(self, error: Error, stages: Stages) -> "Sized | None":
+        """The same with more vectors or a finer mesh, whichever the errors of its blows require."""
+        assert self.seen is not None
+        return self if self.seen.improved(error, self.tolerance - allowed(self.tolerance)) else None
+
+    def _judged(self, found: list[Modes], stages: Stages) -> tuple[Error, list[Modes]]:
+        """The errors of the blows at all points, and the target as seen from each.
+
+        A blow that more vectors do not make any better is given up, as it would be alone, and does not stop the others.
         """
-        while True:
-            found = [seen.of(i, self._cutoff(point)) for i, point in enumerate(seen.at)]
-            errors, lost = [], False
-            with stages("strike"):
-                for (i, modes), (n, values) in product(enumerate(found), enumerate(blows)):
-                    before = tried.setdefault((i, n), [])
-                    if not vectors.hopeless(before):
-                        errors.append(self._error(self.at(modes, seen.at[i], values)))
-                        before.append(errors[-1][0])
-                        lost |= vectors.hopeless(before)
-            if lost:
-                seen.tried.clear()  # the others have not been tried as often
-            worst = np.sort(np.array(errors or [(0.0, 0.0)]), axis=0)  # (n_struck, 2)
-            error = Error(0.0, *worst[len(worst) - 1 - int(SPARED * len(worst))].tolist())
-            if not seen.improved(error, self.tolerance - allowed(self.tolerance)):
-                return found
+        assert self.seen is not None
+        errors, lost = [], False
+        with stages("strike"):
+            for (i, modes), (n, values) in product(enumerate(found), enumerate(self.blows)):
+                before = self.tried.setdefault((i, n), [])
+                if not vectors.hopeless(before):
+                    errors.append(self._error(self.at(modes, self.seen.at[i], values)))
+                    before.append(errors[-1][0])
+                    lost |= vectors.hopeless(before)
+        if lost:
+            self.seen.tried.clear()  # the others have not been tried as often
+        worst = np.sort(np.array(errors or [(0.0, 0.0)]), axis=0)  # (n_struck, 2)
+        return Error(0.0, *worst[len(worst) - 1 - int(SPARED * len(worst))].tolist()), found
 
     def _cutoff(self, point: np.ndarray) -> Callable[[Modes, float], float]:
         """Highest frequency [Hz] that any blow needs of some modes; takes them and a safety factor."""
@@ -279,8 +285,7 @@ class Sized:
             needed = []
             for values in self.ends:
                 case = self.at(modes, point, values)
-                loss = accuracy.LOSSY if case.contact.rated else 1.0
-                allowed = planner.SHARE * self.tolerance / (planner.CAUTION * loss * margin)
+                allowed = Budget(self.tolerance, case.contact.rated, margin).left_out
                 law: dict[str, Any] = {"contact": case.contact, "mass": case.striker.felt_mass, "speed": case.speed}
                 limit = accuracy.tail_cutoff(case.modes, point[None], tolerance=allowed, **law)
                 needed.append(limit / self.raised(values))
@@ -293,7 +298,7 @@ class Sized:
         try:
             hit = collision.strike(
                 case.modes, case.striker, case.contact, at=case.at, speed=case.speed,
-                tolerance=max(planner.FINEST, planner.CHEAP * self.tolerance), max_impacts=self.max_impacts,
+                tolerance=max(FINEST, Budget(self.tolerance).cheap), max_impacts=self.max_impacts,
             )  # fmt: skip
         except check.SimulationError:
             return 0.0, 0.0

@@ -9,7 +9,7 @@ import xarray
 from contourpy import LineType, contour_generator
 
 from .._base import check
-from ..model.planner import FINEST
+from ..model.budget import FINEST
 from . import batches
 from .cells import AXES, FAMILY_AXES, logarithmic
 from .cloud import Cloud

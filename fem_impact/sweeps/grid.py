@@ -26,7 +26,7 @@ from ..impact.distance import distance
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..impact.variation import RESOLVABLE
-from ..model.planner import COSTLY
+from ..model.asked import COSTLY
 from ..model.target import Target
 from ..modes.modal import Damping, Modes
 from . import batches, bodies, cloud, refined

@@ -12,7 +12,7 @@ from fem_impact._base import check
 from fem_impact._base.progress import heard
 from fem_impact.fe import assembly, refinement
 from fem_impact.impact import collision
-from fem_impact.model import cost, planner
+from fem_impact.model import asked, by_modes, by_vectors, cost, planner
 from fem_impact.modes import analytic
 from fem_impact.scenes import templates
 
@@ -304,9 +304,10 @@ def test_a_blow_that_needs_more_memory_than_there_is_is_refused_before_it_is_com
         plan.run()
 
 
+@pytest.mark.slow
 def test_modes_of_a_costly_plan_are_kept_and_taken_up_again(tmp_path, monkeypatch):
     """Broken off after the modes were found, the next run starts with them; other modes are found anew."""
-    monkeypatch.setattr(planner, "COSTLY", (0.0, 0.0))
+    monkeypatch.setattr(asked, "COSTLY", (0.0, 0.0))
     scene, keep = fi.load_scene(SCENES / "marked_linear.toml"), tmp_path / "modes.npz"
     solved = []
     solve = refinement.solve
@@ -415,12 +416,36 @@ def test_steps_of_a_tight_tolerance_are_in_the_predicted_time():
 
 def test_motion_costs_the_modes_it_is_told_by(scene, monkeypatch):
     """A look at a few modes, then as many as ring: here no more, so that both cost the same."""
-    monkeypatch.setattr(planner, "_ringing_count", lambda _: planner.FIRST_LOOK)
+    monkeypatch.setattr(by_vectors, "ringing_count", lambda _: by_vectors.FIRST_LOOK)
     still, moving = (
         scene(PLATE + extra, mass=20.0).plan(target="vectors") for extra in ("", "[observe]\npoints = [[0.1, 0.1]]\n")
     )
-    look = cost.by_modes(cost.PER_MODE * planner.FIRST_LOOK, planner.FIRST_LOOK)
+    look = cost.by_modes(cost.PER_MODE * by_vectors.FIRST_LOOK, by_vectors.FIRST_LOOK)
     assert moving.seconds - still.seconds == pytest.approx(2.0 * look.seconds, rel=1e-6)
+
+
+def test_a_better_description_that_fails_leaves_what_there_is(scene, monkeypatch):
+    class Broken(by_modes.Modal):
+        def found(self, stages, keep=None):
+            raise check.SimulationError("too many steps")
+
+    plan = scene(PLATE, mass=20.0).plan(tolerance=1e-2, target="modal")
+    monkeypatch.setattr(by_modes.Modal, "refined", lambda self, hit, stages: Broken(self.asked, self.forecast, False))
+    run = plan.run()
+    assert run.plan.n_modes == run.response.target.n_modes and run.response.n_impacts > 0
+    with pytest.raises(check.SimulationError, match="too many steps"):
+        replace(plan, description=Broken(plan.description.asked, plan.description.forecast, False)).run()
+
+
+def test_the_modes_that_only_files_take_are_told_besides():
+    """The command says 5 s of this guitar and then takes a minute, most of it for the sound at the point struck."""
+    scene = fi.load_scene(SCENES / "everyday" / "guitar_fingernail.toml")
+    plan = scene.plan()
+    moving = planner.make(replace(plan.blow, moving=True), {}, planner.Stages())
+    assert_allclose(plan.seconds + plan.ringing, moving.seconds, rtol=1e-12)
+    assert moving.ringing == 0.0 < plan.ringing and "once they are asked for" in str(plan)
+    heavy = fi.plan(SCENES / "heavy_plate.toml", tolerance=1e-2)
+    assert heavy.target in ("rigid", "infinite") and heavy.ringing == 0.0
 
 
 def test_a_blow_whose_modes_turn_out_too_few_is_struck_again_with_more(monkeypatch):
@@ -435,14 +460,3 @@ def test_a_blow_whose_modes_turn_out_too_few_is_struck_again_with_more(monkeypat
     monkeypatch.setattr(collision, "strike", strike)
     hit = scene.strike(target="modal")
     assert hit.tolerance_met and len(set(kept)) == 2 and kept[-1] > kept[0]
-
-
-def test_the_modes_that_only_files_take_are_told_besides():
-    """The command says 5 s of this guitar and then takes a minute, most of it for the sound at the point struck."""
-    scene = fi.load_scene(SCENES / "everyday" / "guitar_fingernail.toml")
-    plan = scene.plan()
-    moving = planner.make(replace(plan.blow, moving=True), {}, planner.Stages())
-    assert_allclose(plan.seconds + plan.ringing, moving.seconds, rtol=1e-12)
-    assert moving.ringing == 0.0 < plan.ringing and "once they are asked for" in str(plan)
-    heavy = fi.plan(SCENES / "heavy_plate.toml", tolerance=1e-2)
-    assert heavy.target in ("rigid", "infinite") and heavy.ringing == 0.0

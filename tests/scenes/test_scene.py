@@ -17,7 +17,7 @@ from fem_impact.fe.section import Material, Plate
 from fem_impact.impact import collision
 from fem_impact.impact.contact import Contact
 from fem_impact.impact.striker import Hand, Striker
-from fem_impact.model import planner
+from fem_impact.model.budget import Budget
 from fem_impact.modes import analytic, modal
 from fem_impact.scenes import maps, scene
 from fem_impact.scenes.sentences import words
@@ -83,7 +83,7 @@ def test_scene_strikes_what_the_public_functions_strike(tmp_path):
         Contact.hertz(695e3),
         at=[0.1395, 0.09],
         speed=2.0,
-        tolerance=planner.SHARE * 1e-2,
+        tolerance=Budget(1e-2).half,
     )
     # the same calls with the same numbers, up to rounding of the scale: 1e-9 of the peak after some 1e3 rad
     assert_allclose(hit.force, again.force, rtol=0, atol=1e-9 * again.peak_force)

@@ -9,7 +9,6 @@ from scenes import SMALL
 
 import fem_impact as fi
 from fem_impact import cli
-from fem_impact.model import planner
 from fem_impact.model.target import Stages
 from fem_impact.scenes import maps, scene
 
@@ -78,7 +77,7 @@ def test_a_plan_of_strokes_is_of_all_and_the_body_has_the_modes_that_the_hardest
     assert [plan.max_frequency for plan in planned.plans] == [plan.max_frequency for plan in own]
     assert planned.body.max_frequency == max(plan.max_frequency for plan in own)
     assert planned.body.seconds > own[1].seconds and planned.meets == all(plan.meets for plan in own)
-    assert told.play(tolerance=2e-2).target.n_modes == planner.struck(planned.body, Stages()).n_modes
+    assert told.play(tolerance=2e-2).target.n_modes == planned.body.description.found(Stages())[1].n_modes
     assert cli.main(["plan", str(path), "--tolerance", "2e-2"]) == 0
     said = capsys.readouterr().out.replace("\n    ", " ")
     assert "will be met by 2 strokes: each to 0.01 by itself" in said and f"{planned.body.cost}" in said

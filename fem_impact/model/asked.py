@@ -1,0 +1,293 @@
+"""What is asked of a blow, checked, and what is foretold of it before anything is computed."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from inspect import signature
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from .._base import check
+from ..fe import plausible
+from ..impact import accuracy, collision, stepping
+from ..impact.response import Response
+from ..modes.modal import Modes
+from . import audit, cost, idealisation
+from .budget import Budget
+from .target import MODELS, Stages, Target
+
+if TYPE_CHECKING:
+    from .planner import Blow
+
+# that a user may set
+PIECES = {"target": "", "model": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}
+# after modes, striker and contact; a plan is for a body at rest
+ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
+CHOICES = {"target": ("rigid", "infinite", "vectors", "mixed", "modal"), "model": MODELS}
+COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced: longer than one likes to wait
+
+
+class Unaffordable(check.SimulationError):
+    """A description that meets the tolerance takes too many unknowns or modes; another may not."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What a description of the target keeps, and what that errs and costs."""
+
+    tolerance: float  # [-]
+    quantities: Mapping[str, float | None]  # each with its band [Hz]
+    target: str  # "rigid", "infinite", "vectors" (Ritz vectors started from the blow), "mixed" (see `mixed`) or "modal"
+    element: str | None  # "argyris", "hermite" or "closed form"; None for an idealised target
+    size: float | None  # [m] element size
+    n_dofs: int  # [-] approximate number of unknowns
+    n_modes: int  # [-] approximate number of target modes or vectors
+    max_frequency: float | None  # [Hz] highest kept target mode; those above act as a spring
+    n_striker_modes: int  # [-] striker modes, including its rigid motions
+    scheme: str
+    dt: float  # [s] first time step in contact
+    duration: float  # [s] of an undisturbed contact, not of the run
+    errors: Mapping[str, float]  # [-] predicted, by cause
+    reasons: tuple[str, ...]  # sentences: what is kept, what is left out, and why
+    seconds: float  # [s] predicted
+    memory: float  # [byte] predicted
+    mass: float = 0.0  # [kg] mass of the target
+    mobility: float = 0.0  # [m/(N s)] of an infinite plate
+    notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
+    first: Modes | None = field(default=None, repr=False, compare=False)  # first modes of the target, if needed
+    ringing: float = 0.0  # [s] predicted besides, of the modes that tell motion and sound, once these are asked for
+
+    @property
+    def error(self) -> float:
+        """Total predicted error [-]."""
+        return float(sum(self.errors.values()))
+
+    @property
+    def costly(self) -> bool:
+        """Whether the run takes more than COSTLY: ten seconds or two gigabytes."""
+        return self.seconds > COSTLY[0] or self.memory > COSTLY[1]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A blow with changes, checked."""
+
+    blow: "Blow"
+    changes: Mapping[str, Any]  # overridden arguments of the blow and pieces of the plan
+    values: Mapping[str, Any]  # arguments of `strike`
+    pieces: Mapping[str, Any]  # pieces of the plan set by the user
+    budget: Budget
+    quantities: Mapping[str, float | None]
+    duration: float  # [s] contact time on a rigid wall
+
+    @classmethod
+    def checked(cls, blow: "Blow", changes: Mapping[str, Any]) -> "Asked":
+        """What is asked of a blow; ``changes`` as in `fi.plan`."""
+        changes = MappingProxyType({name: value for name, value in changes.items() if value is not None})
+        pieces = {name: changes[name] for name in PIECES if name in changes}
+        arguments = {name: value for name, value in changes.items() if name not in PIECES}
+        values: dict[str, Any] = {**blow.arguments, **arguments}
+        for name, value in pieces.items():
+            if name in CHOICES:
+                check.one_of(name, value, CHOICES[name])
+            elif PIECES[name]:
+                check.positive(name, value, PIECES[name])
+            else:
+                check.count(name, value)
+        with blow.target.blame("strike", changes):
+            for name in values:
+                if name not in ARGUMENTS:
+                    raise ValueError(f"{name} is not an argument of a blow{check.nearest(name, [*ARGUMENTS, *PIECES])}")
+            wanted = (values.get(name) for name in ("duration", "max_impacts", "scheme", "dt", "quantity"))
+            options = stepping.Options.checked(values.get("tolerance", collision.TOLERANCE), *wanted)
+            values |= {"dt": options.dt, "duration": options.horizon if np.isfinite(options.horizon) else None}
+            speed = check.positive("speed", values["speed"], "m/s")
+            values["stretching"] = check.flag("stretching", values.get("stretching", False)) or blow.target.stretching
+            values["residual"] = values.get("residual", True)
+            for name in ("striker_force", "target_force"):
+                values[name] = check.number(name, values.get(name, 0.0), "N")
+        values["at"] = _struck_at(blow.target, values["at"], changes)
+        duration = accuracy.contact_duration(blow.contact, blow.striker.felt_mass, speed)
+        budget = Budget(options.tolerance, blow.contact.rated)
+        return cls(blow, changes, values, pieces, budget, options.quantities, duration)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the target's motion or sound is wanted, besides the numbers of the blow."""
+        return "sound" in self.quantities or self.blow.moving
+
+    @property
+    def plain(self) -> bool:
+        """Whether the target is thin, in a vacuum and does not stretch."""
+        return not (self.blow.target.thick or self.blow.target.air or self.values["stretching"])
+
+    @property
+    def counted(self) -> bool:
+        """Whether the user says which modes the target keeps."""
+        return bool({"n_modes", "max_frequency"} & set(self.pieces))
+
+    @property
+    def meshed(self) -> bool:
+        """Whether the user insists on the size of the elements."""
+        return self.blow.target.size_stated or "size" in self.pieces
+
+    @property
+    def law(self) -> dict[str, Any]:
+        """Contact and speed, as arguments."""
+        return {"contact": self.blow.contact, "speed": self.values["speed"]}
+
+    @property
+    def mass(self) -> float:
+        """Mass [kg] of the striker felt at its contact point."""
+        return self.blow.striker.felt_mass
+
+    @property
+    def slips(self) -> tuple[str, ...]:
+        """Notes on numbers of the striker and the speed that are probably a slip of a unit."""
+        return *self.blow.striker.notes, *plausible.number("speed", self.values["speed"])
+
+    @cached_property
+    def seen(self) -> idealisation.Outside | None:
+        """What is known of the target without finite elements."""
+        return idealisation.from_outside(self.blow.target, self.values["at"], self.mass, self.duration)
+
+    @property
+    def unfit(self) -> str:
+        """Why the target cannot be treated as rigid or infinite without its modes, if it is not known."""
+        target = self.blow.target
+        if target.mesh is None or target.mesh.dimension == 1:
+            return "is not available for this body"
+        if "first_frequency" in target.scale:
+            return "needs E, nu, rho and thickness: first_frequency gives the rigidity only once the modes are known"
+        return "is only for plates of constant thickness, without tension, point masses and point supports"
+
+    def refuse(self, why: str) -> None:
+        """Raise a ValueError if the user names a description that does not apply."""
+        if "target" in self.pieces:
+            raise ValueError(f"{self.blow.name}target = {self.pieces['target']!r} {why}; use target = 'modal'")
+
+    def find(self, n_modes: int, max_frequency: float | None = None, **how: Any) -> Modes:
+        """Modes of the target, see `Target.find`."""
+        size, limit = self.pieces.get("size"), 2.0 * self.budget.cheap / self.budget.fineness
+        return self.blow.target.find(n_modes, max_frequency, tolerance=limit, size=size, **how)
+
+    def striker_modes(self, margin: float) -> tuple[int, float]:
+        """Number of kept striker modes, and the error [-] of leaving out the others."""
+        modes, kept = self.blow.striker.modes, self.pieces.get("n_striker_modes")
+        if not modes.dimension:
+            return modes.n_modes, 0.0
+        if kept is None and self.values["residual"]:
+            return collision.striker_modes(self.blow.striker, tolerance=self.budget.total / margin, **self.law)
+        kept = max(modes.n_rigid, min(kept or modes.n_modes, modes.n_modes))
+        return kept, collision.striker_error(self.blow.striker, kept, **self.law)
+
+    def from_outside(self, kind: str, mass: float) -> audit.Simplified | None:
+        """The target as its mesh and section describe it, without modes; None if there is only modes."""
+        target = self.blow.target
+        if target.mesh is None:
+            return None
+        section = None if target.scale else target.section
+        return audit.Simplified(kind, mass or 1.0, target.mesh, section, target.supports)
+
+    def foretell(
+        self, target: str, *, errors: Mapping[str, float], reasons: tuple[str, ...], notes: tuple[str, ...],
+        n_modes: int = 0, steps: float | None = None, work: cost.Work = cost.NOTHING, **chosen: Any,
+    ) -> Forecast:  # fmt: skip
+        """The forecast for a target: adds striker modes and time steps, with their errors and cost.
+
+        The time steps may err by ``steps`` [-]; by default, half the budget.
+        """
+        kept, left = self.striker_modes(self.budget.margin)
+        modes, steps = self.blow.striker.modes, steps or self.budget.half
+        if modes.dimension:
+            errors = {**errors, "striker modes left out": left}
+            bending, whole = kept - modes.n_rigid, modes.n_modes - modes.n_rigid
+            stiff = "is treated as rigid" if bending == 0 else f"keeps {bending} of its {whole} bending modes"
+            reasons = (*reasons, f"the striker {stiff}")
+        fixed = self.values.get("scheme") or ("A4" if self.values["stretching"] else None), self.values["dt"]
+        scheme, dt = stepping.steps_for(self.blow.contact, self.duration, steps, self.quantities, *fixed)
+        until = "fixed by dt" if fixed[1] else f"halved until two runs agree to {steps:.1e}"
+        lasts = self.values["duration"]
+        end = "until the bodies have parted for good" if lasts is None else f"for {lasts:g} s"
+        count = self.duration / dt
+        refined = scheme == "collocation" and not fixed[1]  # its first step says little of those it takes in the end
+        if self.blow.target.air:
+            work = work + cost.in_air(n_modes)
+        work = work + cost.strikes(cost.collocated(steps) if refined else count, n_modes + kept)
+        reasons = (*reasons, f"scheme {scheme}, steps of {dt:.3g} s ({count:.0f} per contact), {until}, {end}")
+        rest: dict[str, Any] = {"element": None, "size": None, "n_dofs": 0, "max_frequency": None, **chosen}
+        return Forecast(
+            self.budget.total, self.quantities, target, n_modes=n_modes, n_striker_modes=kept, scheme=scheme, dt=dt,
+            duration=self.duration, errors=MappingProxyType({**errors, "steps": steps}), reasons=reasons,
+            seconds=work.seconds, memory=work.memory, notes=plausible.together(notes, self.slips), **rest,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Description(ABC):
+    """A way to describe the target; those of its kind have ``of``, which tells when it applies."""
+
+    asked: Asked
+    forecast: Forecast
+    seen: Any = field(default=None, kw_only=True)  # what a run has computed so far, see `vectors.Seen`
+    rings: ClassVar[bool] = False  # whether the motion of the target is known, not only the numbers of the blow
+
+    @property
+    def margin(self) -> float:
+        """Divides what left-out modes of the striker may err [-]."""
+        return self.asked.budget.margin
+
+    @abstractmethod
+    def found(self, stages: Stages, keep: Any = None) -> "tuple[Description, Modes]":
+        """The description as it is struck, and its modes; ``keep`` is a file that stores those of a costly plan."""
+
+    def refined(self, hit: Response, stages: Stages) -> "Description | None":
+        """The next better one that the errors of a blow require; None if they do not, or there is none."""
+        return None
+
+    def completed(self, hit: Response, stages: Stages, keep: Any = None) -> Response:
+        """The last response with all that belongs to it, its examiner among that."""
+        told = self.forecast
+        kind = "infinite" if told.mobility else "rigid"
+        return audit.audited(hit, None if self.rings else self.asked.from_outside(kind, told.mass))
+
+
+def refine(description: Any, strike: Callable[..., tuple[Any, Any]], stages: Stages, keep: Any = None) -> Any:
+    """Strike one description after another until the errors require no better one.
+
+    ``strike`` takes a description, its modes and the stages, and returns what tells the errors, and more. Returns the
+    last description that could be struck, with both. What is too much for a better one has missed the tolerance.
+    """
+    struck = None
+    while description is not None:
+        try:
+            found, modes = description.found(stages, keep)
+            struck = found, *strike(found, modes, stages)
+            description = found.refined(struck[1], stages)
+        except check.SimulationError:
+            if struck is None:
+                raise
+            break
+    return struck
+
+
+def _struck_at(target: Target, at: Any, changes: Mapping[str, Any]) -> Any:
+    """The strike point (dimension,) [m], checked to lie on the body."""
+    mesh, blame = target.mesh, partial(target.blame, "strike", changes)
+    if mesh is None:
+        assert target.modes is not None
+        with blame():
+            return target.modes.point("at", at)[0] if target.modes.dimension else at
+    with blame():
+        place = check.places("at", at, mesh.dimension)
+        if len(place) != 1:
+            raise ValueError(f"at must be one point, got {len(place)}")
+    along = mesh.dimension == 1 and mesh.points.min() <= place[0, 0] <= mesh.points.max()
+    if not along and (mesh.dimension == 1 or idealisation.Surroundings.seen(mesh, place[0]) is None):
+        inside = target.assembled(Stages()).contains(place)  # perhaps between a curved edge and its chord
+        with blame():
+            check.on_body("at", place, inside, mesh.points)
+    return place[0]

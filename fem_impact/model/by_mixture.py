@@ -1,0 +1,153 @@
+"""A plate by its modes or vectors up to a frequency, and as an infinite plate above it; see `mixed`."""
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .._base import check, progress
+from ..fe import plausible, refinement
+from ..impact import accuracy
+from ..impact.response import Response
+from ..modes.modal import Modes
+from . import cost, mixed, vectors
+from .asked import Asked, Description
+from .by_modes import MANY_MODES
+from .by_vectors import Vectors
+from .target import FIRST_LOOK, Elements, Stages
+
+# [-] modes times steps of one run of a plate that is infinite above a frequency: a time limit of ten seconds
+MOST_MIXED = 2e8
+NO_MESH = "a mesh that resolves the frequency up to which a plate of 'mixed' keeps its modes has too many unknowns"
+
+
+@dataclass(frozen=True, eq=False)
+class Mixed(Description):
+    """A plate by modes, or vectors of finite elements, that is infinite above a frequency."""
+
+    frequency: float  # [Hz]
+    highest: float  # [Hz] above it, the infinite plate acts as a spring
+    compared: bool = False  # whether vectors up to any frequency have been tried instead
+
+    @classmethod
+    def of(cls, asked: Asked, stages: Stages, anyway: bool = False) -> "Mixed | None":
+        """The plate as infinite above a frequency; None if its mobility is not known.
+
+        Or, without ``anyway`` and unless the user asks for it, where vectors or few modes do: the infinite plate damps
+        the contact less than critically, or few modes tell the blow.
+        """
+        blow, target, named = asked.blow, asked.blow.target, "target" in asked.pieces
+        pressed = asked.values["striker_force"] or asked.values["target_force"] or blow.contact.gap < 0.0
+        stated = pressed or asked.counted or blow.striker.hand or not asked.values["residual"]
+        fits = asked.plain and not (stated or asked.moving)
+        with stages("modes"):
+            seen = asked.seen if fits else None
+        resolved = target.kind == "analytic" or vectors.usable(target)
+        if not resolved or seen is None or not np.isfinite(seen.mobility) or not seen.echo:
+            why = asked.unfit if fits else "is only for thin plates in a vacuum, and for the blow alone"
+            asked.refuse(why)
+            return None
+        allowed, slow = asked.budget.left_out, asked.mass * seen.mobility
+        highest = accuracy.infinite_cutoff(seen.mobility, mass=asked.mass, tolerance=allowed, **asked.law)
+        if not named and mixed.LASTING * slow > mixed.LONGEST * asked.duration:
+            return None
+        few = 0.5 * np.pi * slow < asked.duration or target.count_below(highest / target.stretch) < MANY_MODES
+        if few and not (named or anyway):
+            return None
+        frequency = mixed.first_frequency(asked.mass, seen.mobility, seen.echo, asked.duration)
+        kept = (
+            f"the target keeps its modes up to about {frequency:.3g} Hz, or higher if the echoes left out matter; "
+            f"above, it is treated as an infinite plate of mobility {seen.mobility:.3g} m/(N s), from {highest:.3g} Hz "
+            "on as a spring"
+        )
+        wall = asked.duration
+        why = f"the contact lasts about {wall:.3g} s on a wall, and the striker slows down within {slow:.3g} s"
+        number = round(target.count_below(mixed.REACH * frequency / target.stretch))
+        chosen: dict[str, Any] = {"element": "closed form"}
+        if target.kind == "analytic":
+            with stages("modes"):
+                chosen["first"] = asked.find(FIRST_LOOK, stages=stages)
+        else:
+            try:
+                elements, _, n_dofs, work = _by_elements(asked, frequency, stages)
+            except check.SimulationError:
+                if named:
+                    raise
+                return None
+            chosen = {"element": "argyris", "size": elements.size, "n_dofs": n_dofs, "work": work}
+        forecast = asked.foretell(
+            "mixed", errors={"echoes left out": asked.budget.half}, reasons=(why, kept), mass=seen.mass,
+            mobility=seen.mobility, n_modes=number, max_frequency=frequency,
+            notes=plausible.together(target.notes, seen.notes), **chosen,
+        )  # fmt: skip
+        return cls(asked, forecast, frequency, highest)
+
+    def found(self, stages: Stages, keep: Any = None) -> "tuple[Mixed, Modes]":
+        """The same, and its modes or vectors."""
+        asked, target, told, frequency = self.asked, self.asked.blow.target, self.forecast, self.frequency
+        seen, at = self.seen, asked.values["at"]
+        if told.first is not None:
+            with stages("modes"):
+                reach = mixed.REACH * frequency / target.stretch
+                modes = target.finished(asked.find(FIRST_LOOK, reach, first=told.first, stages=stages))
+        else:
+            if seen is None:
+                elements, count, _, _ = _by_elements(asked, frequency, stages)
+                shift, resolved = 2.0 * np.pi * mixed.REACH * frequency, mixed.RESOLVED * frequency
+                seen = vectors.Seen(
+                    target, at, resolved, asked.budget.total, elements, target.size_stated, stages, shift, count
+                )
+            seen.modes(lambda found, _: float(found.frequencies[-1]))
+            assert seen.whole is not None
+            modes = seen.whole
+        body = mixed.mixed(modes, at, told.mobility, frequency, self.highest)
+        forecast = replace(told, n_modes=body.n_modes, max_frequency=frequency)
+        return replace(self, forecast=forecast, seen=seen), body
+
+    def refined(self, hit: Response, stages: Stages) -> "Mixed | Vectors | None":
+        """More vectors, a finer mesh or twice the frequency; vectors for all frequencies if they cost less."""
+        asked, error, allowed, seen = self.asked, hit.error, self.asked.budget.half, self.seen
+        if seen is not None and seen.count < mixed.MOST_VECTORS:
+            if error.truncation > 0.5 * allowed:
+                seen.count = min(mixed.MOST_VECTORS, 2 * seen.count)  # it lasts longer than expected
+                return self
+            if seen.improved(error, allowed):
+                return self
+        twice = 2.0 * hit.bodies[-1].n_modes
+        many = hit.history.steps.shape[0] * twice > MOST_MIXED or (seen is not None and twice > mixed.MOST_VECTORS)
+        if error.idealisation <= allowed or many:
+            return None
+        higher = replace(self, frequency=2.0 * self.frequency, seen=None)
+        if seen is None:
+            return higher
+        try:
+            more = _by_elements(asked, higher.frequency, stages)[3].seconds
+        except check.SimulationError:
+            more = np.inf
+        if not (self.compared or "target" in asked.pieces):
+            with suppress(check.SimulationError):
+                other = Vectors.of(asked, stages)
+                if other is not None and other.forecast.seconds < more:
+                    progress.foresee(other.forecast.seconds)
+                    return replace(other, otherwise=replace(higher, compared=True))
+        if more == np.inf:
+            return None
+        progress.foresee(more)
+        return higher
+
+
+def _by_elements(asked: Asked, frequency: float, stages: Stages) -> tuple[Elements, int, int, cost.Work]:
+    """Elements and vectors for the infinite plate above a frequency [Hz], with the number of unknowns and the work."""
+    target, reach, tolerance = asked.blow.target, mixed.RESOLVED * frequency, asked.budget.total
+    assert target.mesh is not None and asked.seen is not None
+    size = vectors.size_for(target, reach, tolerance)
+    if size < refinement.smallest_size("argyris", target.mesh):
+        raise check.SimulationError(f"{asked.blow.name}{NO_MESH}")
+    elements = vectors.elements_for(target, size, asked.mass, reach, tolerance)
+    lasts = max(asked.duration, mixed.LASTING * asked.mass * asked.seen.mobility)
+    phase = 2.0 * np.pi * mixed.REACH * frequency * lasts
+    number = target.count_below(mixed.REACH * frequency / target.stretch)
+    count = vectors.FEWEST + min(round(number), round(mixed.PER_RADIAN * phase))
+    n_dofs = target.unknowns(asked.values["at"][None], elements, stages)
+    return elements, count, n_dofs, cost.by_vectors([n_dofs, n_dofs / refinement.COARSER**2], count, 1.0)

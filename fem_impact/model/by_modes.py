@@ -1,0 +1,181 @@
+"""The target by its modes up to a frequency; those above act as a spring."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from .._base import check, progress
+from ..fe import plausible, refinement
+from ..impact import accuracy
+from ..impact.response import Response
+from ..modes.modal import FieldShapes, Modes, at_rest
+from . import cost, vectors
+from .asked import Asked, Description, Forecast, Unaffordable
+from .budget import NOTCH, Budget
+from .target import FIRST_LOOK, Stages
+
+# [-] runs with ever more modes or finer meshes until the tolerance is met: CAUTION makes even a second one rare
+ATTEMPTS = 3
+MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by source: takes about 2 GB and some minutes
+# [-] a plate that needs more modes is taken as infinite above a frequency, if it overdamps the contact: a steel sheet
+# then keeps 4 100 modes instead of 15 190
+MANY_MODES = 10_000
+# [-] frequency error of the shortest waves that the mesh resolves by `refinement.WAVE_PER_ELEMENT`; beams also round
+SHORT_WAVES = {
+    "argyris": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Modal(Description):
+    """A target by its modes."""
+
+    rings = True
+    banded: bool  # whether a band of the quantities asks for more modes than the blow
+    more: float = 1.0  # [-] times as many modes as the blow needs: these give the air around it cells
+    attempt: int = 1
+
+    @classmethod
+    def of(
+        cls, asked: Asked, stages: Stages, first: Modes | None = None, more: float = 1.0, attempt: int = 1
+    ) -> "Modal":
+        """The target with as many modes as the blow needs; finds the first ones, because they tell how many."""
+        target, at, mass = asked.blow.target, asked.values["at"], asked.mass
+        with stages("modes"):
+            first = asked.find(FIRST_LOOK, stages=stages) if first is None else first
+        modes = target.finished(first)
+        with target.blame("strike"):
+            modes.point("at", at)
+        needed = accuracy.cutoff_frequency(modes, at, mass=mass, tolerance=asked.budget.left_out, **asked.law)
+        band = max((band for band in asked.quantities.values() if band), default=0.0)
+        limit, number = _reach(asked, modes, max(needed, band), more)
+        most = MOST_MODES[target.kind]
+        if number > most:
+            raise (check.SimulationError if band > needed else Unaffordable)(
+                f"{asked.blow.name}this blow needs about {number:.2g} modes, up to {limit:.2g} Hz, more than the limit "
+                f"of {most}; {_fewer(asked, modes, band > needed)}"
+            )
+        left = accuracy.truncation_error(modes, at, limit, mass=mass, **asked.law)
+        kept = f"the target keeps its modes up to {limit:.4g} Hz, about {number}; the others act as a spring"
+        why = f"the contact lasts about {asked.duration:.3g} s"
+        if band > needed:
+            kept += f" ({band:g} Hz requested, {needed:.4g} Hz needed for the blow)"
+        if asked.values["stretching"]:
+            kept += "; it stiffens as it stretches"
+        forecast = asked.foretell(
+            "modal", errors={"target modes left out": left}, reasons=(why, kept), mass=modes.mass, n_modes=number,
+            max_frequency=limit, first=first, element="closed form" if target.kind == "analytic" else None,
+            notes=plausible.together(target.notes, modes.notes, at_rest(modes, modes.point("at", at))),
+        )  # fmt: skip
+        if isinstance(first.shapes, FieldShapes):
+            forecast = _with_mesh(asked, forecast, first.shapes, limit * first.frequencies[-1] / modes.frequencies[-1])
+        return cls(asked, forecast, band > needed, more, attempt)
+
+    def found(self, stages: Stages, keep: Any = None) -> "tuple[Modal, Modes]":
+        """The same, and its modes; ``keep`` is a file that stores those of a costly plan."""
+        told, asked, target = self.forecast, self.asked, self.asked.blow.target
+        keep = keep if told.costly and told.n_dofs else None
+        assert told.first is not None and told.max_frequency is not None
+        with stages("modes"):
+            first, modes, number = told.first, told.first, asked.pieces.get("n_modes")
+            ratio = target.finished(first).frequencies[-1] / first.frequencies[-1]
+            if number is not None and number > first.n_modes:
+                modes = asked.find(number, first=first, stages=stages, keep=keep)
+            elif told.max_frequency > ratio * first.frequencies[-1] * (1.0 + 1e-9):
+                modes = asked.find(FIRST_LOOK, told.max_frequency / ratio, first=first, stages=stages, keep=keep)
+            if number is not None:
+                modes = modes.truncated(n_modes=number)
+            elif "max_frequency" in asked.pieces:
+                modes = modes.truncated(max_frequency=told.max_frequency / ratio)
+            modes = target.surrounded(modes)
+        return replace(self, forecast=replace(told, n_modes=modes.n_modes)), modes
+
+    def refined(self, hit: Response, stages: Stages) -> "Modal | None":
+        """More modes if those left out turn out to matter, more for the air's sake, or a finer mesh."""
+        asked, budget, error = self.asked, self.asked.budget, hit.error
+        if self.attempt == ATTEMPTS or asked.counted or not asked.values["residual"]:
+            return None
+        target, missed = asked.blow.target, budget.missed(error, not asked.values["dt"])
+        short = error.truncation > budget.half
+        meshed = target.kind != "fe" or asked.meshed
+        coarse = missed and not meshed and error.mesh > budget.cheap
+        more = 1.0
+        if missed and target.air:  # its error goes as the area of cells, whose number goes as that of the modes
+            left = vectors.MET * (budget.total - (error.total - error.mesh))
+            more = max(1.0, error.mesh / left) if left > 0.0 else 1.0
+        if not (short or coarse or more > 1.0):
+            return None
+        margin, fineness = (NOTCH if more_exact else 1.0 for more_exact in (short, coarse))
+        budget = replace(budget, margin=budget.margin * margin, fineness=budget.fineness * fineness)
+        first = None if coarse else self.forecast.first
+        better = Modal.of(replace(asked, budget=budget), stages, first, self.more * more, self.attempt + 1)
+        progress.foresee(better.forecast.seconds)
+        return better
+
+
+def _reach(asked: Asked, modes: Modes, limit: float, more: float) -> tuple[float, int]:
+    """Highest frequency [Hz] and number of the modes for what needs them up to a limit [Hz], or those asked for."""
+    target, number = asked.blow.target, asked.pieces.get("n_modes")
+    if number is None:
+        limit = asked.pieces.get("max_frequency", limit)
+        # the first modes are kept even if fewer are enough
+        number = max(modes.n_modes, round(modes.n_modes * target.growth(modes.frequencies[-1], limit)))
+        limit, number = limit * more ** (2.0 / max(1, modes.dimension)), round(number * more)
+    else:
+        limit = modes.frequencies[min(number, modes.n_modes) - 1] * max(1.0, number / modes.n_modes) ** (
+            2.0 / modes.dimension
+        )
+    if target.modes is not None and number > target.modes.n_modes:
+        number, limit = target.modes.n_modes, target.modes.frequencies[-1]
+    return limit, number
+
+
+def _with_mesh(asked: Asked, told: Forecast, shapes: FieldShapes, limit: float) -> Forecast:
+    """The forecast with a mesh that resolves a frequency [Hz] of the body as assembled."""
+    first, system = told.first, shapes.system
+    assert first is not None and first.frequency_error is not None
+    mesh = system.mesh
+    stated = asked.meshed or refinement.resolves(system, limit)
+    size = mesh.size if stated else min(mesh.size, refinement.size_for(system, None, limit, None))
+    n_dofs = round(refinement.unknowns(system.element, mesh, size))
+    error = max(float(first.frequency_error.max()), SHORT_WAVES[system.element])
+    reason = f"{system.element} elements of {size:.3g} m, about {n_dofs} unknowns, resolve the shortest wave"
+    work = cost.NOTHING  # if the plan has found all modes, and their compliance
+    if told.n_modes > first.n_modes:
+        thick = system.element == "argyris and shear"  # its errors come from a second mesh
+        coarser = [n_dofs / refinement.COARSER**2] if thick else []
+        each = [cost.by_modes(n, told.n_modes) for n in [n_dofs, *coarser]]
+        if mesh.dimension == 2:
+            finer = [n_dofs * refinement.COARSER**2] if thick else []
+            at_blow = cost.AT_BLOW[system.element]
+            each += [cost.compliance(n + at_blow) for n in [n_dofs, *finer]]
+        work = replace(sum(each, cost.NOTHING), memory=max(part.memory for part in each))  # one mesh after another
+    return replace(
+        told, element=system.element, size=size, n_dofs=n_dofs, errors={**told.errors, "mesh": error},
+        reasons=(*told.reasons, reason), seconds=told.seconds + work.seconds, memory=told.memory + work.memory,
+    )  # fmt: skip
+
+
+def _fewer(asked: Asked, first: Modes, banded: bool) -> str:
+    """What makes a blow that needs more modes than allowed affordable, given its first modes."""
+    contact, target = asked.blow.contact, asked.blow.target
+    most = MOST_MODES[target.kind]
+    reach = float(first.frequencies[-1]) * (most / first.n_modes) ** (2.0 / first.dimension)
+    if "n_modes" in asked.pieces:
+        return f"give n_modes of at most {most}"
+    if "max_frequency" in asked.pieces or banded:
+        name = "max_frequency" if "max_frequency" in asked.pieces else "a band of the quantity"
+        return f"give {name} of at most {float(f'{0.9 * reach:.1e}'):g} Hz"
+
+    def fits(tolerance: float, stiffness: float = contact.stiffness) -> bool:
+        allowed = Budget(tolerance, contact.rated, NOTCH).left_out  # with room for a second, finer run
+        law = {"contact": replace(contact, stiffness=stiffness), "speed": asked.values["speed"], "mass": asked.mass}
+        return accuracy.cutoff_frequency(first, asked.values["at"], tolerance=allowed, **law) <= reach
+
+    enough, total = accuracy.least_tolerance(fits), asked.budget.total
+    fractions = (contact.stiffness * 10.0**-power for power in range(1, 31))
+    softer = next((stiffness for stiffness in fractions if fits(total, stiffness)), None)
+    first_word = "no tolerance is large enough" if enough is None else f"tolerance = {enough:g} is affordable"
+    if softer is None:
+        return f"{first_word}; a heavier striker or a lower speed is needed"
+    word = "take" if enough is None else "so is"
+    return f"{first_word}; {word} a contact with stiffness = {softer:.2g}"

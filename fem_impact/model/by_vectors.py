@@ -1,0 +1,186 @@
+"""The target by Ritz vectors started from the blow, on a mesh and in a number that the blow needs; see `vectors`."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from .._base import check, progress
+from ..fe import refinement
+from ..fe.section import Plate
+from ..impact import accuracy, collision
+from ..impact.compiled import build
+from ..impact.response import LOOKED_AT, Response
+from ..modes.modal import Modes
+from . import audit, cost, idealisation, vectors
+from .asked import Asked, Description, Unaffordable
+from .budget import CHEAP
+from .by_idealisation import Idealised
+from .by_modes import MOST_MODES, Modal
+from .target import FIRST_LOOK, Elements, Stages
+
+# [Hz], [-] the ear's limit: no mode above is asked for unless a band of the sound is; the force looked at every 10 Hz
+AUDIBLE, AUDIBLE_POINTS = 20e3, 2001
+# [-] modes ring up to the last frequency where the force has this part of its impulse: -60 dB, which is not heard
+FAINT = 1e-3
+MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: some seconds
+
+
+@dataclass(frozen=True, eq=False)
+class Vectors(Description):
+    """A plate by Ritz vectors."""
+
+    rings = True
+    elements: Elements  # those to begin with
+    otherwise: Description | None = None  # for a blow that these cannot describe; by default the infinite plate
+    whole: Modes | None = None  # all Ritz pairs
+
+    @property
+    def margin(self) -> float:
+        """Divides what left-out modes of the striker may err [-]."""
+        return 1.0 if self.seen is None else self.seen.margin
+
+    @classmethod
+    def of(cls, asked: Asked, stages: Stages) -> "Vectors | None":
+        """The plate by vectors, if these can describe it and its own modes are not asked for."""
+        blow, target = asked.blow, asked.blow.target
+        if not (vectors.usable(target) and asked.values["residual"] and asked.plain) or asked.counted:
+            asked.refuse(
+                "needs a thin plate in a vacuum by elements that can be meshed again, its residual, no stretching, no "
+                "n_modes or max_frequency, and no damping ratios mode by mode"
+            )
+            return None
+        _check_sound(asked)
+        with stages("modes"):
+            size = asked.pieces.get("size") or vectors.size_for(target, 0.5 / asked.duration, asked.budget.total)
+        assert target.mesh is not None
+        smallest = refinement.smallest_size("argyris", target.mesh)
+        if size < smallest and not asked.meshed:
+            soft = blow.contact.stiffness * (size / smallest) ** (2.0 * (blow.contact.exponent + 1.0))
+            needs = refinement.unknowns("argyris", target.mesh, size)
+            raise Unaffordable(
+                f"{blow.name}this blow needs about {needs:.2g} unknowns, elements of {size:.2g} m, more than the limit "
+                f"of {refinement.MOST_UNKNOWNS}; take a contact with stiffness = {float(f'{0.9 * soft:.1e}'):g}"
+            )
+        wanted, at = (0.5 / asked.duration, asked.budget.total), asked.values["at"][None]
+        elements = vectors.elements_for(target, size, asked.mass, *wanted)
+        n_dofs, count = target.unknowns(at, elements, stages), vectors.first_count(target, *wanted)
+        lasts, impacts = _foreseen(asked)
+        meshes = list(vectors.compared(target, elements, stages))
+        if impacts > cost.MANY and not asked.meshed:
+            meshes.append(vectors.finer(target, meshes[0], stages))
+        work = cost.by_vectors([target.unknowns(at, each, stages) for each in meshes], count, lasts)
+        rings = (cost.by_modes(cost.PER_MODE * number, number) for number in (FIRST_LOOK, ringing_count(asked)))
+        ringing = sum(rings, cost.NOTHING)
+        why = f"the contact lasts about {asked.duration:.3g} s"
+        kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
+        reason = f"argyris elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"
+        if asked.moving:
+            reason += "; the vectors give the early motion, modes driven by the computed force the rest and the sound"
+            work, ringing = work + ringing, cost.NOTHING
+        shares = dict.fromkeys(("Ritz vectors", "mesh"), asked.budget.half * (1.0 - CHEAP))
+        forecast = asked.foretell(
+            "vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
+            element="argyris", steps=asked.budget.cheap, mass=target.mass, notes=target.notes, work=work,
+            ringing=ringing.seconds,
+        )  # fmt: skip
+        return cls(asked, forecast, elements)
+
+    def found(self, stages: Stages, keep: Any = None) -> "tuple[Vectors | Modal, Modes]":
+        """The same, and its vectors; modes, if the point struck is at rest, where no vector can start."""
+        asked, seen = self.asked, self.seen
+        if seen is None:
+            wanted = 0.5 / asked.duration, asked.budget.total, self.elements, asked.meshed
+            seen = vectors.Seen(asked.blow.target, asked.values["at"], *wanted, stages)
+        if seen.at_rest:
+            return Modal.of(asked, stages).found(stages, keep)
+
+        def cutoff(modes: Modes, margin: float) -> float:
+            allowed = replace(asked.budget, margin=margin).left_out
+            return accuracy.tail_cutoff(modes, seen.at, mass=asked.mass, tolerance=allowed, **asked.law)
+
+        modes = seen.modes(cutoff)
+        elements, n_dofs = seen.elements, seen.fine.system.n_dofs
+        forecast = replace(self.forecast, n_modes=seen.count, size=elements.size, n_dofs=n_dofs)
+        return replace(self, forecast=forecast, elements=elements, seen=seen, whole=seen.whole), modes
+
+    def refined(self, hit: Response, stages: Stages) -> Description | None:
+        """More vectors or a finer mesh, whichever the errors demand; if neither helps, an infinite plate that may."""
+        asked, budget, seen = self.asked, self.asked.budget, self.seen
+        assert seen is not None
+        before = seen.count
+        if seen.improved(hit.error, budget.total - hit.error.step):
+            progress.foresee(seen.work(before).seconds)
+            return self
+        if "target" in asked.pieces or not budget.missed(hit.error, not asked.values["dt"]):
+            return None
+        if self.otherwise is not None:
+            return self.otherwise
+        other = Idealised.of("infinite", asked, stages, anyway=True)
+        return other if other is not None and other.forecast.error < hit.error.total else None
+
+    def completed(self, hit: Response, stages: Stages, keep: Any = None) -> Response:
+        """The response with the modes that ring, which are found when they are asked for."""
+        blow, ringing = self.asked.blow, partial(_ringing, self.asked, keep)
+        hit, times = replace(hit, rings=ringing, vectors=self.whole), np.linspace(0.0, hit.history.end_time, LOOKED_AT)
+        sounds, moving = "sound" in self.asked.quantities, blow.points if blow.moving else ()
+        if sounds or not all(np.isfinite(hit.motion_error([point], times)) for point in moving):
+            with stages("modes"):
+                hit = replace(hit, ringing=ringing(hit))
+        return super().completed(hit, stages)
+
+
+def _foreseen(asked: Asked) -> tuple[float, int]:
+    """How long the blow lasts on an infinite plate, in undisturbed contacts, and its impacts; (1, 1) if not known."""
+    at, seen = asked.values["at"], asked.seen
+    if seen is None or not np.isfinite(seen.mobility):
+        return 1.0, 1
+    endless = idealisation.endless(at, seen.mass, seen.mobility, asked.duration)
+    striker = collision.shortened(asked.blow.striker, asked.striker_modes(1.0)[0])
+    try:
+        with build.uncompiled():
+            hit = collision.strike(
+                endless, striker, asked.blow.contact, at=at, speed=asked.values["speed"], tolerance=audit.ROUGH,
+                duration=cost.LONGEST * asked.duration,
+            )  # fmt: skip
+    except check.SimulationError:
+        return 1.0, 1
+    return max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, hit.n_impacts
+
+
+def _check_sound(asked: Asked) -> None:
+    """Raise an error if the sound asked for takes too many modes."""
+    target, band, most = asked.blow.target, asked.quantities.get("sound"), MOST_MODES["fe"]
+    rings = 0.0 if band is None else target.count_below(band / target.stretch)
+    if band is not None and rings > most:
+        reach = 0.9 * band * most / rings
+        raise check.SimulationError(
+            f"{asked.blow.name}the sound up to {band:g} Hz needs about {rings:.2g} modes, more than the limit of "
+            f"{most}; give a band of the quantity of at most {float(f'{reach:.1e}'):g} Hz"
+        )
+
+
+def ringing_count(asked: Asked) -> int:
+    """Predicted number of modes that ring and are found after the blow, by Weyl's law."""
+    target, band = asked.blow.target, asked.quantities.get("sound")
+    mesh, section = target.mesh, target.section
+    assert mesh is not None and isinstance(section, Plate)
+    stiffness = section.stiffness(mesh.points[mesh.cells].mean(axis=1))
+    ratio = float((stiffness[:, 0, 0] / stiffness[:, 1, 1]).mean())  # waves across the grain are shorter
+    below = target.count_below((band or min(AUDIBLE, cost.FAINTEST / asked.duration)) / target.stretch)
+    number = below * min(ratio, 1.0 / ratio) ** 0.25
+    return max(FIRST_LOOK, min(MOST_MODES["fe"] if band else MOST_RINGING, round(number)))
+
+
+def _ringing(asked: Asked, keep: Any, response: Response) -> Modes:
+    """The modes that the force found makes ring: up to the band asked for, or as far as the force reaches."""
+    target, band = asked.blow.target, asked.quantities.get("sound")
+    frequencies = np.linspace(0.0, AUDIBLE, AUDIBLE_POINTS)
+    force = np.abs(response.spectrum(frequencies))
+    limit = band or float(frequencies[np.flatnonzero(force >= FAINT * force[0])[-1]])
+    first = asked.find(FIRST_LOOK)
+    number = round(FIRST_LOOK * target.growth(target.finished(first).frequencies[-1], limit))
+    most = MOST_MODES["fe"] if band else MOST_RINGING
+    modes = first if number <= FIRST_LOOK else asked.find(min(number, most), first=first, keep=keep)
+    return target.surrounded(modes)
