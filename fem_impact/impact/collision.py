@@ -9,7 +9,7 @@ import numpy as np
 from .._base import check
 from ..modes.modal import Modes, left_out
 from ..modes.stretching import stretch
-from . import accuracy, distance, engine, promise, variation
+from . import accuracy, distance, engine, promise, what_if
 from .contact import Contact
 from .engine import TOLERANCE
 from .error import Error
@@ -225,13 +225,13 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
     growth = distance.growth(found.coarse, found.fine)
     if len(found.coarse.contacts) != len(found.fine.contacts):  # a given step was too long
         found = replace(found, coarse=found.fine, steps=(found.steps[0],) * 2)
-    blow = variation.Followed(parts, laws, system, options, pace, found)
+    blow = what_if.Followed(parts, laws, system, options, pace, found)
     told = [any(other.omega[-1] > body.omega[-1] for other in body.poorer.values()) for body in bodies]
-    left_out, resolvable = variation.modes_left_out(blow, told)
-    inherited = variation.Variation("inherited", [[(other, 1.0, 1.0)] for other in others])
-    variations = left_out, variation.unstated(blow, bodies), variation.mesh(blow, bodies), inherited
-    table = {"step": found.error, **variation.what_if(blow, variations)}
-    for cause, more in variation.poorer_descriptions(blow, bodies).items():
+    left_out, resolvable = what_if.modes_left_out(blow, told)
+    inherited = what_if.Variation("inherited", [[(other, 1.0, 1.0)] for other in others])
+    variations = left_out, what_if.unstated(blow, bodies), what_if.mesh(blow, bodies), inherited
+    table = {"step": found.error, **what_if.what_if(blow, variations)}
+    for cause, more in what_if.poorer_descriptions(blow, bodies).items():
         table[cause] = distance.added(table.get(cause, {}), more)
     doubts = {cause: error[distance.MARGIN] for cause, error in table.items()}
     if "n_impacts" in options.quantities and sum(doubts.values()) >= found.fine.margin:

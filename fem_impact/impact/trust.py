@@ -142,6 +142,8 @@ def _judged(hit: "Response", name: str, band: float | None, cure: str) -> Judged
     limit = assumption.allowed(hit.tolerance)
     worst = max(found, key=lambda each: each.effect.get(name) or 0.0)
     parts, own = error.parts(name), error.of_quantity(name)
+    if name == "n_impacts" and own < 0.5:  # a number is right, or doubted as a whole
+        own = 0.0
     cause, size = max(parts.items(), key=lambda part: part[1]) if error.resolvable else ("modes left out", np.inf)
     dominant = worst.name if (worst.effect.get(name) or 0.0) >= size else cause
     remedies = [cure] if cure else []

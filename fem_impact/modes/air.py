@@ -24,6 +24,7 @@ of hinged rectangles); Christian, Davis, Tubis, Anderson, Mills and Rossing (198
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -207,7 +208,7 @@ def _mistaken(air: "_Air", mix: np.ndarray, omega: np.ndarray, doubt: np.ndarray
     ``doubt`` (n,) are the relative errors of the frequencies omega (n,): those of their difference turn two modes.
     """
     order, found = np.argsort(omega, kind="stable"), np.zeros(len(omega))
-    for pair in np.lib.stride_tricks.sliding_window_view(order, 2):
+    for pair in map(np.array, pairwise(order)):
         gap, apart = float(np.ptp(omega[pair]) / omega[pair[1]]), float(doubt[pair].sum())
         turn = min(1.0, 0.5 * apart / gap) if gap > 0.0 else 1.0
         lost = air.exchanged(mix[:, pair], float(omega[pair[1]]))

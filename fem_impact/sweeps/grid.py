@@ -25,7 +25,7 @@ from ..impact.contact import Contact, wall_time
 from ..impact.distance import distance
 from ..impact.response import Response
 from ..impact.striker import Striker
-from ..impact.variation import RESOLVABLE
+from ..impact.what_if import RESOLVABLE
 from ..model.asked import COSTLY
 from ..model.target import Target
 from ..modes.modal import Damping, Modes
