@@ -100,3 +100,19 @@ def test_messages_that_the_page_of_notes_quotes_are_said_so():
     quoted = [each for said in sayings().values() for each in said if each not in names]
     assert len(quoted) > 25
     assert [each for each in quoted if each not in code] == []
+
+
+def test_the_page_on_reading_names_files_and_functions_that_exist():
+    text = (
+        (ROOT / "studies" / "theory.md")
+        .read_text()
+        .split("## 25. How to read this program")[1]
+        .split("## References")[0]
+    )
+    named = re.findall(r"`((?:[a-z_]+/)+[a-z_]+\.py)`(?: \(`(\w+)`\))?", text)
+    assert len(named) > 60
+    for path, function in named:
+        code = (ROOT / "fem_impact" / path).read_text()
+        assert not function or f"def {function}(" in code, (path, function)
+    words = re.findall(r"^\| (?!word|-)([^|]+) \|", text, re.MULTILINE)
+    assert len(words) == len(set(words)) >= 40
