@@ -13,7 +13,6 @@ from .quantities import BAND_POINTS, BANDED
 if TYPE_CHECKING:
     from .response import Response
 
-ABSOLUTE = ("restitution", "n_impacts")
 INSTANTS = ("contact_time", "force")  # quantities that depend on single instants
 MARGIN = "margin"  # the name under which distances of runs hold that of their margins
 REBOUND = "rebound "  # and with the index of an impact that of its restitution
@@ -32,8 +31,8 @@ def distance(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict of str to float or array
-        Absolute for restitution and number of impacts, relative to the second for all others; 1 if only one of the
-        blows has a restitution. Of a spectrum it is the largest difference over the largest value of the second.
+        Absolute for the restitution, relative to the second for all others; 1 if only one of the blows has a
+        restitution. Of a spectrum it is the largest difference over the largest value of the second.
     """
     return {name: _apart(name, one[name], value) for name, value in two.items()}
 
@@ -42,7 +41,7 @@ def _apart(name: str, one: Any, two: Any) -> Any:
     if one is None or two is None:
         return float((one is None) != (two is None))
     apart = abs(one - two)
-    if name in ABSOLUTE or name.startswith(REBOUND):
+    if name == "restitution" or name.startswith(REBOUND):
         return apart
     if name in BANDED:
         return float(apart.max() / (abs(two).max() or 1.0))
