@@ -131,6 +131,7 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
         script=(WEB / "report.js").read_text(encoding="utf-8"),
         si=si,
         power=power,
+        rough=_rough,
     )
     with replacing(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
@@ -264,7 +265,12 @@ def _sentence(clause: str) -> str:
 
 def _share(size: float) -> str:
     """A relative change in percent or as a power of ten."""
-    return f"{100.0 * size:.2g} %" if size >= 1e-3 else power(float(f"{size:.0e}"))
+    return f"{100.0 * size:.2g} %" if size >= 1e-3 else _rough(size)
+
+
+def _rough(size: float) -> str:
+    """A size in one digit, as a power of ten."""
+    return power(float(f"{size:.0e}"))
 
 
 def _modelled(run: Run | Played, n_steps: int, scheme: str) -> list[tuple[str, str]]:
