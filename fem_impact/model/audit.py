@@ -23,7 +23,7 @@ from ..mesh.meshes import Mesh
 from ..modes.analytic import DiskShapes, RectangleShapes
 from ..modes.modal import FieldShapes, Modes
 from ..modes.ritz import RitzShapes
-from . import bending, deflection, local_contact, still_air, thinness, unstated_damping
+from . import bending, deflection, fresh, local_contact, still_air, thinness, unstated_damping
 from .idealisation import Surroundings, unyielding
 from .restrike import Struck
 from .target import BOTH, Target
@@ -56,7 +56,12 @@ def audited(hit: Response, simplified: Simplified | None = None) -> Response:
 def examine(hit: Response, simplified: Simplified | None = None) -> tuple[Assumption, ...]:
     """Every assumption of a blow, in the order of `assumption.ALL`."""
     struck = _struck(hit, simplified)
-    return tuple(examiner(struck) for examiner in EXAMINERS)
+
+    def examined() -> tuple[Assumption, ...]:
+        return tuple(examiner(struck) for examiner in EXAMINERS)
+
+    short = hit.history.stretched is None and len(hit.history.steps) <= fresh.STEPS
+    return fresh.soon(examined) if short else examined()
 
 
 def required(target: Target, hit: Response) -> tuple[Target, str] | None:

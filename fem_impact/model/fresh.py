@@ -14,7 +14,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
 
 from .._base import check, child
 from ..impact.compiled import build, energy, places
@@ -25,10 +27,19 @@ MARK = "compiling"  # name of the file that is there while a process compiles
 PATIENCE = 300.0  # [s] age of a mark whose process was killed: compiling takes 15 s, a minute or two on a busy machine
 # [-] most steps of one run as plain Python, and where the body stretches: about a second
 STEPS, STRETCHED = 10_000, 200
+Answer = TypeVar("Answer")
 
 
 def answer(compute: Callable[[], Response], stretches: bool) -> Response:
-    """What a function finds that strikes once, soon: where kernels are not compiled yet, as plain Python."""
+    """What a function finds that strikes once, soon."""
+    return soon(compute, STRETCHED if stretches else STEPS, lambda found: found.tolerance_met)
+
+
+def soon(compute: Callable[[], Answer], most: float = np.inf, holds: Callable[[Answer], bool] = bool) -> Answer:
+    """What a function finds: where kernels are not compiled yet, as plain Python, if that ``holds``.
+
+    Runs as plain Python give up after ``most`` steps.
+    """
     if not build.COMPILED or SWITCH in os.environ or not places.lasting(os.environ):
         return compute()
     lacking: tuple[Any, ...] = ()
@@ -38,9 +49,9 @@ def answer(compute: Callable[[], Response], stretches: bool) -> Response:
     except build.Uncompiled as error:
         lacking = error.args
     if _under_way(lacking):
-        with suppress(check.SimulationError), build.uncompiled(STRETCHED if stretches else STEPS):
+        with suppress(check.SimulationError), build.uncompiled(most):
             found = compute()
-            if found.tolerance_met:
+            if holds(found):
                 return found
     return compute()
 

@@ -8,12 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import fem_impact as fi
 from fem_impact.impact import engine
 from fem_impact.impact.compiled import build, places
-from fem_impact.model import fresh
+from fem_impact.model import audit, fresh
 
 pytestmark = pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
 
@@ -105,6 +106,26 @@ def test_a_process_of_others_that_compiles_is_enough(compiler):
 
 def test_what_is_compiled_already_is_used(compiler):
     assert not fresh.answer(lambda: SimpleNamespace(plain=build.limited()), False).plain and compiler.begun == 0
+
+
+def test_whether_the_model_holds_is_examined_as_plain_python_too(compiler, monkeypatch):
+    """It strikes again with other bodies: the first verdict waits for no compiler either."""
+    steel = fi.Plate(fi.Material(E=210e9, nu=0.3, rho=7850.0), thickness=5e-3)
+    plate = fi.analytic.rectangle(0.3, 0.2, section=steel, n_modes=20, damping_ratio=0.01)
+    hit = fi.strike(plate, fi.Striker.rigid(0.05), fi.Contact.hertz(1e7), at=(0.1, 0.08), speed=0.2, tolerance=1e-2)
+    compiled = audit.examine(hit)
+    most, follow = [], engine.follow
+
+    def seen(*given):
+        lacking()
+        most.append(build.QUICK.get())
+        return follow(*given)
+
+    monkeypatch.setattr(engine, "follow", seen)
+    plain = audit.examine(hit)
+    assert compiler.begun == 1 and most and set(most) == {np.inf}  # not cut short: that would look like not known
+    for one, other in zip(compiled, plain, strict=True):
+        assert one.name == other.name and one.effect == pytest.approx(other.effect, rel=1e-6, abs=1e-12)
 
 
 def test_what_takes_many_steps_or_misses_the_tolerance_is_compiled(compiler):
